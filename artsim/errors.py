@@ -1,0 +1,56 @@
+"""The one family of errors that artsim raises on purpose.
+
+Every message says *what* went wrong, *where*, and *how to mend it*.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class ArtsimError(Exception):
+    """Base of every deliberate error.
+
+    Parameters
+    ----------
+    what : str
+        What went wrong, in one sentence.
+    where : str or Path, optional
+        File, element or option concerned.
+    mend : str, optional
+        What the user can do about it.
+    """
+
+    def __init__(self, what: str, where: str | Path | None = None, mend: str | None = None):
+        self.what = what
+        self.where = None if where is None else str(where)
+        self.mend = mend
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        text = self.what if self.where is None else f"{self.where}: {self.what}"
+        return text if self.mend is None else f"{text} (mend: {self.mend})"
+
+    def __reduce__(self) -> tuple[type, tuple[str, str | None, str | None]]:
+        # Errors cross process boundaries (generation workers).
+        return type(self), (self.what, self.where, self.mend)
+
+
+class AssetError(ArtsimError):
+    """An object file (URDF, mesh, side file) cannot be used."""
+
+
+class KinematicsError(ArtsimError):
+    """A kinematic tree is inconsistent, or a state does not fit it."""
+
+
+class RenderError(ArtsimError):
+    """A renderer is missing, or cannot draw what it was asked to."""
+
+
+class DatasetError(ArtsimError):
+    """A dataset on disk is damaged, incomplete or of another plan."""
+
+
+class ConfigError(ArtsimError):
+    """An option has a value that makes no sense."""

@@ -1,0 +1,275 @@
+"""The articulated object: a kinematic tree, the meshes of its parts and what is known about it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artsim.errors import AssetError, ConfigError, KinematicsError
+from artsim.files import read_npz, write_atomic
+from artsim.kinematics import Array, KinematicTree
+
+if TYPE_CHECKING:
+    import trimesh
+
+MAX_PARTS = 254
+"""Part ids are stored in a byte; 255 marks the background."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """One thing in a source file that was mended or left out while loading.
+
+    Attributes
+    ----------
+    where : str
+        Element concerned, for example ``joint 'joint_2'``.
+    what : str
+        What was found and what was done about it.
+    """
+
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One rigid part.
+
+    Attributes
+    ----------
+    name : str
+        Link name in the source file.
+    label : str
+        Semantic name where the source gives one ("lid", "drawer"), else the link name.
+    vertices : (V, 3) float
+        In the rest frame, at rest, native units (before the object's scale).
+    faces : (F, 3) int32
+        Triangles; empty for a part without geometry.
+    """
+
+    name: str
+    label: str
+    vertices: Array
+    faces: NDArray[np.int32]
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3) corners of the axis-aligned box of the surface, native units; NaN without geometry."""
+        if len(self.faces) == 0:
+            return np.full((2, 3), np.nan)
+        used = self.vertices[np.unique(self.faces)]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+
+@dataclass(frozen=True, eq=False)
+class ArticulatedObject:
+    """A kinematic tree with geometry, in its rest frame.
+
+    The rest frame has Z up and the front towards -X; its origin is the centre of the axis-aligned box
+    of the whole object in its rest state.
+
+    Attributes
+    ----------
+    object_id, category : str
+    parts : tuple of Part
+        Root first, parents before children.
+    native_tree : KinematicTree
+        In native units (before ``scale``).
+    sha256 : str
+        Digest of the source content.
+    scale : float
+        Size of this object over its native size; every public length below includes it.
+    T_base_rest : (4, 4) float
+        Maps the rest frame to the source file's base-link frame, native units.
+    repairs : tuple of Repair
+    source : str
+        Where the object came from.
+    source_joints : mapping
+        For each joint of the source file: (part index, multiplier), so that the file's own joint value is
+        ``multiplier * q[part]``. Screw parts list two file joints.
+    """
+
+    object_id: str
+    category: str
+    parts: tuple[Part, ...]
+    native_tree: KinematicTree
+    sha256: str
+    scale: float = 1.0
+    T_base_rest: Array = None  # type: ignore[assignment]  # identity, set below
+    repairs: tuple[Repair, ...] = ()
+    source: str = ""
+    source_joints: Mapping[str, tuple[int, float]] = None  # type: ignore[assignment]  # empty, set below
+
+    def __post_init__(self) -> None:
+        if self.T_base_rest is None:
+            object.__setattr__(self, "T_base_rest", np.eye(4))
+        if self.source_joints is None:
+            object.__setattr__(self, "source_joints", {})
+        if len(self.parts) != len(self.native_tree):
+            raise KinematicsError(
+                f"{len(self.parts)} parts do not fit a tree of {len(self.native_tree)}", self.object_id
+            )
+        if len(self.parts) > MAX_PARTS:
+            raise AssetError(f"{len(self.parts)} parts; part ids fit {MAX_PARTS}", self.source or self.object_id)
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    @cached_property
+    def tree(self) -> KinematicTree:
+        """The kinematic tree at the object's scale."""
+        return self.native_tree if self.scale == 1.0 else self.native_tree.scaled(self.scale)
+
+    @cached_property
+    def part_bounds(self) -> Array:
+        """(K, 2, 3) box corners of each part in the rest frame, metres; a part without geometry has a point at its joint."""
+        bounds = np.stack([p.bounds for p in self.parts])
+        empty = np.isnan(bounds[:, 0, 0])
+        bounds[empty] = self.native_tree.origins[empty, None, :]
+        return bounds * self.scale
+
+    @property
+    def box_center(self) -> Array:
+        """(K, 3) centre of each part's amodal box in the rest frame, metres."""
+        return self.part_bounds.mean(axis=1)
+
+    @property
+    def box_size(self) -> Array:
+        """(K, 3) side lengths of each part's amodal box in the rest frame, metres."""
+        return self.part_bounds[:, 1] - self.part_bounds[:, 0]
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3) corners of the box of the whole object in its rest state, metres."""
+        solid = np.array([len(p.faces) > 0 for p in self.parts])
+        return np.stack([self.part_bounds[solid, 0].min(axis=0), self.part_bounds[solid, 1].max(axis=0)])
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the box of the whole object in its rest state, metres."""
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+    @property
+    def num_faces(self) -> int:
+        """Triangles over all parts."""
+        return sum(len(p.faces) for p in self.parts)
+
+    def scaled(self, scale: float) -> ArticulatedObject:
+        """The same object at ``scale`` times its native size; geometry is shared, not copied."""
+        if not (np.isfinite(scale) and scale > 0):
+            raise ConfigError(f"an object cannot have scale {scale}")
+        return replace(self, scale=float(scale))
+
+    def with_diagonal(self, diagonal: float) -> ArticulatedObject:
+        """The same object scaled so that its rest-state box has this diagonal, metres."""
+        return self.scaled(diagonal / (self.diagonal / self.scale))
+
+    def source_state(self, q: ArrayLike) -> dict[str, float]:
+        """Joint values in the source file's own names and convention for a (K,) state of this object.
+
+        Lengths are in native units, so that the values can be given to any simulator that loads the file.
+        """
+        q = self.tree.complete_state(q)
+        native = np.array([q[k] / (self.scale if t == "prismatic" else 1.0) for k, t in enumerate(self.tree.types)])
+        return {name: multiplier * float(native[k]) for name, (k, multiplier) in self.source_joints.items()}
+
+    def part_mesh(self, k: int) -> trimesh.Trimesh:
+        """Part k as a trimesh in the rest frame, at rest, metres."""
+        import trimesh
+
+        part = self.parts[k]
+        return trimesh.Trimesh(part.vertices * self.scale, part.faces, process=False)
+
+
+def joint_labels(obj: ArticulatedObject) -> list[str]:
+    """Readable name of each joint: the part's label with its index."""
+    return [f"{k}:{part.label}" for k, part in enumerate(obj.parts)]
+
+
+def content_sha256(chunks: Sequence[bytes]) -> str:
+    """Hex digest of byte strings, each with its length so that boundaries count."""
+    digest = hashlib.sha256()
+    for chunk in chunks:
+        digest.update(len(chunk).to_bytes(8, "little"))
+        digest.update(chunk)
+    return digest.hexdigest()
+
+
+_COMPILED_FORMAT = 1
+
+
+def save_object(obj: ArticulatedObject, path: Path) -> None:
+    """Write an object as one compact ``.npz`` that :func:`load_object` reads back without the source folder."""
+    header = {
+        "format": _COMPILED_FORMAT,
+        "object_id": obj.object_id,
+        "category": obj.category,
+        "names": [p.name for p in obj.parts],
+        "labels": [p.label for p in obj.parts],
+        "tree": obj.native_tree.to_dict(),
+        "sha256": obj.sha256,
+        "scale": obj.scale,
+        "T_base_rest": obj.T_base_rest.tolist(),
+        "repairs": [[r.where, r.what] for r in obj.repairs],
+        "source_joints": {name: list(v) for name, v in obj.source_joints.items()},
+    }
+    vertices = np.concatenate([p.vertices for p in obj.parts])
+    faces = np.concatenate([p.faces for p in obj.parts])
+    buffer = io.BytesIO()
+    np.savez(
+        buffer,
+        header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
+        vertices=vertices,
+        faces=faces,
+        vertex_counts=np.array([len(p.vertices) for p in obj.parts]),
+        face_counts=np.array([len(p.faces) for p in obj.parts]),
+    )
+    write_atomic(path, buffer.getvalue())
+
+
+def load_object(path: Path) -> ArticulatedObject:
+    """Read an object written by :func:`save_object`.
+
+    Raises
+    ------
+    AssetError
+        When the file is missing, damaged or of another format.
+    """
+    arrays = read_npz(path)
+    try:
+        header: dict[str, Any] = json.loads(arrays["header"].tobytes())
+        if header["format"] != _COMPILED_FORMAT:
+            raise AssetError(f"format {header['format']} is not {_COMPILED_FORMAT}", path, "generate it again")
+        vertices = np.split(arrays["vertices"], np.cumsum(arrays["vertex_counts"])[:-1])
+        faces = np.split(arrays["faces"], np.cumsum(arrays["face_counts"])[:-1])
+        parts = tuple(
+            Part(name, label, v, f)
+            for name, label, v, f in zip(header["names"], header["labels"], vertices, faces, strict=True)
+        )
+        return ArticulatedObject(
+            object_id=header["object_id"],
+            category=header["category"],
+            parts=parts,
+            native_tree=KinematicTree.from_dict(header["tree"]),
+            sha256=header["sha256"],
+            scale=header["scale"],
+            T_base_rest=np.array(header["T_base_rest"]),
+            repairs=tuple(Repair(*r) for r in header["repairs"]),
+            source=str(path),
+            source_joints={name: (int(k), float(m)) for name, (k, m) in header["source_joints"].items()},
+        )
+    except (KeyError, ValueError, TypeError) as error:
+        raise AssetError(f"not an artsim object file ({error})", path, "generate it again") from error

@@ -1,0 +1,87 @@
+"""The side files of a PartNet-Mobility folder: category, id, part labels, the joints as first annotated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from artsim.files import read_bounded
+from artsim.objects import Repair
+
+_MAX_SIDE_FILE = 32_000_000
+
+
+@dataclass(frozen=True)
+class SideFiles:
+    """What stands beside a URDF file.
+
+    Attributes
+    ----------
+    object_id, category : str or None
+        From ``meta.json``.
+    labels : dict
+        Link name -> semantic name, from ``semantics.txt``.
+    num_movable : int or None
+        Movable joints as first annotated (``mobility_v2.json``, else ``semantics.txt``).
+    repairs : tuple of Repair
+        Side files that could not be read.
+    contents : tuple of bytes
+        Bytes of the files used, part of the object's digest.
+    """
+
+    object_id: str | None = None
+    category: str | None = None
+    labels: dict[str, str] = field(default_factory=dict)
+    num_movable: int | None = None
+    repairs: tuple[Repair, ...] = ()
+    contents: tuple[bytes, ...] = ()
+
+
+_STILL = ("free", "static", "heavy", "fixed", "junk")
+
+
+def read_side_files(folder: Path) -> SideFiles:
+    """Read ``meta.json``, ``semantics.txt`` and ``mobility_v2.json`` where they exist; broken ones are reported."""
+    contents: list[bytes] = []
+    repairs: list[Repair] = []
+
+    def content(name: str) -> bytes | None:
+        path = folder / name
+        if not path.is_file():
+            return None
+        contents.append(read_bounded(path, _MAX_SIDE_FILE, name))
+        return contents[-1]
+
+    def parsed(name: str) -> object:
+        data = content(name)
+        if data is None:
+            return None
+        try:
+            return json.loads(data)
+        except (ValueError, RecursionError) as error:
+            repairs.append(Repair(name, f"ignored: not JSON ({error})"))
+            return None
+
+    meta = parsed("meta.json")
+    meta = meta if isinstance(meta, dict) else {}
+    category, object_id = meta.get("model_cat"), meta.get("anno_id")
+
+    rows = [line.split() for line in (content("semantics.txt") or b"").decode("utf-8", "replace").splitlines()]
+    rows = [row for row in rows if len(row) >= 3]
+    labels = {row[0]: row[2] for row in rows}
+    num_movable = sum(row[1] not in _STILL for row in rows) if rows else None
+
+    mobility = parsed("mobility_v2.json")
+    if isinstance(mobility, list):
+        kinds = [str(m.get("joint", "")) for m in mobility if isinstance(m, dict)]
+        num_movable = sum(bool(kind) and kind not in _STILL for kind in kinds)
+
+    return SideFiles(
+        object_id=None if object_id is None else str(object_id),
+        category=None if category is None else str(category),
+        labels=labels,
+        num_movable=num_movable,
+        repairs=tuple(repairs),
+        contents=tuple(contents),
+    )

@@ -1,0 +1,67 @@
+"""What every renderer does: turn a posed object and a camera into a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artsim.camera import Camera
+from artsim.objects import ArticulatedObject
+
+BACKGROUND = 255
+"""Part id of pixels that show no part."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What a camera sees of one object.
+
+    Attributes
+    ----------
+    depth : (H, W) float32
+        z-depth in metres, 0 = no return.
+    part_ids : (H, W) uint8
+        Index of the part seen at each pixel; ``BACKGROUND`` where none is.
+    amodal_pixels : (K,) int64 or None
+        Pixels that each part would cover if nothing hid it, where the renderer knows.
+    rgb : (H, W, 3) uint8 or None
+        Colour, where the renderer makes it.
+    """
+
+    depth: NDArray[np.float32]
+    part_ids: NDArray[np.uint8]
+    amodal_pixels: NDArray[np.int64] | None = None
+    rgb: NDArray[np.uint8] | None = None
+
+
+class Renderer(Protocol):
+    """A renderer is one class with three members: its name, ``render`` and ``close``."""
+
+    name: str
+
+    def render(
+        self, obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None
+    ) -> Frame:
+        """Render one posed object.
+
+        Parameters
+        ----------
+        obj : ArticulatedObject
+        q : (K,) float
+            Joint states.
+        camera : Camera
+        T_world_object : (4, 4) float, optional
+            Pose of the rest frame in the world; identity by default.
+
+        Returns
+        -------
+        Frame
+        """
+        ...
+
+    def close(self) -> None:
+        """Release what the renderer holds (contexts, scenes)."""
+        ...
