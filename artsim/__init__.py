@@ -1,0 +1,37 @@
+"""artsim: synthetic articulated-object data, from URDF folders to labelled partial point clouds.
+
+Stable names; everything else is private. Heavy backends are imported when first used.
+"""
+
+from __future__ import annotations
+
+from artsim.camera import Camera
+from artsim.dataset import Dataset, open_dataset
+from artsim.errors import ArtsimError
+from artsim.kinematics import KinematicTree
+from artsim.objects import ArticulatedObject
+from artsim.pipeline import generate
+from artsim.renderers import Frame, make_renderer, render
+from artsim.sample import Sample, observe
+from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.urdf import load
+
+__all__ = [
+    "ArticulatedObject",
+    "ArtsimError",
+    "Camera",
+    "Dataset",
+    "Frame",
+    "KinematicTree",
+    "Sample",
+    "StateOptions",
+    "ViewOptions",
+    "generate",
+    "load",
+    "make_renderer",
+    "observe",
+    "open_dataset",
+    "render",
+    "sample_state",
+    "sample_view",
+]

@@ -1,0 +1,167 @@
+"""The program ``artsim``: generate, view, inspect, verify."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from artsim.errors import ArtsimError, ConfigError
+from artsim.plan import SampleOptions
+
+
+@dataclass(frozen=True)
+class Generate:
+    """Generate a dataset of labelled partial point clouds.
+
+    Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
+    truth as WebDataset tar shards. Stop it at any moment: the same command goes on where it stopped. The result
+    depends on the options and the seed alone, never on the number of workers.
+
+    Example: python generate.py --objects urdf_assets/laptop urdf_assets/cabinet --out out/first --num-samples 500
+    """
+
+    objects: tuple[Path, ...]
+    """URDF files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
+    out: Path
+    """Folder of the dataset; made if missing."""
+    num_samples: int = 1000
+    """Samples in all; every object gets about the same number."""
+    seed: int = 0
+    """Seed of the dataset; sample i depends on (seed, i) only."""
+    workers: int = field(default_factory=lambda: max(1, len(os.sched_getaffinity(0))))
+    """Worker processes; by default one for each core."""
+    sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
+    splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
+    """Shares of each category's objects in train, val and test: by object, never by view."""
+    shard_size: int = 256
+    """Samples of each tar file."""
+    package_root: Mapping[str, Path] = field(default_factory=dict)
+    """Folders of package:// names: NAME FOLDER ..."""
+    skip_broken: bool = False
+    """Leave out objects that do not load, and say which, instead of stopping."""
+
+    def run(self) -> None:
+        from artsim.pipeline import generate
+        from artsim.sources import find_sources
+
+        try:
+            result = generate(
+                find_sources(self.objects, self.package_root),
+                self.out,
+                num_samples=self.num_samples,
+                seed=self.seed,
+                sample=self.sample,
+                workers=self.workers,
+                shard_size=self.shard_size,
+                splits=self.splits,
+                skip_broken=self.skip_broken,
+            )
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")
+            raise
+        for reason in result.skipped:
+            print(f"left out: {reason}")
+        if result.made == 0:
+            print(f"{result.folder}: already complete, {result.num_samples} samples")
+            return
+        rate = result.made / result.seconds
+        print(f"{result.folder}: {result.num_samples} samples, {result.made} of them made now, {rate:.0f} samples/s")
+        print(f"look at them: artsim view {result.folder}")
+
+
+@dataclass(frozen=True)
+class View:
+    """Draw samples of a dataset, or an object in several states.
+
+    Writes a contact sheet (PNG: depth, part colours, boxes, joint axes) and, with --rerun, a recording that the
+    rerun viewer opens.
+    """
+
+    path: tyro.conf.Positional[Path]
+    """Dataset folder, or an object: URDF file or its folder."""
+    out: Path | None = None
+    """PNG to write; by default contact_sheet.png in the dataset folder, or <object>.png here."""
+    samples: int = 12
+    """How many samples (or states of the object) to draw."""
+    split: str | None = None
+    """Draw from this split only."""
+    rerun: Path | None = None
+    """Also write a rerun recording (.rrd) to this file."""
+
+    def run(self) -> None:
+        from artsim.view import view_path
+
+        for written in view_path(self.path, self.out, self.samples, self.split, self.rerun):
+            print(f"wrote {written}")
+
+
+@dataclass(frozen=True)
+class Inspect:
+    """Print an object's tree, joints, limits, boxes, and what was mended while loading it."""
+
+    path: tyro.conf.Positional[Path]
+    """URDF file or its folder."""
+    package_root: Mapping[str, Path] = field(default_factory=dict)
+    """Folders of package:// names: NAME FOLDER ..."""
+
+    def run(self) -> None:
+        from artsim.inspect import describe
+        from artsim.urdf import load
+
+        print(describe(load(self.path, package_roots=self.package_root)))
+
+
+@dataclass(frozen=True)
+class Verify:
+    """Check a dataset: every shard's checksum, and what must hold of every sample's ground truth."""
+
+    path: tyro.conf.Positional[Path]
+    """Dataset folder."""
+
+    def run(self) -> None:
+        from artsim.verify import verify
+
+        problems = verify(self.path)
+        for problem in problems[:50]:
+            print(problem)
+        if problems:
+            raise ConfigError(
+                f"{len(problems)} problems found", self.path, "delete the shards named, then rerun generate"
+            )
+        print(f"{self.path}: sound")
+
+
+Verb = (
+    Annotated[Generate, tyro.conf.subcommand("generate")]
+    | Annotated[View, tyro.conf.subcommand("view")]
+    | Annotated[Inspect, tyro.conf.subcommand("inspect")]
+    | Annotated[Verify, tyro.conf.subcommand("verify")]
+)
+
+
+def main() -> None:
+    """Entry point of the program ``artsim``."""
+    _run(Verb, "artsim")
+
+
+def generate_main() -> None:
+    """Entry point of ``generate.py``."""
+    _run(Generate, "generate.py")
+
+
+def _run(verb: Any, program: str) -> None:
+    try:
+        tyro.cli(verb, prog=program, description=None if verb is Generate else __doc__).run()
+    except ArtsimError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
+        sys.stderr.close()

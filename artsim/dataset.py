@@ -1,0 +1,241 @@
+"""Datasets on disk: length, random access, verification, and an endless on-line stream of the same distribution."""
+
+from __future__ import annotations
+
+import bisect
+import hashlib
+import json
+import os
+from collections import OrderedDict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.errors import ConfigError, DatasetError
+from artsim.kinematics import JOINT_TYPES
+from artsim.objects import ArticulatedObject
+from artsim.pipeline import ObjectCache, ShardRecord
+from artsim.plan import FORMAT, SPLITS, Plan, draw_sample
+from artsim.renderers import Renderer, make_renderer
+from artsim.sample import Sample
+from artsim.shards import ShardReader, sample_key
+
+_OPEN_SHARDS = 64
+
+
+class Dataset:
+    """Random access to the samples of one split, or of all: ``len(ds)``, ``ds[i]``, iteration.
+
+    It can be given to a torch ``DataLoader`` (which wants :meth:`padded`, so that samples of objects with different
+    numbers of parts stack) and pickled to its workers; torch itself is not imported.
+
+    Parameters
+    ----------
+    folder : path
+        Folder that ``generate.py`` wrote.
+    split : str, optional
+        "train", "val" or "test"; all samples by default.
+
+    Raises
+    ------
+    DatasetError
+        When the folder holds no complete dataset.
+    """
+
+    def __init__(self, folder: str | Path, split: str | None = None):
+        self.folder = Path(folder)
+        self.description = read_description(self.folder)
+        self.plan = Plan.from_dict(self.description)
+        if split is not None and split not in SPLITS:
+            raise ConfigError(f"there is no split {split!r}", mend=f"use one of {', '.join(SPLITS)}")
+        self.split = split
+        self.shards = [ShardRecord(**s) for s in self.description["shards"] if split in (None, s["split"])]
+        self._ends = np.cumsum([s.end - s.first for s in self.shards]).tolist()
+        self._readers: OrderedDict[str, ShardReader] = OrderedDict()
+        self._owner = os.getpid()
+        self.objects = ObjectCache(self.folder / "objects")
+
+    def __len__(self) -> int:
+        return self._ends[-1] if self._ends else 0
+
+    def __getitem__(self, i: int) -> Sample:
+        if not -len(self) <= i < len(self):
+            raise IndexError(f"sample {i} of {len(self)}")
+        i = int(i) % len(self)
+        s = bisect.bisect_right(self._ends, i)
+        shard = self.shards[s]
+        index = shard.end - (self._ends[s] - i)
+        return self._reader(shard.name).read(sample_key(index))
+
+    def __iter__(self) -> Iterator[Sample]:
+        return (self[i] for i in range(len(self)))
+
+    def _reader(self, name: str) -> ShardReader:
+        if self._owner != os.getpid():  # forked: a shared file position would mix up reads
+            self._readers, self._owner = OrderedDict(), os.getpid()
+        if name not in self._readers:
+            self._readers[name] = ShardReader(self.folder / name)
+            if len(self._readers) > _OPEN_SHARDS:
+                self._readers.popitem(last=False)[1].close()
+        self._readers.move_to_end(name)
+        return self._readers[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"folder": self.folder, "split": self.split}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["folder"], state["split"])  # type: ignore[misc]
+
+    def object_of(self, sample: Sample) -> ArticulatedObject:
+        """The object that a sample shows, at the sample's scale."""
+        return self.objects[self.plan.object_of(sample.index).key].scaled(sample.scale)
+
+    def padded(self, max_parts: int | None = None) -> PaddedDataset:
+        """View as dictionaries of arrays of one shape, which default collation stacks.
+
+        Parameters
+        ----------
+        max_parts : int, optional
+            Rows of per-part arrays; by default the most parts of any object of the dataset.
+        """
+        return PaddedDataset(self, max_parts or max(o.num_parts for o in self.plan.objects))
+
+    def stream(self, split: str = "train", seed: int | None = None) -> SampleStream:
+        """Fresh samples of a split's objects for ever, drawn like this dataset's but with another seed.
+
+        Parameters
+        ----------
+        split : str
+        seed : int, optional
+            By default the dataset's seed plus one, so that no sample of the dataset comes back.
+        """
+        return SampleStream(self.plan, self.folder, split, self.plan.seed + 1 if seed is None else seed)
+
+
+class PaddedDataset:
+    """Samples as dictionaries of equally shaped arrays; rows beyond a sample's parts are zero.
+
+    ``part_valid (P,) bool`` marks the rows that are parts; ``joint_type (P,) int64`` indexes
+    ``artsim.kinematics.JOINT_TYPES``; infinite limits stay infinite.
+    """
+
+    def __init__(self, dataset: Dataset, max_parts: int):
+        self.dataset = dataset
+        self.max_parts = max_parts
+
+    def __len__(self) -> int:
+        return len(self.dataset)
+
+    def __getitem__(self, i: int) -> dict[str, NDArray[Any]]:
+        return pad_sample(self.dataset[i], self.max_parts)
+
+
+_PER_PART = (
+    "T_camera_part", "box_center", "box_size", "visible_fraction", "joint_parent", "joint_axis", "joint_origin",
+    "joint_axis_camera", "joint_origin_camera", "joint_state", "joint_rest", "joint_limits",
+)  # fmt: skip
+
+
+def pad_sample(sample: Sample, max_parts: int) -> dict[str, NDArray[Any]]:
+    """A sample as arrays whose shapes do not depend on its number of parts.
+
+    Raises
+    ------
+    ConfigError
+        When the sample has more parts than rows.
+    """
+    num_parts = len(sample.joint_type)
+    if num_parts > max_parts:
+        raise ConfigError(f"{num_parts} parts do not fit {max_parts} rows", "max_parts", f"use at least {num_parts}")
+
+    def pad(array: NDArray[Any]) -> NDArray[Any]:
+        rows: NDArray[Any] = np.zeros((max_parts, *array.shape[1:]), dtype=array.dtype)
+        rows[:num_parts] = array
+        return rows
+
+    arrays = {name: pad(getattr(sample, name)) for name in _PER_PART}
+    arrays["joint_type"] = pad(np.array([JOINT_TYPES.index(t) for t in sample.joint_type], dtype=np.int64))
+    arrays["part_valid"] = np.arange(max_parts) < num_parts
+    arrays |= {name: getattr(sample, name) for name in ("points", "part", "npcs", "K", "T_world_camera")}
+    arrays |= {name: np.asarray(getattr(sample, name)) for name in ("scale", "diagonal", "index", "width", "height")}
+    arrays |= {name: image for name in ("depth", "part_mask", "rgb") if (image := getattr(sample, name)) is not None}
+    return arrays
+
+
+class SampleStream:
+    """Endless on-line source: sample ``i`` is made when asked for, and is always the same.
+
+    Iterating yields samples ``start``, ``start + step``, ...; give each training process its own ``start`` and a common
+    ``step``. Indexing makes any one.
+
+    Parameters
+    ----------
+    plan : Plan
+    folder : Path
+        Dataset folder that holds the objects.
+    split : str
+    seed : int
+    start, step : int
+    """
+
+    def __init__(self, plan: Plan, folder: Path, split: str = "train", seed: int = 1, start: int = 0, step: int = 1):
+        if split not in SPLITS or not plan.objects_of[split]:
+            raise ConfigError(f"split {split!r} has no objects", mend="choose one that has, or other shares")
+        self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
+        self.objects = ObjectCache(Path(folder) / "objects")
+        self._renderer: Renderer | None = None
+
+    def __getitem__(self, i: int) -> Sample:
+        if self._renderer is None:
+            self._renderer = make_renderer(self.plan.sample.renderer)
+        planned = self.plan.object_in_split(self.split, i)
+        return draw_sample(self.objects[planned.key], self.plan.sample, self.seed, i, self._renderer)
+
+    def __iter__(self) -> Iterator[Sample]:
+        i = self.start
+        while True:
+            yield self[i]
+            i += self.step
+
+
+def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:
+    """Open a dataset that ``generate.py`` wrote; see :class:`Dataset`."""
+    return Dataset(folder, split)
+
+
+def read_description(folder: Path) -> dict[str, Any]:
+    """Content of ``dataset.json``.
+
+    Raises
+    ------
+    DatasetError
+        When it is missing, damaged or of another format.
+    """
+    path = folder / "dataset.json"
+    if not path.is_file():
+        unfinished = (folder / "plan.json").is_file()
+        raise DatasetError(
+            "the dataset is not complete" if unfinished else "no dataset here (no dataset.json)",
+            folder,
+            "run the same generate command again: it goes on" if unfinished else "name a folder that generate.py wrote",
+        )
+    try:
+        description = json.loads(path.read_text())
+        found = description["format"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise DatasetError(f"dataset.json is damaged ({error})", folder, "delete it and rerun generate") from error
+    if found != FORMAT:
+        raise DatasetError(f"format {found} is not {FORMAT}", folder, "generate it with this version of artsim")
+    return description  # type: ignore[no-any-return]
+
+
+def file_sha256(path: Path) -> str:
+    """Hex digest of a file, read in pieces."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,273 @@
+"""The plan of a dataset: which object, split and random stream each sample index has.
+
+A sample depends on (dataset seed, sample index) and on nothing else: not on the number of workers, the size of
+a shard, the order of work or a restart.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from artsim.errors import ConfigError, RenderError
+from artsim.objects import ArticulatedObject
+from artsim.renderers import Renderer
+from artsim.sample import IMAGES, Sample, observe
+from artsim.sampling import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
+
+SPLITS = ("train", "val", "test")
+FORMAT = 1
+
+_OBJECTS_AT_ONCE = 16
+_VIEWS_IN_A_ROW = 16
+_VIEW_ATTEMPTS = 50
+
+
+@dataclass(frozen=True)
+class SampleOptions:
+    """What one sample looks like."""
+
+    num_points: int = 2048
+    """Points of each cloud."""
+    scale: Scale = "native"
+    """Size of the object: native (as in its file), unit (diagonal of 1 m), or a range of diagonals in metres."""
+    states: StateOptions = field(default_factory=StateOptions)
+    views: ViewOptions = field(default_factory=ViewOptions)
+    renderer: Literal["raycast", "pybullet", "pybullet-egl"] = "raycast"
+    """raycast needs nothing installed; the others need the extra 'pybullet'."""
+    images: tuple[Literal["depth", "part_mask", "rgb"], ...] = ()
+    """Images to keep beside the cloud; rgb needs a pybullet renderer."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.num_points <= 1_000_000:
+            raise ConfigError(f"clouds of {self.num_points} points are not made", "num_points", "use 1 to 1000000")
+        if not isinstance(self.scale, str) and not 0.0 < self.scale[0] <= self.scale[1]:
+            raise ConfigError(f"{self.scale} is not a range of diagonals", "scale", "write LOW HIGH in metres")
+        if "rgb" in self.images and self.renderer == "raycast":
+            raise ConfigError("raycast makes no rgb", "images", "add --renderer pybullet")
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> SampleOptions:
+        """Inverse of ``dataclasses.asdict`` after a trip through JSON."""
+        pair = {
+            k: v if v is None or isinstance(v, (str, int, float)) else tuple(v)
+            for k, v in {**data["states"], **data["views"]}.items()
+            if k != "joint_range"
+        }
+        ranges = {name: (float(low), float(high)) for name, (low, high) in data["states"]["joint_range"].items()}
+        return SampleOptions(
+            num_points=data["num_points"],
+            scale=data["scale"] if isinstance(data["scale"], str) else tuple(data["scale"]),
+            states=StateOptions(pair["mode"], pair["fraction_open"], ranges),
+            views=ViewOptions(**{k: pair[k] for k in data["views"]}),
+            renderer=data["renderer"],
+            images=tuple(data["images"]),
+        )
+
+
+def draw_sample(obj: ArticulatedObject, options: SampleOptions, seed: int, index: int, renderer: Renderer) -> Sample:
+    """The sample that (seed, index) stands for, of this object.
+
+    Raises
+    ------
+    RenderError
+        When 50 drawn views in a row do not see the object.
+    """
+    rng = np.random.default_rng([seed, index])
+    sized = sample_scale(obj, options.scale, rng)
+    for _ in range(_VIEW_ATTEMPTS):
+        q = sample_state(sized, options.states, rng)
+        camera = sample_view(sized, q, options.views, rng)
+        try:
+            return observe(
+                sized,
+                q,
+                camera,
+                num_points=options.num_points,
+                renderer=renderer,
+                images=options.images,
+                rng=rng,
+                seed=seed,
+                index=index,
+            )
+        except RenderError:
+            continue  # out of sight: draw another view
+    raise RenderError(
+        f"{_VIEW_ATTEMPTS} drawn views in a row do not see the object",
+        f"{obj.object_id}, sample {index}",
+        "mend the view options",
+    )
+
+
+@dataclass(frozen=True)
+class PlannedObject:
+    """One object of a dataset.
+
+    Attributes
+    ----------
+    key : str
+        Unique name in the dataset; its file is ``objects/<key>.npz``.
+    category, object_id, sha256 : str
+        As in :class:`ArticulatedObject`.
+    num_parts : int
+    source : str
+        Where it came from, relative to the folder given.
+    source_sha256 : str
+        Digest of the source's main file, to tell a changed source at a restart.
+    split : str
+        One of ``SPLITS``.
+    """
+
+    key: str
+    category: str
+    object_id: str
+    sha256: str
+    num_parts: int
+    source: str
+    source_sha256: str
+    split: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A deterministic list of samples.
+
+    Attributes
+    ----------
+    seed, num_samples, shard_size : int
+    fractions : tuple of 3 float
+        Share of the objects of each category in train, val and test.
+    sample : SampleOptions
+    objects : tuple of PlannedObject
+    """
+
+    seed: int
+    num_samples: int
+    shard_size: int
+    fractions: tuple[float, float, float]
+    sample: SampleOptions
+    objects: tuple[PlannedObject, ...]
+
+    @cached_property
+    def objects_of(self) -> dict[str, list[PlannedObject]]:
+        """Objects of each split, in the plan's order."""
+        return {split: [o for o in self.objects if o.split == split] for split in SPLITS}
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[int, int]]:
+        """First and end index of each split's samples: shares by the number of objects, together ``num_samples``."""
+        ends = np.cumsum([len(self.objects_of[split]) for split in SPLITS])
+        ends = np.round(self.num_samples * ends / max(1, len(self.objects))).astype(int)
+        starts = [0, *ends[:-1]]
+        return {split: (int(s), int(e)) for split, s, e in zip(SPLITS, starts, ends, strict=True)}
+
+    def split_of(self, index: int) -> str:
+        """Split that a sample belongs to."""
+        return next(split for split, (start, end) in self.ranges.items() if start <= index < end)
+
+    def object_of(self, index: int) -> PlannedObject:
+        """Object that a sample shows."""
+        split = self.split_of(index)
+        return self.object_in_split(split, index - self.ranges[split][0])
+
+    def object_in_split(self, split: str, turn: int) -> PlannedObject:
+        """Object at a turn of a split's endless rotation.
+
+        A few objects take turns for a few hundred samples, then the next few: every shard mixes objects, and a worker
+        needs only those in memory.
+        """
+        objects = self.objects_of[split]
+        together = min(_OBJECTS_AT_ONCE, len(objects))
+        group, slot = turn // (together * _VIEWS_IN_A_ROW), turn % together
+        return objects[(group * together + slot) % len(objects)]
+
+    def shards(self) -> list[Shard]:
+        """Every shard, in order."""
+        return [
+            Shard(f"{split}-{number:06d}.tar", split, first, min(first + self.shard_size, end))
+            for split, (start, end) in self.ranges.items()
+            for number, first in enumerate(range(start, end, self.shard_size))
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready description, inverse of :meth:`from_dict`."""
+        return {
+            "format": FORMAT,
+            "seed": self.seed,
+            "num_samples": self.num_samples,
+            "shard_size": self.shard_size,
+            "fractions": list(self.fractions),
+            "sample": asdict(self.sample),
+            "objects": [asdict(o) for o in self.objects],
+        }
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> Plan:
+        """Rebuild a plan from :meth:`to_dict`."""
+        train, val, test = data["fractions"]
+        return Plan(
+            seed=data["seed"],
+            num_samples=data["num_samples"],
+            shard_size=data["shard_size"],
+            fractions=(train, val, test),
+            sample=SampleOptions.from_dict(data["sample"]),
+            objects=tuple(PlannedObject(**o) for o in data["objects"]),
+        )
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Samples ``first`` to ``end`` (exclusive) in one tar file."""
+
+    name: str
+    split: str
+    first: int
+    end: int
+
+
+def assign_splits(objects: Sequence[tuple[str, str]], fractions: tuple[float, float, float], seed: int) -> list[str]:
+    """Split of each object: by object, never by view, stratified by category.
+
+    Objects with equal content always share a split, whatever they are called.
+
+    Parameters
+    ----------
+    objects : sequence of (category, sha256)
+    fractions : 3 float
+        Shares of train, val and test; their sum is taken as 1.
+    seed : int
+
+    Returns
+    -------
+    list of str
+    """
+    total = sum(fractions)
+    if min(fractions) < 0 or total <= 0:
+        raise ConfigError(f"{fractions} are not shares", "splits", "write three numbers such as 0.8 0.1 0.1")
+    contents: dict[str, set[str]] = defaultdict(set)
+    for category, sha256 in objects:
+        contents[category].add(sha256)
+    split_of: dict[tuple[str, str], str] = {}
+    for category, digests in contents.items():
+        order = sorted(digests, key=lambda d: hashlib.sha256(f"{seed}:{d}".encode()).hexdigest())
+        ends = np.floor(np.cumsum(fractions) / total * len(order) + 0.5)
+        # Rounding keeps at least one object where a share is asked for and there is more than one to give.
+        for place, digest in enumerate(order):
+            split_of[category, digest] = SPLITS[int(np.searchsorted(ends, place, side="right"))]
+    return [split_of[obj] for obj in objects]
+
+
+def unique_keys(objects: Sequence[tuple[str, str, str]]) -> list[str]:
+    """A file-safe unique key for each (category, object_id, sha256)."""
+    names = [re.sub(r"[^A-Za-z0-9_-]+", "_", f"{category}-{object_id}") for category, object_id, _ in objects]
+    return [
+        f"{name}-{sha256[:8]}" if names.count(name) > 1 else name
+        for name, (_, _, sha256) in zip(names, objects, strict=True)
+    ]

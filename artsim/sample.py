@@ -1,0 +1,322 @@
+"""The Sample record: one camera view of one posed object, with everything that is true of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artsim.camera import Camera
+from artsim.errors import ConfigError, RenderError
+from artsim.kinematics import Array
+from artsim.objects import ArticulatedObject
+from artsim.renderers import BACKGROUND, Frame, Renderer, shared_renderer
+from artsim.renderers.raycast import PosedObject, cast, pose, window_pixels
+
+IMAGES = ("depth", "part_mask", "rgb")
+"""Images that a sample can carry besides its cloud."""
+
+Look = Callable[[NDArray[np.int64]], tuple[NDArray[np.float32], NDArray[np.uint8]]]
+"""What stands at some pixels: depth (N,) and part ids (N,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One view of one posed object. N points, K parts; camera frame = OpenCV, metres, radians.
+
+    Attributes
+    ----------
+    points : (N, 3) float32
+        Partial cloud in the camera frame.
+    part : (N,) uint8
+        Part of each point.
+    npcs : (N, 3) float32
+        Normalised part coordinates ``(p_rest - box_center) / ||box_size|| + 0.5``.
+    T_camera_part : (K, 4, 4) float64
+        Maps the rest frame, as carried by part k, to the camera.
+    box_center, box_size : (K, 3) float64
+        Amodal box of each part, axis-aligned in the rest frame.
+    visible_fraction : (K,) float64
+        Visible over amodal pixels; exact when images are made, otherwise estimated from the rays cast.
+    joint_type : tuple of str, length K
+        "free" for the root, else revolute, continuous, prismatic or screw.
+    joint_parent : (K,) int64
+        Index of the parent part, -1 for the root.
+    joint_axis, joint_origin : (K, 3) float64
+        In the rest frame, at rest.
+    joint_axis_camera, joint_origin_camera : (K, 3) float64
+        As posed, in the camera frame.
+    joint_state, joint_rest : (K,) float64
+    joint_limits : (K, 2) float64
+        Infinite where a joint turns freely.
+    K : (3, 3) float64
+        Camera intrinsics in pixels.
+    T_world_camera : (4, 4) float64
+    width, height : int
+    part_names : tuple of str, length K
+    category, object_id, object_sha256 : str
+    scale, diagonal : float
+        Size over native size; diagonal of the rest-state box in metres.
+    seed, index : int
+        What the sample was drawn from; -1 when it was asked for directly.
+    renderer, artsim_version : str
+    depth : (H, W) float32 or None
+        z-depth in metres, 0 = no return.
+    part_mask : (H, W) uint8 or None
+        Part ids, 255 = background.
+    rgb : (H, W, 3) uint8 or None
+    """
+
+    points: NDArray[np.float32]
+    part: NDArray[np.uint8]
+    npcs: NDArray[np.float32]
+    T_camera_part: Array
+    box_center: Array
+    box_size: Array
+    visible_fraction: Array
+    joint_type: tuple[str, ...]
+    joint_parent: NDArray[np.int64]
+    joint_axis: Array
+    joint_origin: Array
+    joint_axis_camera: Array
+    joint_origin_camera: Array
+    joint_state: Array
+    joint_rest: Array
+    joint_limits: Array
+    K: Array
+    T_world_camera: Array
+    width: int
+    height: int
+    part_names: tuple[str, ...]
+    category: str
+    object_id: str
+    object_sha256: str
+    scale: float
+    diagonal: float
+    seed: int
+    index: int
+    renderer: str
+    artsim_version: str
+    depth: NDArray[np.float32] | None = None
+    part_mask: NDArray[np.uint8] | None = None
+    rgb: NDArray[np.uint8] | None = None
+
+
+def observe(
+    obj: ArticulatedObject,
+    q: ArrayLike,
+    camera: Camera,
+    T_world_object: ArrayLike | None = None,
+    num_points: int = 2048,
+    renderer: str | Renderer = "raycast",
+    images: tuple[str, ...] = (),
+    rng: np.random.Generator | None = None,
+    seed: int = -1,
+    index: int = -1,
+) -> Sample:
+    """Look at a posed object and write down the cloud with its ground truth.
+
+    The cloud is ``num_points`` pixels drawn uniformly without replacement from those that show the object (with
+    replacement once there are fewer). Without images, ``raycast`` casts only as many of them as the cloud needs:
+    pixels are visited in the same random order in both cases, so the same ``rng`` gives the same cloud.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    q : (K,) float
+        Joint states in radians or metres; the root's entry is ignored.
+    camera : Camera
+    T_world_object : (4, 4) float, optional
+        Pose of the rest frame in the world; identity by default.
+    num_points : int
+    renderer : str or Renderer
+        "raycast", "pybullet" or "pybullet-egl".
+    images : tuple of str
+        Which of ``IMAGES`` to keep.
+    rng : numpy Generator, optional
+        Seeded with 0 by default.
+    seed, index : int
+        Stored in the record.
+
+    Returns
+    -------
+    Sample
+
+    Raises
+    ------
+    RenderError
+        When the camera does not see the object at all.
+    ConfigError
+        When an option makes no sense.
+    """
+    if num_points < 1:
+        raise ConfigError(f"a cloud of {num_points} points is empty", "num_points", "ask for at least 1")
+    unknown = set(images) - set(IMAGES)
+    if unknown:
+        raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")
+    rng = rng or np.random.default_rng(0)
+    name = renderer if isinstance(renderer, str) else renderer.name
+    posed = pose(obj, q, camera, T_world_object)
+    frame = None
+    if images or name != "raycast":
+        drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
+        frame = drawer.render(obj, q, camera, T_world_object)
+        pixels, depth, part = draw_visible(posed, _lookup(frame), num_points, rng)
+        visible_fraction = _exact_visible_fraction(posed, frame)
+    else:
+        rays = _Rays(posed)
+        pixels, depth, part = draw_visible(posed, rays, num_points, rng)
+        visible_fraction = rays.visible_fraction()
+    if len(pixels) == 0:
+        raise RenderError("the camera does not see the object", obj.object_id, "move the camera or the object")
+    points = camera.unproject(pixels, depth)
+    wanted = {image: None if frame is None else getattr(frame, field) for image, field in _FRAME_FIELDS.items()}
+    if "rgb" in images and wanted["rgb"] is None:
+        raise ConfigError(f"renderer {name!r} makes no rgb", "images", "use a renderer that does, such as pybullet")
+    tree = obj.tree
+    axis_camera, origin_camera = tree.posed_joints(posed.T_camera_part)
+    return Sample(
+        points=points.astype(np.float32),
+        part=part,
+        npcs=_npcs(points, part, posed).astype(np.float32),
+        T_camera_part=posed.T_camera_part,
+        box_center=obj.box_center,
+        box_size=obj.box_size,
+        visible_fraction=visible_fraction,
+        joint_type=tree.types,
+        joint_parent=tree.parents,
+        joint_axis=tree.axes,
+        joint_origin=tree.origins,
+        joint_axis_camera=axis_camera,
+        joint_origin_camera=origin_camera,
+        joint_state=tree.complete_state(q),
+        joint_rest=tree.rest,
+        joint_limits=tree.limits,
+        K=camera.K,
+        T_world_camera=camera.T_world_camera,
+        width=camera.width,
+        height=camera.height,
+        part_names=tuple(p.label for p in obj.parts),
+        category=obj.category,
+        object_id=obj.object_id,
+        object_sha256=obj.sha256,
+        scale=obj.scale,
+        diagonal=obj.diagonal,
+        seed=seed,
+        index=index,
+        renderer=name,
+        artsim_version=ARTSIM_VERSION,
+        **{image: value if image in images else None for image, value in wanted.items()},
+    )
+
+
+ARTSIM_VERSION = version("artsim")
+_FRAME_FIELDS = {"depth": "depth", "part_mask": "part_ids", "rgb": "rgb"}
+
+
+def _lookup(frame: Frame) -> Look:
+    depth, part_ids = frame.depth.ravel(), frame.part_ids.ravel()
+    return lambda pixels: (depth[pixels], part_ids[pixels])
+
+
+def draw_visible(
+    posed: PosedObject, look: Look, num_points: int, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]:
+    """Visit pixels of the object's window in random order until ``num_points`` of them show the object.
+
+    Returns
+    -------
+    pixels : (num_points,) int
+        All different, unless fewer pixels show the object: then those are drawn again with replacement. Empty when
+        none does.
+    depth : (num_points,) float32
+    part : (num_points,) uint8
+    """
+    first_row, end_row, first_column, end_column = posed.window
+    columns = end_column - first_column
+    total = (end_row - first_row) * columns
+    seen = np.zeros(total, dtype=bool)
+    turn = np.empty(total, dtype=np.int64)
+    hits: list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]] = []
+    found = visited = 0
+    while found < num_points and visited < total:
+        # As many as it should take, judging by the share of hits so far, and a few more.
+        share = max(found, 1) / max(visited, 2)
+        wanted = int(1.15 * (num_points - found) / share) + 64
+        if visited + wanted > total // 2:
+            local = rng.permutation(np.flatnonzero(~seen))
+        else:
+            drawn = rng.integers(0, total, size=wanted)
+            turn[drawn[::-1]] = np.arange(wanted)[::-1]  # the first turn of a pixel that was drawn twice
+            local = drawn[(turn[drawn] == np.arange(wanted)) & ~seen[drawn]]
+        seen[local] = True
+        row, column = np.divmod(local, columns)
+        pixels = (row + first_row) * posed.camera.width + column + first_column
+        depth, part = look(pixels)
+        hit = np.flatnonzero(part != BACKGROUND)
+        hits.append((pixels[hit], depth[hit], part[hit]))
+        visited, found = visited + len(local), found + len(hit)
+    if found == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.uint8)
+    pixels, depth, part = (np.concatenate(column)[:num_points] for column in zip(*hits, strict=True))
+    if found < num_points:
+        again = np.concatenate([np.arange(found), rng.integers(0, found, size=num_points - found)])
+        pixels, depth, part = pixels[again], depth[again], part[again]
+    return pixels, depth, part
+
+
+class _Rays:
+    """A :data:`Look` that casts rays and counts, for each part, how many met it and how many saw it."""
+
+    enough = 100
+    """Amodal hits from which a part's visible fraction is estimated; parts with fewer are looked at more closely."""
+
+    def __init__(self, posed: PosedObject):
+        self.posed = posed
+        self.met = np.zeros(len(posed.obj), dtype=np.int64)
+        self.saw = np.zeros(len(posed.obj), dtype=np.int64)
+
+    def __call__(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        depth, part, met = cast(self.posed, pixels)
+        self.met += met
+        self.saw += np.bincount(part, minlength=BACKGROUND + 1)[: len(self.met)]
+        return depth, part
+
+    def visible_fraction(self) -> Array:
+        """(K,) estimate with a standard error of at most 0.05, exact for parts of few pixels."""
+        met, saw = self.met.copy(), self.saw.copy()
+        for k in np.flatnonzero(met < self.enough):
+            window = self.posed.windows[k]
+            pixels = window_pixels(tuple(window), self.posed.camera.width)
+            if len(pixels) == 0:
+                continue
+            step = max(1, len(pixels) // 1024)
+            _, part, hits = cast(self.posed, pixels[step // 2 :: step])
+            met[k], saw[k] = hits[k], np.count_nonzero(part == k)
+        return saw / np.maximum(met, 1)
+
+
+def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
+    """(K,) visible pixels of the frame over amodal pixels, which are cast where the renderer does not count them."""
+    amodal = frame.amodal_pixels
+    if amodal is None:
+        _, _, amodal = cast(posed, window_pixels(posed.window, posed.camera.width))
+    visible = np.bincount(frame.part_ids.ravel(), minlength=BACKGROUND + 1)[: len(amodal)]
+    # A rasteriser may cover a pixel more than the rays do at a silhouette.
+    return np.minimum(visible / np.maximum(amodal, 1), 1.0)
+
+
+def _npcs(points: Array, part: NDArray[np.uint8], posed: PosedObject) -> Array:
+    """(N, 3) normalised part coordinates of camera-frame points: one uniform scale per part."""
+    rotation, translation = posed.T_camera_part[:, :3, :3], posed.T_camera_part[:, :3, 3]
+    size = np.linalg.norm(posed.obj.box_size, axis=1)
+    size[size == 0] = 1.0  # parts without geometry have no points
+    # (p - t) @ R is the inverse transform; the part's centre and scale are folded into it.
+    offset = np.einsum("ki,kij->kj", translation, rotation) + posed.obj.box_center
+    linear = rotation / size[:, None, None]
+    shift = 0.5 - offset / size[:, None]
+    npcs: Array = np.einsum("ni,nij->nj", points, linear[part]) + shift[part]
+    return npcs

@@ -1,0 +1,184 @@
+"""The pose distribution: joint states, viewpoints and object scale, each drawn from an explicit generator."""
+
+from __future__ import annotations
+
+import fnmatch
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from artsim.camera import Camera
+from artsim.errors import ConfigError
+from artsim.kinematics import Array
+from artsim.objects import ArticulatedObject
+
+ViewSampler = Callable[[np.random.Generator, ArticulatedObject, Array], Camera]
+"""Draws a camera for an object (in its rest frame, which is the world) in joint state q."""
+
+
+@dataclass(frozen=True)
+class StateOptions:
+    """How joint states are drawn. A continuous joint counts as limited to half a turn either way."""
+
+    mode: Literal["uniform", "rest", "limits"] = "uniform"
+    """uniform: anywhere within the limits; rest: the rest state; limits: one end or the other."""
+    fraction_open: tuple[float, float] | None = None
+    """Instead of the mode: open each joint by a fraction, drawn from this range, of the way from its rest state to its
+    farther limit (0 = at rest, 1 = fully open)."""
+    joint_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Range in radians or metres for joints whose name, or whose part's label, matches a pattern such as 'lid' or
+    'drawer*'. Cut to the limits; overrides the other options for those joints."""
+
+    def __post_init__(self) -> None:
+        if self.fraction_open is not None and not 0.0 <= self.fraction_open[0] <= self.fraction_open[1] <= 1.0:
+            raise ConfigError(f"{self.fraction_open} is not a range within 0..1", "fraction_open", "write 0.2 0.8")
+        for pattern, (low, high) in self.joint_range.items():
+            if not low <= high:
+                raise ConfigError(f"{low} to {high} is not a range", f"joint_range {pattern!r}", "write LOW HIGH")
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """From where, and with which camera, objects are seen."""
+
+    preset: Literal["artimage", "sphere"] = "artimage"
+    """artimage: azimuth within 75 deg of the front, elevation 10 to 60 deg; sphere: all round, elevation -10 to 85."""
+    azimuth: tuple[float, float] | None = None
+    """Range in degrees about the vertical, 0 = in front of the object, 90 = from its right (its -Y side); overrides
+    the preset."""
+    elevation: tuple[float, float] | None = None
+    """Range in degrees above the horizon; overrides the preset."""
+    fill: tuple[float, float] = (0.7, 0.98)
+    """Range of the object's bounding sphere over the smaller side of the image: sets the distance."""
+    width: int = 640
+    height: int = 480
+    fov: float = 45.0
+    """Vertical field of view in degrees."""
+    custom: str | None = None
+    """'module:function' of your own that draws the camera: function(rng, obj, q) -> artsim.Camera."""
+
+    def __post_init__(self) -> None:
+        for name, bounds in (("azimuth", self.azimuth), ("elevation", self.elevation), ("fill", self.fill)):
+            if bounds is not None and not bounds[0] <= bounds[1]:
+                raise ConfigError(f"{bounds[0]} to {bounds[1]} is not a range", name, "write LOW HIGH")
+        if not 0.0 < self.fill[0] <= self.fill[1] <= 4.0:
+            raise ConfigError(f"{self.fill} is not a range within 0..4", "fill", "write 0.7 0.98")
+        if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
+            raise ConfigError(f"images of {self.width}x{self.height} are not made", "width, height", "use 1 to 8192")
+        if not 1.0 <= self.fov <= 170.0:
+            raise ConfigError(f"a field of view of {self.fov} deg is not within 1..170", "fov", "write 45")
+
+
+_PRESETS = {"artimage": ((-75.0, 75.0), (10.0, 60.0)), "sphere": ((-180.0, 180.0), (-10.0, 85.0))}
+
+Scale = Literal["native", "unit"] | tuple[float, float]
+"""native: as the file has it; unit: diagonal of 1 m; or a range of diagonals in metres."""
+
+
+def joint_intervals(obj: ArticulatedObject) -> Array:
+    """(K, 2) range that each joint state is drawn from: its limits, half a turn either way where it has none."""
+    limits, rest = obj.tree.limits, obj.tree.rest
+    turn = np.stack([rest - np.pi, rest + np.pi], axis=1)
+    return np.where(np.isfinite(limits), limits, turn)
+
+
+def sample_state(obj: ArticulatedObject, options: StateOptions, rng: np.random.Generator) -> Array:
+    """Draw joint states.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    options : StateOptions
+    rng : numpy Generator
+
+    Returns
+    -------
+    (K,) float
+        Complete state, mimic joints set; radians or metres at the object's scale.
+    """
+    tree, intervals = obj.tree, joint_intervals(obj)
+    low, high = intervals.T
+    draw = rng.random(len(tree))
+    if options.fraction_open is not None:
+        far = np.where(high - tree.rest >= tree.rest - low, high, low)
+        start, end = options.fraction_open
+        q = tree.rest + (start + draw * (end - start)) * (far - tree.rest)
+    elif options.mode == "rest":
+        q = tree.rest.copy()
+    elif options.mode == "limits":
+        q = np.where(draw < 0.5, low, high)
+    else:
+        q = low + draw * (high - low)
+    for pattern, bounds in options.joint_range.items():
+        for k in tree.free_joints:
+            if fnmatch.fnmatchcase(tree.joints[k].name, pattern) or fnmatch.fnmatchcase(obj.parts[k].label, pattern):
+                first, last = np.clip(bounds, low[k], high[k])
+                q[k] = first + draw[k] * (last - first)
+    return tree.complete_state(q)
+
+
+def sample_scale(obj: ArticulatedObject, scale: Scale, rng: np.random.Generator) -> ArticulatedObject:
+    """The object at a drawn size; lengths of joint states change with it, so draw the size first."""
+    if scale == "native":
+        return obj
+    if scale == "unit":
+        return obj.with_diagonal(1.0)
+    low, high = scale
+    return obj.with_diagonal(low + float(rng.random()) * (high - low))
+
+
+def sample_view(obj: ArticulatedObject, q: ArrayLike, options: ViewOptions, rng: np.random.Generator) -> Camera:
+    """Draw a camera that looks at the posed object from a distance at which it fits the image.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+        Stands with its rest frame on the world's.
+    q : (K,) float
+    options : ViewOptions
+    rng : numpy Generator
+    """
+    if options.custom is not None:
+        return view_sampler(options.custom)(rng, obj, np.asarray(q, dtype=np.float64))
+    default_azimuth, default_elevation = _PRESETS[options.preset]
+    azimuth = np.deg2rad(rng.uniform(*(options.azimuth or default_azimuth)))
+    elevation = np.deg2rad(rng.uniform(*(options.elevation or default_elevation)))
+    fill = rng.uniform(*options.fill)
+    center, radius = bounding_sphere(obj, q)
+    fov_y = np.deg2rad(options.fov)
+    half_side = np.tan(0.5 * fov_y) * min(1.0, options.width / options.height)
+    distance = radius / np.sin(np.arctan(fill * half_side))
+    away = np.array([-np.cos(azimuth) * np.cos(elevation), -np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    return Camera.look_at(center + distance * away, center, options.width, options.height, fov_y)
+
+
+def bounding_sphere(obj: ArticulatedObject, q: ArrayLike) -> tuple[Array, float]:
+    """Centre (3,) and radius of a sphere around the posed object, from its parts' boxes, rest frame, metres."""
+    low, high = obj.part_bounds[:, 0], obj.part_bounds[:, 1]
+    T = obj.tree.forward_kinematics(q)
+    center = (T[:, :3, :3] @ (0.5 * (low + high))[:, :, None])[..., 0] + T[:, :3, 3]
+    reach = (np.abs(T[:, :3, :3]) @ (0.5 * (high - low))[:, :, None])[..., 0]
+    bottom, top = (center - reach).min(axis=0), (center + reach).max(axis=0)
+    return 0.5 * (bottom + top), 0.5 * float(np.linalg.norm(top - bottom))
+
+
+def view_sampler(name: str) -> ViewSampler:
+    """The function that 'module:function' names.
+
+    Raises
+    ------
+    ConfigError
+        When it cannot be imported.
+    """
+    module, _, function = name.partition(":")
+    try:
+        sampler = getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ConfigError(f"cannot import {name!r} ({error})", "views.custom", "write module:function") from error
+    if not callable(sampler):
+        raise ConfigError(f"{name!r} is not a function", "views.custom", "write module:function")
+    return sampler  # type: ignore[no-any-return]

@@ -1,0 +1,168 @@
+"""Samples as members of WebDataset tar shards, byte for byte reproducible."""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from artsim.errors import DatasetError
+from artsim.sample import Sample
+
+_CLOUD = ("points", "part", "npcs")
+_PNG = ("part_mask", "rgb")
+_STRINGS = ("joint_type", "part_names")
+_INTEGERS = ("joint_parent",)
+_SCALARS = ("width", "height", "category", "object_id", "object_sha256", "scale", "diagonal", "seed", "index",
+            "renderer", "artsim_version")  # fmt: skip
+_ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in (*_CLOUD, *_PNG, "depth", *_STRINGS, *_SCALARS))
+
+_MAX_MEMBER = 1 << 30
+
+
+def sample_members(sample: Sample) -> dict[str, bytes]:
+    """Member suffix -> content: ``points.npy``, ``part.npy``, ``npcs.npy``, ``json``, and images where there are any."""
+    members = {f"{name}.npy": npy_bytes(getattr(sample, name)) for name in _CLOUD}
+    record: dict[str, Any] = {name: getattr(sample, name) for name in _SCALARS}
+    record |= {name: list(getattr(sample, name)) for name in _STRINGS}
+    record |= {name: getattr(sample, name).tolist() for name in _ARRAYS}
+    record["joint_limits"] = [[v if np.isfinite(v) else None for v in row] for row in record["joint_limits"]]
+    members["json"] = json.dumps(record, allow_nan=False).encode()
+    if sample.depth is not None:
+        members["depth.npy"] = npy_bytes(sample.depth)
+    for name in _PNG:
+        image = getattr(sample, name)
+        if image is not None:
+            buffer = io.BytesIO()
+            Image.fromarray(image).save(buffer, "PNG")
+            members[f"{name}.png"] = buffer.getvalue()
+    return members
+
+
+def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
+    """Inverse of :func:`sample_members`.
+
+    Raises
+    ------
+    DatasetError
+        When a member is missing or damaged.
+    """
+    try:
+        record = json.loads(members["json"])
+        limits = np.array(
+            [
+                [-np.inf if lower is None else lower, np.inf if upper is None else upper]
+                for lower, upper in record["joint_limits"]
+            ]
+        )
+        values: dict[str, Any] = {name: record[name] for name in _SCALARS}
+        values |= {name: tuple(record[name]) for name in _STRINGS}
+        values |= {
+            name: np.array(record[name], dtype=np.int64 if name in _INTEGERS else np.float64)
+            for name in _ARRAYS
+            if name != "joint_limits"
+        }
+        values["joint_limits"] = limits.reshape(-1, 2)
+        values |= {name: npy_array(members[f"{name}.npy"]) for name in _CLOUD}
+        if "depth.npy" in members:
+            values["depth"] = npy_array(members["depth.npy"])
+        for name in _PNG:
+            if f"{name}.png" in members:
+                values[name] = np.asarray(Image.open(io.BytesIO(members[f"{name}.png"])))
+        return Sample(**values)
+    except (KeyError, ValueError, TypeError, EOFError, OSError) as error:
+        raise DatasetError(
+            f"damaged sample ({error})", where, "generate the shard again: delete it and rerun"
+        ) from error
+
+
+def npy_bytes(array: NDArray[Any]) -> bytes:
+    """An array in NumPy's ``.npy`` format."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def npy_array(data: bytes) -> NDArray[Any]:
+    """Inverse of :func:`npy_bytes`; never unpickles."""
+    array: NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    return array
+
+
+def sample_key(index: int) -> str:
+    """Name that all members of a sample share."""
+    return f"{index:09d}"
+
+
+def tar_bytes(samples: Iterable[Sample]) -> bytes:
+    """A whole shard: plain tar, no times, no owners."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
+        for sample in samples:
+            for suffix, content in sample_members(sample).items():
+                info = tarfile.TarInfo(f"{sample_key(sample.index)}.{suffix}")
+                info.size = len(content)
+                tar.addfile(info, io.BytesIO(content))
+    return buffer.getvalue()
+
+
+class ShardReader:
+    """Random access to the samples of one shard file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    DatasetError
+        When the file is missing or is not a whole tar file.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._members: dict[str, dict[str, tuple[int, int]]] = {}
+        try:
+            with tarfile.open(path, "r:") as tar:
+                for info in tar:
+                    key, _, suffix = info.name.partition(".")
+                    if not info.isreg() or info.size > _MAX_MEMBER:
+                        raise DatasetError(f"unexpected member {info.name!r}", path, "verify or regenerate the dataset")
+                    self._members.setdefault(key, {})[suffix] = (info.offset_data, info.size)
+            self._file = path.open("rb")
+        except (tarfile.TarError, OSError, EOFError) as error:
+            raise DatasetError(
+                f"cannot read the shard ({error})", path, "delete it and run the same generate command again"
+            ) from error
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def keys(self) -> list[str]:
+        """Sample keys in the order of the file."""
+        return list(self._members)
+
+    def read(self, key: str) -> Sample:
+        """One sample by its key."""
+        members = self._members.get(key)
+        if members is None:
+            raise DatasetError(f"holds no sample {key}", self.path, "delete it and run the same generate command again")
+        contents = {}
+        for suffix, (offset, size) in members.items():
+            self._file.seek(offset)
+            contents[suffix] = self._file.read(size)
+            if len(contents[suffix]) != size:
+                raise DatasetError("the shard is cut short", self.path, "delete it and rerun the same command")
+        return sample_from_members(contents, f"{self.path}: sample {key}")
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

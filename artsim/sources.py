@@ -1,0 +1,84 @@
+"""Where objects come from: URDF files and folders of them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from artsim.errors import AssetError
+from artsim.files import read_bounded
+from artsim.meshes import LoadLimits
+from artsim.objects import ArticulatedObject
+from artsim.urdf import find_urdf, load
+
+
+@dataclass(frozen=True)
+class Source:
+    """One object to load.
+
+    Attributes
+    ----------
+    path : Path
+        URDF file.
+    name : str
+        Path relative to the folder it was found in: stable when that folder moves.
+    sha256 : str
+        Digest of the file.
+    package_roots : mapping of str to Path
+        For ``package://`` meshes.
+    """
+
+    path: Path
+    name: str
+    sha256: str
+    package_roots: Mapping[str, Path] = field(default_factory=dict)
+
+
+def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None) -> list[Source]:
+    """Every object below some paths, in a stable order.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        URDF files, object folders, or folders of object folders: below a folder, every ``mobility.urdf`` is taken, and
+        where there is none, every ``*.urdf``.
+    package_roots : mapping, optional
+
+    Raises
+    ------
+    AssetError
+        When a path does not exist or holds no object.
+    """
+    sources = []
+    for given in map(Path, paths):
+        if given.is_dir():
+            found = _below(given)
+            if not found:
+                raise AssetError("no URDF file below this folder", given, "name a folder that holds some")
+        else:
+            found = [find_urdf(given)]
+        for file in found:
+            name = f"{given.name}/{file.relative_to(given).as_posix()}" if given.is_dir() else file.name
+            data = read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file")
+            sources.append(Source(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
+    return sources
+
+
+def _below(folder: Path) -> list[Path]:
+    found = []
+    for here, folders, files in os.walk(folder):
+        folders.sort()
+        if "mobility.urdf" in files:
+            found.append(Path(here) / "mobility.urdf")
+            folders.clear()
+        else:
+            found += [Path(here) / name for name in sorted(files) if name.endswith(".urdf")]
+    return found
+
+
+def load_source(source: Source) -> ArticulatedObject:
+    """Load the object of a source."""
+    return load(source.path, package_roots=source.package_roots)
