@@ -65,7 +65,7 @@ class Generate:
         except KeyboardInterrupt:
             print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")
             raise
-        for reason in result.skipped:
+        for reason in result.left_out:
             print(f"left out: {reason}")
         if result.made == 0:
             print(f"{result.folder}: already complete, {result.num_samples} samples")

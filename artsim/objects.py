@@ -135,7 +135,7 @@ class ArticulatedObject:
 
     @cached_property
     def part_bounds(self) -> Array:
-        """(K, 2, 3) box corners of each part in the rest frame, metres; a part without geometry has a point at its joint."""
+        """(K, 2, 3) box corners of each part in the rest frame, metres; without geometry, its joint's origin twice."""
         bounds = np.stack([p.bounds for p in self.parts])
         empty = np.isnan(bounds[:, 0, 0])
         bounds[empty] = self.native_tree.origins[empty, None, :]

@@ -148,7 +148,7 @@ class GenerateResult:
     num_samples: int
     made: int
     seconds: float
-    skipped: tuple[str, ...]
+    left_out: tuple[str, ...]
     """Sources left out because they could not be loaded, with the reason."""
 
 
@@ -210,9 +210,10 @@ def generate(
     _check_counts(num_samples, shard_size, workers, sources)
     with _locked(folder):
         _remove_leftovers(folder)
-        plan, skipped = _resumed_plan(folder, options, sources), ()
+        left_out: list[str] = []
+        plan = _resumed_plan(folder, options, sources)
         if plan is None:
-            plan, skipped = _new_plan(folder, options, sources, workers, skip_broken, progress)
+            plan, left_out = _new_plan(folder, options, sources, workers, skip_broken, progress)
         finished = _finished_shards(folder, plan)
         missing = [shard for shard in plan.shards() if shard.name not in finished]
         before = sum(record.end - record.first for record in finished.values())
@@ -221,7 +222,7 @@ def generate(
             finished |= _run(plan, folder, missing, workers, before, progress)
         _write_dataset_file(folder, plan, finished)
     made = plan.num_samples - before
-    return GenerateResult(folder, plan.num_samples, made, time.perf_counter() - start, tuple(skipped))
+    return GenerateResult(folder, plan.num_samples, made, time.perf_counter() - start, tuple(left_out))
 
 
 def _check_counts(num_samples: int, shard_size: int, workers: int, sources: Sequence[Source]) -> None:
@@ -320,7 +321,7 @@ def _new_plan(
         except KeyboardInterrupt:
             pool.shutdown(cancel_futures=True)
             raise
-    if broken and not skip_broken or not loaded:
+    if (broken and not skip_broken) or not loaded:
         raise AssetError(
             f"{len(broken)} of {len(sources)} objects do not load:\n  " + "\n  ".join(text for _, text in broken[:20]),
             mend="mend them, or leave them out with --skip-broken",
@@ -334,18 +335,18 @@ def _new_plan(
     )
     objects = []
     for key, split, (source, compiled) in zip(keys, split_names, unique.values(), strict=True):
-        os.replace(staging / compiled.staged, staging / f"{key}.npz")
+        (staging / compiled.staged).replace(staging / f"{key}.npz")
         objects.append(
             PlannedObject(
-                key,
-                compiled.category,
-                compiled.object_id,
-                compiled.sha256,
-                compiled.num_parts,
-                source.name,
-                source.sha256,
-                split,
-            )  # fmt: skip
+                key=key,
+                category=compiled.category,
+                object_id=compiled.object_id,
+                sha256=compiled.sha256,
+                num_parts=compiled.num_parts,
+                source=source.name,
+                source_sha256=source.sha256,
+                split=split,
+            )
         )
     for stray in staging.glob("_staged_*.npz"):
         stray.unlink()

@@ -19,7 +19,7 @@ import numpy as np
 from artsim.errors import ConfigError, RenderError
 from artsim.objects import ArticulatedObject
 from artsim.renderers import Renderer
-from artsim.sample import IMAGES, Sample, observe
+from artsim.sample import Sample, observe
 from artsim.sampling import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
 
 SPLITS = ("train", "val", "test")
@@ -56,17 +56,17 @@ class SampleOptions:
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> SampleOptions:
         """Inverse of ``dataclasses.asdict`` after a trip through JSON."""
-        pair = {
-            k: v if v is None or isinstance(v, (str, int, float)) else tuple(v)
-            for k, v in {**data["states"], **data["views"]}.items()
-            if k != "joint_range"
-        }
-        ranges = {name: (float(low), float(high)) for name, (low, high) in data["states"]["joint_range"].items()}
+
+        def pair(values: Any) -> Any:
+            return None if values is None else (float(values[0]), float(values[1]))
+
+        states, views, scale = data["states"], data["views"], data["scale"]
+        ranges = {name: (float(low), float(high)) for name, (low, high) in states["joint_range"].items()}
         return SampleOptions(
             num_points=data["num_points"],
-            scale=data["scale"] if isinstance(data["scale"], str) else tuple(data["scale"]),
-            states=StateOptions(pair["mode"], pair["fraction_open"], ranges),
-            views=ViewOptions(**{k: pair[k] for k in data["views"]}),
+            scale=scale if scale in ("native", "unit") else (float(scale[0]), float(scale[1])),
+            states=StateOptions(states["mode"], pair(states["fraction_open"]), ranges),
+            views=ViewOptions(**{k: pair(v) if isinstance(v, list) else v for k, v in views.items()}),
             renderer=data["renderer"],
             images=tuple(data["images"]),
         )

@@ -296,7 +296,8 @@ class _Rays:
             step = max(1, len(pixels) // 1024)
             _, part, hits = cast(self.posed, pixels[step // 2 :: step])
             met[k], saw[k] = hits[k], np.count_nonzero(part == k)
-        return saw / np.maximum(met, 1)
+        fraction: Array = saw / np.maximum(met, 1)
+        return fraction
 
 
 def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
@@ -306,7 +307,8 @@ def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
         _, _, amodal = cast(posed, window_pixels(posed.window, posed.camera.width))
     visible = np.bincount(frame.part_ids.ravel(), minlength=BACKGROUND + 1)[: len(amodal)]
     # A rasteriser may cover a pixel more than the rays do at a silhouette.
-    return np.minimum(visible / np.maximum(amodal, 1), 1.0)
+    fraction: Array = np.minimum(visible / np.maximum(amodal, 1), 1.0)
+    return fraction
 
 
 def _npcs(points: Array, part: NDArray[np.uint8], posed: PosedObject) -> Array:

@@ -29,7 +29,7 @@ _MAX_MEMBER = 1 << 30
 
 
 def sample_members(sample: Sample) -> dict[str, bytes]:
-    """Member suffix -> content: ``points.npy``, ``part.npy``, ``npcs.npy``, ``json``, and images where there are any."""
+    """Member suffix -> content: ``points.npy``, ``part.npy``, ``npcs.npy``, ``json``, and the images there are."""
     members = {f"{name}.npy": npy_bytes(getattr(sample, name)) for name in _CLOUD}
     record: dict[str, Any] = {name: getattr(sample, name) for name in _SCALARS}
     record |= {name: list(getattr(sample, name)) for name in _STRINGS}

@@ -329,9 +329,7 @@ def _slide_rate(turn: _Body, slide: _Body) -> float:
 # --- bodies become a tree ---------------------------------------------------------------------------------------
 
 
-def _tree(
-    bodies: list[_Body], file: Path, repairs: list[Repair]
-) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
+def _tree(bodies: list[_Body], file: Path, repairs: list[Repair]) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
     """Tree in the base link's frame with rest state 0, and where each of the file's joints went."""
     index = {body.joint.name: k for k, body in enumerate(bodies) if body.joint is not None}
     position = {id(body): k for k, body in enumerate(bodies)}
@@ -384,9 +382,7 @@ def _mimic(joint: yourdfpy.Joint, index: Mapping[str, int], file: Path, repairs:
     return Mimic(source, 1.0 if multiplier is None else float(multiplier), 0.0 if offset is None else float(offset))
 
 
-def _to_rest_frame(
-    tree: KinematicTree, parts: list[Part], rest: Array
-) -> tuple[KinematicTree, list[Part], Array]:
+def _to_rest_frame(tree: KinematicTree, parts: list[Part], rest: Array) -> tuple[KinematicTree, list[Part], Array]:
     """Pose everything at the rest state and move the origin to the centre of the whole object's box.
 
     Returns the tree, the parts and ``T_base_rest``.
@@ -399,7 +395,9 @@ def _to_rest_frame(
     center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
     joints = [
         replace(joint, axis=_triple(a), origin=_triple(o - center), rest=float(r))
-        for joint, a, o, r in zip(tree.joints, axes / np.linalg.norm(axes, axis=1, keepdims=True), origins, rest, strict=True)
+        for joint, a, o, r in zip(
+            tree.joints, axes / np.linalg.norm(axes, axis=1, keepdims=True), origins, rest, strict=True
+        )
     ]
     joints[0] = replace(joints[0], origin=(0.0, 0.0, 0.0))
     T_base_rest = np.eye(4)

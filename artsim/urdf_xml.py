@@ -207,7 +207,9 @@ def _check_limit(joint: etree._Element, kind: str, name: str, where: str, repair
             limit.attrib.pop(attribute)  # not kinematics; some files carry text here
     lower = float(_numbers(limit, "lower", 1, where, "0")[0])
     upper = float(_numbers(limit, "upper", 1, where, "0")[0])
-    if any(text.strip().startswith("-0") and float(text) == 0 for text in (limit.get("lower", ""), limit.get("upper", ""))):
+    if any(
+        text.strip().startswith("-0") and float(text) == 0 for text in (limit.get("lower", ""), limit.get("upper", ""))
+    ):
         repairs.append(Repair(name, "limit -0 read as 0"))
     if lower > upper:
         repairs.append(Repair(name, f"limits {lower:g} and {upper:g} swapped"))

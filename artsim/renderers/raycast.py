@@ -73,8 +73,8 @@ def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: A
     T_world_object : (4, 4) float, optional
         Pose of the rest frame in the world; identity by default.
     """
-    T_camera_object = camera.T_camera_world if T_world_object is None else camera.T_camera_world @ T_world_object
-    T_camera_part = T_camera_object @ obj.tree.forward_kinematics(q)
+    T_world_rest = np.eye(4) if T_world_object is None else np.asarray(T_world_object, dtype=np.float64)
+    T_camera_part = camera.T_camera_world @ T_world_rest @ obj.tree.forward_kinematics(q)
     return PosedObject(obj, camera, T_camera_part, _windows(obj, camera, T_camera_part))
 
 
