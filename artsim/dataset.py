@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from artsim.errors import ConfigError, DatasetError
 from artsim.kinematics import JOINT_TYPES
+from artsim.object_file import ObjectCache
 from artsim.objects import ArticulatedObject
-from artsim.pipeline import ObjectCache, ShardRecord
-from artsim.plan import FORMAT, SPLITS, Plan, draw_sample
+from artsim.plan import FORMAT, SPLITS, Plan, ShardRecord, draw_sample
 from artsim.renderers import Renderer, make_renderer
 from artsim.sample import Sample
 from artsim.shards import ShardReader, sample_key
@@ -229,7 +229,7 @@ def read_description(folder: Path) -> dict[str, Any]:
         raise DatasetError(f"dataset.json is damaged ({error})", folder, "delete it and rerun generate") from error
     if found != FORMAT:
         raise DatasetError(f"format {found} is not {FORMAT}", folder, "generate it with this version of artsim")
-    return description  # type: ignore[no-any-return]
+    return description
 
 
 def file_sha256(path: Path) -> str:

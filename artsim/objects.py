@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.errors import AssetError, ConfigError, KinematicsError
-from artsim.files import read_npz, write_atomic
 from artsim.kinematics import Array, KinematicTree
 
 if TYPE_CHECKING:
@@ -206,70 +202,3 @@ def content_sha256(chunks: Sequence[bytes]) -> str:
         digest.update(len(chunk).to_bytes(8, "little"))
         digest.update(chunk)
     return digest.hexdigest()
-
-
-_COMPILED_FORMAT = 1
-
-
-def save_object(obj: ArticulatedObject, path: Path) -> None:
-    """Write an object as one compact ``.npz`` that :func:`load_object` reads back without the source folder."""
-    header = {
-        "format": _COMPILED_FORMAT,
-        "object_id": obj.object_id,
-        "category": obj.category,
-        "names": [p.name for p in obj.parts],
-        "labels": [p.label for p in obj.parts],
-        "tree": obj.native_tree.to_dict(),
-        "sha256": obj.sha256,
-        "scale": obj.scale,
-        "T_base_rest": obj.T_base_rest.tolist(),
-        "repairs": [[r.where, r.what] for r in obj.repairs],
-        "source_joints": {name: list(v) for name, v in obj.source_joints.items()},
-    }
-    vertices = np.concatenate([p.vertices for p in obj.parts])
-    faces = np.concatenate([p.faces for p in obj.parts])
-    buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
-        vertices=vertices,
-        faces=faces,
-        vertex_counts=np.array([len(p.vertices) for p in obj.parts]),
-        face_counts=np.array([len(p.faces) for p in obj.parts]),
-    )
-    write_atomic(path, buffer.getvalue())
-
-
-def load_object(path: Path) -> ArticulatedObject:
-    """Read an object written by :func:`save_object`.
-
-    Raises
-    ------
-    AssetError
-        When the file is missing, damaged or of another format.
-    """
-    arrays = read_npz(path)
-    try:
-        header: dict[str, Any] = json.loads(arrays["header"].tobytes())
-        if header["format"] != _COMPILED_FORMAT:
-            raise AssetError(f"format {header['format']} is not {_COMPILED_FORMAT}", path, "generate it again")
-        vertices = np.split(arrays["vertices"], np.cumsum(arrays["vertex_counts"])[:-1])
-        faces = np.split(arrays["faces"], np.cumsum(arrays["face_counts"])[:-1])
-        parts = tuple(
-            Part(name, label, v, f)
-            for name, label, v, f in zip(header["names"], header["labels"], vertices, faces, strict=True)
-        )
-        return ArticulatedObject(
-            object_id=header["object_id"],
-            category=header["category"],
-            parts=parts,
-            native_tree=KinematicTree.from_dict(header["tree"]),
-            sha256=header["sha256"],
-            scale=header["scale"],
-            T_base_rest=np.array(header["T_base_rest"]),
-            repairs=tuple(Repair(*r) for r in header["repairs"]),
-            source=str(path),
-            source_joints={name: (int(k), float(m)) for name, (k, m) in header["source_joints"].items()},
-        )
-    except (KeyError, ValueError, TypeError) as error:
-        raise AssetError(f"not an artsim object file ({error})", path, "generate it again") from error

@@ -8,15 +8,10 @@ presence means that the dataset is complete.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import multiprocessing
-import os
-import signal
 import sys
-import threading
 import time
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -28,116 +23,15 @@ from tqdm import tqdm
 
 from artsim.errors import ArtsimError, AssetError, DatasetError
 from artsim.files import write_atomic
-from artsim.objects import ArticulatedObject, load_object, save_object
-from artsim.plan import FORMAT, Plan, PlannedObject, SampleOptions, Shard, assign_splits, draw_sample, unique_keys
-from artsim.renderers import Renderer, make_renderer
-from artsim.shards import tar_bytes
-from artsim.sources import Source, load_source
+from artsim.plan import FORMAT, Plan, PlannedObject, SampleOptions, Shard, ShardRecord, assign_splits, unique_keys
+from artsim.sources import Source
+from artsim.worker import CompiledSource, compile_source, make_shard, start_quiet_child, start_worker
 
 CONVENTIONS = (
     "Metres, radians. Camera frame OpenCV (x right, y down, z forward); depth is z-depth, 0 = no return; pixel centres "
     "at +0.5. T_camera_part maps the rest frame, as carried by each part, to the camera. Rest frame: Z up, front "
     "towards -X, origin at the centre of the object's box in its rest state."
 )
-_CACHE_BYTES = 250_000_000
-_STEP = 16  # samples between two looks at the stop flag
-
-
-@dataclass(frozen=True)
-class ShardRecord:
-    """A finished shard: its samples are ``first`` to ``end`` (exclusive)."""
-
-    name: str
-    split: str
-    first: int
-    end: int
-    bytes: int
-    sha256: str
-
-
-class ObjectCache:
-    """Compiled objects of a dataset folder, the least recently used dropped once they take too much memory."""
-
-    def __init__(self, folder: Path, max_bytes: int = _CACHE_BYTES):
-        self.folder = folder
-        self.max_bytes = max_bytes
-        self._objects: OrderedDict[str, ArticulatedObject] = OrderedDict()
-
-    def __getitem__(self, key: str) -> ArticulatedObject:
-        obj = self._objects.get(key)
-        if obj is None:
-            obj = self._objects[key] = load_object(self.folder / f"{key}.npz")
-            while len(self._objects) > 1 and sum(map(_memory, self._objects.values())) > self.max_bytes:
-                self._objects.popitem(last=False)
-        self._objects.move_to_end(key)
-        return obj
-
-
-def _memory(obj: ArticulatedObject) -> int:
-    """Bytes that an object takes with its acceleration structures (measured: about 180 for each triangle)."""
-    return 40_000 + 180 * obj.num_faces
-
-
-# --- the worker ------------------------------------------------------------------------------------------------
-
-
-@dataclass
-class _Worker:
-    """What a worker process keeps between shards."""
-
-    plan: Plan
-    folder: Path
-    objects: ObjectCache
-    renderer: Renderer
-    made: Any  # shared counter of samples
-    stop: Any  # shared event
-
-
-_worker: _Worker | None = None
-
-
-def _start_worker(plan: Plan, folder: Path, made: Any, stop: Any) -> None:
-    global _worker
-    _start_quiet_child()
-    renderer = make_renderer(plan.sample.renderer)
-    _worker = _Worker(plan, folder, ObjectCache(folder / "objects"), renderer, made, stop)
-
-
-def _start_quiet_child() -> None:
-    """Leave Ctrl-C to the parent, and end with it even when it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
-
-    def follow() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
-
-
-def _make_shard(shard: Shard) -> ShardRecord | None:
-    """Make and write one shard; None when asked to stop before it is whole."""
-    assert _worker is not None
-    worker = _worker
-    samples = []
-    for index in range(shard.first, shard.end):
-        if (index - shard.first) % _STEP == 0 and worker.stop.is_set():
-            return None
-        planned = worker.plan.object_of(index)
-        samples.append(
-            draw_sample(worker.objects[planned.key], worker.plan.sample, worker.plan.seed, index, worker.renderer)
-        )
-        if (index - shard.first) % _STEP == _STEP - 1 or index == shard.end - 1:
-            with worker.made.get_lock():
-                worker.made.value += (index - shard.first) % _STEP + 1
-    data = tar_bytes(samples)
-    write_atomic(worker.folder / shard.name, data)
-    digest = hashlib.sha256(data).hexdigest()
-    return ShardRecord(shard.name, shard.split, shard.first, shard.end, len(data), digest)
-
-
-# --- the parent ------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -301,16 +195,16 @@ def _new_plan(
     progress: bool,
 ) -> tuple[Plan, list[str]]:
     """Load every source, keep it compiled in the folder, and write the plan."""
-    loaded: list[tuple[Source, _Compiled]] = []
+    loaded: list[tuple[Source, CompiledSource]] = []
     broken: list[tuple[Source, str]] = []
     staging = folder / "objects"
     staging.mkdir(exist_ok=True)
     context = multiprocessing.get_context("spawn")
     with (
-        ProcessPoolExecutor(min(workers, len(sources)), context, _start_quiet_child) as pool,
+        ProcessPoolExecutor(min(workers, len(sources)), context, start_quiet_child) as pool,
         tqdm(total=len(sources), desc="objects", unit="object", disable=not progress) as bar,
     ):
-        futures = [pool.submit(_compile, source, staging) for source in sources]
+        futures = [pool.submit(compile_source, source, staging) for source in sources]
         try:
             for source, future in zip(sources, futures, strict=True):
                 try:
@@ -326,7 +220,7 @@ def _new_plan(
             f"{len(broken)} of {len(sources)} objects do not load:\n  " + "\n  ".join(text for _, text in broken[:20]),
             mend="mend them, or leave them out with --skip-broken",
         )
-    unique: dict[tuple[str, str, str], tuple[Source, _Compiled]] = {}
+    unique: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
     for source, compiled in loaded:  # the same object named twice counts once
         unique.setdefault((compiled.category, compiled.object_id, compiled.sha256), (source, compiled))
     keys = unique_keys(list(unique))
@@ -357,22 +251,6 @@ def _new_plan(
     return plan, [text for _, text in broken]
 
 
-@dataclass(frozen=True)
-class _Compiled:
-    staged: str
-    category: str
-    object_id: str
-    sha256: str
-    num_parts: int
-
-
-def _compile(source: Source, staging: Path) -> _Compiled:
-    obj = load_source(source)
-    staged = f"_staged_{hashlib.sha256(source.name.encode()).hexdigest()[:16]}.npz"
-    save_object(obj, staging / staged)
-    return _Compiled(staged, obj.category, obj.object_id, obj.sha256, len(obj))
-
-
 def _finished_shards(folder: Path, plan: Plan) -> dict[str, ShardRecord]:
     """Shards that earlier runs finished and that are still there at their full size."""
     path = folder / "progress.jsonl"
@@ -399,14 +277,14 @@ def _run(
     """Make the missing shards on worker processes, writing down each as it is finished."""
     context = multiprocessing.get_context("spawn")
     made, stop = context.Value("q", 0), context.Event()
-    pool = ProcessPoolExecutor(min(workers, len(shards)), context, _start_worker, (plan, folder, made, stop))
+    pool = ProcessPoolExecutor(min(workers, len(shards)), context, start_worker, (plan, folder, made, stop))
     finished: dict[str, ShardRecord] = {}
     bar = tqdm(
         total=plan.num_samples, initial=before, desc="samples", unit="sample", smoothing=0.05, disable=not progress
     )
     try:
         with (folder / "progress.jsonl").open("a") as journal:
-            pending: set[Future[ShardRecord | None]] = {pool.submit(_make_shard, shard) for shard in shards}
+            pending: set[Future[ShardRecord | None]] = {pool.submit(make_shard, shard) for shard in shards}
             while pending:
                 done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
                 for future in done:

@@ -232,6 +232,18 @@ class Shard:
     end: int
 
 
+@dataclass(frozen=True)
+class ShardRecord:
+    """A finished shard: its samples are ``first`` to ``end`` (exclusive)."""
+
+    name: str
+    split: str
+    first: int
+    end: int
+    bytes: int
+    sha256: str
+
+
 def assign_splits(objects: Sequence[tuple[str, str]], fractions: tuple[float, float, float], seed: int) -> list[str]:
     """Split of each object: by object, never by view, stratified by category.
 

@@ -181,4 +181,4 @@ def view_sampler(name: str) -> ViewSampler:
         raise ConfigError(f"cannot import {name!r} ({error})", "views.custom", "write module:function") from error
     if not callable(sampler):
         raise ConfigError(f"{name!r} is not a function", "views.custom", "write module:function")
-    return sampler  # type: ignore[no-any-return]
+    return sampler

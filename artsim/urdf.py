@@ -19,7 +19,8 @@ from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
 from artsim.meshes import LoadLimits, MeshReader, UnusableMesh, merged
-from artsim.objects import ArticulatedObject, Part, Repair, content_sha256, load_object
+from artsim.object_file import load_object
+from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
 from artsim.partnet import read_side_files
 from artsim.rest import canonical_category, rest_state
 from artsim.urdf_xml import parse_robot

@@ -1,0 +1,99 @@
+"""The worker process of a generation run: makes whole shards, follows its parent, never outlives it."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from artsim.files import write_atomic
+from artsim.object_file import ObjectCache, save_object
+from artsim.plan import Plan, Shard, ShardRecord, draw_sample
+from artsim.renderers import Renderer, make_renderer
+from artsim.shards import tar_bytes
+from artsim.sources import Source, load_source
+
+_STEP = 16  # samples between two looks at the stop flag
+
+
+@dataclass
+class _Worker:
+    """What a worker process keeps between shards."""
+
+    plan: Plan
+    folder: Path
+    objects: ObjectCache
+    renderer: Renderer
+    made: Any  # shared counter of samples
+    stop: Any  # shared event
+
+
+_worker: _Worker | None = None
+
+
+def start_worker(plan: Plan, folder: Path, made: Any, stop: Any) -> None:
+    """Prepare a process for :func:`make_shard`; ``made`` counts samples, ``stop`` asks to stop."""
+    global _worker
+    start_quiet_child()
+    renderer = make_renderer(plan.sample.renderer)
+    _worker = _Worker(plan, folder, ObjectCache(folder / "objects"), renderer, made, stop)
+
+
+def start_quiet_child() -> None:
+    """Leave Ctrl-C to the parent, and end with it even when it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        while os.getppid() == parent.pid:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+def make_shard(shard: Shard) -> ShardRecord | None:
+    """Make and write one shard; None when asked to stop before it is whole."""
+    assert _worker is not None
+    worker = _worker
+    samples = []
+    for index in range(shard.first, shard.end):
+        if (index - shard.first) % _STEP == 0 and worker.stop.is_set():
+            return None
+        planned = worker.plan.object_of(index)
+        samples.append(
+            draw_sample(worker.objects[planned.key], worker.plan.sample, worker.plan.seed, index, worker.renderer)
+        )
+        if (index - shard.first) % _STEP == _STEP - 1 or index == shard.end - 1:
+            with worker.made.get_lock():
+                worker.made.value += (index - shard.first) % _STEP + 1
+    data = tar_bytes(samples)
+    write_atomic(worker.folder / shard.name, data)
+    digest = hashlib.sha256(data).hexdigest()
+    return ShardRecord(shard.name, shard.split, shard.first, shard.end, len(data), digest)
+
+
+@dataclass(frozen=True)
+class CompiledSource:
+    """What the plan needs to know of a source, and the name of its compiled file."""
+
+    staged: str
+    category: str
+    object_id: str
+    sha256: str
+    num_parts: int
+
+
+def compile_source(source: Source, staging: Path) -> CompiledSource:
+    """Load a source and keep it compiled in the folder, under a provisional name."""
+    obj = load_source(source)
+    staged = f"_staged_{hashlib.sha256(source.name.encode()).hexdigest()[:16]}.npz"
+    save_object(obj, staging / staged)
+    return CompiledSource(staged, obj.category, obj.object_id, obj.sha256, len(obj))
