@@ -14,7 +14,7 @@ from artsim.errors import ConfigError, RenderError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer, shared_renderer
-from artsim.renderers.raycast import PosedObject, cast, pose, window_pixels
+from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visibility
 
 IMAGES = ("depth", "part_mask", "rgb")
 """Images that a sample can carry besides its cloud."""
@@ -289,13 +289,7 @@ class _Rays:
         """(K,) estimate with a standard error of at most 0.05, exact for parts of few pixels."""
         met, saw = self.met.copy(), self.saw.copy()
         for k in np.flatnonzero(met < self.enough):
-            window = self.posed.windows[k]
-            pixels = window_pixels(tuple(window), self.posed.camera.width)
-            if len(pixels) == 0:
-                continue
-            step = max(1, len(pixels) // 1024)
-            _, part, hits = cast(self.posed, pixels[step // 2 :: step])
-            met[k], saw[k] = hits[k], np.count_nonzero(part == k)
+            met[k], saw[k] = visibility(self.posed, int(k), max_rays=512)
         fraction: Array = saw / np.maximum(met, 1)
         return fraction
 
@@ -304,7 +298,8 @@ def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
     """(K,) visible pixels of the frame over amodal pixels, which are cast where the renderer does not count them."""
     amodal = frame.amodal_pixels
     if amodal is None:
-        _, _, amodal = cast(posed, window_pixels(posed.window, posed.camera.width))
+        amodal = render_posed(posed).amodal_pixels
+    assert amodal is not None
     visible = np.bincount(frame.part_ids.ravel(), minlength=BACKGROUND + 1)[: len(amodal)]
     # A rasteriser may cover a pixel more than the rays do at a silhouette.
     fraction: Array = np.minimum(visible / np.maximum(amodal, 1), 1.0)
