@@ -121,7 +121,7 @@ def observe(
 
     The cloud is ``num_points`` pixels drawn uniformly without replacement from those that show the object (with
     replacement once there are fewer). Without images, ``raycast`` casts only as many of them as the cloud needs:
-    pixels are visited in the same random order in both cases, so the same ``rng`` gives the same cloud.
+    the same pixels are looked at in both cases, so that the same ``rng`` gives the same cloud.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def _lookup(frame: Frame) -> Look:
 def draw_visible(
     posed: PosedObject, look: Look, num_points: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]:
-    """Visit pixels of the object's window in random order until ``num_points`` of them show the object.
+    """Look at random pixels of the object's window until ``num_points`` of them show the object.
 
     Returns
     -------
@@ -238,21 +238,20 @@ def draw_visible(
     first_row, end_row, first_column, end_column = posed.window
     columns = end_column - first_column
     total = (end_row - first_row) * columns
-    seen = np.zeros(total, dtype=bool)
-    turn = np.empty(total, dtype=np.int64)
+    fresh = np.ones(total, dtype=bool)
     hits: list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]] = []
     found = visited = 0
     while found < num_points and visited < total:
         # As many as it should take, judging by the share of hits so far, and a few more.
-        share = max(found, 1) / max(visited, 2)
-        wanted = int(1.15 * (num_points - found) / share) + 64
+        wanted = int(1.1 * (num_points - found) * max(visited, 2) / max(found, 1)) + 64
         if visited + wanted > total // 2:
-            local = rng.permutation(np.flatnonzero(~seen))
+            left = np.flatnonzero(fresh)
+            local = left if wanted >= len(left) else np.sort(rng.permutation(left)[:wanted])
         else:
-            drawn = rng.integers(0, total, size=wanted)
-            turn[drawn[::-1]] = np.arange(wanted)[::-1]  # the first turn of a pixel that was drawn twice
-            local = drawn[(turn[drawn] == np.arange(wanted)) & ~seen[drawn]]
-        seen[local] = True
+            drawn = np.zeros(total, dtype=bool)
+            drawn[rng.integers(0, total, size=wanted)] = True
+            local = np.flatnonzero(drawn & fresh)  # in order: neighbouring rays share memory
+        fresh[local] = False
         row, column = np.divmod(local, columns)
         pixels = (row + first_row) * posed.camera.width + column + first_column
         depth, part = look(pixels)
@@ -261,10 +260,11 @@ def draw_visible(
         visited, found = visited + len(local), found + len(hit)
     if found == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.uint8)
-    pixels, depth, part = (np.concatenate(column)[:num_points] for column in zip(*hits, strict=True))
+    # Every visible pixel has had the same chance so far, so that any choice among those found is uniform.
+    chosen = rng.permutation(found)[:num_points]
     if found < num_points:
-        again = np.concatenate([np.arange(found), rng.integers(0, found, size=num_points - found)])
-        pixels, depth, part = pixels[again], depth[again], part[again]
+        chosen = np.concatenate([chosen, rng.integers(0, found, size=num_points - found)])
+    pixels, depth, part = (np.concatenate(column)[chosen] for column in zip(*hits, strict=True))
     return pixels, depth, part
 
 

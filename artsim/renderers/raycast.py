@@ -85,7 +85,7 @@ def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: A
 
 _CORNERS = np.array([[i & 1, i & 2, i & 4] for i in range(8)], dtype=bool)
 _EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
-_MARGIN = 1e-2  # pixels: covers the difference between single and double precision
+_MARGIN = np.float32(0.05)  # pixels: covers single precision
 
 
 def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDArray[np.float32]:
@@ -94,9 +94,10 @@ def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDAr
     seen = transform_points(T_camera_part, corners)
     depth = seen[..., 2]
     image = camera.project(np.where(depth[..., None] > 0, seen, [0.0, 0.0, 1.0]))
+    image = image.clip(-1e6, 1e6).astype(np.float32)
     start, end = image[:, _EDGES[:, 0]], image[:, _EDGES[:, 1]]
     rise = end[..., 1] - start[..., 1]
-    rows = np.arange(camera.height) + 0.5
+    rows = np.arange(camera.height, dtype=np.float32) + np.float32(0.5)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = (rows - start[..., 1, None]) / rise[..., None]
     slack = _MARGIN / np.maximum(np.abs(rise), _MARGIN)[..., None]
@@ -108,7 +109,7 @@ def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDAr
     spans[(depth <= 0).any(axis=1)] = np.array([-np.inf, np.inf])[:, None]  # reaches behind the camera: anywhere
     hidden = (depth <= 0).all(axis=1) | np.array([len(part.faces) == 0 for part in obj.parts])
     spans[hidden] = np.array([np.inf, -np.inf])[:, None]
-    return spans.astype(np.float32)
+    return spans
 
 
 def _windows(spans: NDArray[np.float32], width: int) -> NDArray[np.int64]:
