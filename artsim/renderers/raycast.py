@@ -105,7 +105,7 @@ def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDAr
     column = start[..., 0, None] + along * (end[..., 0] - start[..., 0])[..., None]
     low = np.where(crossed, column, np.inf).min(axis=1) - _MARGIN
     high = np.where(crossed, column, -np.inf).max(axis=1) + _MARGIN
-    spans = np.stack([low, high], axis=1) - 0.5
+    spans = np.stack([low, high], axis=1) - np.float32(0.5)
     spans[(depth <= 0).any(axis=1)] = np.array([-np.inf, np.inf])[:, None]  # reaches behind the camera: anywhere
     hidden = (depth <= 0).all(axis=1) | np.array([len(part.faces) == 0 for part in obj.parts])
     spans[hidden] = np.array([np.inf, -np.inf])[:, None]
