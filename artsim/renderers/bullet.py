@@ -107,7 +107,7 @@ class _World:
         spec = importlib.util.find_spec("eglRenderer")
         if spec is None or spec.origin is None:
             raise RenderError("this PyBullet has no EGL plugin", "pybullet-egl", _EGL_MEND)
-        with _silent_stdout():
+        with _silent():
             plugin = self._bullet.loadPlugin(spec.origin, "_eglRendererPlugin", physicsClientId=self._client)
         if plugin < 0:
             raise RenderError("EGL does not start", "pybullet-egl", _EGL_MEND)
@@ -135,7 +135,7 @@ class _World:
             if body >= 0:
                 quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()
                 self._bullet.resetBasePositionAndOrientation(body, T[:3, 3], quaternion, physicsClientId=self._client)
-        with _silent_stdout():
+        with _silent():
             _, _, rgb, buffer, bodies = self._bullet.getCameraImage(
                 camera.width,
                 camera.height,
@@ -154,7 +154,7 @@ class _World:
 
     def close(self) -> None:
         """Unload the plugin and disconnect."""
-        with _silent_stdout():
+        with _silent():
             if self._plugin >= 0:
                 self._bullet.unloadPlugin(self._plugin, physicsClientId=self._client)
             self._bullet.disconnect(self._client)
@@ -205,7 +205,7 @@ def _projection(camera: Camera, near: float, far: float, shift: tuple[float, flo
 
 def _import_pybullet() -> ModuleType:
     try:
-        with _silent_stdout():
+        with _silent():
             import pybullet
     except ImportError as error:
         raise RenderError("PyBullet is not installed", "pybullet", "pip install 'artsim[pybullet]'") from error
@@ -213,15 +213,17 @@ def _import_pybullet() -> ModuleType:
 
 
 @contextlib.contextmanager
-def _silent_stdout() -> Iterator[None]:
+def _silent() -> Iterator[None]:
     """Keep PyBullet's own chatter, which it prints from C, out of the program's output."""
     sys.stdout.flush()
+    sys.stderr.flush()
     with contextlib.ExitStack() as stack:
-        saved = os.dup(1)
-        stack.callback(os.close, saved)
         null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, 1)
-        os.close(null)
-        stack.callback(os.dup2, saved, 1)
+        stack.callback(os.close, null)
+        for stream in (1, 2):
+            saved = os.dup(stream)
+            stack.callback(os.close, saved)
+            os.dup2(null, stream)
+            stack.callback(os.dup2, saved, stream)
         stack.callback(ctypes.CDLL(None).fflush, None)  # C buffers what it prints
         yield
