@@ -1,0 +1,372 @@
+"""Build the demo objects of this folder: ``python urdf_assets/build.py``. Deterministic; rerunning changes no byte.
+
+Objects are drawn in their rest frame (metres, Z up, front towards -X) and written as PartNet-Mobility folders: Y-up
+meshes, an empty ``base`` link, and joints without rotations of their own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from shapely.geometry import LineString, Point, Polygon
+from shapely.ops import unary_union
+
+Vector = Sequence[float]
+Mesh = trimesh.Trimesh
+
+
+# --- shapes ------------------------------------------------------------------------------------------------------
+
+
+def box(low: Vector, high: Vector) -> Mesh:
+    """Axis-aligned box between two corners."""
+    return trimesh.creation.box(bounds=[low, high])
+
+
+def rod(start: Vector, end: Vector, radius: float, sections: int = 24) -> Mesh:
+    """Cylinder between two points."""
+    return trimesh.creation.cylinder(radius, segment=[start, end], sections=sections)
+
+
+def plate(outline: Polygon, low: float, high: float) -> Mesh:
+    """A polygon of the XY plane, extruded from one height to another."""
+    mesh = trimesh.creation.extrude_polygon(outline, high - low)
+    mesh.apply_translation([0, 0, low])
+    return mesh
+
+
+def upright(outline: Polygon, x_low: float, x_high: float) -> Mesh:
+    """A polygon of the YZ plane, extruded along X."""
+    mesh = plate(outline, x_low, x_high)
+    mesh.apply_transform([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    return mesh
+
+
+def along_y(point: Vector, distance: float) -> Vector:
+    """A point moved along Y."""
+    return (point[0], point[1] + distance, point[2])
+
+
+def rounded(width: float, depth: float, radius: float, center: Vector = (0, 0)) -> Polygon:
+    """Rectangle with round corners."""
+    half = np.array([width, depth]) / 2 - radius
+    corners = [(sx * half[0] + center[0], sy * half[1] + center[1]) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return Polygon(corners).buffer(radius, quad_segs=6)
+
+
+# --- PartNet-style folders -----------------------------------------------------------------------------------------
+
+
+@dataclass
+class Link:
+    """One part: its solids, and the joint that carries it (none for the root)."""
+
+    name: str
+    label: str
+    solids: list[tuple[str, Mesh]]
+    parent: str = "base"
+    kind: str = "fixed"
+    origin: Vector = (0, 0, 0)
+    axis: Vector = (0, 0, 1)
+    limits: tuple[float, float] = (0, 0)
+
+
+@dataclass
+class Model:
+    """An object to be written."""
+
+    category: str
+    links: list[Link] = field(default_factory=list)
+
+
+def y_up(vector: Vector) -> np.ndarray:
+    """PartNet's mesh axes for a direction or point of the rest frame."""
+    x, y, z = vector
+    return np.array([-y, z, -x]) + 0.0
+
+
+def numbers(vector: Vector) -> str:
+    return " ".join(f"{v + 0.0:.6g}" for v in np.round(vector, 9))
+
+
+def write(model: Model, folder: Path) -> None:
+    """Write ``mobility.urdf``, meshes and side files."""
+    meshes = folder / "textured_objs"
+    meshes.mkdir(parents=True, exist_ok=True)
+    lines = ['<?xml version="1.0" ?>', f'<robot name="artsim_{folder.name}">', '\t<link name="base"/>']
+    origins = {link.name: np.array(link.origin, dtype=float) for link in model.links} | {"base": np.zeros(3)}
+    count = 0
+    for link in model.links:
+        visuals, collisions = [], []
+        for name, solid in link.solids:
+            file = f"textured_objs/{count}.obj"
+            count += 1
+            (folder / file).write_text(obj_text(solid))
+            shape = (
+                f'<origin xyz="{numbers(y_up(-origins[link.name]))}"/><geometry><mesh filename="{file}"/></geometry>'
+            )
+            visuals.append(f'\t\t<visual name="{name}-{count}">{shape}</visual>')
+            collisions.append(f"\t\t<collision>{shape}</collision>")
+        lines += [f'\t<link name="{link.name}">', *visuals, *collisions, "\t</link>"]
+        lines.append(f'\t<joint name="joint_{link.name.split("_")[1]}" type="{link.kind}">')
+        if link.kind == "fixed":
+            lines.append('\t\t<origin rpy="1.570796326794897 0 -1.570796326794897" xyz="0 0 0"/>')
+        else:
+            lines.append(f'\t\t<origin xyz="{numbers(y_up(origins[link.name] - origins[link.parent]))}"/>')
+            lines.append(f'\t\t<axis xyz="{numbers(y_up(link.axis))}"/>')
+            lines.append(f'\t\t<limit lower="{link.limits[0]:.9g}" upper="{link.limits[1]:.9g}"/>')
+        lines += [f'\t\t<child link="{link.name}"/>', f'\t\t<parent link="{link.parent}"/>', "\t</joint>"]
+    (folder / "mobility.urdf").write_text("\n".join([*lines, "</robot>", ""]))
+    words = {"fixed": "static", "revolute": "hinge", "prismatic": "slider"}
+    semantics = [f"{link.name} {words[link.kind]} {link.label}\n" for link in model.links]
+    (folder / "semantics.txt").write_text("".join(semantics))
+    (folder / "meta.json").write_text(json.dumps({"anno_id": folder.name, "model_cat": model.category}) + "\n")
+
+
+def obj_text(solid: Mesh) -> str:
+    lines = [f"v {numbers(y_up(vertex))}" for vertex in np.round(solid.vertices, 6)]
+    lines += [f"f {a} {b} {c}" for a, b, c in (solid.faces + 1).tolist()]
+    return "\n".join([*lines, ""])
+
+
+# --- the objects ---------------------------------------------------------------------------------------------------
+
+
+def laptop() -> Model:
+    """Base with keyboard and touchpad, lid with screen; the file's zero is the lid standing upright."""
+    width, depth, base_height, lid_height, gap = 0.330, 0.225, 0.016, 0.007, 0.0024
+    base = [("base_frame", plate(rounded(depth, width, 0.012), 0, base_height))]
+    pitch, key = 0.0195, 0.0165
+    for row in range(5):
+        x = 0.075 - row * pitch
+        columns = 14 if row < 4 else 9
+        for column in range(columns):
+            wide = row == 4 and column == 4
+            shift = 0 if row < 4 else (-2.5 if column < 4 else (0 if wide else 2.5))
+            y = (column - (columns - 1) / 2 + shift) * pitch
+            half = (key + (5 * pitch if wide else 0)) / 2
+            base.append(
+                ("key", box([x - key / 2, y - half, base_height], [x + key / 2, y + half, base_height + 0.0014]))
+            )
+    base.append(("touchpad", plate(rounded(0.062, 0.105, 0.004, (-0.070, 0)), base_height, base_height + 0.0004)))
+    base += [("foot", rod([x, y, -0.002], [x, y, 0], 0.008)) for x in (-0.09, 0.09) for y in (-0.14, 0.14)]
+    hinge = np.array([depth / 2 + 0.001, 0, base_height + 0.0015])
+    base += [("shaft", rod(along_y(hinge, y - 0.022), along_y(hinge, y + 0.022), 0.0042)) for y in (-0.11, 0.11)]
+    bottom, top = base_height + gap, base_height + gap + lid_height
+    notches = unary_union([rounded(0.02, 0.05, 0.001, (depth / 2 + 0.004, y)) for y in (-0.11, 0.11)])
+    lid = [
+        ("screen_frame", plate(rounded(depth, width, 0.012).difference(notches), bottom, top)),
+        ("screen", plate(rounded(depth - 0.03, width - 0.02, 0.002, (-0.004, 0)), bottom - 0.0003, bottom)),
+        ("shaft", rod(along_y(hinge, -0.085), along_y(hinge, 0.085), 0.0036)),
+    ]
+    upright_lid = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0], hinge)
+    for _, solid in lid:
+        solid.apply_transform(upright_lid)
+    return Model(
+        "Laptop",
+        [
+            Link("link_0", "base_body", base),
+            Link("link_1", "screen", lid, "link_0", "revolute", hinge, (0, 1, 0), (-np.pi / 2, 0.7)),
+        ],
+    )
+
+
+def cabinet() -> Model:
+    """Body with three open-topped drawers."""
+    width, depth, height, board, back = 0.48, 0.42, 0.66, 0.018, 0.008
+    x0, x1, y0, y1 = -depth / 2, depth / 2, -width / 2, width / 2
+    body = [
+        ("side", box([x0, y0, 0], [x1, y0 + board, height])),
+        ("side", box([x0, y1 - board, 0], [x1, y1, height])),
+        ("top", box([x0 - 0.012, y0 - 0.01, height], [x1, y1 + 0.01, height + board])),
+        ("bottom", box([x0, y0 + board, 0], [x1, y1 - board, board])),
+        ("back", box([x1 - back, y0 + board, board], [x1, y1 - board, height])),
+    ]
+    body += [
+        ("leg", rod([x, y, -0.08], [x, y, 0], 0.014)) for x in (x0 + 0.04, x1 - 0.04) for y in (y0 + 0.04, y1 - 0.04)
+    ]
+    links = [Link("link_0", "cabinet_frame", body)]
+    shares = np.array([0.24, 0.33, 0.43])
+    opening = height - board
+    tops = height - np.concatenate([[0], np.cumsum(shares)]) * opening
+    for number, (top, bottom) in enumerate(pairwise(tops), start=1):
+        low, high = bottom + 0.004, top - 0.004
+        inner0, inner1, end = y0 + board + 0.006, y1 - board - 0.006, x1 - back - 0.02
+        wall, rim = 0.010, low + 0.72 * (high - low)
+        drawer = [
+            ("front", box([x0 - board, y0 + 0.002, low], [x0 - 0.001, y1 - 0.002, high])),
+            ("bottom", box([x0 - 0.001, inner0, low + 0.02], [end, inner1, low + 0.028])),
+            ("side", box([x0 - 0.001, inner0, low + 0.028], [end, inner0 + wall, rim])),
+            ("side", box([x0 - 0.001, inner1 - wall, low + 0.028], [end, inner1, rim])),
+            ("back", box([end - wall, inner0 + wall, low + 0.028], [end, inner1 - wall, rim])),
+        ]
+        middle, face = 0.5 * (low + high), x0 - board
+        drawer.append(("handle", rod([face - 0.026, -0.07, middle], [face - 0.026, 0.07, middle], 0.006)))
+        drawer += [("handle", rod([face - 0.026, y, middle], [face, y, middle], 0.005)) for y in (-0.055, 0.055)]
+        links.append(Link(f"link_{number}", "drawer", drawer, "link_0", "prismatic", (0, 0, 0), (-1, 0, 0), (0, 0.3)))
+    return Model("StorageFurniture", links)
+
+
+def eyeglasses() -> Model:
+    """Two rims with lenses, bridge, nose pads and two legs; zero is open."""
+    thickness, spread = 0.004, 0.034
+    rims = []
+    for side in (-1, 1):
+        lens = Polygon(
+            [
+                (
+                    side * spread + 0.026 * np.sign(np.cos(a)) * abs(np.cos(a)) ** 0.75,
+                    0.0205 * np.sign(np.sin(a)) * abs(np.sin(a)) ** 0.75,
+                )
+                for a in np.linspace(0, 2 * np.pi, 48, endpoint=False)
+            ]
+        )
+        rims.append(("rim", upright(lens.buffer(0.0035).difference(lens), -thickness / 2, thickness / 2)))
+        rims.append(("lens", upright(lens.buffer(0.0005), -0.0006, 0.0006)))
+    bridge = LineString([(-0.010, 0.006), (-0.004, 0.0105), (0.004, 0.0105), (0.010, 0.006)]).buffer(0.0018)
+    frame = [*rims, ("bridge", upright(bridge, -thickness / 2, thickness / 2))]
+    for side in (-1, 1):
+        pad = trimesh.creation.icosphere(2, 1.0)
+        pad.apply_scale([0.0022, 0.0016, 0.0045])
+        pad.apply_translation([0.0055, side * 0.0085, -0.006])
+        arm = rod([0.0005, side * 0.0098, -0.003], [0.005, side * 0.0088, -0.005], 0.0007, 10)
+        frame += [("nose_pad", pad), ("nose_pad_arm", arm)]
+        y = side * (spread + 0.0285)
+        frame.append(
+            (
+                "end_piece",
+                box([-thickness / 2, min(y, y + side * 0.008), 0.006], [0.006, max(y, y + side * 0.008), 0.012]),
+            )
+        )
+    links = [Link("link_0", "glasses_body", frame)]
+    for number, side in enumerate((-1, 1), start=1):
+        outer = side * (spread + 0.0340)
+        hinge = np.array([0.0095, outer, 0.009])
+        path = LineString(
+            [(0.008, 0.009), (0.055, 0.0088), (0.098, 0.0075), (0.118, 0.001), (0.132, -0.012), (0.138, -0.022)]
+        )
+        temple = plate(path.buffer(0.0026, quad_segs=4), outer - 0.0013, outer + 0.0013)
+        temple.apply_transform([[1, 0, 0, 0], [0, 0, -1, 2 * outer], [0, 1, 0, 0], [0, 0, 0, 1]])
+        leg = [("leg", temple), ("hinge", rod((*hinge[:2], 0.006), (*hinge[:2], 0.012), 0.0019, 16))]
+        links.append(Link(f"link_{number}", "leg", leg, "link_0", "revolute", hinge, (0, 0, -side), (0, 1.45)))
+    return Model("Eyeglasses", links)
+
+
+def dishwasher() -> Model:
+    """Hollow tub, door hinged at its bottom edge, two wire racks that slide out."""
+    width, depth, height, wall = 0.598, 0.56, 0.82, 0.022
+    x0, x1, y0, y1, kick = -depth / 2, depth / 2, -width / 2, width / 2, 0.10
+    body = [
+        ("side", box([x0, y0, kick], [x1, y0 + wall, height])),
+        ("side", box([x0, y1 - wall, kick], [x1, y1, height])),
+        ("top", box([x0, y0 + wall, height - wall], [x1, y1 - wall, height])),
+        ("bottom", box([x0, y0 + wall, kick], [x1, y1 - wall, kick + wall])),
+        ("back", box([x1 - wall, y0 + wall, kick + wall], [x1, y1 - wall, height - wall])),
+        ("plinth", box([x0 + 0.05, y0 + 0.01, 0], [x1 - 0.02, y1 - 0.01, kick])),
+        ("spray_arm", box([-0.2, -0.02, kick + wall + 0.012], [0.2, 0.02, kick + wall + 0.022])),
+        ("spray_arm_hub", rod([0, 0, kick + wall], [0, 0, kick + wall + 0.012], 0.03)),
+    ]
+    face, inner = x0 - 0.045, x0 - 0.002
+    door = [
+        ("door_frame", box([face, y0, kick + 0.012], [inner, y1, height - 0.10])),
+        ("control_panel", box([face, y0, height - 0.098], [inner, y1, height])),
+        (
+            "door_lining",
+            box([inner, y0 + wall + 0.03, kick + wall + 0.07], [inner + 0.0012, y1 - wall - 0.03, height - 0.13]),
+        ),
+        ("handle", rod([face - 0.035, y0 + 0.08, height - 0.135], [face - 0.035, y1 - 0.08, height - 0.135], 0.008)),
+    ]
+    door += [
+        ("handle", rod([face - 0.035, y, height - 0.135], [face, y, height - 0.135], 0.006)) for y in (-0.19, 0.19)
+    ]
+    door += [
+        ("button", rod([face - 0.003, y, height - 0.05], [face, y, height - 0.05], 0.009))
+        for y in (0.14, 0.17, 0.2, 0.23)
+    ]
+    door.append(("display", box([face - 0.001, -0.06, height - 0.066], [face, 0.06, height - 0.034])))
+    hinge = (x0 - 0.02, 0.0, kick + 0.012)
+    links = [
+        Link("link_0", "dishwasher_body", body),
+        Link("link_1", "door", door, "link_0", "revolute", hinge, (0, -1, 0), (0, np.pi / 2)),
+    ]
+    for number, (low, deep) in enumerate(((kick + 0.075, 0.12), (kick + 0.36, 0.10)), start=2):
+        rack = wire_rack([x0 + 0.012, y0 + wall + 0.015, low], [x1 - wall - 0.02, y1 - wall - 0.015, low + deep])
+        links.append(Link(f"link_{number}", "rack", rack, "link_0", "prismatic", (0, 0, 0), (-1, 0, 0), (0, 0.38)))
+    return Model("Dishwasher", links)
+
+
+def wire_rack(low: Vector, high: Vector, wire: float = 0.0022) -> list[tuple[str, Mesh]]:
+    """An open basket of wires between two corners."""
+    (ax, ay, az), (bx, by, bz) = low, high
+    wires = [[[ax, y, az], [bx, y, az]] for y in np.linspace(ay, by, 9)]
+    wires += [[[x, ay, az], [x, by, az]] for x in np.linspace(ax, bx, 9)]
+    wires += [[[x, y, az], [x, y, bz]] for x in np.linspace(ax, bx, 7) for y in (ay, by)]
+    wires += [[[x, y, az], [x, y, bz]] for y in np.linspace(ay, by, 7)[1:-1] for x in (ax, bx)]
+    for z in (0.5 * (az + bz), bz):
+        wires += [[[ax, y, z], [bx, y, z]] for y in (ay, by)] + [[[x, ay, z], [x, by, z]] for x in (ax, bx)]
+    wires += [
+        [[x, y, az], [x, y, az + 0.055]] for x in np.linspace(ax, bx, 9)[1:-1] for y in np.linspace(ay, by, 9)[2:-2:2]
+    ]
+    return [("wire", rod(start, end, wire, 6)) for start, end in wires]
+
+
+def scissors() -> Model:
+    """Two halves that cross at the pivot, lying flat with the blades to the front; zero is closed."""
+
+    def half(side: int, low: float, high: float, pivot_hole: float) -> list[tuple[str, Mesh]]:
+        def mirrored(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+            return [(x, side * y) for x, y in points]
+
+        blade = Polygon(
+            mirrored([(-0.098, 0.0006), (-0.012, 0.0022), (0.004, 0.007), (0.008, 0), (0, -0.0082), (-0.02, -0.0088)])
+        )
+        shank = LineString(mirrored([(0, 0), (0.018, 0.004), (0.036, 0.0165)])).buffer(0.0058)
+        steel = unary_union([blade.buffer(0.0004), shank])
+        if pivot_hole:
+            steel = steel.difference(Point(0, 0).buffer(pivot_hole))
+        center = (0.064, side * 0.0265)
+        eye = ellipse(center, 0.034, 0.0195).difference(ellipse(center, 0.0275, 0.0130))
+        return [("blade", plate(steel, low, high)), ("handle", plate(eye, low - 0.002, high + 0.002))]
+
+    lower = half(1, 0.0, 0.0024, 0.0)
+    lower += [
+        ("screw", rod([0, 0, 0.0024], [0, 0, 0.0056], 0.0034)),
+        ("screw", rod([0, 0, 0.0056], [0, 0, 0.0068], 0.0055)),
+    ]
+    upper = half(-1, 0.0028, 0.0052, 0.0038)
+    links = [
+        Link("link_0", "blade", lower),
+        Link("link_1", "blade", upper, "link_0", "revolute", (0, 0, 0), (0, 0, -1), (0, 0.9)),
+    ]
+    return Model("Scissors", links)
+
+
+def ellipse(center: Vector, half_x: float, half_y: float) -> Polygon:
+    """Ellipse of the XY plane."""
+    turns = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    return Polygon([(center[0] + half_x * np.cos(a), center[1] + half_y * np.sin(a)) for a in turns])
+
+
+MODELS = {
+    "laptop": laptop,
+    "cabinet": cabinet,
+    "eyeglasses": eyeglasses,
+    "dishwasher": dishwasher,
+    "scissors": scissors,
+}
+
+
+def main(folder: Path) -> None:
+    """Write every object below a folder."""
+    for name, build in MODELS.items():
+        write(build(), folder / name)
+
+
+if __name__ == "__main__":
+    main(Path(__file__).resolve().parent)
