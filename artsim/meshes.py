@@ -35,7 +35,7 @@ class LoadLimits:
     max_links: int = 1_000
 
 
-class UnusableMesh(Exception):
+class UnusableMeshError(Exception):
     """One mesh cannot be used, and why; the loader leaves it out and says so."""
 
 
@@ -65,7 +65,7 @@ class MeshReader:
 
         Raises
         ------
-        UnusableMesh
+        UnusableMeshError
             When a mesh is missing, empty or broken.
         AssetError
             When a mesh lies outside the allowed folders or is over a limit.
@@ -87,7 +87,7 @@ class MeshReader:
 
         Raises
         ------
-        UnusableMesh
+        UnusableMeshError
             When no such file exists.
         AssetError
             When the file would lie outside the allowed folders.
@@ -115,7 +115,7 @@ class MeshReader:
         for candidate in inside:
             if candidate.is_file():
                 return candidate
-        raise UnusableMesh(f"mesh {filename!r} is missing")
+        raise UnusableMeshError(f"mesh {filename!r} is missing")
 
     def _own_package(self, package: str) -> Path | None:
         """The ROS package that holds the URDF file itself, when it has the wanted name."""
@@ -129,12 +129,12 @@ class MeshReader:
         path = self.resolve(reference.filename)
         kind = path.suffix.lower()
         if kind not in FORMATS:
-            raise UnusableMesh(f"mesh {reference.filename!r} is of a kind that is not read ({', '.join(FORMATS)})")
+            raise UnusableMeshError(f"mesh {reference.filename!r} is of a kind that is not read ({', '.join(FORMATS)})")
         data = read_bounded(path, self.limits.max_mesh_bytes, "mesh")
         self.contents.append(data)
         vertices, faces, dropped = triangles(data, kind, path)
         if len(faces) == 0:
-            raise UnusableMesh(f"mesh {reference.filename!r} has no faces")
+            raise UnusableMeshError(f"mesh {reference.filename!r} has no faces")
         self.num_faces += len(faces)
         if self.num_faces > self.limits.max_faces:
             raise AssetError(
@@ -158,7 +158,7 @@ def triangles(data: bytes, kind: str, where: Path) -> tuple[Array, NDArray[np.in
 
     Raises
     ------
-    UnusableMesh
+    UnusableMeshError
         When the content cannot be parsed.
     """
     import trimesh
@@ -172,14 +172,14 @@ def triangles(data: bytes, kind: str, where: Path) -> tuple[Array, NDArray[np.in
     except AssetError:
         raise
     except Exception as error:  # parsers raise whatever they stumble on; the file is at fault either way
-        raise UnusableMesh(f"mesh {where.name!r} cannot be parsed ({type(error).__name__}: {error})") from error
+        raise UnusableMeshError(f"mesh {where.name!r} cannot be parsed ({type(error).__name__}: {error})") from error
     if mesh is None or not hasattr(mesh, "faces"):
         return np.zeros((0, 3)), np.zeros((0, 3), np.int32), 0
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     faces = np.asarray(mesh.faces, dtype=np.int64)
-    usable = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
-    finite = np.isfinite(vertices).all(axis=1)
-    usable[usable] = finite[faces[usable]].all(axis=1)
+    usable = np.all((faces >= 0) & (faces < len(vertices)), axis=1)
+    finite = np.all(np.isfinite(vertices), axis=1)
+    usable &= finite[faces.clip(0, max(0, len(vertices) - 1))].all(axis=1)
     return np.where(finite[:, None], vertices, 0.0), faces[usable].astype(np.int32), int((~usable).sum())
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
-from artsim.meshes import LoadLimits, MeshReader, UnusableMesh, merged
+from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError, merged
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
 from artsim.partnet import read_side_files
@@ -71,7 +71,7 @@ def load(
     bodies = _merge_fixed_links(robot, file, repairs)
     _read_geometry(bodies, robot, reader, file, repairs)
     bodies = _join_screws(_without_empty_leaves(bodies, repairs), repairs)
-    tree, source_joints = _tree(bodies, file, repairs)
+    tree, source_joints = _tree(bodies, file)
     parts = [body.part(side.labels) for body in bodies]
     if side.num_movable is not None and len(tree) - 1 != side.num_movable:
         repairs.append(
@@ -246,7 +246,7 @@ def _read_geometry(
                 T_base_shape = body.T_base_link[name] @ (np.eye(4) if element.origin is None else element.origin)
                 try:
                     vertices, faces = reader.shape(element.geometry)
-                except UnusableMesh as problem:
+                except UnusableMeshError as problem:
                     problems.append(str(problem))
                     continue
                 shapes.append((vertices, faces, T_base_shape))
@@ -296,7 +296,7 @@ def _join_screws(bodies: list[_Body], repairs: list[Repair]) -> list[_Body]:
         others = [b.joint.mimic.joint for b in bodies if b not in (helper, body) and b.joint and b.joint.mimic]
         if slide.joint is None or turn.joint is None or slide.joint.name in others:
             continue
-        pitch = rate * np.sign(along)
+        pitch = rate * _stretch(slide.joint) * float(np.sign(along))
         body.links = body.links + helper.links
         repairs.append(
             Repair(
@@ -320,7 +320,8 @@ def _axis(body: _Body) -> Array:
 
 def _slide_rate(turn: _Body, slide: _Body) -> float:
     """Slide for each radian of turn: what a mimic relation says, else one turn for the whole slide."""
-    assert turn.joint is not None and slide.joint is not None
+    assert turn.joint is not None
+    assert slide.joint is not None
     if slide.joint.mimic is not None and slide.joint.mimic.joint == turn.joint.name:
         mimic = slide.joint.mimic
         return 0.0 if mimic.offset else float(1.0 if mimic.multiplier is None else mimic.multiplier)
@@ -330,7 +331,7 @@ def _slide_rate(turn: _Body, slide: _Body) -> float:
 # --- bodies become a tree ---------------------------------------------------------------------------------------
 
 
-def _tree(bodies: list[_Body], file: Path, repairs: list[Repair]) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
+def _tree(bodies: list[_Body], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
     """Tree in the base link's frame with rest state 0, and where each of the file's joints went."""
     index = {body.joint.name: k for k, body in enumerate(bodies) if body.joint is not None}
     position = {id(body): k for k, body in enumerate(bodies)}
@@ -338,7 +339,8 @@ def _tree(bodies: list[_Body], file: Path, repairs: list[Repair]) -> tuple[Kinem
     source_joints: dict[str, tuple[int, float]] = {}
     for k, body in enumerate(bodies[1:], start=1):
         joint = body.joint
-        assert joint is not None and body.parent is not None
+        assert joint is not None
+        assert body.parent is not None
         lower, upper = -np.inf, np.inf
         kind = joint.type
         if kind in ("revolute", "prismatic"):
@@ -347,7 +349,9 @@ def _tree(bodies: list[_Body], file: Path, repairs: list[Repair]) -> tuple[Kinem
             kind = "screw"
             lower, upper = sorted(float(v) / body.slide_rate for v in (body.slide.limit.lower, body.slide.limit.upper))
             source_joints[body.slide.name] = (k, body.slide_rate)
-        source_joints[joint.name] = (k, 1.0)
+        # Simulators move a prismatic joint by its value times its axis, whatever the axis's length.
+        lower, upper = lower * _stretch(joint), upper * _stretch(joint)
+        source_joints[joint.name] = (k, 1.0 / _stretch(joint))
         joints.append(
             Joint(
                 name=joint.name,
@@ -358,7 +362,7 @@ def _tree(bodies: list[_Body], file: Path, repairs: list[Repair]) -> tuple[Kinem
                 lower=lower,
                 upper=upper,
                 pitch=body.pitch,
-                mimic=_mimic(joint, index, file, repairs),
+                mimic=_mimic(joint, bodies, index, file),
             )
         )
     return KinematicTree(joints), source_joints
@@ -369,7 +373,12 @@ def _triple(vector: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _mimic(joint: yourdfpy.Joint, index: Mapping[str, int], file: Path, repairs: list[Repair]) -> Mimic | None:
+def _stretch(joint: yourdfpy.Joint) -> float:
+    """Metres of travel for each unit of a prismatic joint's value; 1 for joints that turn."""
+    return float(np.linalg.norm(joint.axis)) if joint.type == "prismatic" else 1.0
+
+
+def _mimic(joint: yourdfpy.Joint, bodies: list[_Body], index: Mapping[str, int], file: Path) -> Mimic | None:
     if joint.mimic is None:
         return None
     source = index.get(joint.mimic.joint)
@@ -379,8 +388,10 @@ def _mimic(joint: yourdfpy.Joint, index: Mapping[str, int], file: Path, repairs:
             f"{file}: joint {joint.name!r}",
             "name a moving joint of the file",
         )
-    multiplier, offset = joint.mimic.multiplier, joint.mimic.offset
-    return Mimic(source, 1.0 if multiplier is None else float(multiplier), 0.0 if offset is None else float(offset))
+    multiplier = 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
+    offset = 0.0 if joint.mimic.offset is None else float(joint.mimic.offset)
+    unit = _stretch(joint)
+    return Mimic(source, multiplier * unit / _stretch(bodies[source].joint), offset * unit)
 
 
 def _to_rest_frame(tree: KinematicTree, parts: list[Part], rest: Array) -> tuple[KinematicTree, list[Part], Array]:

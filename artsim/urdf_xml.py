@@ -183,7 +183,8 @@ def _check_joint(joint: etree._Element, links: set[str | None], file: Path, repa
         repairs.append(Repair(name, "has a zero axis, along which nothing moves: read as fixed"))
         return
     if abs(length - 1.0) > 1e-6:
-        repairs.append(Repair(name, f"axis of length {length:.6g} normalised"))
+        stretched = ", its travel and limits multiplied by it as simulators do" if kind == "prismatic" else ""
+        repairs.append(Repair(name, f"axis of length {length:.6g} normalised{stretched}"))
     _check_limit(joint, kind, name, where, repairs)
 
 

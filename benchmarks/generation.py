@@ -147,7 +147,10 @@ def end_to_end(samples: int) -> dict[str, float]:
         write_rate = disk_rate(Path(folder))
     rate = samples / made.seconds
     print(f"\nend to end, 2 workers: {rate:.0f} samples/s, start-up and loading of the objects included")
-    print(f"  {size / samples / 1e3:.1f} kB a sample, {size / made.seconds / 1e6:.0f} MB/s; the disk takes {write_rate:.0f} MB/s")
+    print(
+        f"  {size / samples / 1e3:.1f} kB a sample, {size / made.seconds / 1e6:.0f} MB/s; "
+        f"the disk takes {write_rate:.0f} MB/s"
+    )
     return {"end_to_end_samples_per_s": rate, "bytes_per_s": size / made.seconds, "disk_mb_per_s": write_rate}
 
 

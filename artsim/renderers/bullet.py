@@ -84,7 +84,7 @@ class _World:
 
     def __init__(self, parts: tuple[Part, ...], egl: bool):
         self.num_faces = sum(len(part.faces) for part in parts)
-        self._bullet = _import_pybullet()
+        self._bullet = import_pybullet()
         self._client: int = self._bullet.connect(self._bullet.DIRECT)
         self._flag = self._bullet.ER_BULLET_HARDWARE_OPENGL if egl else self._bullet.ER_TINY_RENDERER
         # TinyRenderer looks through the lower left corner of a pixel where others look through its centre (measured).
@@ -107,7 +107,7 @@ class _World:
         spec = importlib.util.find_spec("eglRenderer")
         if spec is None or spec.origin is None:
             raise RenderError("this PyBullet has no EGL plugin", "pybullet-egl", _EGL_MEND)
-        with _silent():
+        with silent():
             plugin = self._bullet.loadPlugin(spec.origin, "_eglRendererPlugin", physicsClientId=self._client)
         if plugin < 0:
             raise RenderError("EGL does not start", "pybullet-egl", _EGL_MEND)
@@ -135,7 +135,7 @@ class _World:
             if body >= 0:
                 quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()
                 self._bullet.resetBasePositionAndOrientation(body, T[:3, 3], quaternion, physicsClientId=self._client)
-        with _silent():
+        with silent():
             _, _, rgb, buffer, bodies = self._bullet.getCameraImage(
                 camera.width,
                 camera.height,
@@ -154,7 +154,7 @@ class _World:
 
     def close(self) -> None:
         """Unload the plugin and disconnect."""
-        with _silent():
+        with silent():
             if self._plugin >= 0:
                 self._bullet.unloadPlugin(self._plugin, physicsClientId=self._client)
             self._bullet.disconnect(self._client)
@@ -203,9 +203,16 @@ def _projection(camera: Camera, near: float, far: float, shift: tuple[float, flo
     )
 
 
-def _import_pybullet() -> ModuleType:
+def import_pybullet() -> ModuleType:
+    """PyBullet, without its greeting.
+
+    Raises
+    ------
+    RenderError
+        When it is not installed.
+    """
     try:
-        with _silent():
+        with silent():
             import pybullet
     except ImportError as error:
         raise RenderError("PyBullet is not installed", "pybullet", "pip install 'artsim[pybullet]'") from error
@@ -213,7 +220,7 @@ def _import_pybullet() -> ModuleType:
 
 
 @contextlib.contextmanager
-def _silent() -> Iterator[None]:
+def silent() -> Iterator[None]:
     """Keep PyBullet's own chatter, which it prints from C, out of the program's output."""
     sys.stdout.flush()
     sys.stderr.flush()
