@@ -217,11 +217,11 @@ def visibility(posed: PosedObject, k: int, max_rays: int) -> tuple[int, int]:
     return len(met), int(np.count_nonzero(part_ids == k))
 
 
-def render_posed(posed: PosedObject) -> Frame:
-    """Cast a ray through every pixel that a part can cover."""
+def render_posed(posed: PosedObject, only: int | None = None) -> Frame:
+    """Cast a ray through every pixel that a part, or only one of them, can cover."""
     camera = posed.camera
     nearest = _Nearest(camera.height * camera.width, len(posed.obj))
-    for k in range(len(posed.obj)):
+    for k in range(len(posed.obj)) if only is None else (only,):
         pixels, row, column = _span_pixels(posed, k)
         if len(pixels):
             nearest.update(k, pixels, _cast_part(posed, k, row, column))
