@@ -1,7 +1,8 @@
 """Build the demo objects of this folder: ``python urdf_assets/build.py``. Deterministic; rerunning changes no byte.
 
 Objects are drawn in their rest frame (metres, Z up, front towards -X) and written as PartNet-Mobility folders: Y-up
-meshes, an empty ``base`` link, and joints without rotations of their own.
+meshes, an empty ``base`` link, and joints without rotations of their own. The binary meshes of ``quirks/formats`` are
+written too; all other quirk cases are written by hand.
 """
 
 from __future__ import annotations
@@ -46,6 +47,11 @@ def upright(outline: Polygon, x_low: float, x_high: float) -> Mesh:
     mesh = plate(outline, x_low, x_high)
     mesh.apply_transform([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     return mesh
+
+
+def joined(solids: Sequence[Mesh]) -> Mesh:
+    """One mesh of several solids, each of which stays closed."""
+    return trimesh.util.concatenate(list(solids))
 
 
 def along_y(point: Vector, distance: float) -> Vector:
@@ -138,32 +144,47 @@ def obj_text(solid: Mesh) -> str:
 # --- the objects ---------------------------------------------------------------------------------------------------
 
 
+KEYBOARD = (
+    (1.0,) * 15,
+    (*(1.0,) * 13, 2.0),
+    (1.5, *(1.0,) * 12, 1.5),
+    (1.75, *(1.0,) * 11, 2.25),
+    (2.25, *(1.0,) * 10, 2.75),
+    (1.25, 1.25, 1.25, 6.25, 1.25, 1.25, 1.25, 1.25),
+)
+"""Widths of the keys of each row from the back to the front, in units of one key."""
+
+
+def keyboard(x: float, z: float, pitch: float = 0.0192, gap: float = 0.0026, height: float = 0.0014) -> list[Mesh]:
+    """Rows of keys on a deck; the last row's middle is at ``x``, the first row's further back."""
+    rows = []
+    for number, widths in enumerate(reversed(KEYBOARD)):
+        middle, edges = x + number * pitch, (np.cumsum([0.0, *widths]) - sum(widths) / 2) * pitch
+        front, back = middle - (pitch - gap) / 2, middle + (pitch - gap) / 2
+        keys = [box([front, -y1 + gap / 2, z], [back, -y0 - gap / 2, z + height]) for y0, y1 in pairwise(edges)]
+        rows.append(joined(keys))
+    return rows
+
+
 def laptop() -> Model:
     """Base with keyboard and touchpad, lid with screen; the file's zero is the lid standing upright."""
     width, depth, base_height, lid_height, gap = 0.330, 0.225, 0.016, 0.007, 0.0024
-    base = [("base_frame", plate(rounded(depth, width, 0.012), 0, base_height))]
-    pitch, key = 0.0195, 0.0165
-    for row in range(5):
-        x = 0.075 - row * pitch
-        columns = 14 if row < 4 else 9
-        for column in range(columns):
-            wide = row == 4 and column == 4
-            shift = 0 if row < 4 else (-2.5 if column < 4 else (0 if wide else 2.5))
-            y = (column - (columns - 1) / 2 + shift) * pitch
-            half = (key + (5 * pitch if wide else 0)) / 2
-            base.append(
-                ("key", box([x - key / 2, y - half, base_height], [x + key / 2, y + half, base_height + 0.0014]))
-            )
-    base.append(("touchpad", plate(rounded(0.062, 0.105, 0.004, (-0.070, 0)), base_height, base_height + 0.0004)))
-    base += [("foot", rod([x, y, -0.002], [x, y, 0], 0.008)) for x in (-0.09, 0.09) for y in (-0.14, 0.14)]
+    barrel, shaft = 0.0042, 0.0036
     hinge = np.array([depth / 2 + 0.001, 0, base_height + 0.0015])
-    base += [("shaft", rod(along_y(hinge, y - 0.022), along_y(hinge, y + 0.022), 0.0042)) for y in (-0.11, 0.11)]
+    outline = rounded(depth, width, 0.012)
+    room = rounded(2 * shaft + 0.0016, 0.174, 0.001, hinge)
+    base = [("base_frame", plate(outline.difference(room), 0, base_height))]
+    base += [("keyboard", row) for row in keyboard(-0.018, base_height)]
+    base.append(("touchpad", plate(rounded(0.060, 0.105, 0.004, (-0.068, 0)), base_height, base_height + 0.0004)))
+    base += [("foot", rod([x, y, -0.002], [x, y, 0], 0.008)) for x in (-0.09, 0.09) for y in (-0.14, 0.14)]
+    base += [("shaft", rod(along_y(hinge, y - 0.022), along_y(hinge, y + 0.022), barrel)) for y in (-0.11, 0.11)]
     bottom, top = base_height + gap, base_height + gap + lid_height
     notches = unary_union([rounded(0.02, 0.05, 0.001, (depth / 2 + 0.004, y)) for y in (-0.11, 0.11)])
     lid = [
-        ("screen_frame", plate(rounded(depth, width, 0.012).difference(notches), bottom, top)),
-        ("screen", plate(rounded(depth - 0.03, width - 0.02, 0.002, (-0.004, 0)), bottom - 0.0003, bottom)),
-        ("shaft", rod(along_y(hinge, -0.085), along_y(hinge, 0.085), 0.0036)),
+        ("screen_frame", plate(outline.difference(notches), bottom, top)),
+        ("screen", plate(rounded(depth - 0.034, width - 0.02, 0.002, (-0.001, 0)), bottom - 0.0004, bottom)),
+        ("camera", rod([-depth / 2 + 0.008, 0, bottom - 0.0004], [-depth / 2 + 0.008, 0, bottom], 0.0022)),
+        ("shaft", rod(along_y(hinge, -0.085), along_y(hinge, 0.085), shaft)),
     ]
     upright_lid = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0], hinge)
     for _, solid in lid:
@@ -231,7 +252,9 @@ def eyeglasses() -> Model:
         rims.append(("lens", upright(lens.buffer(0.0005), -0.0006, 0.0006)))
     bridge = LineString([(-0.010, 0.006), (-0.004, 0.0105), (0.004, 0.0105), (0.010, 0.006)]).buffer(0.0018)
     frame = [*rims, ("bridge", upright(bridge, -thickness / 2, thickness / 2))]
-    for side in (-1, 1):
+    # One leg's hinge stands further back, so that folded legs lie on each other.
+    hinges = [np.array([x, side * (spread + 0.0340), 0.009]) for x, side in ((0.0095, -1), (0.0132, 1))]
+    for side, hinge in zip((-1, 1), hinges, strict=True):
         pad = trimesh.creation.icosphere(2, 1.0)
         pad.apply_scale([0.0022, 0.0016, 0.0045])
         pad.apply_translation([0.0055, side * 0.0085, -0.006])
@@ -241,20 +264,22 @@ def eyeglasses() -> Model:
         frame.append(
             (
                 "end_piece",
-                box([-thickness / 2, min(y, y + side * 0.008), 0.006], [0.006, max(y, y + side * 0.008), 0.012]),
+                box(
+                    [-thickness / 2, min(y, y + side * 0.008), 0.006],
+                    [hinge[0] - 0.0048, max(y, y + side * 0.008), 0.012],
+                ),
             )
         )
     links = [Link("link_0", "glasses_body", frame)]
-    for number, side in enumerate((-1, 1), start=1):
-        outer = side * (spread + 0.0340)
-        hinge = np.array([0.0095, outer, 0.009])
-        path = LineString(
-            [(0.008, 0.009), (0.055, 0.0088), (0.098, 0.0075), (0.118, 0.001), (0.132, -0.012), (0.138, -0.022)]
-        )
-        temple = plate(path.buffer(0.0026, quad_segs=4), outer - 0.0013, outer + 0.0013)
+    for number, (side, hinge) in enumerate(zip((-1, 1), hinges, strict=True), start=1):
+        x, outer, _ = hinge
+        ear = [(0.098, 0.0075), (0.112, 0.0035), (0.122, -0.003), (0.131, -0.012), (0.138, -0.023)]
+        stem = LineString([(x - 0.0015, 0.009), (0.055, 0.0088), *ear]).buffer(0.0026, quad_segs=4)
+        outline = stem.union(LineString(ear[1:]).buffer(0.0036, quad_segs=4))
+        temple = plate(outline, outer - 0.0013, outer + 0.0013)
         temple.apply_transform([[1, 0, 0, 0], [0, 0, -1, 2 * outer], [0, 1, 0, 0], [0, 0, 0, 1]])
-        leg = [("leg", temple), ("hinge", rod((*hinge[:2], 0.006), (*hinge[:2], 0.012), 0.0019, 16))]
-        links.append(Link(f"link_{number}", "leg", leg, "link_0", "revolute", hinge, (0, 0, -side), (0, 1.45)))
+        leg = [("leg", temple), ("hinge", rod((x, outer, 0.006), (x, outer, 0.012), 0.0019, 16))]
+        links.append(Link(f"link_{number}", "leg", leg, "link_0", "revolute", hinge, (0, 0, -side), (0, np.pi / 2)))
     return Model("Eyeglasses", links)
 
 
@@ -297,6 +322,8 @@ def dishwasher() -> Model:
     ]
     for number, (low, deep) in enumerate(((kick + 0.075, 0.12), (kick + 0.36, 0.10)), start=2):
         rack = wire_rack([x0 + 0.012, y0 + wall + 0.015, low], [x1 - wall - 0.02, y1 - wall - 0.015, low + deep])
+        if number == 2:
+            rack.append(("cutlery_basket", cutlery_basket([-0.21, y0 + wall + 0.03, low + 0.003], [0.10, 0.13, 0.115])))
         links.append(Link(f"link_{number}", "rack", rack, "link_0", "prismatic", (0, 0, 0), (-1, 0, 0), (0, 0.38)))
     return Model("Dishwasher", links)
 
@@ -313,7 +340,17 @@ def wire_rack(low: Vector, high: Vector, wire: float = 0.0022) -> list[tuple[str
     wires += [
         [[x, y, az], [x, y, az + 0.055]] for x in np.linspace(ax, bx, 9)[1:-1] for y in np.linspace(ay, by, 9)[2:-2:2]
     ]
-    return [("wire", rod(start, end, wire, 6)) for start, end in wires]
+    return [("wires", joined([rod(start, end, wire, 6) for start, end in wires]))]
+
+
+def cutlery_basket(corner: Vector, size: Vector, wall: float = 0.002) -> Mesh:
+    """A box of three open compartments."""
+    (x, y, z), (dx, dy, dz) = corner, size
+    pockets = [
+        box([x + wall, a + wall / 2, z + wall], [x + dx - wall, b - wall / 2, z + dz + wall])
+        for a, b in pairwise(np.linspace(y + wall / 2, y + dy - wall / 2, 4))
+    ]
+    return trimesh.boolean.difference([box(corner, np.add(corner, size)), *pockets], engine="manifold")
 
 
 def scissors() -> Model:
@@ -362,8 +399,17 @@ MODELS = {
 }
 
 
+def write_formats(folder: Path) -> None:
+    """One ramp with a corner at the origin, so that a swapped or flipped axis would show, in three binary formats."""
+    folder.mkdir(parents=True, exist_ok=True)
+    ramp = upright(Polygon([(0, 0), (0.1, 0), (0.1, 0.2), (0, 0.1)]), 0, 0.3)
+    for kind in ("stl", "glb", "ply"):
+        (folder / f"ramp.{kind}").write_bytes(ramp.export(file_type=kind))
+
+
 def main(folder: Path) -> None:
-    """Write every object below a folder."""
+    """Write every object, and the meshes of ``quirks/formats``, below a folder."""
+    write_formats(folder / "quirks" / "formats" / "meshes")
     for name, build in MODELS.items():
         write(build(), folder / name)
 

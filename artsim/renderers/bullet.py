@@ -8,6 +8,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+import weakref
 from collections import OrderedDict
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +25,8 @@ from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame
 from artsim.renderers.raycast import pose
 
-_MAX_WORLDS = 16  # as many objects as take turns in a plan
+# As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
+_MAX_WORLDS = {"pybullet": 16, "pybullet-egl": 1}
 _MAX_FACES = 1_500_000  # triangles kept loaded
 _EGL_MEND = "install libegl1 libegl-mesa0 libgl1-mesa-dri (Debian/Ubuntu), or use --renderer raycast"
 # OpenGL's camera looks along -z with y up.
@@ -65,11 +67,12 @@ class BulletRenderer:
     def _world(self, obj: ArticulatedObject) -> _World:
         world = self._worlds.get(obj.parts)
         if world is None:
-            world = self._worlds[obj.parts] = _World(obj.parts, self._egl)
-            while len(self._worlds) > 1 and (
-                len(self._worlds) > _MAX_WORLDS or sum(w.num_faces for w in self._worlds.values()) > _MAX_FACES
+            while self._worlds and (
+                len(self._worlds) >= _MAX_WORLDS[self.name]
+                or sum(w.num_faces for w in self._worlds.values()) + obj.num_faces > _MAX_FACES
             ):
                 self._worlds.popitem(last=False)[1].close()
+            world = self._worlds[obj.parts] = _World(obj.parts, self._egl)
         self._worlds.move_to_end(obj.parts)
         return world
 
@@ -89,10 +92,10 @@ class _World:
         self._flag = self._bullet.ER_BULLET_HARDWARE_OPENGL if egl else self._bullet.ER_TINY_RENDERER
         # TinyRenderer looks through the lower left corner of a pixel where others look through its centre (measured).
         self._shift = (0.0, 0.0) if egl else (-0.5, 0.5)
-        self._plugin = -1
+        self.close = weakref.finalize(self, _disconnect, self._bullet, self._client)  # at exit, if not before
         try:
             if egl:
-                self._plugin = self._start_egl()
+                self._start_egl()
             self._bodies = [self._body(part) for part in parts]
         except RenderError:
             self.close()
@@ -103,7 +106,7 @@ class _World:
             if body >= 0:
                 self._part_of_body[body] = k
 
-    def _start_egl(self) -> int:
+    def _start_egl(self) -> None:
         spec = importlib.util.find_spec("eglRenderer")
         if spec is None or spec.origin is None:
             raise RenderError("this PyBullet has no EGL plugin", "pybullet-egl", _EGL_MEND)
@@ -111,7 +114,6 @@ class _World:
             plugin = self._bullet.loadPlugin(spec.origin, "_eglRendererPlugin", physicsClientId=self._client)
         if plugin < 0:
             raise RenderError("EGL does not start", "pybullet-egl", _EGL_MEND)
-        return int(plugin)
 
     def _body(self, part: Part) -> int:
         """Body with the part's surface, -1 for a part without."""
@@ -152,12 +154,11 @@ class _World:
         depth = np.where(part_ids == BACKGROUND, 0.0, far * near / (far - (far - near) * buffer))
         return depth, part_ids, np.ascontiguousarray(np.asarray(rgb, dtype=np.uint8).reshape(*shape, -1)[..., :3])
 
-    def close(self) -> None:
-        """Unload the plugin and disconnect."""
-        with silent():
-            if self._plugin >= 0:
-                self._bullet.unloadPlugin(self._plugin, physicsClientId=self._client)
-            self._bullet.disconnect(self._client)
+
+def _disconnect(bullet: ModuleType, client: int) -> None:
+    """Close a physics server, and with it its plugins."""
+    with silent():
+        bullet.disconnect(client)
 
 
 def _obj_text(part: Part) -> str:

@@ -100,9 +100,9 @@ def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDAr
     rows = np.arange(camera.height, dtype=np.float32) + np.float32(0.5)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = (rows - start[..., 1, None]) / rise[..., None]
+        column = start[..., 0, None] + along * (end[..., 0] - start[..., 0])[..., None]
     slack = _MARGIN / np.maximum(np.abs(rise), _MARGIN)[..., None]
     crossed = (along >= -slack) & (along <= 1.0 + slack)
-    column = start[..., 0, None] + along * (end[..., 0] - start[..., 0])[..., None]
     low = np.where(crossed, column, np.inf).min(axis=1) - _MARGIN
     high = np.where(crossed, column, -np.inf).max(axis=1) + _MARGIN
     spans = np.stack([low, high], axis=1) - np.float32(0.5)

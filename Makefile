@@ -1,0 +1,44 @@
+# Two commands do everything on a fresh machine: `make demo` and `make test`.
+PYTHON ?= python3
+VENV := .venv
+PY := $(VENV)/bin/python
+
+.PHONY: demo test lint bench clean system assets
+
+demo: $(VENV)/.ready
+	$(PY) examples/demo/main.py out/demo
+
+test: system $(VENV)/.ready-dev lint
+	$(PY) -m pytest
+
+lint: $(VENV)/.ready-dev
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
+
+bench: $(VENV)/.ready-dev
+	$(PY) -m benchmarks.kinematics
+	$(PY) -m benchmarks.agreement
+	$(PY) -m benchmarks.generation
+	$(PY) -m benchmarks.resume
+
+assets: $(VENV)/.ready
+	$(PY) urdf_assets/build.py
+
+# System libraries that PyBullet's EGL renderer needs; everything else comes from pip.
+system:
+	scripts/install-system.sh
+
+$(VENV)/.ready: pyproject.toml constraints.txt
+	test -x $(PY) || $(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view]'
+	touch $@
+
+$(VENV)/.ready-dev: pyproject.toml constraints.txt
+	test -x $(PY) || $(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view,train,dev]'
+	touch $(VENV)/.ready $@
+
+clean:
+	rm -rf $(VENV) out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
