@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import settings
 
 from artsim.kinematics import Joint, KinematicTree
 from artsim.objects import ArticulatedObject, Part
@@ -38,6 +39,9 @@ def rigid(mesh: trimesh.Trimesh) -> ArticulatedObject:
     tree = KinematicTree([Joint("root", "free", -1)])
     return ArticulatedObject("solid", "solid", (solid("solid", mesh),), tree, sha256="0" * 64)
 
+
+settings.register_profile("plain", max_examples=50, deadline=None)
+settings.load_profile("plain")
 
 BOX_LAPTOP = """<robot name="box_laptop">
   <link name="base"><visual><geometry><box size="0.3 0.4 0.02"/></geometry></visual></link>

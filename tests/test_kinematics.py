@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -161,6 +161,3 @@ def test_states_that_do_not_fit_are_refused() -> None:
     with pytest.raises(KinematicsError, match="at least one part"):
         KinematicTree([])
 
-
-settings.register_profile("quick", max_examples=40, deadline=None)
-settings.load_profile("quick")

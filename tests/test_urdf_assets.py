@@ -7,7 +7,7 @@ import runpy
 from dataclasses import dataclass
 from pathlib import Path
 
-import manifold3d
+import manifold3d  # type: ignore[import-not-found]  # a compiled module without stubs
 import numpy as np
 import pytest
 import trimesh
@@ -81,17 +81,44 @@ CASES = {
         ),
     ),
     "formats": Expected((("prismatic", 0, 0.1),) * 3),
-    "mimic_pair": Expected((("revolute", -1.5, 0), ("revolute", 0, 1.6))),
-    "mirrored_scale": Expected((("revolute", -1, 0),)),
-    "missing_limit": Expected(
-        (("continuous", -INF, INF), ("prismatic", 0, 0)),
+    "limits": Expected(
         (
-            "joint 'lever_joint': is revolute without a limit: read as continuous",
-            "joint 'slider_joint': is prismatic without a limit: held at 0",
+            ("revolute", -0.5, 1),
+            ("continuous", -INF, INF),
+            ("prismatic", 0, 0),
+            ("revolute", 0.5, 1.5),
+            ("prismatic", 0, 0.1),
+        ),
+        (
+            "joint 'j_swapped': limits 1 and -0.5 swapped",
+            "joint 'j_zero_axis': has a zero axis, along which nothing moves: read as fixed",
+            "joint 'j_no_limit': is revolute without a limit: read as continuous",
+            "joint 'j_no_range': is prismatic without a limit: held at 0",
+            "joint 'j_negative_zero': limit -0 read as 0",
+            "fixed joints: merged into their parent: zero_axis",
+            "joint 'j_late': rest state 28.6 deg instead of 0: 0 is outside its limits",
         ),
     ),
+    "merged": Expected(
+        (("prismatic", -0.15, 0.15),),
+        (
+            "links: without geometry: base, camera_frame",
+            "fixed joints: merged into their parent: left, right",
+            "link 'camera_frame': left out: it moves, but shows and carries nothing",
+        ),
+    ),
+    "meshes": Expected(
+        (("revolute", 0, 1),),
+        (
+            "link 'body': mesh 'meshes/gone.obj' is missing: left out",
+            "link 'body': mesh 'meshes/empty.obj' has no faces: left out",
+        ),
+    ),
+    "mimic_pair": Expected((("revolute", -1.5, 0), ("revolute", 0, 1.6))),
+    "mirrored_scale": Expected((("revolute", -1, 0),)),
     "missing_mesh": Expected((("revolute", 0, 1),), ("link 'body': mesh 'meshes/gone.obj' is missing: left out",)),
     "negative_zero": Expected((("prismatic", 0, 0.1),), ("joint 'slider_joint': limit -0 read as 0",)),
+    "package": Expected((("revolute", 0, 1),)),
     "package_paths": Expected((("revolute", 0, 1),)),
     "primitives": Expected((("continuous", -INF, INF),)),
     "range_excludes_zero": Expected(
@@ -236,10 +263,9 @@ def test_the_legs_of_the_eyeglasses_point_backwards_and_fold_inwards() -> None:
 
 def test_the_scissors_lie_flat_with_their_blades_in_front() -> None:
     obj = load(ASSETS / "scissors")
-    width_in_front, width_behind = (
-        np.ptp(np.concatenate([p.vertices[side(p.vertices[:, 0])] for p in obj.parts])[:, 1])
-        for side in (lambda x: x < -0.02, lambda x: x > 0.02)
-    )
+    points = np.concatenate([part.vertices for part in obj.parts])
+    width_in_front = np.ptp(points[points[:, 0] < -0.02, 1])
+    width_behind = np.ptp(points[points[:, 0] > 0.02, 1])
     assert width_behind > 4 * width_in_front
     assert np.ptp(opened(obj, 1)[:, 1]) > 0.06
 
@@ -310,7 +336,9 @@ def test_quirks_are_mended_and_recorded(name: str) -> None:
     assert ((obj.tree.limits[:, 0] <= obj.tree.rest) & (obj.tree.rest <= obj.tree.limits[:, 1])).all()
 
 
-@pytest.mark.parametrize("name", ["mirrored_scale", "missing_mesh", "zero_face_mesh", "package_paths"])
+@pytest.mark.parametrize(
+    "name", ["mirrored_scale", "meshes", "missing_mesh", "zero_face_mesh", "package", "package_paths"]
+)
 def test_meshes_that_are_scaled_or_mirrored_keep_facing_outwards(name: str) -> None:
     obj = quirk(name)
     for k in range(len(obj)):

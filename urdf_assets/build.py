@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from shapely.geometry import LineString, Point, Polygon
-from shapely.ops import unary_union
+from numpy.typing import NDArray
+from shapely import LineString, Point, Polygon, unary_union  # type: ignore[import-untyped]
+from trimesh import Trimesh as Mesh
 
-Vector = Sequence[float]
-Mesh = trimesh.Trimesh
+Array = NDArray[np.float64]
+Vector = Sequence[float] | Array
 
 
 # --- shapes ------------------------------------------------------------------------------------------------------
@@ -91,7 +92,7 @@ class Model:
     links: list[Link] = field(default_factory=list)
 
 
-def y_up(vector: Vector) -> np.ndarray:
+def y_up(vector: Vector) -> Array:
     """PartNet's mesh axes for a direction or point of the rest frame."""
     x, y, z = vector
     return np.array([-y, z, -x]) + 0.0
