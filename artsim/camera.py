@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.errors import ConfigError
-from artsim.kinematics import Array, invert_transform
+from artsim.kinematics import Array, cross_matrix, invert_transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +126,16 @@ def look_at_transform(eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0
     """(4, 4) ``T_world_camera`` of a camera at ``eye`` that looks at ``target``, ``up`` being up in the image."""
     eye, target, up = (np.asarray(v, dtype=np.float64) for v in (eye, target, up))
     forward = target - eye
-    if not np.linalg.norm(forward) > 0:
+    length = np.sqrt(forward @ forward)
+    if not length > 0:
         raise ConfigError("a camera cannot look at its own position")
-    z = forward / np.linalg.norm(forward)
-    x = np.cross(z, up)
-    if np.linalg.norm(x) < 1e-9:  # looking along `up`: any horizontal direction serves
-        x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
-    x = x / np.linalg.norm(x)
+    z = forward / length
+    x = cross_matrix(z) @ up
+    if x @ x < 1e-18:  # looking along `up`: any horizontal direction serves
+        x = cross_matrix(z) @ np.eye(3)[np.argmin(np.abs(z))]
+    x = x / np.sqrt(x @ x)
     T = np.eye(4)
-    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, np.cross(z, x), z, eye
+    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, cross_matrix(z) @ x, z, eye
     return T
 
 

@@ -19,8 +19,8 @@ from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visi
 IMAGES = ("depth", "part_mask", "rgb")
 """Images that a sample can carry besides its cloud."""
 
-Look = Callable[[NDArray[np.int64]], tuple[NDArray[np.float32], NDArray[np.uint8]]]
-"""What stands at some pixels: depth (N,) and part ids (N,)."""
+Look = Callable[[NDArray[np.int64], NDArray[np.int64]], tuple[NDArray[np.float32], NDArray[np.uint8]]]
+"""What stands at some pixels, by row and column: depth (N,) and part ids (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,45 +218,46 @@ _FRAME_FIELDS = {"depth": "depth", "part_mask": "part_ids", "rgb": "rgb"}
 
 
 def _lookup(frame: Frame) -> Look:
-    depth, part_ids = frame.depth.ravel(), frame.part_ids.ravel()
-    return lambda pixels: (depth[pixels], part_ids[pixels])
+    return lambda row, column: (frame.depth[row, column], frame.part_ids[row, column])
 
 
 def draw_visible(
     posed: PosedObject, look: Look, num_points: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]:
-    """Look at random pixels of the object's window until ``num_points`` of them show the object.
+    """Look at random pixels that the object can cover until ``num_points`` of them show it.
 
     Returns
     -------
     pixels : (num_points,) int
-        All different, unless fewer pixels show the object: then those are drawn again with replacement. Empty when
-        none does.
+        Flat indices, all different, unless fewer pixels show the object: then some are drawn again with replacement.
+        Empty when none does.
     depth : (num_points,) float32
     part : (num_points,) uint8
     """
-    first_row, end_row, first_column, end_column = posed.window
-    columns = end_column - first_column
-    total = (end_row - first_row) * columns
+    first, end = posed.candidates()
+    up_to = np.cumsum(end - first)  # candidates in the rows so far
+    shift = end - up_to  # from a candidate's number to its column
+    total = int(up_to[-1])
     fresh = np.ones(total, dtype=bool)
     hits: list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]] = []
     found = visited = 0
     while found < num_points and visited < total:
-        # As many as it should take, judging by the share of hits so far, and a few more.
-        wanted = int(1.1 * (num_points - found) * max(visited, 2) / max(found, 1)) + 64
+        # As many as it should take, judging by the share of hits so far (at first, by experience), and a few more.
+        share = found / visited if found else 0.9 / (1 + visited)
+        wanted = min(int(1.12 * (num_points - found) / share) + 32, total)
         if visited + wanted > total // 2:
-            left = np.flatnonzero(fresh)
-            local = left if wanted >= len(left) else np.sort(rng.permutation(left)[:wanted])
+            left = fresh.nonzero()[0]
+            local = left if wanted > 0.7 * len(left) else np.sort(rng.permutation(left)[:wanted])
         else:
             drawn = np.zeros(total, dtype=bool)
             drawn[rng.integers(0, total, size=wanted)] = True
-            local = np.flatnonzero(drawn & fresh)  # in order: neighbouring rays share memory
+            local = (drawn & fresh).nonzero()[0]  # in order: neighbouring rays share memory
         fresh[local] = False
-        row, column = np.divmod(local, columns)
-        pixels = (row + first_row) * posed.camera.width + column + first_column
-        depth, part = look(pixels)
-        hit = np.flatnonzero(part != BACKGROUND)
-        hits.append((pixels[hit], depth[hit], part[hit]))
+        row = np.searchsorted(up_to, local, side="right")
+        column = local + shift[row]
+        depth, part = look(row, column)
+        hit = (part != BACKGROUND).nonzero()[0]
+        hits.append((row[hit] * posed.camera.width + column[hit], depth[hit], part[hit]))
         visited, found = visited + len(local), found + len(hit)
     if found == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.uint8)
@@ -279,8 +280,10 @@ class _Rays:
         self.met = np.zeros(len(posed.obj), dtype=np.int64)
         self.saw = np.zeros(len(posed.obj), dtype=np.int64)
 
-    def __call__(self, pixels: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        depth, part, met = cast(self.posed, pixels)
+    def __call__(
+        self, row: NDArray[np.int64], column: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        depth, part, met = cast(self.posed, row, column)
         self.met += met
         self.saw += np.bincount(part, minlength=BACKGROUND + 1)[: len(self.met)]
         return depth, part

@@ -9,12 +9,14 @@ line is one JSON object.
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import platform
 import resource
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,9 +90,8 @@ def compare_renderers(scenes: list[Scene]) -> dict[str, float]:
     def tiny_cloud(scene: Scene) -> None:
         obj, q, camera = scene
         frame = tiny.render(obj, q, camera)
-        depth, part_ids = frame.depth.ravel(), frame.part_ids.ravel()
         posed = pose(obj, q, camera)
-        draw_visible(posed, lambda pixels: (depth[pixels], part_ids[pixels]), 2048, np.random.default_rng(0))
+        draw_visible(posed, lambda r, c: (frame.depth[r, c], frame.part_ids[r, c]), 2048, np.random.default_rng(0))
 
     def tiny_frame(scene: Scene) -> None:
         tiny.render(*scene)
@@ -127,10 +128,11 @@ def rays_per_second(scenes: list[Scene]) -> dict[str, float]:
     rays, start = 0, time.process_time()
     for obj, q, camera in scenes:
         posed = pose(obj, q, camera)
-        first_row, end_row, first_column, end_column = posed.window
-        row, column = np.mgrid[first_row:end_row, first_column:end_column]
-        cast(posed, (row * camera.width + column).ravel())
-        rays += row.size
+        first, end = posed.candidates()
+        row = np.repeat(np.arange(camera.height), end - first)
+        column = np.concatenate([np.arange(a, b) for a, b in zip(first, end, strict=True)])
+        cast(posed, row, column)
+        rays += len(row)
     rate = rays / (time.process_time() - start)
     print(f"  rays: {rate / 1e6:.1f} M/s, each against all parts it can meet")
     return {"rays_per_s": rate}
@@ -171,35 +173,30 @@ def worker_memory(options: Options) -> dict[str, float]:
 
     It runs in a child so that this process's own memory does not count.
     """
-    import multiprocessing
-
     context = multiprocessing.get_context("spawn")
-    with context.Pool(1) as pool:
-        peak, early, late = pool.apply(_watch_memory, (options.partnet, options.memory_samples))
+    sources = find_sources([options.partnet] if options.partnet else demo_paths())
+    with tempfile.TemporaryDirectory() as folder:
+        # Objects are loaded by one process and read, compiled, by another: a worker does not load.
+        with ProcessPoolExecutor(1, context) as loader:
+            keys = loader.submit(_compile_all, [s.path for s in sources], Path(folder)).result()
+        with ProcessPoolExecutor(1, context) as worker:
+            peak, early, late = worker.submit(_watch_memory, Path(folder), keys, options.memory_samples).result()
     shown = "real objects" if options.partnet else "demo objects (ARTSIM_PARTNET_DIR is not set)"
     print(f"\nworker with all {shown} in rotation, {options.memory_samples} samples: peak {peak:.0f} MB")
     print(f"  resident after a fifth of the samples {early:.0f} MB, at the end {late:.0f} MB")
     return {"worker_peak_mb": peak, "worker_early_mb": early, "worker_late_mb": late}
 
 
-def _watch_memory(partnet: Path | None, samples: int) -> tuple[float, float, float]:
-    sources = find_sources([partnet] if partnet else demo_paths())
-    with tempfile.TemporaryDirectory() as folder:
-        # A worker reads compiled objects; compile in a grandchild so that loading does not count.
-        import multiprocessing
-
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            keys = pool.apply(_compile_all, ([s.path for s in sources], Path(folder)))
-        cache, renderer, early = ObjectCache(Path(folder)), make_renderer("raycast"), 0.0
-        for i in tqdm(range(samples), desc="memory", leave=False):
-            # As a plan does: a few objects take turns for a while, then the next few.
-            group, slot = divmod(i, 256)
-            obj = cache[keys[(group * 16 + slot % 16) % len(keys)]]
-            draw_sample(obj, SampleOptions(), 0, i, renderer)
-            if i == samples // 5:
-                early = resident_mb()
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-        return peak, early, resident_mb()
+def _watch_memory(folder: Path, keys: list[str], samples: int) -> tuple[float, float, float]:
+    cache, renderer, early = ObjectCache(folder), make_renderer("raycast"), 0.0
+    for i in tqdm(range(samples), desc="memory", leave=False):
+        # As a plan does: a few objects take turns for a while, then the next few.
+        group, slot = divmod(i, 256)
+        obj = cache[keys[(group * 16 + slot % 16) % len(keys)]]
+        draw_sample(obj, SampleOptions(), 0, i, renderer)
+        if i == samples // 5:
+            early = resident_mb()
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3, early, resident_mb()
 
 
 def _compile_all(paths: list[Path], folder: Path) -> list[str]:

@@ -160,4 +160,3 @@ def test_states_that_do_not_fit_are_refused() -> None:
             tree.forward_kinematics(q)
     with pytest.raises(KinematicsError, match="at least one part"):
         KinematicTree([])
-

@@ -63,13 +63,9 @@ def test_only_the_projected_outline_is_cast_and_nothing_is_lost() -> None:
         q = sample_state(obj, StateOptions(), rng)
         camera = sample_view(obj, q, ViewOptions(preset="sphere"), rng)
         frame = render(obj, q, camera)
-        depth, part, amodal = [], [], np.zeros(len(obj), int)
         posed = pose(obj, q, camera)
         everywhere = replace(posed, spans=np.broadcast_to(np.float32([[-np.inf], [np.inf]]), posed.spans.shape))
-        everywhere = replace(everywhere, windows=np.broadcast_to([0, 480, 0, 640], posed.windows.shape))
-        d, p, amodal = cast(everywhere, np.arange(640 * 480))
-        depth.append(d)
-        part.append(p)
+        d, p, amodal = cast(everywhere, *np.divmod(np.arange(640 * 480), 640))
         assert np.array_equal(p.reshape(480, 640), frame.part_ids)
         assert np.array_equal(d.reshape(480, 640), frame.depth)
         assert np.array_equal(amodal, frame.amodal_pixels)
@@ -108,8 +104,8 @@ def test_sparse_clouds_choose_every_visible_pixel_equally_often() -> None:
     visible = np.flatnonzero(render(obj, q, camera).part_ids.ravel() != BACKGROUND)
     posed = pose(obj, q, camera)
 
-    def look(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return cast(posed, pixels)[:2]
+    def look(row: np.ndarray, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return cast(posed, row, column)[:2]
 
     counts = np.zeros(64 * 48)
     for seed in range(400):

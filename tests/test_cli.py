@@ -1,0 +1,83 @@
+"""The programs as a user runs them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.conftest import ASSETS
+
+ROOT = ASSETS.parent
+ARTSIM = str(Path(sys.executable).with_name("artsim"))
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(arguments, capture_output=True, text=True, cwd=ROOT, timeout=120)
+
+
+def generate(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return run(sys.executable, "generate.py", *arguments)
+
+
+def test_help_teaches() -> None:
+    result = generate("--help")
+    assert result.returncode == 0
+    for word in ("--objects", "--out", "--states.fraction-open", "--views.preset", "--renderer", "Example:"):
+        assert word in result.stdout
+    result = run(ARTSIM, "--help")
+    for verb in ("generate", "view", "inspect", "verify"):
+        assert verb in result.stdout
+
+
+def test_a_mistyped_option_is_pointed_out() -> None:
+    result = generate("--objects", "urdf_assets/laptop", "--out", "x", "--num-sample", "3")
+    assert result.returncode == 2
+    assert "num-samples" in result.stdout + result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_errors_are_one_line_and_exit_with_2(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot>")
+    for arguments in (
+        (ARTSIM, "inspect", str(broken)),
+        (ARTSIM, "inspect", str(tmp_path / "nowhere")),
+        (ARTSIM, "verify", str(tmp_path)),
+        (ARTSIM, "view", str(tmp_path)),
+        (sys.executable, "generate.py", "--objects", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")),
+        (sys.executable, "generate.py", "--objects", "urdf_assets/laptop", "--out", str(tmp_path / "o"), "--num-points", "0"),
+    ):  # fmt: skip
+        result = run(*arguments)
+        assert result.returncode == 2, arguments
+        assert "Traceback" not in result.stderr
+        assert "error" in result.stderr.lower() or "error" in result.stdout.lower()
+
+
+def test_inspect_prints_tree_limits_boxes_and_repairs() -> None:
+    result = run(ARTSIM, "inspect", "urdf_assets/quirks/chain")
+    assert result.returncode == 0
+    for text in (
+        "7 parts, 6 free joints",
+        "revolute 'j1'",
+        "-114.6 to 114.6 deg",
+        "turns freely",
+        "repairs: 3",
+        "axis of length 2",
+    ):
+        assert text in result.stdout
+    assert "m/rad" in run(ARTSIM, "inspect", "urdf_assets/quirks/screw_helper").stdout
+    assert "follows 1 x -1 + 0.1" in run(ARTSIM, "inspect", "urdf_assets/quirks/mimic_pair").stdout
+
+
+def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
+    out = tmp_path / "first"
+    made = generate("--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), "--num-samples", "20",
+                    "--scale", "0.5", "1.0", "--states.joint-range", "screen", "-1.5", "0", "--images", "depth", "part_mask")  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert "20 samples" in made.stdout
+    assert "sound" in run(ARTSIM, "verify", str(out)).stdout
+    view = run(ARTSIM, "view", str(out), "--samples", "2", "--rerun", str(tmp_path / "r.rrd"))
+    assert view.returncode == 0, view.stderr
+    assert (out / "contact_sheet.png").stat().st_size > 10_000
+    assert (tmp_path / "r.rrd").stat().st_size > 10_000

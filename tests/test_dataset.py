@@ -1,0 +1,169 @@
+"""Datasets as their readers see them."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import webdataset
+
+import artsim
+from artsim import StateOptions, observe, sample_state
+from artsim.dataset import Dataset, pad_sample
+from artsim.errors import ConfigError, DatasetError
+from artsim.kinematics import JOINT_TYPES
+from artsim.object_file import ObjectCache
+from artsim.plan import SampleOptions
+from artsim.sample import Sample
+from artsim.shards import sample_from_members, sample_members
+from artsim.sources import find_sources
+from tests.conftest import ASSETS, DEMO
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """150 samples of the demo objects and a globe that turns freely."""
+    out = tmp_path_factory.mktemp("data") / "out"
+    paths = [*DEMO, ASSETS / "quirks" / "primitives", ASSETS / "quirks" / "mimic_pair"]
+    options = SampleOptions(num_points=256)
+    artsim.generate(find_sources(paths), out, 150, sample=options, shard_size=40, splits=(2, 0, 1), progress=False)
+    return out
+
+
+def assert_equal(one: Sample, two: Sample) -> None:
+    for field in fields(Sample):
+        a, b = getattr(one, field.name), getattr(two, field.name)
+        if isinstance(a, np.ndarray):
+            assert a.dtype == b.dtype, field.name
+            assert np.array_equal(a, b), field.name
+        else:
+            assert a == b, field.name
+
+
+def test_a_sample_survives_its_members() -> None:
+    for path, images in ((ASSETS / "quirks" / "primitives", ()), (ASSETS / "cabinet", ("depth", "part_mask", "rgb"))):
+        obj = artsim.load(path)
+        q = sample_state(obj, StateOptions(), np.random.default_rng(0))
+        camera = artsim.Camera.look_at([-2, 0.3, 1], [0, 0, 0], 160, 120)
+        renderer = "pybullet" if images else "raycast"
+        sample = observe(obj, q, camera, num_points=99, images=images, renderer=renderer, seed=3, index=7)
+        assert_equal(sample, sample_from_members(sample_members(sample), "here"))
+
+
+def test_length_indexing_and_splits(folder: Path) -> None:
+    everything = artsim.open_dataset(folder)
+    assert len(everything) == 150
+    assert [s.index for s in everything] == list(range(150))
+    assert everything[-1].index == 149
+    for wrong in (150, -151):
+        with pytest.raises(IndexError):
+            everything[wrong]
+    parts = {split: artsim.open_dataset(folder, split) for split in ("train", "val", "test")}
+    assert sum(map(len, parts.values())) == 150
+    shown = {split: {s.object_sha256 for s in part} for split, part in parts.items()}
+    for one, two in itertools.combinations(shown.values(), 2):
+        assert not one & two
+    with pytest.raises(ConfigError, match="no split 'holdout'"):
+        artsim.open_dataset(folder, "holdout")
+
+
+def test_samples_know_their_object_without_the_source_files(folder: Path) -> None:
+    dataset = artsim.open_dataset(folder)
+    for i in (0, 40, 149):
+        obj = dataset.object_of(dataset[i])
+        assert obj.sha256 == dataset[i].object_sha256
+        assert obj.diagonal == pytest.approx(dataset[i].diagonal)
+
+
+def test_a_torch_loader_stacks_padded_samples(folder: Path) -> None:
+    padded = artsim.open_dataset(folder).padded()
+    loader = torch.utils.data.DataLoader(padded, batch_size=50, num_workers=2, shuffle=True)  # type: ignore[arg-type]
+    batches = list(loader)
+    assert sorted(torch.cat([b["index"] for b in batches]).tolist()) == list(range(150))
+    for batch in batches:
+        parts = batch["part_valid"].sum(1)
+        assert batch["points"].shape == (50, 256, 3)
+        assert batch["T_camera_part"].shape == (50, padded.max_parts, 4, 4)
+        assert (batch["part"].max(1).values < parts).all()
+        assert {JOINT_TYPES[int(t)] for t in batch["joint_type"][:, 0]} == {"free"}
+
+
+def test_too_few_rows_are_refused(folder: Path) -> None:
+    with pytest.raises(ConfigError, match="parts do not fit 1 rows"):
+        pad_sample(artsim.open_dataset(folder)[0], 1)
+
+
+def test_a_dataset_can_be_pickled(folder: Path) -> None:
+    dataset = artsim.open_dataset(folder, "train")
+    _ = dataset[0]
+    again: Dataset = pickle.loads(pickle.dumps(dataset))
+    assert_equal(again[3], dataset[3])
+
+
+def test_webdataset_reads_the_shards(folder: Path) -> None:
+    shards = sorted(map(str, folder.glob("*.tar")))
+    read = list(webdataset.WebDataset(shards, shardshuffle=False).decode())
+    ours = {f"{s.index:09d}": s for s in artsim.open_dataset(folder)}
+    assert sorted(r["__key__"] for r in read) == sorted(ours)
+    for record in read[:20]:
+        sample = ours[record["__key__"]]
+        assert np.array_equal(record["points.npy"], sample.points)
+        assert record["json"]["category"] == sample.category
+
+
+def test_the_stream_is_endless_repeatable_and_new(folder: Path) -> None:
+    dataset = artsim.open_dataset(folder)
+    first = list(itertools.islice(dataset.stream(), 30))
+    again = list(itertools.islice(dataset.stream(), 30))
+    for one, two in zip(first, again, strict=True):
+        assert_equal(one, two)
+    assert_equal(dataset.stream()[10_000], dataset.stream()[10_000])
+    stored = {s.points.tobytes() for s in dataset}
+    assert not stored & {s.points.tobytes() for s in first}
+    train = {o.sha256 for o in dataset.plan.objects_of["train"]}
+    assert {s.object_sha256 for s in first} == train
+    other = next(iter(dataset.stream(seed=99)))
+    assert not np.array_equal(other.points, first[0].points)
+    with pytest.raises(ConfigError, match="has no objects"):
+        dataset.stream("val")
+
+
+def test_training_processes_share_a_stream(folder: Path) -> None:
+    stream = artsim.open_dataset(folder).stream()
+    stream.start, stream.step = 1, 3
+    assert [s.index for s in itertools.islice(stream, 4)] == [1, 4, 7, 10]
+
+
+def test_the_object_cache_forgets_what_was_not_used_lately(folder: Path) -> None:
+    keys = [o.key for o in artsim.open_dataset(folder).plan.objects]
+    cache = ObjectCache(folder / "objects", max_bytes=1)
+    first = cache[keys[0]]
+    assert cache[keys[0]] is first
+    _ = cache[keys[1]]
+    assert cache[keys[0]] is not first
+    assert len(cache._objects) == 1
+
+
+def test_what_is_not_a_dataset_is_refused(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="no dataset here"):
+        artsim.open_dataset(tmp_path)
+    (tmp_path / "plan.json").write_text("{}")
+    with pytest.raises(DatasetError, match="not complete"):
+        artsim.open_dataset(tmp_path)
+    for content, message in (("{", "damaged"), ('{"format": 99}', "format 99 is not"), ("[]", "damaged")):
+        (tmp_path / "dataset.json").write_text(content)
+        with pytest.raises(DatasetError, match=message):
+            artsim.open_dataset(tmp_path)
+
+
+def test_importing_artsim_is_light() -> None:
+    heavy = ("torch", "sapien", "pybullet", "ray", "matplotlib", "rerun", "trimesh.viewer")
+    code = f"import sys, artsim; print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
