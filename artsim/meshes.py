@@ -11,15 +11,18 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import yourdfpy
 from numpy.typing import NDArray
 
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, transform_points
 from artsim.urdf_xml import safe_xml
+
+if TYPE_CHECKING:
+    import yourdfpy
 
 FORMATS = (".obj", ".stl", ".dae", ".glb", ".ply")
 

@@ -23,9 +23,9 @@ from tqdm import tqdm
 
 from artsim.errors import ArtsimError, AssetError, DatasetError
 from artsim.files import write_atomic
-from artsim.plan import FORMAT, Plan, PlannedObject, SampleOptions, Shard, ShardRecord, assign_splits, unique_keys
+from artsim.plan import FORMAT, Plan, PlannedObject, SampleOptions, ShardRecord, assign_splits, unique_keys
 from artsim.sources import Source
-from artsim.worker import CompiledSource, compile_source, make_shard, start_quiet_child, start_worker
+from artsim.worker import CompiledSource, compile_source, make_shard, start_worker
 
 CONVENTIONS = (
     "Metres, radians. Camera frame OpenCV (x right, y down, z forward); depth is z-depth, 0 = no return; pixel centres "
@@ -106,17 +106,36 @@ def generate(
         _remove_leftovers(folder)
         left_out: list[str] = []
         plan = _resumed_plan(folder, options, sources)
-        if plan is None:
-            plan, left_out = _new_plan(folder, options, sources, workers, skip_broken, progress)
-        finished = _finished_shards(folder, plan)
-        missing = [shard for shard in plan.shards() if shard.name not in finished]
-        before = sum(record.end - record.first for record in finished.values())
-        if missing:
-            (folder / "dataset.json").unlink(missing_ok=True)
-            finished |= _run(plan, folder, missing, workers, before, progress)
+        with _Team(folder, workers) as team:
+            if plan is None:
+                plan, left_out = _new_plan(folder, options, sources, team, skip_broken, progress)
+            finished = _finished_shards(folder, plan)
+            before = sum(record.end - record.first for record in finished.values())
+            finished |= _make_missing(folder, plan, finished, team, progress)
         _write_dataset_file(folder, plan, finished)
     made = plan.num_samples - before
     return GenerateResult(folder, plan.num_samples, made, time.perf_counter() - start, tuple(left_out))
+
+
+class _Team:
+    """The worker processes of a run: started when first given work, stopped at the end however it comes."""
+
+    def __init__(self, folder: Path, workers: int):
+        context = multiprocessing.get_context("spawn")
+        self.folder = folder
+        self.made, self.stop = context.Value("q", 0), context.Event()
+        self.pool = ProcessPoolExecutor(workers, context, start_worker, (folder, self.made, self.stop))
+
+    def __enter__(self) -> _Team:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        self.stop.set()
+        self.pool.shutdown(wait=True, cancel_futures=True)
+        if isinstance(error, BrokenProcessPool):
+            raise DatasetError(
+                "a worker process died (out of memory?)", self.folder, "use fewer --workers; the same command resumes"
+            ) from error
 
 
 def _check_counts(num_samples: int, shard_size: int, workers: int, sources: Sequence[Source]) -> None:
@@ -190,7 +209,7 @@ def _new_plan(
     folder: Path,
     options: Mapping[str, Any],
     sources: Sequence[Source],
-    workers: int,
+    team: _Team,
     skip_broken: bool,
     progress: bool,
 ) -> tuple[Plan, list[str]]:
@@ -199,22 +218,14 @@ def _new_plan(
     broken: list[tuple[Source, str]] = []
     staging = folder / "objects"
     staging.mkdir(exist_ok=True)
-    context = multiprocessing.get_context("spawn")
-    with (
-        ProcessPoolExecutor(min(workers, len(sources)), context, start_quiet_child) as pool,
-        tqdm(total=len(sources), desc="objects", unit="object", disable=not progress) as bar,
-    ):
-        futures = [pool.submit(compile_source, source, staging) for source in sources]
-        try:
-            for source, future in zip(sources, futures, strict=True):
-                try:
-                    loaded.append((source, future.result()))
-                except ArtsimError as error:
-                    broken.append((source, str(error)))
-                bar.update()
-        except KeyboardInterrupt:
-            pool.shutdown(cancel_futures=True)
-            raise
+    futures = [team.pool.submit(compile_source, source) for source in sources]
+    with tqdm(total=len(sources), desc="objects", unit="object", disable=not progress) as bar:
+        for source, future in zip(sources, futures, strict=True):
+            try:
+                loaded.append((source, future.result()))
+            except ArtsimError as error:
+                broken.append((source, str(error)))
+            bar.update()
     if (broken and not skip_broken) or not loaded:
         raise AssetError(
             f"{len(broken)} of {len(sources)} objects do not load:\n  " + "\n  ".join(text for _, text in broken[:20]),
@@ -271,38 +282,30 @@ def _finished_shards(folder: Path, plan: Plan) -> dict[str, ShardRecord]:
     return finished
 
 
-def _run(
-    plan: Plan, folder: Path, shards: Sequence[Shard], workers: int, before: int, progress: bool
+def _make_missing(
+    folder: Path, plan: Plan, finished: Mapping[str, ShardRecord], team: _Team, progress: bool
 ) -> dict[str, ShardRecord]:
-    """Make the missing shards on worker processes, writing down each as it is finished."""
-    context = multiprocessing.get_context("spawn")
-    made, stop = context.Value("q", 0), context.Event()
-    pool = ProcessPoolExecutor(min(workers, len(shards)), context, start_worker, (plan, folder, made, stop))
-    finished: dict[str, ShardRecord] = {}
-    bar = tqdm(
-        total=plan.num_samples, initial=before, desc="samples", unit="sample", smoothing=0.05, disable=not progress
-    )
-    try:
-        with (folder / "progress.jsonl").open("a") as journal:
-            pending: set[Future[ShardRecord | None]] = {pool.submit(make_shard, shard) for shard in shards}
-            while pending:
-                done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in done:
-                    record = future.result()
-                    if record is not None:
-                        finished[record.name] = record
-                        journal.write("\n" + json.dumps(asdict(record)))
-                        journal.flush()
-                bar.update(before + made.value - bar.n)
-    except BrokenProcessPool as error:
-        raise DatasetError(
-            "a worker process died (out of memory?)", folder, "use fewer --workers; the same command resumes"
-        ) from error
-    finally:
-        stop.set()
-        pool.shutdown(wait=True, cancel_futures=True)
-        bar.close()
-    return finished
+    """Make the shards that are not finished, writing down each as it is."""
+    missing = [shard for shard in plan.shards() if shard.name not in finished]
+    before = plan.num_samples - sum(shard.end - shard.first for shard in missing)
+    if missing:
+        (folder / "dataset.json").unlink(missing_ok=True)
+    made: dict[str, ShardRecord] = {}
+    with (
+        (folder / "progress.jsonl").open("a") as journal,
+        tqdm(total=plan.num_samples, initial=before, desc="samples", unit="sample", disable=not progress) as bar,
+    ):
+        for record in finished.values():  # those of a complete dataset that lost a shard are only in its description
+            journal.write("\n" + json.dumps(asdict(record)))
+        pending: set[Future[ShardRecord | None]] = {team.pool.submit(make_shard, shard) for shard in missing}
+        while pending:
+            done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+            for record in filter(None, (future.result() for future in done)):
+                made[record.name] = record
+                journal.write("\n" + json.dumps(asdict(record)))
+                journal.flush()
+            bar.update(before + team.made.value - bar.n)
+    return made
 
 
 def _write_dataset_file(folder: Path, plan: Plan, finished: Mapping[str, ShardRecord]) -> None:

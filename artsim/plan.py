@@ -7,11 +7,13 @@ a shard, the order of work or a restart.
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -220,6 +222,11 @@ class Plan:
             sample=SampleOptions.from_dict(data["sample"]),
             objects=tuple(PlannedObject(**o) for o in data["objects"]),
         )
+
+
+def read_plan(folder: Path) -> Plan:
+    """The plan that a generation run wrote into its folder."""
+    return Plan.from_dict(json.loads((folder / "plan.json").read_text()))
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.spatial import ConvexHull
 
 from artsim.kinematics import Array, KinematicTree, transform_points
 from artsim.objects import Part, Repair
@@ -87,6 +85,8 @@ class _Shape:
 
     def hull_volume(self, k: int, state: float) -> float:
         """Volume of the convex hull of the whole object: least when it is folded up, however it is turned."""
+        from scipy.spatial import ConvexHull
+
         return float(ConvexHull(np.concatenate(self.posed(k, state)), qhull_options="QJ").volume)
 
     def states(self, k: int) -> Array:
@@ -96,6 +96,8 @@ class _Shape:
 
     def refined(self, cost: Callable[[float], float], k: int, state: float, reach: float) -> float:
         """The least-cost state within reach of one, cut to the limits."""
+        from scipy.optimize import minimize_scalar
+
         low, high = np.clip([state - reach, state + reach], *self.tree.limits[k]).tolist()
         best = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 1e-4})
         # The search stays inside its bounds: a limit itself may be better.
@@ -104,6 +106,8 @@ class _Shape:
 
 def hull_corners(part: Part) -> Array:
     """(C, 3) corners of a part's convex hull; none for a part without geometry."""
+    from scipy.spatial import ConvexHull
+
     if len(part.faces) == 0:
         return np.zeros((0, 3))
     vertices = part.vertices[np.unique(part.faces)]

@@ -10,9 +10,9 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import yourdfpy
 from numpy.typing import NDArray
 
 from artsim.errors import AssetError
@@ -24,6 +24,9 @@ from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
 from artsim.partnet import read_side_files
 from artsim.rest import canonical_category, rest_state
 from artsim.urdf_xml import parse_robot
+
+if TYPE_CHECKING:
+    import yourdfpy
 
 
 def load(

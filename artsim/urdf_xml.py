@@ -9,13 +9,16 @@ from __future__ import annotations
 import io
 from collections import Counter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import yourdfpy
 from lxml import etree
 
 from artsim.errors import AssetError
 from artsim.objects import Repair
+
+if TYPE_CHECKING:
+    import yourdfpy
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 KNOWN_TYPES = (*MOVING_TYPES, "fixed", "floating")
@@ -66,6 +69,8 @@ def parse_robot(data: bytes, where: Path, max_links: int) -> tuple[yourdfpy.Robo
     AssetError
         Naming the file and the element that cannot be used.
     """
+    import yourdfpy  # takes most of a second, which only loading should pay for
+
     root = safe_xml(data, where)
     if root.tag != "robot":
         raise AssetError(f"the top element is <{root.tag}>, not <robot>", where, "pass a URDF file")

@@ -9,12 +9,13 @@ import signal
 import threading
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from artsim.files import write_atomic
 from artsim.object_file import ObjectCache, save_object
-from artsim.plan import Plan, Shard, ShardRecord, draw_sample
+from artsim.plan import Plan, Shard, ShardRecord, draw_sample, read_plan
 from artsim.renderers import Renderer, make_renderer
 from artsim.shards import tar_bytes
 from artsim.sources import Source, load_source
@@ -24,29 +25,34 @@ _STEP = 16  # samples between two looks at the stop flag
 
 @dataclass
 class _Worker:
-    """What a worker process keeps between shards."""
+    """What a worker process keeps between shards. The plan is read at the first: it may not exist before."""
 
-    plan: Plan
     folder: Path
-    objects: ObjectCache
-    renderer: Renderer
     made: Any  # shared counter of samples
     stop: Any  # shared event
+
+    @cached_property
+    def plan(self) -> Plan:
+        return read_plan(self.folder)
+
+    @cached_property
+    def objects(self) -> ObjectCache:
+        return ObjectCache(self.folder / "objects")
+
+    @cached_property
+    def renderer(self) -> Renderer:
+        return make_renderer(self.plan.sample.renderer)
 
 
 _worker: _Worker | None = None
 
 
-def start_worker(plan: Plan, folder: Path, made: Any, stop: Any) -> None:
-    """Prepare a process for :func:`make_shard`; ``made`` counts samples, ``stop`` asks to stop."""
+def start_worker(folder: Path, made: Any, stop: Any) -> None:
+    """Prepare a process for :func:`compile_source` and :func:`make_shard`.
+
+    ``made`` counts samples, ``stop`` asks to stop. Ctrl-C is left to the parent; when that is killed, so is this.
+    """
     global _worker
-    start_quiet_child()
-    renderer = make_renderer(plan.sample.renderer)
-    _worker = _Worker(plan, folder, ObjectCache(folder / "objects"), renderer, made, stop)
-
-
-def start_quiet_child() -> None:
-    """Leave Ctrl-C to the parent, and end with it even when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None
@@ -57,6 +63,7 @@ def start_quiet_child() -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
+    _worker = _Worker(folder, made, stop)
 
 
 def make_shard(shard: Shard) -> ShardRecord | None:
@@ -91,9 +98,10 @@ class CompiledSource:
     num_parts: int
 
 
-def compile_source(source: Source, staging: Path) -> CompiledSource:
-    """Load a source and keep it compiled in the folder, under a provisional name."""
+def compile_source(source: Source) -> CompiledSource:
+    """Load a source and keep it compiled in the dataset's folder, under a provisional name."""
+    assert _worker is not None
     obj = load_source(source)
     staged = f"_staged_{hashlib.sha256(source.name.encode()).hexdigest()[:16]}.npz"
-    save_object(obj, staging / staged)
+    save_object(obj, _worker.folder / "objects" / staged)
     return CompiledSource(staged, obj.category, obj.object_id, obj.sha256, len(obj))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -53,6 +54,26 @@ class PosedObject:
     camera: Camera
     T_camera_part: Array
     spans: NDArray[np.float32]
+
+    @cached_property
+    def rotations(self) -> NDArray[np.float32]:
+        """(K, 3, 3) rotations from each part to the camera."""
+        return self.T_camera_part[:, :3, :3].astype(np.float32)
+
+    @cached_property
+    def origins(self) -> NDArray[np.float32]:
+        """(K, 3) position of the camera in each part's rest frame, native units."""
+        rotation, translation = self.T_camera_part[:, :3, :3], self.T_camera_part[:, :3, 3]
+        return (-np.einsum("ki,kij->kj", translation, rotation) / self.obj.scale).astype(np.float32)
+
+    def image_plane(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(N, 3) directions of the rays through pixel centres, camera frame, z = 1."""
+        K = self.camera.K.astype(np.float32)
+        directions = np.ones((len(row), 3), dtype=np.float32)
+        y = (row.astype(np.float32) + (np.float32(0.5) - K[1, 2])) / K[1, 1]
+        directions[:, 1] = y
+        directions[:, 0] = (column.astype(np.float32) + (np.float32(0.5) - K[0, 2]) - K[0, 1] * y) / K[0, 0]
+        return directions
 
     def candidates(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(H,) first and end column, in each row, of the pixels that the whole object can cover."""
@@ -138,10 +159,11 @@ def cast(
         Rays that hit each part, hidden or not.
     """
     nearest = _Nearest(len(row), len(posed.obj))
+    directions = posed.image_plane(row, column)
     for k, (low, high) in enumerate(posed.spans):
         rays = ((column >= low[row]) & (column <= high[row])).nonzero()[0]
         if len(rays):
-            nearest.update(k, rays, _cast_part(posed, k, row[rays], column[rays]))
+            nearest.update(k, rays, _cast_part(posed, k, directions[rays]))
     return (*nearest.result(posed.obj.scale), nearest.amodal)
 
 
@@ -169,20 +191,12 @@ class _Nearest:
         return self.distance * np.float32(scale), self.part_ids
 
 
-def _cast_part(
-    posed: PosedObject, k: int, row: NDArray[np.integer], column: NDArray[np.integer]
-) -> NDArray[np.float32]:
-    """Native z-depth at which rays through pixel centres meet part k, ``_MISS`` or more where they do not."""
-    K = posed.camera.K.astype(np.float32)
-    directions = np.ones((len(row), 3), dtype=np.float32)
-    directions[:, 1] = (row + (np.float32(0.5) - K[1, 2])) * (1 / K[1, 1])
-    directions[:, 0] = (column + (np.float32(0.5) - K[0, 2]) - K[0, 1] * directions[:, 1]) * (1 / K[0, 0])
-    rotation = posed.T_camera_part[k, :3, :3]
-    origin = (-(posed.T_camera_part[k, :3, 3] / posed.obj.scale) @ rotation).astype(np.float32)
+def _cast_part(posed: PosedObject, k: int, directions: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Native z-depth at which rays from the camera meet part k, ``_MISS`` or more where they do not."""
     # All rays start at the camera: one origin, seen N times through a stride of 0.
-    origins: NDArray[np.float32] = np.ndarray(directions.shape, np.float32, origin, strides=(0, 4))
+    origins: NDArray[np.float32] = np.ndarray(directions.shape, np.float32, posed.origins[k].copy(), strides=(0, 4))
     distance: NDArray[np.float32] = part_scene(posed.obj.parts[k]).run(
-        origins, directions @ rotation.astype(np.float32), query="DISTANCE"
+        origins, directions @ posed.rotations[k], query="DISTANCE"
     )
     return distance
 
@@ -200,7 +214,7 @@ def visibility(posed: PosedObject, k: int, max_rays: int) -> tuple[int, int]:
     row, column = _span_pixels(posed, k)
     step = max(1, len(row) // max_rays)
     row, column = row[step // 2 :: step], column[step // 2 :: step]
-    met = _cast_part(posed, k, row, column) < _MISS
+    met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
     _, part_ids, _ = cast(posed, row[met], column[met])
     return int(met.sum()), int(np.count_nonzero(part_ids == k))
 
@@ -212,7 +226,7 @@ def render_posed(posed: PosedObject, only: int | None = None) -> Frame:
     for k in range(len(posed.obj)) if only is None else (only,):
         row, column = _span_pixels(posed, k)
         if len(row):
-            nearest.update(k, row * camera.width + column, _cast_part(posed, k, row, column))
+            nearest.update(k, row * camera.width + column, _cast_part(posed, k, posed.image_plane(row, column)))
     depth, part_ids = nearest.result(posed.obj.scale)
     shape = (camera.height, camera.width)
     return Frame(depth.reshape(shape), part_ids.reshape(shape), nearest.amodal)
