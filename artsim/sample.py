@@ -292,7 +292,7 @@ class _Rays:
         """(K,) estimate with a standard error of at most 0.05, exact for parts of few pixels."""
         met, saw = self.met.copy(), self.saw.copy()
         for k in np.flatnonzero(met < self.enough):
-            met[k], saw[k] = visibility(self.posed, int(k), max_rays=512)
+            met[k], saw[k] = visibility(self.posed, int(k), max_rays=256)
         fraction: Array = saw / np.maximum(met, 1)
         return fraction
 

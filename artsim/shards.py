@@ -104,14 +104,15 @@ def sample_key(index: int) -> str:
 
 def tar_bytes(samples: Iterable[Sample]) -> bytes:
     """A whole shard: plain tar, no times, no owners."""
-    buffer = io.BytesIO()
-    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
-        for sample in samples:
-            for suffix, content in sample_members(sample).items():
-                info = tarfile.TarInfo(f"{sample_key(sample.index)}.{suffix}")
-                info.size = len(content)
-                tar.addfile(info, io.BytesIO(content))
-    return buffer.getvalue()
+    blocks = []
+    for sample in samples:
+        for suffix, content in sample_members(sample).items():
+            info = tarfile.TarInfo(f"{sample_key(sample.index)}.{suffix}")
+            info.size = len(content)
+            padding = bytes(-len(content) % tarfile.BLOCKSIZE)
+            blocks += [info.tobuf(tarfile.USTAR_FORMAT), content, padding]
+    blocks.append(bytes(2 * tarfile.BLOCKSIZE))  # marks the end
+    return b"".join(blocks)
 
 
 class ShardReader:

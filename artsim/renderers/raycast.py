@@ -48,12 +48,15 @@ class PosedObject:
     spans : (K, 2, H) float
         Columns between which each part's posed box covers the centres of a row of pixels; empty (inf, -inf) where it
         does not.
+    row_ranges : (K, 2) int
+        First and end row of each part's spans.
     """
 
     obj: ArticulatedObject
     camera: Camera
     T_camera_part: Array
     spans: NDArray[np.float32]
+    row_ranges: NDArray[np.int64]
 
     @cached_property
     def rotations(self) -> NDArray[np.float32]:
@@ -102,7 +105,7 @@ def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: A
     """
     T_world_rest = np.eye(4) if T_world_object is None else np.asarray(T_world_object, dtype=np.float64)
     T_camera_part = camera.T_camera_world @ T_world_rest @ obj.tree.forward_kinematics(q)
-    return PosedObject(obj, camera, T_camera_part, _spans(obj, camera, T_camera_part))
+    return PosedObject(obj, camera, T_camera_part, *_spans(obj, camera, T_camera_part))
 
 
 _CORNERS = np.array([[i & 1, i & 2, i & 4] for i in range(8)], dtype=bool)
@@ -110,20 +113,24 @@ _EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i 
 _MARGIN = np.float32(0.05)  # pixels: covers single precision
 
 
-def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDArray[np.float32]:
-    """Row spans of the projected boxes: the outline of a convex body is made of its edges' images."""
+def _spans(
+    obj: ArticulatedObject, camera: Camera, T_camera_part: Array
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Row spans of the projected boxes (the outline of a convex body is made of its edges' images), and their rows."""
     corners = np.where(_CORNERS, obj.part_bounds[:, None, 1], obj.part_bounds[:, None, 0])
     seen = transform_points(T_camera_part, corners)
     depth = seen[..., 2]
     image = camera.project(np.where(depth[..., None] > 0, seen, [0.0, 0.0, 1.0])).clip(-1e6, 1e6).astype(np.float32)
     start, end = image[:, _EDGES[:, 0]], image[:, _EDGES[:, 1]]
     rise = end[..., 1] - start[..., 1]
-    first_row, end_row = np.clip([image[..., 1].min() - 1, image[..., 1].max() + 1], 0, camera.height).astype(int)
+    heights = np.stack([image[..., 1].min(axis=1) - 1, image[..., 1].max(axis=1) + 1], axis=1)
+    row_ranges = np.clip(heights, 0, camera.height).astype(np.int64)
+    first_row, end_row = row_ranges[:, 0].min(), row_ranges[:, 1].max()
     rows = np.arange(first_row, end_row, dtype=np.float32) + np.float32(0.5)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (rows - start[..., 1, None]) / rise[..., None]
-        column = start[..., 0, None] + along * (end[..., 0] - start[..., 0])[..., None]
     slack = _MARGIN / np.maximum(np.abs(rise), _MARGIN)[..., None]
+    rise = np.where(np.abs(rise) < 1e-6, np.float32(1e-6), rise)  # level edges share their ends with others
+    along = (rows - start[..., 1, None]) / rise[..., None]
+    column = start[..., 0, None] + along * (end[..., 0] - start[..., 0])[..., None]
     crossed = (along >= -slack) & (along <= 1.0 + slack)
     half = np.float32(0.5)  # a span counts from pixel centres
     spans = np.empty((len(obj), 2, camera.height), dtype=np.float32)
@@ -132,9 +139,10 @@ def _spans(obj: ArticulatedObject, camera: Camera, T_camera_part: Array) -> NDAr
     spans[:, 1, first_row:end_row] = np.where(crossed, column, -np.inf).max(axis=1) - half + _MARGIN
     around = (depth <= 0).any(axis=1)  # the box reaches behind the camera: it may cover any pixel
     spans[around] = np.array([-np.inf, np.inf])[:, None]
+    row_ranges[around] = 0, camera.height
     hidden = (depth <= 0).all(axis=1) | np.array([len(part.faces) == 0 for part in obj.parts])
     spans[hidden] = np.array([np.inf, -np.inf])[:, None]
-    return spans
+    return spans, row_ranges
 
 
 def cast(
@@ -148,6 +156,7 @@ def cast(
     ----------
     posed : PosedObject
     row, column : (N,) int
+        Row after row.
 
     Returns
     -------
@@ -160,8 +169,10 @@ def cast(
     """
     nearest = _Nearest(len(row), len(posed.obj))
     directions = posed.image_plane(row, column)
-    for k, (low, high) in enumerate(posed.spans):
-        rays = ((column >= low[row]) & (column <= high[row])).nonzero()[0]
+    for k, (start, end) in enumerate(np.searchsorted(row, posed.row_ranges).tolist()):
+        low, high = posed.spans[k]
+        near_row, near_column = row[start:end], column[start:end]
+        rays = ((near_column >= low[near_row]) & (near_column <= high[near_row])).nonzero()[0] + start
         if len(rays):
             nearest.update(k, rays, _cast_part(posed, k, directions[rays]))
     return (*nearest.result(posed.obj.scale), nearest.amodal)
@@ -177,9 +188,7 @@ class _Nearest:
 
     def update(self, k: int, rays: NDArray[np.int64], distance: NDArray[np.float32]) -> None:
         """Take in the native z-depths at which some rays meet part k."""
-        hit = (distance < _MISS).nonzero()[0]
-        self.amodal[k] += len(hit)
-        rays, distance = rays[hit], distance[hit]
+        self.amodal[k] += np.count_nonzero(distance < _MISS)
         nearer = (distance < self.distance[rays]).nonzero()[0]
         rays = rays[nearer]
         self.distance[rays] = distance[nearer]
