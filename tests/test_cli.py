@@ -46,8 +46,8 @@ def test_errors_are_one_line_and_exit_with_2(tmp_path: Path) -> None:
         (ARTSIM, "verify", str(tmp_path)),
         (ARTSIM, "view", str(tmp_path)),
         (sys.executable, "generate.py", "--objects", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")),
-        (sys.executable, "generate.py", "--objects", "urdf_assets/laptop", "--out", str(tmp_path / "o"), "--num-points", "0"),
-    ):  # fmt: skip
+        (sys.executable, "generate.py", "--objects", "urdf_assets/laptop", "--out", str(tmp_path), "--num-points", "0"),
+    ):
         result = run(*arguments)
         assert result.returncode == 2, arguments
         assert "Traceback" not in result.stderr
@@ -72,8 +72,8 @@ def test_inspect_prints_tree_limits_boxes_and_repairs() -> None:
 
 def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     out = tmp_path / "first"
-    made = generate("--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), "--num-samples", "20",
-                    "--scale", "0.5", "1.0", "--states.joint-range", "screen", "-1.5", "0", "--images", "depth", "part_mask")  # fmt: skip
+    options = "--num-samples 20 --scale 0.5 1.0 --states.joint-range screen -1.5 0 --images depth part_mask"
+    made = generate("--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), *options.split())
     assert made.returncode == 0, made.stderr
     assert "20 samples" in made.stdout
     assert "sound" in run(ARTSIM, "verify", str(out)).stdout
