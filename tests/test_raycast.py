@@ -13,10 +13,12 @@ import artsim
 from artsim import Camera, StateOptions, ViewOptions, observe, render, sample_state, sample_view
 from artsim.camera import points_from_depth
 from artsim.errors import ConfigError, RenderError
+from artsim.kinematics import Joint
+from artsim.objects import Part
 from artsim.renderers import BACKGROUND, make_renderer
-from artsim.renderers.raycast import cast, pose
+from artsim.renderers.raycast import bounding_corners, cast, pose
 from artsim.sample import draw_visible
-from tests.conftest import ASSETS, DEMO, rigid
+from tests.conftest import ASSETS, DEMO, rigid, solid
 
 
 def test_a_box_face_in_front_has_the_depth_of_its_plane() -> None:
@@ -70,6 +72,28 @@ def test_only_the_projected_outline_is_cast_and_nothing_is_lost() -> None:
         assert np.array_equal(p.reshape(480, 640), frame.part_ids)
         assert np.array_equal(d.reshape(480, 640), frame.depth)
         assert np.array_equal(amodal, frame.amodal_pixels)
+
+
+def test_a_part_without_geometry_is_never_seen() -> None:
+    """Toasters of PartNet-Mobility have a root that shows nothing."""
+    turn = Joint("turn", "continuous", 0, lower=-np.inf, upper=np.inf)
+    tree = artsim.KinematicTree([Joint("root", "free", -1), turn])
+    empty = Part("empty", "empty", np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+    obj = artsim.ArticulatedObject("o", "c", (empty, solid("box", trimesh.creation.box((1, 1, 1)))), tree, "0" * 64)
+    sample = observe(obj, [0.0, 1.0], Camera.look_at([-3, 1, 1], [0, 0, 0]))
+    assert set(sample.part) == {1}
+    assert sample.visible_fraction.tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("shape", ["ball", "plate", "needle", "triangle"])
+def test_bounding_corners_contain_every_point(shape: str) -> None:
+    points = np.random.default_rng(0).normal(size=(300, 3))
+    points *= {"ball": (1, 1, 1), "plate": (1, 1, 0), "needle": (1, 1e-5, 1e-5), "triangle": (1, 1, 0)}[shape]
+    points = points[:3] if shape == "triangle" else points
+    points = points @ trimesh.transformations.random_rotation_matrix(np.array([0.3, 0.5, 0.7]))[:3, :3]
+    corners = bounding_corners(points)
+    normals = np.random.default_rng(1).normal(size=(500, 3))
+    assert ((corners @ normals.T).max(axis=0) >= (points @ normals.T).max(axis=0) - 1e-9).all()
 
 
 def test_a_camera_inside_the_object_sees_its_walls() -> None:

@@ -7,6 +7,7 @@ have z = 1 in the camera frame, which makes the ray parameter the z-depth itself
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from dataclasses import dataclass
 from functools import cached_property
@@ -66,13 +67,19 @@ def bounding_corners(points: Array) -> Array:
     (C, 3) float
         Their convex hull contains the points.
     """
-    from scipy.spatial import HalfspaceIntersection
+    from scipy.spatial import HalfspaceIntersection, QhullError
 
     reach = points @ _NORMALS.T
     low, high = reach.min(axis=0), reach.max(axis=0)
-    slack = 1e-6 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
+    slack = 1e-5 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
     faces = np.concatenate([np.column_stack([_NORMALS, -high - slack]), np.column_stack([-_NORMALS, low - slack])])
-    return HalfspaceIntersection(faces, points.mean(axis=0), qhull_options="QJ").intersections
+    with contextlib.suppress(QhullError):
+        corners = HalfspaceIntersection(faces, points.mean(axis=0)).intersections
+        around = corners @ _NORMALS.T
+        if np.isfinite(around).all() and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
+            return corners
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    return np.array([(box[a, 0], box[b, 1], box[c, 2]) for a in (0, 1) for b in (0, 1) for c in (0, 1)])
 
 
 _NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)])
@@ -280,6 +287,8 @@ def visibility(posed: PosedObject, k: int, max_rays: int) -> tuple[int, int]:
         About the most rays to cast; all pixels are looked at when there are fewer.
     """
     row, column = _span_pixels(posed, k)
+    if len(row) == 0:
+        return 0, 0
     step = max(1, len(row) // max_rays)
     row, column = row[step // 2 :: step], column[step // 2 :: step]
     met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
