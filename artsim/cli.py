@@ -15,6 +15,11 @@ from artsim.errors import ArtsimError, ConfigError
 from artsim.plan import SampleOptions
 
 
+def _cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
 @dataclass(frozen=True)
 class Generate:
     """Generate a dataset of labelled partial point clouds.
@@ -34,7 +39,7 @@ class Generate:
     """Samples in all; every object gets about the same number."""
     seed: int = 0
     """Seed of the dataset; sample i depends on (seed, i) only."""
-    workers: int = field(default_factory=lambda: max(1, len(os.sched_getaffinity(0))))
+    workers: int = field(default_factory=_cores)
     """Worker processes; by default one for each core."""
     sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
@@ -130,6 +135,8 @@ class Verify:
         problems = verify(self.path)
         for problem in problems[:50]:
             print(problem)
+        if len(problems) > 50:
+            print(f"... and {len(problems) - 50} more")
         if problems:
             raise ConfigError(
                 f"{len(problems)} problems found", self.path, "delete the shards named, then rerun generate"
@@ -158,10 +165,10 @@ def generate_main() -> None:
 def _run(verb: Any, program: str) -> None:
     try:
         tyro.cli(verb, prog=program, description=None if verb is Generate else __doc__).run()
-    except ArtsimError as error:
+    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
+        sys.stderr.close()
+    except (ArtsimError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
-    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
-        sys.stderr.close()

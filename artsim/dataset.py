@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import hashlib
 import json
 import os
 from collections import OrderedDict
@@ -24,6 +23,7 @@ from artsim.sample import Sample
 from artsim.shards import ShardReader, sample_key
 
 _OPEN_SHARDS = 64
+_FAR = 1_000_000_007
 
 
 class Dataset:
@@ -47,12 +47,11 @@ class Dataset:
 
     def __init__(self, folder: str | Path, split: str | None = None):
         self.folder = Path(folder)
-        self.description = read_description(self.folder)
-        self.plan = Plan.from_dict(self.description)
+        self.plan, shards = _read_description(self.folder)
         if split is not None and split not in SPLITS:
             raise ConfigError(f"there is no split {split!r}", mend=f"use one of {', '.join(SPLITS)}")
         self.split = split
-        self.shards = [ShardRecord(**s) for s in self.description["shards"] if split in (None, s["split"])]
+        self.shards = [s for s in shards if split in (None, s.split)]
         self._ends = np.cumsum([s.end - s.first for s in self.shards]).tolist()
         self._readers: OrderedDict[str, ShardReader] = OrderedDict()
         self._owner = os.getpid()
@@ -103,16 +102,18 @@ class Dataset:
         """
         return PaddedDataset(self, max_parts or max(o.num_parts for o in self.plan.objects))
 
-    def stream(self, split: str = "train", seed: int | None = None) -> SampleStream:
+    def stream(self, split: str = "train", seed: int | None = None, start: int = 0, step: int = 1) -> SampleStream:
         """Fresh samples of a split's objects for ever, drawn like this dataset's but with another seed.
 
         Parameters
         ----------
         split : str
         seed : int, optional
-            By default the dataset's seed plus one, so that no sample of the dataset comes back.
+            By default far from the dataset's, so that no sample of it, or of one with a neighbouring seed, comes back.
+        start, step : int
+            See :class:`SampleStream`.
         """
-        return SampleStream(self.plan, self.folder, split, self.plan.seed + 1 if seed is None else seed)
+        return SampleStream(self.plan, self.folder, split, self.plan.seed + _FAR if seed is None else seed, start, step)
 
 
 class PaddedDataset:
@@ -184,15 +185,22 @@ class SampleStream:
     def __init__(self, plan: Plan, folder: Path, split: str = "train", seed: int = 1, start: int = 0, step: int = 1):
         if split not in SPLITS or not plan.objects_of[split]:
             raise ConfigError(f"split {split!r} has no objects", mend="choose one that has, or other shares")
+        if seed < 0 or start < 0 or step < 1:
+            raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", mend="count from 0 upwards")
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
         self.objects = ObjectCache(Path(folder) / "objects")
         self._renderer: Renderer | None = None
 
     def __getitem__(self, i: int) -> Sample:
+        if i < 0:
+            raise IndexError(f"sample {i} of an endless stream")
         if self._renderer is None:
             self._renderer = make_renderer(self.plan.sample.renderer)
         planned = self.plan.object_in_split(self.split, i)
         return draw_sample(self.objects[planned.key], self.plan.sample, self.seed, i, self._renderer)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "objects": ObjectCache(self.objects.folder), "_renderer": None}
 
     def __iter__(self) -> Iterator[Sample]:
         i = self.start
@@ -206,7 +214,7 @@ def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:
     return Dataset(folder, split)
 
 
-def read_description(folder: Path) -> dict[str, Any]:
+def _read_description(folder: Path) -> tuple[Plan, list[ShardRecord]]:
     """Content of ``dataset.json``.
 
     Raises
@@ -225,17 +233,8 @@ def read_description(folder: Path) -> dict[str, Any]:
     try:
         description = json.loads(path.read_text())
         found = description["format"]
-    except (ValueError, KeyError, TypeError) as error:
+        if found != FORMAT:
+            raise DatasetError(f"format {found} is not {FORMAT}", folder, "generate it with this version of artsim")
+        return Plan.from_dict(description), [ShardRecord(**s) for s in description["shards"]]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ConfigError) as error:
         raise DatasetError(f"dataset.json is damaged ({error})", folder, "delete it and rerun generate") from error
-    if found != FORMAT:
-        raise DatasetError(f"format {found} is not {FORMAT}", folder, "generate it with this version of artsim")
-    return description
-
-
-def file_sha256(path: Path) -> str:
-    """Hex digest of a file, read in pieces."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()

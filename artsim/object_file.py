@@ -79,7 +79,7 @@ def load_object(path: Path) -> ArticulatedObject:
             source=str(path),
             source_joints={name: (int(k), float(m)) for name, (k, m) in header["source_joints"].items()},
         )
-    except (KeyError, ValueError, TypeError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
         raise AssetError(f"not an artsim object file ({error})", path, "generate it again") from error
 
 

@@ -8,22 +8,34 @@ presence means that the dataset is complete.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import multiprocessing
+import os
+import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from tqdm import tqdm
 
-from artsim.errors import ArtsimError, AssetError, DatasetError
-from artsim.files import write_atomic
-from artsim.plan import FORMAT, Plan, PlannedObject, SampleOptions, ShardRecord, assign_splits, unique_keys
+from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError, KinematicsError
+from artsim.files import write_atomic, write_error
+from artsim.plan import (
+    Plan,
+    PlannedObject,
+    SampleOptions,
+    ShardRecord,
+    assign_splits,
+    check_shares,
+    unique_keys,
+)
 from artsim.sources import Source
 from artsim.worker import CompiledSource, compile_source, make_shard, start_worker
 
@@ -32,6 +44,10 @@ CONVENTIONS = (
     "at +0.5. T_camera_part maps the rest frame, as carried by each part, to the camera. Rest frame: Z up, front "
     "towards -X, origin at the centre of the object's box in its rest state."
 )
+_VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -87,6 +103,8 @@ def generate(
     ------
     AssetError
         When sources cannot be loaded.
+    ConfigError
+        When an option makes no sense, or the folder cannot be written to.
     DatasetError
         When the folder holds a dataset of another plan, or is in use.
     KeyboardInterrupt
@@ -94,37 +112,45 @@ def generate(
     """
     start = time.perf_counter()
     folder = Path(out)
-    options = {
-        "seed": seed,
-        "num_samples": num_samples,
-        "shard_size": shard_size,
-        "fractions": list(splits),
-        "sample": json.loads(json.dumps(asdict(sample or SampleOptions()))),
-    }
-    _check_counts(num_samples, shard_size, workers, sources)
+    asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), ())
+    options = {**json.loads(json.dumps(asked.to_dict())), "artsim_version": version("artsim")}
+    del options["objects"]
+    _check_options(num_samples, seed, shard_size, workers, splits, sources)
     with _locked(folder):
         _remove_leftovers(folder)
-        left_out: list[str] = []
-        plan = _resumed_plan(folder, options, sources)
+        begun = _begun_plan(folder, options, sources)
         with _Team(folder, workers) as team:
-            if plan is None:
-                plan, left_out = _new_plan(folder, options, sources, team, skip_broken, progress)
+            if begun is None:
+                begun = _new_plan(folder, options, sources, team, skip_broken, progress)
+            plan = Plan.from_dict(begun)
             finished = _finished_shards(folder, plan)
             before = sum(record.end - record.first for record in finished.values())
             finished |= _make_missing(folder, plan, finished, team, progress)
-        _write_dataset_file(folder, plan, finished)
-    made = plan.num_samples - before
-    return GenerateResult(folder, plan.num_samples, made, time.perf_counter() - start, tuple(left_out))
+        _complete(folder, plan, begun, finished)
+    left_out = tuple(entry["why"] for entry in begun["left_out"])
+    return GenerateResult(folder, plan.num_samples, plan.num_samples - before, time.perf_counter() - start, left_out)
 
 
 class _Team:
     """The worker processes of a run: started when first given work, stopped at the end however it comes."""
 
     def __init__(self, folder: Path, workers: int):
+        # Inherited by the processes: with one of them for each core, NumPy's own threads only get in the way.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         context = multiprocessing.get_context("spawn")
-        self.folder = folder
+        self.folder, self.workers = folder, workers
         self.made, self.stop = context.Value("q", 0), context.Event()
         self.pool = ProcessPoolExecutor(workers, context, start_worker, (folder, self.made, self.stop))
+
+    def submit(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Give work to the processes; those that it starts never hear a Ctrl-C, which is the parent's to answer."""
+        if sys.platform == "win32":
+            return self.pool.submit(work, *args, **kwargs)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return self.pool.submit(work, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def __enter__(self) -> _Team:
         return self
@@ -132,16 +158,28 @@ class _Team:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         self.stop.set()
         self.pool.shutdown(wait=True, cancel_futures=True)
-        if isinstance(error, BrokenProcessPool):
+        if isinstance(error, BrokenProcessPool | MemoryError):
             raise DatasetError(
-                "a worker process died (out of memory?)", self.folder, "use fewer --workers; the same command resumes"
+                "a worker process died (out of memory? a script without `if __name__ == '__main__'`?)",
+                self.folder,
+                "use fewer --workers; the same command resumes",
             ) from error
 
 
-def _check_counts(num_samples: int, shard_size: int, workers: int, sources: Sequence[Source]) -> None:
+def _check_options(
+    num_samples: int,
+    seed: int,
+    shard_size: int,
+    workers: int,
+    splits: tuple[float, float, float],
+    sources: Sequence[Source],
+) -> None:
     for name, value in (("num_samples", num_samples), ("shard_size", shard_size), ("workers", workers)):
         if value < 1:
-            raise ArtsimError(f"{value} is not a count", name, "use 1 or more")
+            raise ConfigError(f"{value} is not a count", name, "use 1 or more")
+    if seed < 0:
+        raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
+    check_shares(splits)
     if not sources:
         raise AssetError("no objects to show", mend="name URDF files or folders that hold some")
 
@@ -153,25 +191,28 @@ def _locked(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         lock = (folder / ".lock").open("w")
     except OSError as error:
-        raise DatasetError(f"cannot write ({error.strerror})", folder, "choose another --out folder") from error
+        raise write_error(error, folder) from error
     with lock:
         if sys.platform != "win32":
             import fcntl
 
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+            except BlockingIOError as error:
                 raise DatasetError("another run is writing here", folder, "wait for it or stop it") from error
+            except OSError as error:
+                raise DatasetError(f"cannot lock ({error.strerror})", folder, "use a folder on a local disk") from error
         yield
 
 
 def _remove_leftovers(folder: Path) -> None:
-    for leftover in [*folder.glob(".*.part"), *(folder / "objects").glob(".*.part")]:
+    """Remove files that killed runs did not finish."""
+    for leftover in [*folder.glob(".*.part"), *folder.glob("objects/.*.part")]:
         leftover.unlink(missing_ok=True)
 
 
-def _resumed_plan(folder: Path, options: Mapping[str, Any], sources: Sequence[Source]) -> Plan | None:
-    """The folder's plan if there is one and it is the one asked for.
+def _begun_plan(folder: Path, options: Mapping[str, Any], sources: Sequence[Source]) -> dict[str, Any] | None:
+    """Content of the folder's ``plan.json`` if there is one and it is the one asked for.
 
     Raises
     ------
@@ -180,29 +221,43 @@ def _resumed_plan(folder: Path, options: Mapping[str, Any], sources: Sequence[So
     """
     path = folder / "plan.json"
     if not path.exists():
-        strangers = [p.name for p in folder.iterdir() if not p.name.startswith(".") and p.name != "objects"]
+        ours = {folder / "objects", *folder.glob(".*"), *folder.glob("objects/.*"), *folder.glob("objects/*.npz")}
+        strangers = sorted({*folder.iterdir(), *folder.glob("objects/*")} - ours)
         if strangers:
-            raise DatasetError(f"the folder already holds {strangers[0]!r}", folder, "choose an empty or new folder")
+            name = strangers[0].relative_to(folder).as_posix()
+            raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
         return None
     try:
-        stored = json.loads(path.read_text())
-        plan = Plan.from_dict(stored)
-    except (ValueError, KeyError, TypeError) as error:
+        stored: dict[str, Any] = json.loads(path.read_text())
+        differing = _differing(options, stored)
+        have = {
+            (o["source"], o["source_sha256"]) for o in [*stored["objects"], *stored["left_out"], *stored["repeated"]]
+        }
+        if have != {(s.name, s.sha256) for s in sources}:
+            differing.append("objects")
+        if not differing:
+            Plan.from_dict(stored)
+    except (ValueError, KeyError, TypeError, AttributeError, ArtsimError) as error:
         raise DatasetError(f"plan.json is damaged ({error})", folder, "delete the folder and start again") from error
-    differing = [name for name, value in options.items() if stored.get(name) != value]
-    wanted = sorted((s.name, s.sha256) for s in sources)
-    have = sorted({(o.source, o.source_sha256) for o in plan.objects} | {tuple(s) for s in stored["left_out"]})
-    if wanted != have:
-        differing.append("objects")
-    if stored.get("format") != FORMAT:
-        differing.append("format")
     if differing:
         raise DatasetError(
             f"the folder holds a dataset of another plan (different: {', '.join(differing)})",
             folder,
             "choose another --out folder, or the options it was begun with (see its plan.json)",
         )
-    return plan
+    return stored
+
+
+def _differing(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Names of the entries of ``wanted`` that are stored otherwise, such as 'sample.views.fov'."""
+    names: list[str] = []
+    for name, value in wanted.items():
+        there = stored.get(name)
+        if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
+            names += _differing(value, there, f"{prefix}{name}.")
+        elif value != there:
+            names.append(prefix + name)
+    return names
 
 
 def _new_plan(
@@ -212,34 +267,40 @@ def _new_plan(
     team: _Team,
     skip_broken: bool,
     progress: bool,
-) -> tuple[Plan, list[str]]:
+) -> dict[str, Any]:
     """Load every source, keep it compiled in the folder, and write the plan."""
-    loaded: list[tuple[Source, CompiledSource]] = []
-    broken: list[tuple[Source, str]] = []
     staging = folder / "objects"
-    staging.mkdir(exist_ok=True)
-    futures = [team.pool.submit(compile_source, source) for source in sources]
+    try:
+        staging.mkdir(exist_ok=True)
+    except OSError as error:
+        raise write_error(error, staging) from error
+    loaded: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
+    repeated: list[dict[str, str]] = []
+    left_out: list[dict[str, str]] = []
+    futures = [team.submit(compile_source, source, f"_staged_{i}.npz") for i, source in enumerate(sources)]
     with tqdm(total=len(sources), desc="objects", unit="object", disable=not progress) as bar:
         for source, future in zip(sources, futures, strict=True):
+            entry = {"source": source.name, "source_sha256": source.sha256}
             try:
-                loaded.append((source, future.result()))
-            except ArtsimError as error:
-                broken.append((source, str(error)))
+                compiled = future.result()
+                content = compiled.category, compiled.object_id, compiled.sha256
+                if loaded.setdefault(content, (source, compiled))[0] is not source:
+                    repeated.append(entry)  # the same object named twice counts once
+            except (AssetError, KinematicsError) as error:
+                left_out.append({**entry, "why": str(error)})
             bar.update()
-    if (broken and not skip_broken) or not loaded:
+    if (left_out and not skip_broken) or not loaded:
         raise AssetError(
-            f"{len(broken)} of {len(sources)} objects do not load:\n  " + "\n  ".join(text for _, text in broken[:20]),
+            f"{len(left_out)} of {len(sources)} objects do not load:\n  "
+            + "\n  ".join(entry["why"] for entry in left_out[:20]),
             mend="mend them, or leave them out with --skip-broken",
         )
-    unique: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
-    for source, compiled in loaded:  # the same object named twice counts once
-        unique.setdefault((compiled.category, compiled.object_id, compiled.sha256), (source, compiled))
-    keys = unique_keys(list(unique))
-    split_names = assign_splits(
-        [(c.category, c.sha256) for _, c in unique.values()], options["fractions"], options["seed"]
+    keys = unique_keys(list(loaded))
+    splits = assign_splits(
+        [(category, sha256) for category, _, sha256 in loaded], options["fractions"], options["seed"]
     )
     objects = []
-    for key, split, (source, compiled) in zip(keys, split_names, unique.values(), strict=True):
+    for key, split, (source, compiled) in zip(keys, splits, loaded.values(), strict=True):
         (staging / compiled.staged).replace(staging / f"{key}.npz")
         objects.append(
             PlannedObject(
@@ -253,31 +314,33 @@ def _new_plan(
                 split=split,
             )
         )
-    for stray in staging.glob("_staged_*.npz"):
-        stray.unlink()
-    planned = {(o.source, o.source_sha256) for o in objects}
-    left_out = sorted({(s.name, s.sha256) for s in sources} - planned)
-    plan = Plan.from_dict({**options, "objects": [asdict(o) for o in objects]})
-    write_atomic(folder / "plan.json", json.dumps({**plan.to_dict(), "left_out": left_out}, indent=1).encode())
-    return plan, [text for _, text in broken]
+    plan = {
+        **options,
+        "versions": {name: version(name) for name in _VERSIONS_OF},
+        "objects": [asdict(o) for o in objects],
+        "left_out": left_out,
+        "repeated": repeated,
+    }
+    write_atomic(folder / "plan.json", json.dumps(plan, indent=1).encode())
+    return plan
 
 
 def _finished_shards(folder: Path, plan: Plan) -> dict[str, ShardRecord]:
     """Shards that earlier runs finished and that are still there at their full size."""
-    path = folder / "progress.jsonl"
-    wanted = {shard.name: shard for shard in plan.shards()}
+    lines: list[str] = []
+    with contextlib.suppress(FileNotFoundError):
+        lines += (folder / "progress.jsonl").read_text(errors="replace").splitlines()
+    with contextlib.suppress(FileNotFoundError, ValueError, KeyError, TypeError):
+        lines += [json.dumps(record) for record in json.loads((folder / "dataset.json").read_text())["shards"]]
+    wanted = {shard.name for shard in plan.shards()}
     finished = {}
-    lines = path.read_text().splitlines() if path.exists() else []
-    complete = folder / "dataset.json"
-    if complete.exists():
-        lines += [json.dumps(record) for record in json.loads(complete.read_text())["shards"]]
     for line in lines:
         try:
             record = ShardRecord(**json.loads(line))
         except (ValueError, TypeError):
             continue  # the last line of a killed run may be cut short; its shard is made again
-        shard, file = wanted.get(record.name), folder / record.name
-        if shard is not None and file.exists() and file.stat().st_size == record.bytes:
+        file = folder / record.name
+        if record.name in wanted and file.exists() and file.stat().st_size == record.bytes:
             finished[record.name] = record
     return finished
 
@@ -287,33 +350,52 @@ def _make_missing(
 ) -> dict[str, ShardRecord]:
     """Make the shards that are not finished, writing down each as it is."""
     missing = [shard for shard in plan.shards() if shard.name not in finished]
+    if not missing:
+        return {}
+    journal = folder / "progress.jsonl"
+    write_atomic(journal, b"".join(map(_line, finished.values())))
+    (folder / "dataset.json").unlink(missing_ok=True)
     before = plan.num_samples - sum(shard.end - shard.first for shard in missing)
-    if missing:
-        (folder / "dataset.json").unlink(missing_ok=True)
     made: dict[str, ShardRecord] = {}
-    with (
-        (folder / "progress.jsonl").open("a") as journal,
-        tqdm(total=plan.num_samples, initial=before, desc="samples", unit="sample", disable=not progress) as bar,
-    ):
-        for record in finished.values():  # those of a complete dataset that lost a shard are only in its description
-            journal.write("\n" + json.dumps(asdict(record)))
-        pending: set[Future[ShardRecord | None]] = {team.pool.submit(make_shard, shard) for shard in missing}
-        while pending:
+    waiting = iter(missing)
+    pending: set[Future[ShardRecord | None]] = set()
+    with tqdm(total=plan.num_samples, initial=before, desc="samples", unit="sample", disable=not progress) as bar:
+        while len(made) < len(missing):
+            pending |= {team.submit(make_shard, s) for s in itertools.islice(waiting, 2 * team.workers - len(pending))}
             done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-            for record in filter(None, (future.result() for future in done)):
-                made[record.name] = record
-                journal.write("\n" + json.dumps(asdict(record)))
-                journal.flush()
+            records = [record for future in done if (record := future.result())]
+            made |= {record.name: record for record in records}
+            _append(journal, b"".join(map(_line, records)))
             bar.update(before + team.made.value - bar.n)
     return made
 
 
-def _write_dataset_file(folder: Path, plan: Plan, finished: Mapping[str, ShardRecord]) -> None:
+def _line(record: ShardRecord) -> bytes:
+    return json.dumps(asdict(record)).encode() + b"\n"
+
+
+def _append(path: Path, data: bytes) -> None:
+    try:
+        with path.open("ab") as file:
+            file.write(data)
+    except OSError as error:
+        raise write_error(error, path) from error
+
+
+def _complete(folder: Path, plan: Plan, begun: Mapping[str, Any], finished: Mapping[str, ShardRecord]) -> None:
+    """Write ``dataset.json``, and remove what killed runs and their last workers left."""
     description = {
-        **plan.to_dict(),
+        **begun,
         "conventions": CONVENTIONS,
         "splits": {split: {"first": first, "end": end} for split, (first, end) in plan.ranges.items()},
         "shards": [asdict(finished[shard.name]) for shard in plan.shards()],
     }
-    write_atomic(folder / "dataset.json", json.dumps(description, indent=1).encode())
+    path, content = folder / "dataset.json", json.dumps(description, indent=1).encode()
+    if not path.exists() or path.read_bytes() != content:
+        write_atomic(path, content)
+    planned = {f"{o.key}.npz" for o in plan.objects}
+    for stray in folder.glob("objects/*.npz"):
+        if stray.name not in planned:
+            stray.unlink()
     (folder / "progress.jsonl").unlink(missing_ok=True)
+    _remove_leftovers(folder)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -172,23 +172,22 @@ class Plan:
 
     def split_of(self, index: int) -> str:
         """Split that a sample belongs to."""
-        return next(split for split, (start, end) in self.ranges.items() if start <= index < end)
+        for split, (start, end) in self.ranges.items():
+            if start <= index < end:
+                return split
+        raise IndexError(f"sample {index} of {self.num_samples}")
 
     def object_of(self, index: int) -> PlannedObject:
-        """Object that a sample shows."""
+        """Object that a sample shows: each object of a split gets the same number of samples, give or take one."""
         split = self.split_of(index)
-        return self.object_in_split(split, index - self.ranges[split][0])
+        start, end = self.ranges[split]
+        objects = self.objects_of[split]
+        return objects[_whose_turn(index - start, len(objects), (end - start) // len(objects))]
 
     def object_in_split(self, split: str, turn: int) -> PlannedObject:
-        """Object at a turn of a split's endless rotation.
-
-        A few objects take turns for a few hundred samples, then the next few: every shard mixes objects, and a worker
-        needs only those in memory.
-        """
+        """Object at a turn of a split's endless rotation."""
         objects = self.objects_of[split]
-        together = min(_OBJECTS_AT_ONCE, len(objects))
-        group, slot = turn // (together * _VIEWS_IN_A_ROW), turn % together
-        return objects[(group * together + slot) % len(objects)]
+        return objects[_whose_turn(turn, len(objects))]
 
     def shards(self) -> list[Shard]:
         """Every shard, in order."""
@@ -224,6 +223,20 @@ class Plan:
         )
 
 
+def _whose_turn(turn: int, objects: int, rounds: int | None = None) -> int:
+    """Number of the object at a turn.
+
+    A few objects take turns until each has had several, then the next few: every shard mixes objects, and a worker
+    needs only those in memory. After the last of ``rounds`` turns each, every object gets one more, in order.
+    """
+    lap, left = divmod(turn, objects * _VIEWS_IN_A_ROW)
+    in_a_row = _VIEWS_IN_A_ROW if rounds is None else min(_VIEWS_IN_A_ROW, rounds - lap * _VIEWS_IN_A_ROW)
+    if left >= objects * in_a_row:
+        return left - objects * in_a_row
+    first = left // (_OBJECTS_AT_ONCE * in_a_row) * _OBJECTS_AT_ONCE
+    return first + (left - first * in_a_row) % min(_OBJECTS_AT_ONCE, objects - first)
+
+
 def read_plan(folder: Path) -> Plan:
     """The plan that a generation run wrote into its folder."""
     return Plan.from_dict(json.loads((folder / "plan.json").read_text()))
@@ -254,7 +267,8 @@ class ShardRecord:
 def assign_splits(objects: Sequence[tuple[str, str]], fractions: tuple[float, float, float], seed: int) -> list[str]:
     """Split of each object: by object, never by view, stratified by category.
 
-    Objects with equal content always share a split, whatever they are called.
+    Objects with equal content always share a split, whatever they and their categories are called. Each category has
+    at least one object in train, unless its share is 0.
 
     Parameters
     ----------
@@ -267,26 +281,41 @@ def assign_splits(objects: Sequence[tuple[str, str]], fractions: tuple[float, fl
     -------
     list of str
     """
-    total = sum(fractions)
-    if min(fractions) < 0 or total <= 0:
-        raise ConfigError(f"{fractions} are not shares", "splits", "write three numbers such as 0.8 0.1 0.1")
-    contents: dict[str, set[str]] = defaultdict(set)
+    check_shares(fractions)
+    category_of: dict[str, str] = {}
     for category, sha256 in objects:
-        contents[category].add(sha256)
-    split_of: dict[tuple[str, str], str] = {}
-    for category, digests in contents.items():
+        category_of[sha256] = min(category, category_of.get(sha256, category))
+    contents: dict[str, list[str]] = defaultdict(list)
+    for sha256, category in category_of.items():
+        contents[category].append(sha256)
+    shares = np.cumsum(fractions) / sum(fractions)
+    split_of: dict[str, str] = {}
+    for digests in contents.values():
         order = sorted(digests, key=lambda d: hashlib.sha256(f"{seed}:{d}".encode()).hexdigest())
-        ends = np.floor(np.cumsum(fractions) / total * len(order) + 0.5)
-        # Rounding keeps at least one object where a share is asked for and there is more than one to give.
+        ends = np.floor(shares * len(order) + 0.5)
+        if fractions[0] > 0:
+            ends = np.maximum(ends, 1)  # a category of one object can at least be trained on
         for place, digest in enumerate(order):
-            split_of[category, digest] = SPLITS[int(np.searchsorted(ends, place, side="right"))]
-    return [split_of[obj] for obj in objects]
+            split_of[digest] = SPLITS[int(np.searchsorted(ends, place, side="right"))]
+    return [split_of[sha256] for _, sha256 in objects]
+
+
+def check_shares(fractions: tuple[float, float, float]) -> None:
+    """Refuse shares of train, val and test that make no sense.
+
+    Raises
+    ------
+    ConfigError
+    """
+    if not np.isfinite(fractions).all() or min(fractions) < 0 or sum(fractions) <= 0:
+        raise ConfigError(f"{tuple(fractions)} are not shares", "splits", "write three numbers such as 0.8 0.1 0.1")
 
 
 def unique_keys(objects: Sequence[tuple[str, str, str]]) -> list[str]:
-    """A file-safe unique key for each (category, object_id, sha256)."""
-    names = [re.sub(r"[^A-Za-z0-9_-]+", "_", f"{category}-{object_id}") for category, object_id, _ in objects]
+    """A file-safe unique key for each (category, object_id, sha256), also where file names ignore case."""
+    names = [re.sub(r"[^A-Za-z0-9_-]+", "_", f"{category}-{object_id}")[:100] for category, object_id, _ in objects]
+    count = Counter(name.lower() for name in names)
     return [
-        f"{name}-{sha256[:8]}" if names.count(name) > 1 else name
-        for name, (_, _, sha256) in zip(names, objects, strict=True)
+        f"{name}-{hashlib.sha256(repr(obj).encode()).hexdigest()[:12]}" if count[name.lower()] > 1 else name
+        for name, obj in zip(names, objects, strict=True)
     ]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from artsim.errors import DatasetError
+from artsim.files import atomic_file, file_sha256
 from artsim.sample import Sample
 
 _CLOUD = ("points", "part", "npcs")
@@ -26,6 +27,7 @@ _SCALARS = ("width", "height", "category", "object_id", "object_sha256", "scale"
 _ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in (*_CLOUD, *_PNG, "depth", *_STRINGS, *_SCALARS))
 
 _MAX_MEMBER = 1 << 30
+_MEND = "delete the shard and run the same generate command again"
 
 
 def sample_members(sample: Sample) -> dict[str, bytes]:
@@ -78,10 +80,8 @@ def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
             if f"{name}.png" in members:
                 values[name] = np.asarray(Image.open(io.BytesIO(members[f"{name}.png"])))
         return Sample(**values)
-    except (KeyError, ValueError, TypeError, EOFError, OSError) as error:
-        raise DatasetError(
-            f"damaged sample ({error})", where, "generate the shard again: delete it and rerun"
-        ) from error
+    except Exception as error:  # NumPy, Pillow and json fail in many ways on bytes that are not theirs
+        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, _MEND) from error
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
@@ -102,17 +102,22 @@ def sample_key(index: int) -> str:
     return f"{index:09d}"
 
 
-def tar_bytes(samples: Iterable[Sample]) -> bytes:
-    """A whole shard: plain tar, no times, no owners."""
-    blocks = []
-    for sample in samples:
-        for suffix, content in sample_members(sample).items():
-            info = tarfile.TarInfo(f"{sample_key(sample.index)}.{suffix}")
-            info.size = len(content)
-            padding = bytes(-len(content) % tarfile.BLOCKSIZE)
-            blocks += [info.tobuf(tarfile.USTAR_FORMAT), content, padding]
-    blocks.append(bytes(2 * tarfile.BLOCKSIZE))  # marks the end
-    return b"".join(blocks)
+def write_shard(path: Path, samples: Iterable[Sample]) -> tuple[int, str]:
+    """Write a whole shard, each sample as it comes: plain tar, no times, no owners.
+
+    Returns
+    -------
+    size : int
+        In bytes.
+    sha256 : str
+    """
+    with atomic_file(path) as file, tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as tar:
+        for sample in samples:
+            for suffix, content in sample_members(sample).items():
+                info = tarfile.TarInfo(f"{sample_key(sample.index)}.{suffix}")
+                info.size = len(content)
+                tar.addfile(info, io.BytesIO(content))
+    return path.stat().st_size, file_sha256(path)
 
 
 class ShardReader:
@@ -135,14 +140,12 @@ class ShardReader:
             with tarfile.open(path, "r:") as tar:
                 for info in tar:
                     key, _, suffix = info.name.partition(".")
-                    if not info.isreg() or info.size > _MAX_MEMBER:
-                        raise DatasetError(f"unexpected member {info.name!r}", path, "verify or regenerate the dataset")
+                    if not info.isreg() or not 0 <= info.size <= _MAX_MEMBER:
+                        raise DatasetError(f"unexpected member {info.name!r}", path, _MEND)
                     self._members.setdefault(key, {})[suffix] = (info.offset_data, info.size)
             self._file = path.open("rb")
-        except (tarfile.TarError, OSError, EOFError) as error:
-            raise DatasetError(
-                f"cannot read the shard ({error})", path, "delete it and run the same generate command again"
-            ) from error
+        except (tarfile.TarError, OSError, EOFError, ValueError) as error:
+            raise DatasetError(f"cannot read the shard ({error})", path, _MEND) from error
 
     def __len__(self) -> int:
         return len(self._members)
@@ -155,13 +158,13 @@ class ShardReader:
         """One sample by its key."""
         members = self._members.get(key)
         if members is None:
-            raise DatasetError(f"holds no sample {key}", self.path, "delete it and run the same generate command again")
+            raise DatasetError(f"holds no sample {key}", self.path, _MEND)
         contents = {}
         for suffix, (offset, size) in members.items():
             self._file.seek(offset)
             contents[suffix] = self._file.read(size)
             if len(contents[suffix]) != size:
-                raise DatasetError("the shard is cut short", self.path, "delete it and rerun the same command")
+                raise DatasetError("the shard is cut short", self.path, _MEND)
         return sample_from_members(contents, f"{self.path}: sample {key}")
 
     def close(self) -> None:

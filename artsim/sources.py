@@ -24,7 +24,7 @@ class Source:
     path : Path
         URDF file.
     name : str
-        Path relative to the folder it was found in: stable when that folder moves.
+        Path from the folder that was named (or holds the file that was) on: stable when that folder moves.
     sha256 : str
         Digest of the file.
     package_roots : mapping of str to Path
@@ -53,7 +53,7 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         When a path does not exist or holds no object.
     """
     sources = []
-    for given in map(Path, paths):
+    for given in (Path(path).absolute() for path in paths):
         if given.is_dir():
             found = _below(given)
             if not found:
@@ -61,7 +61,7 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         else:
             found = [find_urdf(given)]
         for file in found:
-            name = f"{given.name}/{file.relative_to(given).as_posix()}" if given.is_dir() else file.name
+            name = (file.relative_to(given.parent) if given.is_dir() else Path(file.parent.name, file.name)).as_posix()
             data = read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file")
             sources.append(Source(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
     return sources
@@ -69,7 +69,17 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
 
 def _below(folder: Path) -> list[Path]:
     found = []
-    for here, folders, files in os.walk(folder):
+    visited = set()
+
+    def refuse(error: OSError) -> None:
+        raise AssetError(f"cannot list ({error.strerror})", error.filename, "mend its rights") from error
+
+    for here, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
+        real = os.path.realpath(here)
+        if real in visited:  # links that go round in a circle
+            folders.clear()
+            continue
+        visited.add(real)
         folders.sort()
         if "mobility.urdf" in files:
             found.append(Path(here) / "mobility.urdf")

@@ -5,19 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from artsim.camera import Camera
-from artsim.dataset import Dataset, file_sha256
-from artsim.errors import ArtsimError
+from artsim.dataset import Dataset
+from artsim.errors import ArtsimError, DatasetError
+from artsim.files import file_sha256
 from artsim.kinematics import invert_transform, transform_points
 from artsim.objects import ArticulatedObject
+from artsim.plan import Plan, ShardRecord
+from artsim.renderers.raycast import cast, pose
 from artsim.sample import Sample
+from artsim.sampling import Scale
+from artsim.shards import ShardReader, sample_key
 
 _TOLERANCE = 1e-4
 """Of the object's diagonal: points are stored in single precision."""
+_STRAY_RAYS = 0.005
+"""Share of rays that may end elsewhere on another processor: those that graze an edge."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Problem:
 
 
 def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
-    """Check every shard and sample of a dataset.
+    """Check every file and sample of a dataset.
 
     Parameters
     ----------
@@ -51,31 +60,93 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
         When the folder holds no complete dataset.
     """
     dataset = Dataset(folder)
-    problems = []
-    ranges = {shard.name: range(shard.first, shard.end) for shard in dataset.shards}
-    planned = [(s.name, s.split, s.first, s.end) for s in dataset.plan.shards()]
-    if [(s.name, s.split, s.first, s.end) for s in dataset.shards] != planned:
-        problems.append(Problem("dataset.json", "its shards are not those of its plan"))
-    position = 0
+    problems = [*_listing_problems(dataset), *_object_problems(dataset)]
+    unusable = {problem.where for problem in problems}
     with tqdm(total=len(dataset), desc="verify", unit="sample", disable=not progress) as bar:
         for shard in dataset.shards:
-            path = dataset.folder / shard.name
-            if not path.is_file():
-                problems.append(Problem(shard.name, "is missing"))
-            elif file_sha256(path) != shard.sha256:
-                problems.append(Problem(shard.name, "has another checksum than when it was written"))
-            for i, index in enumerate(ranges[shard.name]):
-                where = f"{shard.name}: sample {index}"
-                try:
-                    sample = dataset[position + i]
-                    problems += [Problem(where, what) for what in sample_problems(sample, dataset.object_of(sample))]
-                    if sample.index != index:
-                        problems.append(Problem(where, f"calls itself {sample.index}"))
-                except ArtsimError as error:
-                    problems.append(Problem(where, str(error)))
-                bar.update()
-            position += len(ranges[shard.name])
+            problems += _shard_problems(dataset, shard, unusable)
+            bar.update(shard.end - shard.first)
     return problems
+
+
+def _listing_problems(dataset: Dataset) -> Iterator[Problem]:
+    planned = [(s.name, s.split, s.first, s.end) for s in dataset.plan.shards()]
+    if [(s.name, s.split, s.first, s.end) for s in dataset.shards] != planned:
+        yield Problem("dataset.json", "its shards are not those of its plan")
+    for name in sorted({path.name for path in dataset.folder.glob("*.tar")} - {s.name for s in dataset.shards}):
+        yield Problem(name, "is no shard of this dataset")
+
+
+def _object_file(key: str) -> str:
+    return f"objects/{key}.npz"
+
+
+def _object_problems(dataset: Dataset) -> Iterator[Problem]:
+    for planned in dataset.plan.objects:
+        try:
+            if dataset.objects[planned.key].sha256 != planned.sha256:
+                yield Problem(_object_file(planned.key), "is another object than the plan says")
+        except ArtsimError as error:
+            yield Problem(_object_file(planned.key), str(error))
+
+
+def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) -> Iterator[Problem]:
+    path = dataset.folder / shard.name
+    if not path.is_file():
+        yield Problem(shard.name, "is missing")
+        return
+    try:
+        if file_sha256(path) != shard.sha256:
+            yield Problem(shard.name, "has another checksum than when it was written")
+        reader = ShardReader(path)
+    except (OSError, DatasetError) as error:
+        yield Problem(shard.name, str(error))
+        return
+    wanted, have = [sample_key(index) for index in range(shard.first, shard.end)], reader.keys()
+    if have != wanted:
+        lost, foreign = sorted({*wanted} - {*have}), sorted({*have} - {*wanted})
+        yield Problem(
+            shard.name, f"lacks samples {lost[:5]}, has foreign ones {foreign[:5]}, or holds them out of order"
+        )
+    for index, key in enumerate(wanted, start=shard.first):
+        planned = dataset.plan.object_of(index)
+        if key not in have or _object_file(planned.key) in unusable:
+            continue
+        where = f"{shard.name}: sample {index}"
+        try:
+            sample = reader.read(key)
+            obj = dataset.objects[planned.key].scaled(sample.scale)
+            yield from (Problem(where, what) for what in _unplanned(sample, dataset.plan, index))
+            yield from (Problem(where, what) for what in sample_problems(sample, obj))
+        except ArtsimError as error:
+            yield Problem(where, str(error))
+        except Exception as error:  # a forged record may hold anything
+            yield Problem(where, f"cannot be checked ({type(error).__name__}: {error})")
+    reader.close()
+
+
+def _unplanned(sample: Sample, plan: Plan, index: int) -> Iterator[str]:
+    options = plan.sample
+    if (sample.seed, sample.index) != (plan.seed, index):
+        yield f"calls itself sample {sample.index} of seed {sample.seed}"
+    if len(sample.points) != options.num_points:
+        yield f"has {len(sample.points)} points instead of {options.num_points}"
+    if sample.renderer != options.renderer:
+        yield f"was drawn by {sample.renderer} instead of {options.renderer}"
+    images = {name for name in ("depth", "part_mask", "rgb") if getattr(sample, name) is not None}
+    if images != set(options.images):
+        yield f"has images {sorted(images)} instead of {sorted(options.images)}"
+    if not _is_asked_size(sample, options.scale):
+        yield f"its scale of {sample.scale:.4g} (diagonal {sample.diagonal:.4g} m) is not as asked for"
+    if not _close(sample.T_world_camera @ sample.T_camera_part[0], np.eye(4), 1e-9):
+        yield "the root part does not stand on the world's origin"
+
+
+def _is_asked_size(sample: Sample, scale: Scale) -> bool:
+    if scale == "native":
+        return sample.scale == 1.0
+    low, high = (1.0, 1.0) if scale == "unit" else scale
+    return low * (1 - 1e-9) <= sample.diagonal <= high * (1 + 1e-9)
 
 
 def sample_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
@@ -87,47 +158,100 @@ def sample_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
     obj : ArticulatedObject
         The object it shows, at its scale.
     """
-    tolerance = _TOLERANCE * sample.diagonal
-    num_parts = len(obj)
-    if sample.object_sha256 != obj.sha256 or len(sample.joint_type) != num_parts:
+    if sample.object_sha256 != obj.sha256 or len(sample.joint_type) != len(obj):
         yield "shows another object than the plan says"
         return
-    if not len(sample.points) == len(sample.part) == len(sample.npcs):
-        yield "points, part and npcs differ in length"
+    malformed = list(_malformed(sample, len(obj)))
+    yield from malformed
+    if malformed:
         return
-    if not (np.isfinite(sample.points).all() and np.isfinite(sample.npcs).all()):
-        yield "a point is not finite"
-    if sample.part.max(initial=0) >= num_parts:
-        yield f"a point belongs to part {sample.part.max()} of {num_parts}"
-        return
-    rotations = sample.T_camera_part[:, :3, :3]
-    if (
-        np.abs(rotations @ np.swapaxes(rotations, 1, 2) - np.eye(3)).max() > 1e-9
-        or (np.linalg.det(rotations) < 0).any()
-    ):
-        yield "a rotation is not a rotation"
-    T_camera_rest = sample.T_camera_part[0]
-    posed = T_camera_rest @ obj.tree.forward_kinematics(sample.joint_state)
-    if np.abs(posed - sample.T_camera_part).max() > max(1e-9, 1e-9 * sample.diagonal):
-        yield "part poses do not follow from the joint states"
-    axis, origin = obj.tree.posed_joints(sample.T_camera_part)
-    if np.abs(axis - sample.joint_axis_camera).max() > 1e-9 or np.abs(origin - sample.joint_origin_camera).max() > 1e-9:
-        yield "posed joint axes do not follow from the part poses"
-    low, high = sample.joint_limits.T
-    if (sample.joint_state < low - 1e-9).any() or (sample.joint_state > high + 1e-9).any():
-        driven = [k for k, joint in enumerate(obj.tree.joints) if joint.mimic is not None]
-        outside = (sample.joint_state < low - 1e-9) | (sample.joint_state > high + 1e-9)
-        outside[driven] = False  # a mimic joint goes where its source takes it
-        if outside.any():
-            yield f"joint states of parts {np.flatnonzero(outside).tolist()} are outside their limits"
-    if not np.allclose(sample.box_center, obj.box_center) or not np.allclose(sample.box_size, obj.box_size):
-        yield "boxes are not those of the object"
+    yield from _copy_problems(sample, obj)
+    yield from _pose_problems(sample, obj)
     if (sample.visible_fraction < 0).any() or (sample.visible_fraction > 1).any():
         yield "a visible fraction is not within 0..1"
-    yield from _cloud_problems(sample, tolerance)
+    if sample.part.max() >= len(obj):
+        yield f"a point belongs to part {sample.part.max()} of {len(obj)}"
+        return
+    yield from _cloud_problems(sample)
+    yield from _image_problems(sample, obj)
 
 
-def _cloud_problems(sample: Sample, tolerance: float) -> Iterator[str]:
+def _malformed(sample: Sample, num_parts: int) -> Iterator[str]:
+    """Arrays of another shape or type than they should have, and numbers that are none."""
+    points, K, image = sample.part.size, num_parts, (sample.height, sample.width)
+    shapes: dict[str, tuple[type, tuple[int, ...]]] = {
+        "points": (np.float32, (points, 3)), "part": (np.uint8, (points,)), "npcs": (np.float32, (points, 3)),
+        "T_camera_part": (np.float64, (K, 4, 4)), "box_center": (np.float64, (K, 3)), "box_size": (np.float64, (K, 3)),
+        "visible_fraction": (np.float64, (K,)), "joint_parent": (np.int64, (K,)),
+        "joint_axis": (np.float64, (K, 3)), "joint_origin": (np.float64, (K, 3)),
+        "joint_axis_camera": (np.float64, (K, 3)), "joint_origin_camera": (np.float64, (K, 3)),
+        "joint_state": (np.float64, (K,)), "joint_rest": (np.float64, (K,)), "joint_limits": (np.float64, (K, 2)),
+        "K": (np.float64, (3, 3)), "T_world_camera": (np.float64, (4, 4)),
+        "depth": (np.float32, image), "part_mask": (np.uint8, image), "rgb": (np.uint8, (*image, 3)),
+    }  # fmt: skip
+    if points == 0:
+        yield "has no points"
+    for name, (dtype, shape) in shapes.items():
+        array: Any = getattr(sample, name)
+        if array is None:
+            continue  # an image that was not asked for
+        if array.dtype != dtype or array.shape != shape:
+            yield f"{name} is {array.dtype} {array.shape} instead of {np.dtype(dtype)} {shape}"
+        elif name != "joint_limits" and not np.isfinite(array).all():
+            yield f"{name} is not finite"
+
+
+def _close(one: ArrayLike, two: ArrayLike, tolerance: float) -> bool:
+    return np.allclose(one, two, rtol=0, atol=tolerance)
+
+
+def _copy_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
+    """What the sample copies from its object."""
+    tree, length = obj.tree, 1e-9 * max(1.0, obj.diagonal)
+    if (sample.category, sample.object_id) != (obj.category, obj.object_id):
+        yield "category or object_id are not those of the object"
+    if sample.part_names != tuple(p.label for p in obj.parts):
+        yield "part names are not those of the object"
+    if not _close(sample.diagonal, obj.diagonal, length):
+        yield "the diagonal is not that of the object"
+    if not (_close(sample.box_center, obj.box_center, length) and _close(sample.box_size, obj.box_size, length)):
+        yield "boxes are not those of the object"
+    if not (
+        sample.joint_type == tree.types
+        and np.array_equal(sample.joint_parent, tree.parents)
+        and _close(sample.joint_axis, tree.axes, 1e-9)
+        and _close(sample.joint_origin, tree.origins, length)
+        and _close(sample.joint_rest, tree.rest, length)
+        and _close(sample.joint_limits, tree.limits, length)
+    ):
+        yield "joints are not those of the object"
+
+
+def _pose_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
+    tree, T, length = obj.tree, sample.T_camera_part, 1e-9 * max(1.0, obj.diagonal)
+    rotation = T[:, :3, :3]
+    if (
+        not _close(rotation @ np.swapaxes(rotation, 1, 2), np.eye(3), 1e-9)
+        or (np.linalg.det(rotation) < 0).any()
+        or (T[:, 3] != (0, 0, 0, 1)).any()
+    ):
+        yield "a rotation is not a rotation"
+    if not _close(T[0] @ tree.forward_kinematics(sample.joint_state), T, length):
+        yield "part poses do not follow from the joint states"
+    axis, origin = tree.posed_joints(T)
+    if not (_close(axis, sample.joint_axis_camera, 1e-9) and _close(origin, sample.joint_origin_camera, length)):
+        yield "posed joint axes do not follow from the part poses"
+    if not _close(sample.joint_state, tree.complete_state(sample.joint_state), 1e-9):
+        yield "mimic joints do not follow their sources"
+    low, high = tree.limits.T
+    outside = (sample.joint_state < low - 1e-9) | (sample.joint_state > high + 1e-9)
+    outside[[joint.mimic is not None for joint in tree.joints]] = False  # it goes where its source takes it
+    if outside.any():
+        yield f"joint states of parts {np.flatnonzero(outside).tolist()} are outside their limits"
+
+
+def _cloud_problems(sample: Sample) -> Iterator[str]:
+    tolerance = _TOLERANCE * sample.diagonal
     T_part_camera = invert_transform(sample.T_camera_part)
     for k in np.unique(sample.part):
         mine = sample.part == k
@@ -135,26 +259,40 @@ def _cloud_problems(sample: Sample, tolerance: float) -> Iterator[str]:
         offset = np.abs(p_rest - sample.box_center[k]) - 0.5 * sample.box_size[k]
         if offset.max() > tolerance:
             yield f"points of part {k} lie {offset.max():.2g} m outside its box"
-        size = np.linalg.norm(sample.box_size[k])
-        if (
-            np.abs((p_rest - sample.box_center[k]) / size + 0.5 - sample.npcs[mine]).max()
-            > _TOLERANCE * sample.diagonal / size + 1e-6
-        ):
+        size = max(float(np.linalg.norm(sample.box_size[k])), 1e-12)
+        npcs = (p_rest - sample.box_center[k]) / size + 0.5
+        if not _close(npcs, sample.npcs[mine], tolerance / size + 1e-6):
             yield f"npcs of part {k} do not follow from its points"
         if sample.visible_fraction[k] == 0:
             yield f"part {k} has points but a visible fraction of 0"
+
+
+def _image_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
+    """Points against the camera, the images, and rays cast anew."""
+    tolerance = _TOLERANCE * sample.diagonal
     camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
+    if (sample.points[:, 2] <= 0).any():
+        yield "a point lies behind the camera"
+        return
     image = camera.project(sample.points)
     # Rays start at pixel centres; single precision moves them by far less than this.
     if np.abs(image - np.floor(image) - 0.5).max() > 0.05:
         yield "a point does not project onto the centre of a pixel"
-    pixel = np.floor(image).astype(int)
-    if (pixel < 0).any() or (pixel >= (sample.width, sample.height)).any():
+    column, row = np.floor(image).astype(np.int64).T
+    if min(column.min(), row.min()) < 0 or column.max() >= sample.width or row.max() >= sample.height:
         yield "a point projects outside the image"
         return
-    if sample.depth is not None:
-        seen = sample.depth[pixel[:, 1], pixel[:, 0]]
-        if np.abs(seen - sample.points[:, 2]).max() > tolerance:
-            yield "points do not agree with the depth image"
-    if sample.part_mask is not None and (sample.part_mask[pixel[:, 1], pixel[:, 0]] != sample.part).any():
+    if sample.depth is not None and not _close(sample.depth[row, column], sample.points[:, 2], tolerance):
+        yield "points do not agree with the depth image"
+    if sample.part_mask is not None and (sample.part_mask[row, column] != sample.part).any():
         yield "points do not agree with the part mask"
+    if sample.renderer == "raycast":
+        T_world_object = sample.T_world_camera @ sample.T_camera_part[0]
+        if _close(T_world_object, np.eye(4), 1e-9):
+            T_world_object = np.eye(4)  # exactly the rays that made the sample
+        order = np.lexsort((column, row))
+        posed = pose(obj, sample.joint_state, camera, T_world_object)
+        depth, part, _ = cast(posed, row[order], column[order])
+        wrong = (part != sample.part[order]) | (np.abs(depth - sample.points[order, 2]) > tolerance)
+        if wrong.sum() > max(2, _STRAY_RAYS * len(wrong)):
+            yield f"{wrong.sum()} points do not lie where a ray through their pixel meets their part"

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 import multiprocessing
 import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from artsim.files import write_atomic
 from artsim.object_file import ObjectCache, save_object
 from artsim.plan import Plan, Shard, ShardRecord, draw_sample, read_plan
 from artsim.renderers import Renderer, make_renderer
-from artsim.shards import tar_bytes
+from artsim.sample import Sample
+from artsim.shards import write_shard
 from artsim.sources import Source, load_source
 
-_STEP = 16  # samples between two looks at the stop flag
+_STEP = 16  # samples between two reports
 
 
 @dataclass
@@ -66,25 +66,30 @@ def start_worker(folder: Path, made: Any, stop: Any) -> None:
     _worker = _Worker(folder, made, stop)
 
 
+class _StoppedError(Exception):
+    """The run was asked to stop."""
+
+
 def make_shard(shard: Shard) -> ShardRecord | None:
     """Make and write one shard; None when asked to stop before it is whole."""
     assert _worker is not None
-    worker = _worker
-    samples = []
+    try:
+        size, digest = write_shard(_worker.folder / shard.name, _samples(_worker, shard))
+    except _StoppedError:
+        return None
+    return ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest)
+
+
+def _samples(worker: _Worker, shard: Shard) -> Iterator[Sample]:
     for index in range(shard.first, shard.end):
-        if (index - shard.first) % _STEP == 0 and worker.stop.is_set():
-            return None
-        planned = worker.plan.object_of(index)
-        samples.append(
-            draw_sample(worker.objects[planned.key], worker.plan.sample, worker.plan.seed, index, worker.renderer)
-        )
-        if (index - shard.first) % _STEP == _STEP - 1 or index == shard.end - 1:
+        if worker.stop.is_set():
+            raise _StoppedError
+        obj = worker.objects[worker.plan.object_of(index).key]
+        yield draw_sample(obj, worker.plan.sample, worker.plan.seed, index, worker.renderer)
+        made = index - shard.first + 1
+        if made % _STEP == 0 or made == shard.end - shard.first:
             with worker.made.get_lock():
-                worker.made.value += (index - shard.first) % _STEP + 1
-    data = tar_bytes(samples)
-    write_atomic(worker.folder / shard.name, data)
-    digest = hashlib.sha256(data).hexdigest()
-    return ShardRecord(shard.name, shard.split, shard.first, shard.end, len(data), digest)
+                worker.made.value += (made - 1) % _STEP + 1
 
 
 @dataclass(frozen=True)
@@ -98,10 +103,9 @@ class CompiledSource:
     num_parts: int
 
 
-def compile_source(source: Source) -> CompiledSource:
+def compile_source(source: Source, staged: str) -> CompiledSource:
     """Load a source and keep it compiled in the dataset's folder, under a provisional name."""
     assert _worker is not None
     obj = load_source(source)
-    staged = f"_staged_{hashlib.sha256(source.name.encode()).hexdigest()[:16]}.npz"
     save_object(obj, _worker.folder / "objects" / staged)
     return CompiledSource(staged, obj.category, obj.object_id, obj.sha256, len(obj))

@@ -9,6 +9,7 @@ from pathlib import Path
 from tests.conftest import ASSETS
 
 ROOT = ASSETS.parent
+LAPTOP = "urdf_assets/laptop"
 ARTSIM = str(Path(sys.executable).with_name("artsim"))
 
 
@@ -31,7 +32,7 @@ def test_help_teaches() -> None:
 
 
 def test_a_mistyped_option_is_pointed_out() -> None:
-    result = generate("--objects", "urdf_assets/laptop", "--out", "x", "--num-sample", "3")
+    result = generate("--objects", LAPTOP, "--out", "x", "--num-sample", "3")
     assert result.returncode == 2
     assert "num-samples" in result.stdout + result.stderr
     assert "Traceback" not in result.stderr

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import pickle
+import shutil
 import subprocess
 import sys
+import warnings
 from dataclasses import fields
 from pathlib import Path
 
@@ -48,7 +51,9 @@ def assert_equal(one: Sample, two: Sample) -> None:
 
 
 def test_a_sample_survives_its_members() -> None:
-    for path, images in ((ASSETS / "quirks" / "primitives", ()), (ASSETS / "cabinet", ("depth", "part_mask", "rgb"))):
+    turns_freely = ASSETS / "quirks" / "primitives"
+    assert np.isinf(artsim.load(turns_freely).tree.limits[1:]).any()
+    for path, images in ((turns_freely, ()), (ASSETS / "cabinet", ("depth", "part_mask", "rgb"))):
         obj = artsim.load(path)
         q = sample_state(obj, StateOptions(), np.random.default_rng(0))
         camera = artsim.Camera.look_at([-2, 0.3, 1], [0, 0, 0], 160, 120)
@@ -136,9 +141,25 @@ def test_the_stream_is_endless_repeatable_and_new(folder: Path) -> None:
 
 
 def test_training_processes_share_a_stream(folder: Path) -> None:
-    stream = artsim.open_dataset(folder).stream()
-    stream.start, stream.step = 1, 3
+    dataset = artsim.open_dataset(folder)
+    stream = dataset.stream("test", start=1, step=3)
     assert [s.index for s in itertools.islice(stream, 4)] == [1, 4, 7, 10]
+    assert {s.object_sha256 for s in itertools.islice(stream, 40)} == {
+        o.sha256 for o in dataset.plan.objects_of["test"]
+    }
+    assert_equal(pickle.loads(pickle.dumps(stream))[4], stream[4])
+    with pytest.raises(IndexError):
+        stream[-1]
+    with pytest.raises(ConfigError, match="step 0"):
+        dataset.stream(step=0)
+
+
+def test_neighbouring_seeds_do_not_bring_back_a_stream(folder: Path) -> None:
+    """A training stream must not show what a dataset of the next seed, made for testing, holds."""
+    dataset = artsim.open_dataset(folder)
+    drawn = {s.points.tobytes() for s in itertools.islice(dataset.stream(), 20)}
+    neighbours = {s.points.tobytes() for seed in range(4) for s in itertools.islice(dataset.stream(seed=seed), 20)}
+    assert len(drawn | neighbours) == 100
 
 
 def test_the_object_cache_forgets_what_was_not_used_lately(folder: Path) -> None:
@@ -151,13 +172,42 @@ def test_the_object_cache_forgets_what_was_not_used_lately(folder: Path) -> None
     assert len(cache._objects) == 1
 
 
+def test_any_damage_to_a_sample_is_a_clear_error(folder: Path) -> None:
+    members = sample_members(artsim.open_dataset(folder)[0])
+    rng = np.random.default_rng(0)
+    for name in members:
+        with pytest.raises(DatasetError, match="damaged sample"):
+            sample_from_members({k: v for k, v in members.items() if k != name}, "here")
+        for _ in range(100):
+            damaged = bytearray(members[name])
+            damaged[rng.integers(min(len(damaged), 200))] = rng.integers(256)
+            with contextlib.suppress(DatasetError), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                sample_from_members({**members, name: bytes(damaged)}, "here")
+
+
+def test_a_shard_cut_anywhere_is_a_clear_error(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder, tmp_path / "out")
+    path = tmp_path / "out" / "train-000000.tar"
+    whole = path.read_bytes()
+    for size in (0, 100, 512, 700, 10_000, len(whole) // 2, len(whole) - 11_000):
+        path.write_bytes(whole[:size])
+        with pytest.raises(DatasetError, match=r"train-000000\.tar"):
+            artsim.open_dataset(tmp_path / "out")[39]
+
+
 def test_what_is_not_a_dataset_is_refused(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no dataset here"):
         artsim.open_dataset(tmp_path)
     (tmp_path / "plan.json").write_text("{}")
     with pytest.raises(DatasetError, match="not complete"):
         artsim.open_dataset(tmp_path)
-    for content, message in (("{", "damaged"), ('{"format": 99}', "format 99 is not"), ("[]", "damaged")):
+    for content, message in (
+        ("{", "damaged"),
+        ('{"format": 99}', "format 99 is not"),
+        ("[]", "damaged"),
+        ('{"format": 1}', "damaged"),
+    ):
         (tmp_path / "dataset.json").write_text(content)
         with pytest.raises(DatasetError, match=message):
             artsim.open_dataset(tmp_path)

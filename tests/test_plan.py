@@ -39,16 +39,32 @@ def test_shards_hold_every_index_once_and_one_split_each(objects: int, samples: 
         assert {p.object_of(i).split for i in range(shard.first, shard.end)} == {shard.split}
 
 
-@given(st.integers(1, 60), st.integers(0, 40))
-def test_objects_of_a_split_get_about_the_same_number_of_samples(objects: int, rounds: int) -> None:
+@given(st.integers(1, 60), st.integers(1, 3000))
+def test_objects_of_a_split_get_the_same_number_of_samples(objects: int, samples: int) -> None:
+    p = plan(objects, samples)
+    shown = Counter(p.object_of(index).key for index in range(samples))
+    for split in SPLITS:
+        counts = [shown[o.key] for o in p.objects_of[split]]
+        if counts:
+            assert max(counts) - min(counts) <= 1
+
+
+@given(st.integers(1, 60), st.integers(0, 20), st.integers(0, 10_000))
+def test_a_stream_shows_few_objects_at_a_time_and_all_of_them_in_the_end(objects: int, laps: int, at: int) -> None:
     p = plan(objects, 10)
     for split in SPLITS:
         count = len(p.objects_of[split])
         if count:
-            turns = 256 * count * (rounds + 1)
-            shown = Counter(p.object_in_split(split, turn).key for turn in range(turns))
-            assert max(shown.values()) - min(shown.values()) <= 256
-            assert len(shown) == count
+            shown = Counter(p.object_in_split(split, turn).key for turn in range(16 * count * laps))
+            assert set(shown.values()) <= {16 * laps}
+            assert len(shown) == (count if laps else 0)
+            assert len({p.object_in_split(split, at + i).key for i in range(16)}) <= 32
+
+
+def test_indices_beyond_the_plan_are_refused() -> None:
+    for index in (-1, 50):
+        with pytest.raises(IndexError):
+            plan(9, 50).object_of(index)
 
 
 @given(st.integers(1, 60), st.integers(1, 64), st.integers(1, 64))
@@ -57,17 +73,30 @@ def test_what_a_sample_shows_does_not_depend_on_the_shard_size(objects: int, one
     assert [a.object_of(i) for i in range(300)] == [b.object_of(i) for i in range(300)]
 
 
-@given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 30).map(str)), min_size=1), st.integers(0, 99))
-def test_splits_are_by_object(objects: list[tuple[str, str]], seed: int) -> None:
-    splits = assign_splits(objects, (0.8, 0.1, 0.1), seed)
-    assert len({(obj, split) for obj, split in zip(objects, splits, strict=True)}) == len(set(objects))
-    for category in {c for c, _ in objects}:
-        mine = dict(zip(objects, splits, strict=True))
-        counts = Counter(split for (c, _), split in mine.items() if c == category)
-        total = sum(counts.values())
-        assert counts["train"] >= 1
-        for split, share in zip(SPLITS, (0.8, 0.1, 0.1), strict=True):
-            assert abs(counts[split] - share * total) <= 1
+SHARES = [(0.8, 0.1, 0.1), (1.0, 1.0, 1.0), (0.0, 0.5, 0.5), (0.3, 0.0, 0.7), (1.0, 0.0, 0.0)]
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 30).map(str)), min_size=1),
+    st.sampled_from(SHARES),
+    st.integers(0, 99),
+)
+def test_splits_are_by_content(objects: list[tuple[str, str]], shares: tuple[float, float, float], seed: int) -> None:
+    """Whatever the category: a file found under two names must not be trained on and tested with."""
+    splits = assign_splits(objects, shares, seed)
+    pairs = {(content, split) for (_, content), split in zip(objects, splits, strict=True)}
+    assert len(pairs) == len({content for _, content in objects})
+    assert assign_splits(objects[::-1], shares, seed) == splits[::-1]
+
+
+@given(st.integers(1, 50), st.sampled_from(SHARES), st.integers(0, 99))
+def test_splits_have_their_shares_of_each_category(count: int, shares: tuple[float, float, float], seed: int) -> None:
+    objects = [(category, f"{category}{i}") for category in "ab" for i in range(count)]
+    splits = assign_splits(objects, shares, seed)
+    for mine in (splits[:count], splits[count:]):
+        for split, share in zip(SPLITS, shares, strict=True):
+            assert abs(mine.count(split) - share / sum(shares) * count) <= 1
+        assert ("train" in mine) == (shares[0] > 0)
 
 
 def test_splits_do_not_move_when_other_categories_come() -> None:
@@ -76,14 +105,16 @@ def test_splits_do_not_move_when_other_categories_come() -> None:
 
 
 def test_shares_that_make_no_sense_are_refused() -> None:
-    for shares in ((0.0, 0.0, 0.0), (-1.0, 1.0, 1.0)):
+    for shares in ((0.0, 0.0, 0.0), (-1.0, 1.0, 1.0), (np.nan, 1.0, 1.0), (np.inf, 1.0, 1.0)):
         with pytest.raises(ConfigError, match="are not shares"):
             assign_splits([("a", "b")], shares, 0)
 
 
 def test_keys_are_unique_and_safe() -> None:
-    keys = unique_keys([("box", "../../x", "a" * 64), ("box", "1", "b" * 64), ("box", "1", "c" * 64)])
-    assert len(set(keys)) == 3
+    named = [("box", "../../x"), ("box", "1"), ("box", "1"), ("Box", "1"), ("a b", "1"), ("a_b", "1"), ("c", "1" * 999)]
+    keys = unique_keys([(category, name, f"{i:064x}") for i, (category, name) in enumerate(named)])
+    assert len({key.lower() for key in keys}) == len(named)
+    assert max(map(len, keys)) < 200
     assert not any("/" in key or "." in key for key in keys)
 
 
