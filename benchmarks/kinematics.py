@@ -13,6 +13,7 @@ import os
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -140,14 +141,22 @@ def yourdfpy_poses(file: Path) -> LinkPoses:
     return poses
 
 
+@cache
+def _client() -> int:
+    """One physics server for all files: each takes tens of megabytes."""
+    bullet = import_pybullet()
+    return int(bullet.connect(bullet.DIRECT))
+
+
 def pybullet_poses(file: Path) -> LinkPoses:
-    """PyBullet's own forward kinematics of a file without meshes and inertias."""
+    """PyBullet's own forward kinematics of a file without meshes and inertias; valid until the next call."""
     bullet = import_pybullet()
     root = etree.parse(str(file)).getroot()
     for link in root.findall("link"):
         for child in list(link):
             link.remove(child)
-    client = bullet.connect(bullet.DIRECT)
+    client = _client()
+    bullet.resetSimulation(physicsClientId=client)
     with tempfile.NamedTemporaryFile(suffix=".urdf") as bare, silent():
         bare.write(etree.tostring(root))
         bare.flush()
