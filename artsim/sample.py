@@ -289,10 +289,11 @@ class _Rays:
         return depth, part
 
     def visible_fraction(self) -> Array:
-        """(K,) estimate with a standard error of at most 0.05, exact for parts of few pixels."""
+        """(K,) estimate with a standard error of at most about 0.05."""
         met, saw = self.met.copy(), self.saw.copy()
         for k in np.flatnonzero(met < self.enough):
-            met[k], saw[k] = visibility(self.posed, int(k), max_rays=256)
+            more_met, more_saw = visibility(self.posed, int(k), max_rays=256)
+            met[k], saw[k] = met[k] + more_met, saw[k] + more_saw
         fraction: Array = saw / np.maximum(met, 1)
         return fraction
 

@@ -132,8 +132,9 @@ def marked(mark: str) -> list[int]:
 def test_ctrl_c_stops_quietly_and_says_how_to_go_on(shards: int, sources: list[Source], tmp_path: Path) -> None:
     out, objects = tmp_path / "out", tmp_path / "objects"
     process = subprocess.Popen(
-        command(objects, out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+        command(objects, out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores Ctrl-C
+    )  # fmt: skip
     wait_for_shards(out, shards)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the group
     printed, errors = process.communicate(timeout=60)
