@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 JOINT_TYPES = ("free", "revolute", "continuous", "prismatic", "screw")
 """Every joint type a tree can hold. Fixed joints do not appear: a loader merges them."""
 
+_EYE = np.eye(3)
 ROTATING = ("revolute", "continuous", "screw")
 
 
@@ -184,8 +185,9 @@ class KinematicTree:
         return np.array([{"prismatic": 1.0, "screw": j.pitch}.get(j.type, 0.0) for j in self.joints])
 
     @cached_property
-    def _axis_cross(self) -> Array:
-        return cross_matrix(self.axes)
+    def _axis_cross(self) -> tuple[Array, Array]:
+        cross = cross_matrix(self.axes)
+        return cross, cross @ cross
 
     @cached_property
     def _mimics_in_order(self) -> tuple[tuple[int, Mimic], ...]:
@@ -244,8 +246,8 @@ class KinematicTree:
         step = self.complete_state(q) - self.rest
         step[..., 0] = 0.0
         angle = (step * self._angle_rate)[..., None, None]
-        rotation = np.sin(angle) * self._axis_cross + (1.0 - np.cos(angle)) * (self._axis_cross @ self._axis_cross)
-        rotation += np.eye(3)
+        cross, cross_squared = self._axis_cross
+        rotation = np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross_squared + _EYE
         turned = (rotation @ self.origins[..., None])[..., 0]
         motion = np.zeros((*step.shape, 4, 4))
         motion[..., :3, :3] = rotation

@@ -243,14 +243,17 @@ def draw_visible(
     found = visited = 0
     while found < num_points and visited < total:
         # As many as it should take, judging by the share of hits so far (at first, by experience), and a few more.
-        share = found / visited if found else 0.9 / (1 + visited)
-        wanted = min(int(1.12 * (num_points - found) / share) + 32, total)
-        if visited + wanted > total // 2:
-            left = fresh.nonzero()[0]
-            local = left if wanted > 0.7 * len(left) else np.sort(rng.permutation(left)[:wanted])
+        share = found / visited if found else 0.82 / (1 + visited)
+        missing = num_points - found
+        wanted = min(int((missing + 2.5 * np.sqrt(missing * (1.03 - share))) / share) + 16, total)
+        left = total - visited
+        if wanted > left // 2:
+            rest = fresh.nonzero()[0]
+            local = rest if wanted > 0.7 * left else np.sort(rng.permutation(rest)[:wanted])
         else:
+            # Numbers drawn with replacement repeat each other and earlier rounds: so many leave ``wanted`` new ones.
             drawn = np.zeros(total, dtype=bool)
-            drawn[rng.integers(0, total, size=wanted)] = True
+            drawn[rng.integers(0, total, size=int(-total * np.log1p(-wanted / left)))] = True
             local = (drawn & fresh).nonzero()[0]  # in order: neighbouring rays share memory
         fresh[local] = False
         row = np.searchsorted(up_to, local, side="right")

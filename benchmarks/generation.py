@@ -43,7 +43,7 @@ class Options:
 
     views: int = 20
     """Views of each object in the comparison with TinyRenderer."""
-    samples: int = 20_000
+    samples: int = 50_000
     """Samples of the end-to-end run."""
     memory_samples: int = 50_000
     """Samples over which a worker's memory is watched."""
