@@ -8,6 +8,7 @@ from __future__ import annotations
 from artsim.camera import Camera
 from artsim.dataset import Dataset, open_dataset
 from artsim.errors import ArtsimError
+from artsim.families import make
 from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject
 from artsim.pipeline import generate
@@ -28,6 +29,7 @@ __all__ = [
     "ViewOptions",
     "generate",
     "load",
+    "make",
     "make_renderer",
     "observe",
     "open_dataset",

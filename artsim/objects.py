@@ -40,6 +40,26 @@ class Repair:
         return f"{self.where}: {self.what}"
 
 
+Mesh = tuple[Array, NDArray[np.int32]]
+"""Vertices (V, 3) and triangles (F, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What physics needs of a part.
+
+    Attributes
+    ----------
+    pieces : tuple of Mesh
+        Convex collision geometry in the rest frame, at rest, native units. Their union is the part's surface.
+    density : float
+        kg/m^3.
+    """
+
+    pieces: tuple[Mesh, ...]
+    density: float
+
+
 @dataclass(frozen=True, eq=False)
 class Part:
     """One rigid part.
@@ -54,12 +74,15 @@ class Part:
         In the rest frame, at rest, native units (before the object's scale).
     faces : (F, 3) int32
         Triangles; empty for a part without geometry.
+    body : Body or None
+        Where the source knows it: procedural objects do.
     """
 
     name: str
     label: str
     vertices: Array
     faces: NDArray[np.int32]
+    body: Body | None = None
 
     @cached_property
     def bounds(self) -> Array:
@@ -68,6 +91,13 @@ class Part:
             return np.full((2, 3), np.nan)
         used = self.vertices[np.unique(self.faces)]
         return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    def moved(self, offset: Array) -> Part:
+        """The part translated by (3,) metres."""
+        body = self.body
+        if body is not None:
+            body = replace(body, pieces=tuple((vertices + offset, faces) for vertices, faces in body.pieces))
+        return replace(self, vertices=self.vertices + offset, body=body)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,54 @@
+"""Procedural objects: one file for each category, one line in the registry.
+
+A family is a function ``build(rng) -> Assembly`` that draws a new, plausible object from an explicit generator. It
+draws proportions, details and the shape of the kinematic tree, in metres, with Z up and the front towards -X, and
+leaves a gap between parts in every joint state. ``README.md`` shows how to add one.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+
+import numpy as np
+
+from artsim.assembly import Assembly
+from artsim.errors import ConfigError
+from artsim.families import drawer, laptop
+from artsim.objects import ArticulatedObject
+
+Family = Callable[[np.random.Generator], Assembly]
+
+FAMILIES: dict[str, Family] = {
+    "drawer": drawer.build,
+    "laptop": laptop.build,
+}
+"""Every category that :func:`make` knows."""
+
+
+def make(category: str, seed: int = 0) -> ArticulatedObject:
+    """A new procedural object: the same for the same category and seed, different for every other seed.
+
+    Parameters
+    ----------
+    category : str
+        A key of ``FAMILIES``.
+    seed : int
+        Not negative.
+
+    Returns
+    -------
+    ArticulatedObject
+        In its rest state at q = 0, metric, with collision geometry and densities in ``parts[k].body``.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such category, or the seed is negative.
+    """
+    if category not in FAMILIES:
+        raise ConfigError(f"there is no category {category!r}", mend=f"use one of {', '.join(sorted(FAMILIES))}")
+    if seed < 0:
+        raise ConfigError(f"seed {seed} is negative", mend="use 0 or more")
+    rng = np.random.default_rng([zlib.crc32(category.encode()), seed])
+    return FAMILIES[category](rng).build(category, str(seed))
