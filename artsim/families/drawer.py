@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, JointSpec, prismatic
+from artsim.families.details import bar_handle, bow_handle, knob
 from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, tube, union
+from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
 
 GAP = 0.002
 
@@ -128,19 +129,11 @@ def _handle(style: dict[str, float | str], low: Array, high: Array) -> Solid:
     z = 0.5 * (low[2] + high[2]) + float(style["rise"]) * height
     half = 0.5 * min(size * width, 0.3)
     radius = min(0.006, 0.08 * height)
+    left, right, outward = (x, y - half, z), (x, y + half, z), (-1.0, 0.0, 0.0)
     if kind == "bar":
-        bar = tube([(x - reach, y - half, z), (x - reach, y + half, z)], radius)
-        posts = (
-            tube([(x + 0.001, y + s * 0.8 * half, z), (x - reach, y + s * 0.8 * half, z)], 0.8 * radius)
-            for s in (-1, 1)
-        )
-        return bar + union(posts)
+        return bar_handle(left, right, outward, reach, radius)
     if kind == "knob":
-        knob = min(0.018, 0.2 * height)
-        stem = cylinder((x + 0.001, y, z), (x - reach, y, z), 0.4 * knob, sections=12)
-        return stem + cylinder((x - reach, y, z), (x - reach - 0.5 * knob, y, z), knob, 0.8 * knob, 20)
+        return knob((x, y, z), outward, reach, min(0.018, 0.2 * height))
     if kind == "bow":
-        angles = np.linspace(0.0, np.pi, 9)
-        path = np.stack([x - reach * np.sin(angles), y - half * np.cos(angles), np.full(9, z)], axis=1)
-        return tube(path, radius, 10)
+        return bow_handle(left, right, outward, reach, radius)
     return Solid()
