@@ -25,16 +25,25 @@ class Generate:
     """Generate a dataset of labelled partial point clouds.
 
     Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
-    truth as WebDataset tar shards. Stop it at any moment: the same command goes on where it stopped. The result
-    depends on the options and the seed alone, never on the number of workers.
+    truth as WebDataset tar shards. Objects are made (--categories), loaded (--objects), or both. Stop it at any moment:
+    the same command goes on where it stopped. The result depends on the options and the seed alone, never on the number
+    of workers.
 
-    Example: python generate.py --objects urdf_assets/laptop urdf_assets/cabinet --out out/first --num-samples 500
+    Examples:
+    python generate.py --categories laptop drawer --objects-per-category 200 --out out/first --num-samples 5000
+    python generate.py --objects path/to/partnet_mobility/Laptop --out out/real --num-samples 500
     """
 
-    objects: tuple[Path, ...]
-    """URDF files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
     out: Path
     """Folder of the dataset; made if missing."""
+    categories: tuple[str, ...] = ()
+    """Procedural categories, such as laptop or drawer; 'all' for every one."""
+    objects_per_category: int = 50
+    """Procedural objects of each category."""
+    first_object: int = 0
+    """Seed of the first procedural object; the others count up from it."""
+    objects: tuple[Path, ...] = ()
+    """URDF files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
     num_samples: int = 1000
     """Samples in all; every object gets about the same number."""
     seed: int = 0
@@ -52,12 +61,16 @@ class Generate:
     """Leave out objects that do not load, and say which, instead of stopping."""
 
     def run(self) -> None:
+        from artsim.families import FAMILIES
         from artsim.pipeline import generate
-        from artsim.sources import find_sources
+        from artsim.sources import Source, family_sources, find_sources
 
+        categories = tuple(FAMILIES) if "all" in self.categories else self.categories
+        sources: list[Source] = [*find_sources(self.objects, self.package_root)]
+        sources += family_sources(categories, self.objects_per_category, self.first_object)
         try:
             result = generate(
-                find_sources(self.objects, self.package_root),
+                sources,
                 self.out,
                 num_samples=self.num_samples,
                 seed=self.seed,

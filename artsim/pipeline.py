@@ -79,7 +79,7 @@ def generate(
     Parameters
     ----------
     sources : sequence of Source
-        The objects; see :func:`artsim.sources.find_sources`.
+        The objects; see :func:`artsim.sources.find_sources` and :func:`artsim.sources.family_sources`.
     out : path
         Folder of the dataset; made if missing.
     num_samples, seed : int
@@ -181,7 +181,7 @@ def _check_options(
         raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
     check_shares(splits)
     if not sources:
-        raise AssetError("no objects to show", mend="name URDF files or folders that hold some")
+        raise AssetError("no objects to show", mend="name categories to make, or URDF files or folders that hold some")
 
 
 @contextlib.contextmanager

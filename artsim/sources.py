@@ -1,4 +1,4 @@
-"""Where objects come from: URDF files and folders of them."""
+"""Where objects come from: URDF files and folders of them, and the procedural families."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from artsim.errors import AssetError
+from artsim.errors import AssetError, ConfigError
+from artsim.families import FAMILIES, make
 from artsim.files import read_bounded
 from artsim.meshes import LoadLimits
 from artsim.objects import ArticulatedObject
@@ -16,8 +17,8 @@ from artsim.urdf import find_urdf, load
 
 
 @dataclass(frozen=True)
-class Source:
-    """One object to load.
+class FileSource:
+    """An object to load from a file.
 
     Attributes
     ----------
@@ -36,8 +37,62 @@ class Source:
     sha256: str
     package_roots: Mapping[str, Path] = field(default_factory=dict)
 
+    def load(self) -> ArticulatedObject:
+        """The object."""
+        return load(self.path, package_roots=self.package_roots)
 
-def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None) -> list[Source]:
+
+@dataclass(frozen=True)
+class FamilySource:
+    """A procedural object to make.
+
+    Attributes
+    ----------
+    category : str
+    seed : int
+    """
+
+    category: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Category and seed."""
+        return f"{self.category}:{self.seed}"
+
+    @property
+    def sha256(self) -> str:
+        """Digest of the name: the version of artsim, which a plan holds too, decides on the rest."""
+        return hashlib.sha256(self.name.encode()).hexdigest()
+
+    def load(self) -> ArticulatedObject:
+        """The object."""
+        return make(self.category, self.seed)
+
+
+Source = FileSource | FamilySource
+
+
+def family_sources(categories: Sequence[str], objects_per_category: int, first_seed: int = 0) -> list[FamilySource]:
+    """The same number of procedural objects of each category, seeds counting up from ``first_seed``.
+
+    Raises
+    ------
+    ConfigError
+        When a category is unknown, or the number is not positive.
+    """
+    unknown = sorted(set(categories) - FAMILIES.keys())
+    if unknown:
+        raise ConfigError(
+            f"there is no category {', '.join(unknown)}", "categories", f"use {', '.join(sorted(FAMILIES))}, or all"
+        )
+    if objects_per_category < 1:
+        raise ConfigError(f"{objects_per_category} is not a count", "objects_per_category", "use 1 or more")
+    seeds = range(first_seed, first_seed + objects_per_category)
+    return [FamilySource(category, seed) for category in dict.fromkeys(categories) for seed in seeds]
+
+
+def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None) -> list[FileSource]:
     """Every object below some paths, in a stable order.
 
     Parameters
@@ -63,7 +118,7 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         for file in found:
             name = (file.relative_to(given.parent) if given.is_dir() else Path(file.parent.name, file.name)).as_posix()
             data = read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file")
-            sources.append(Source(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
+            sources.append(FileSource(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
     return sources
 
 
@@ -87,8 +142,3 @@ def _below(folder: Path) -> list[Path]:
         else:
             found += [Path(here) / name for name in sorted(files) if name.endswith(".urdf")]
     return found
-
-
-def load_source(source: Source) -> ArticulatedObject:
-    """Load the object of a source."""
-    return load(source.path, package_roots=source.package_roots)

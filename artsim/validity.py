@@ -5,172 +5,108 @@ Every gate fails closed: what cannot be checked has failed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import combinations
 
-import fcl
 import numpy as np
-from manifold3d import Error, Manifold, Mesh64
-from numpy.typing import NDArray
-from scipy.stats import qmc
+from scipy.spatial import ConvexHull, QhullError
 
+from artsim.collision import Collision, Sweep
+from artsim.errors import ArtsimError
+from artsim.inertia import mass_properties
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
-from artsim.sampling import joint_intervals
+from artsim.strict import strict_kinematics
 
-PENETRATION = 1e-6
-"""Metres by which parts that no joint connects may overlap."""
-JOINED_OVERLAP = 1e-3
-"""Share of the smaller part's volume by which two parts that a joint connects may overlap."""
-STATES_PER_JOINT = 21
-JOINT_STATES = 64
+CONVEX = 1e-6
+"""Share of its hull's volume by which a collision piece may fall short of it."""
 
 
 @dataclass(frozen=True)
-class Collision:
-    """Two parts that overlap.
+class Gate:
+    """Outcome of one check.
 
     Attributes
     ----------
-    parts : tuple of 2 int
-    state : (K,) float
-    depth : float
-        Mean thickness of the overlap in metres; infinite where a surface is not closed, so that it has none.
+    name : str
+    problems : tuple of str
+        Empty when the object has passed.
     """
 
-    parts: tuple[int, int]
-    state: Array
-    depth: float
+    name: str
+    problems: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing was found."""
+        return not self.problems
+
+    def __str__(self) -> str:
+        return f"{self.name}: {'passed' if self.passed else '; '.join(self.problems)}"
 
 
-def sweep_states(obj: ArticulatedObject) -> Array:
-    """(S, K) states: at rest, 21 over the range of each joint with the others at rest, 64 Sobol states of all joints.
+def check(obj: ArticulatedObject) -> list[Gate]:
+    """All gates that need nothing but the object.
 
-    Limits are kept; a joint without limits makes a whole turn.
+    Those that read its URDF file are in :mod:`artsim.strict`, those that load it into simulators in
+    :mod:`artsim.simulators`.
     """
-    tree = obj.tree
-    free = tree.free_joints
-    intervals = joint_intervals(obj)
-    states = [tree.rest[None]]
-    for k in free:
-        along = np.repeat(tree.rest[None], STATES_PER_JOINT, axis=0)
-        along[:, k] = np.linspace(intervals[k, 0], intervals[k, 1], STATES_PER_JOINT)
-        states.append(along)
-    if len(free):
-        together = np.repeat(tree.rest[None], JOINT_STATES, axis=0)
-        unit = qmc.Sobol(len(free), rng=0).random(JOINT_STATES)
-        together[:, free] = intervals[free, 0] + unit * (intervals[free, 1] - intervals[free, 0])
-        states.append(together)
-    return tree.complete_state(np.concatenate(states))
+    sweep = Sweep(obj)
+    gates: dict[str, Callable[[], list[str]]] = {
+        "kinematics": lambda: strict_kinematics(obj),
+        "collision free": lambda: [_say(obj, c) for c in sweep.collisions()],
+        "joined parts apart": lambda: [_say(obj, c) for c in sweep.joined_overlaps()],
+        "watertight": lambda: [f"{obj.parts[k].name} is not closed" for k in np.flatnonzero(~sweep.watertight)],
+        "convex collision geometry": lambda: _collision_geometry(obj),
+        "inertia": lambda: _inertia(obj),
+    }
+    return [Gate(name, tuple(_closed(gate))) for name, gate in gates.items()]
 
 
-class Sweep:
-    """The parts of an object, made ready to be tested for overlap in many states.
-
-    Surfaces are tested triangle by triangle (FCL); where two of them cross, the overlap is measured exactly
-    (manifold3d): its mean thickness is twice its volume over its surface.
-    """
-
-    def __init__(self, obj: ArticulatedObject):
-        self.obj = obj
-        self.solids = [_manifold(obj, k) for k in range(len(obj))]
-        self._surfaces = [_surface(obj, k) for k in range(len(obj))]
-
-    @cached_property
-    def joined(self) -> set[tuple[int, int]]:
-        """Pairs of parts that a joint connects."""
-        return {(int(self.obj.tree.parents[k]), k) for k in range(1, len(self.obj))}
-
-    def collisions(self, states: Array | None = None) -> Iterator[Collision]:
-        """Overlaps of parts that no joint connects, deeper than ``PENETRATION``; at most one for each pair."""
-        pairs = [pair for pair in combinations(range(len(self.obj)), 2) if pair not in self.joined]
-        return self._overlaps(pairs, states, lambda pair, volume, depth: depth > PENETRATION)
-
-    def joined_overlaps(self, states: Array | None = None) -> Iterator[Collision]:
-        """Overlaps of parts that a joint connects, larger than ``JOINED_OVERLAP``; at most one for each pair."""
-
-        def too_much(pair: tuple[int, int], volume: float, depth: float) -> bool:
-            smaller = min(_volume(self.solids[pair[0]]), _volume(self.solids[pair[1]]))
-            return not volume <= JOINED_OVERLAP * smaller
-
-        return self._overlaps(sorted(self.joined), states, too_much)
-
-    def _overlaps(
-        self,
-        pairs: Sequence[tuple[int, int]],
-        states: Array | None,
-        matters: Callable[[tuple[int, int], float, float], bool],
-    ) -> Iterator[Collision]:
-        states = sweep_states(self.obj) if states is None else states
-        T = self.obj.tree.forward_kinematics(states)
-        low, high = _posed_boxes(self.obj, T)
-        for i, j in pairs:
-            if self._surfaces[i] is None or self._surfaces[j] is None:
-                continue
-            near = ((low[:, i] <= high[:, j]) & (low[:, j] <= high[:, i])).all(axis=1).nonzero()[0]
-            relative = np.linalg.inv(T[near, i]) @ T[near, j]
-            _, first = np.unique(np.round(relative, 9).reshape(len(near), 16), axis=0, return_index=True)
-            for n in np.sort(first):  # states in which the two stand differently to each other
-                at_rest = near[n] == 0
-                if not at_rest and not self._crossing(i, j, relative[n]):
-                    continue
-                volume, depth = self._overlap(i, j, relative[n])
-                if at_rest and volume != volume and not self._crossing(i, j, relative[n]):
-                    continue
-                if matters((i, j), volume, depth):
-                    yield Collision((i, j), states[near[n]], depth)
-                    break
-
-    def _crossing(self, i: int, j: int, T_i_j: Array) -> bool:
-        """Whether two surfaces cross."""
-        here = fcl.CollisionObject(self._surfaces[i], fcl.Transform())
-        there = fcl.CollisionObject(self._surfaces[j], fcl.Transform(T_i_j[:3, :3], T_i_j[:3, 3]))
-        return bool(fcl.collide(here, there, fcl.CollisionRequest(), fcl.CollisionResult()))
-
-    def _overlap(self, i: int, j: int, T_i_j: Array) -> tuple[float, float]:
-        """Volume and mean thickness of an overlap; NaN and infinite where a surface is not closed."""
-        first, second = self.solids[i], self.solids[j]
-        if first is None or second is None:
-            return np.nan, np.inf
-        overlap = first ^ second.transform(T_i_j[:3])
-        volume = overlap.volume()
-        return volume, 2.0 * volume / max(overlap.surface_area(), 1e-300)
+def _closed(gate: Callable[[], list[str]]) -> list[str]:
+    """The problems a gate finds; an error is one."""
+    try:
+        return gate()
+    except (ArtsimError, ValueError, RuntimeError) as error:
+        return [f"cannot be checked ({error})"]
 
 
-def _posed_boxes(obj: ArticulatedObject, T: Array) -> tuple[Array, Array]:
-    """(S, K, 3) lower and upper corners of boxes around the posed parts' own boxes."""
-    center, half = obj.box_center, 0.5 * obj.box_size
-    middle = (T[..., :3, :3] @ center[..., None])[..., 0] + T[..., :3, 3]
-    reach = (np.abs(T[..., :3, :3]) @ half[..., None])[..., 0]
-    return middle - reach, middle + reach
+def _say(obj: ArticulatedObject, collision: Collision) -> str:
+    i, j = collision.parts
+    depth = f" by {1e3 * collision.depth:.3g} mm" if np.isfinite(collision.depth) else ""
+    moved = np.flatnonzero(np.abs(collision.state - obj.tree.rest) > 1e-9)
+    state = ", ".join(f"{obj.parts[k].name} = {collision.state[k]:.3g}" for k in moved) or "rest"
+    return f"{obj.parts[i].name} and {obj.parts[j].name} overlap{depth} at {state}"
 
 
-def _surface(obj: ArticulatedObject, k: int) -> fcl.BVHModel | None:
-    part = obj.parts[k]
-    if len(part.faces) == 0:
-        return None
-    model = fcl.BVHModel()
-    model.beginModel(len(part.vertices), len(part.faces))
-    model.addSubModel(part.vertices * obj.scale, part.faces.astype(np.int64))
-    model.endModel()
-    return model
+def _collision_geometry(obj: ArticulatedObject) -> list[str]:
+    problems = []
+    for part in obj.parts:
+        if part.body is None or not part.body.pieces:
+            problems.append(f"{part.name} has none")
+        elif not all(_is_convex(vertices, faces) for vertices, faces in part.body.pieces):
+            problems.append(f"{part.name} has pieces that are not convex")
+    return problems
 
 
-def _manifold(obj: ArticulatedObject, k: int) -> Manifold | None:
-    """The part as an exact solid; None where its surface is not closed."""
-    part = obj.parts[k]
-    if len(part.faces) == 0:
-        return None
-    solid = Manifold(Mesh64(part.vertices * obj.scale, part.faces.astype(np.uint64)))
-    return solid if solid.status() == Error.NoError and not solid.is_empty() else None
+def _is_convex(vertices: Array, faces: Array) -> bool:
+    corners = (vertices - vertices[0])[faces]
+    volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    try:
+        whole = ConvexHull(vertices - vertices[0]).volume
+    except QhullError:  # flat
+        return False
+    return bool(volume >= (1.0 - CONVEX) * whole)
 
 
-def _volume(solid: Manifold | None) -> float:
-    return np.nan if solid is None else float(solid.volume())
-
-
-def watertight(obj: ArticulatedObject) -> NDArray[np.bool_]:
-    """(K,) whether each part's surface is closed, consistently oriented and encloses a volume."""
-    return np.array([_volume(_manifold(obj, k)) > 0 for k in range(len(obj))])
+def _inertia(obj: ArticulatedObject) -> list[str]:
+    problems = []
+    for part in obj.parts:
+        if part.body is None:
+            problems.append(f"{part.name} has no density")
+            continue
+        properties = mass_properties(part)
+        moments = np.linalg.eigvalsh(properties.inertia)
+        if not (properties.mass > 0 and moments[0] > 0 and moments[2] <= moments[0] + moments[1] * (1 + 1e-9)):
+            problems.append(f"{part.name} has mass {properties.mass:.3g} kg, principal moments {moments}")
+    return problems

@@ -18,7 +18,7 @@ from artsim.plan import Plan, Shard, ShardRecord, draw_sample, read_plan
 from artsim.renderers import Renderer, make_renderer
 from artsim.sample import Sample
 from artsim.shards import write_shard
-from artsim.sources import Source, load_source
+from artsim.sources import Source
 
 _STEP = 16  # samples between two reports
 
@@ -106,6 +106,6 @@ class CompiledSource:
 def compile_source(source: Source, staged: str) -> CompiledSource:
     """Load a source and keep it compiled in the dataset's folder, under a provisional name."""
     assert _worker is not None
-    obj = load_source(source)
+    obj = source.load()
     save_object(obj, _worker.folder / "objects" / staged)
     return CompiledSource(staged, obj.category, obj.object_id, obj.sha256, len(obj))
