@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from artsim.kinematics import Array
-from artsim.solids import Solid, Vector, box, cylinder, frame, hull, rounded_box, tube, union
+from artsim.solids import Solid, Vector, box, cylinder, frame, hull, prism, rounded_box, tube, union
 
 
 def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
@@ -94,3 +96,101 @@ def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> S
 def _rectangle(x: float, low: Array, high: Array) -> Array:
     """(4, 3) corners of a rectangle across the X axis."""
     return np.array([(x, y, z) for y in (low[0], high[0]) for z in (low[1], high[1])])
+
+
+def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, depth: float) -> Solid:
+    """Flat bar along Y or Z on two posts, on a panel that faces -X.
+
+    Parameters
+    ----------
+    start, end : (3,) float
+        On the panel, start below or to the -Y side of end.
+    reach : float
+        Distance of the bar's front from the panel.
+    thickness, depth : float
+        Of the bar, across it in the panel's plane and along X.
+    """
+    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    half = np.array([0.0, 0.5 * thickness, 0.5 * thickness])
+    along = (end - start) / np.linalg.norm(end - start)
+    side = half * (1.0 - along)
+    front, back = np.array([-reach, 0.0, 0.0]), np.array([depth - reach, 0.0, 0.0])
+    solid = rounded_box(start - side + front, end + side + back, 0.25 * min(thickness, depth))
+    for share in (0.06, 0.94):
+        foot = start + share * (end - start)
+        solid += box(foot - half + 0.8 * front, foot + half + (0.002, 0.0, 0.0))
+    return solid
+
+
+def dial(foot: Vector, outward: Vector, reach: float, radius: float, sections: int = 24) -> Solid:
+    """Control knob 1 mm clear of its panel; a grip across it shows how far it is turned."""
+    foot, outward = np.asarray(foot, dtype=np.float64), np.asarray(outward, dtype=np.float64)
+    up = np.array([0.0, 0.0, 1.0]) if abs(outward[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    side = np.cross(up, outward)
+    skirt = 0.35 * reach
+    solid = cylinder(foot + 0.001 * outward, foot + skirt * outward, radius, 0.9 * radius, sections)
+    corners = [
+        foot + lift * outward + a * wide * side + b * 0.88 * radius * up
+        for lift, wide in ((0.9 * skirt, 0.24 * radius), (reach, 0.16 * radius))
+        for a in (-1, 1)
+        for b in (-1, 1)
+    ]
+    return solid + hull(corners)
+
+
+def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: int = 0, sections: int = 24) -> Solid:
+    """Box with a round hole along a coordinate axis.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+    center : 2 float
+        Of the hole, in the two other coordinates.
+    radius : float
+        Clear radius: of the circle inside the hole's polygon.
+    """
+    low, high, middle = (np.asarray(v, dtype=np.float64) for v in (low, high, center))
+    across = [i for i in range(3) if i != axis]
+    reach = np.stack([low[across], high[across]]) - middle
+    corners = np.array([(u, v) for u in reach[:, 0] for v in reach[:, 1]])
+    corner_angles = np.mod(np.arctan2(corners[:, 1], corners[:, 0]), 2 * np.pi)
+    angles = np.linspace(0.0, 2.0 * np.pi, sections + 1)
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    limits = np.where(rays > 0, reach[1], reach[0])
+    outer = rays * np.min(limits / np.where(np.abs(rays) > 1e-12, rays, 1e-12 * np.sign(limits)), axis=1)[:, None]
+    inner = rays * radius / np.cos(np.pi / sections)
+    solid = Solid()
+    for k in range(sections):
+        between = corners[(corner_angles > angles[k]) & (corner_angles < angles[k + 1])]
+        outline = np.concatenate([inner[k : k + 2], outer[k : k + 2], between]) + middle
+        solid += prism(outline, low[axis], high[axis], axis)
+    return solid
+
+
+def windowed_panel(low: Vector, high: Vector, margins: Sequence[float], pane: float, inset: float) -> Solid:
+    """Panel that faces -X, with a window: a frame and a thinner pane set back from its front.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+    margins : 4 float
+        Width of the frame at low Y, high Y, the bottom and the top.
+    pane : float
+        Thickness of the pane.
+    inset : float
+        How far the pane lies behind the front.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    left, right, bottom, top = np.asarray(margins, dtype=np.float64) - 0.002
+    x = low[0] + inset
+    glass = box((x, low[1] + left, low[2] + bottom), (x + pane, high[1] - right, high[2] - top))
+    return frame(low, high, margins) + glass
+
+
+def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
+    """Flat grid within a box: a square rim, as high as the box, and bars along X."""
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    solid = frame(low, high, [wire] * 4, 0, 1)
+    for y in np.linspace(low[1], high[1] - wire, bars + 2)[1:-1]:
+        solid += box((low[0], y, low[2]), (high[0], y + wire, low[2] + min(wire, high[2] - low[2])))
+    return solid
