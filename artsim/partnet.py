@@ -1,4 +1,8 @@
-"""The side files of a PartNet-Mobility folder: category, id, part labels, the joints as first annotated."""
+"""The side files of a PartNet-Mobility folder: category, id, part labels, the joints as first annotated.
+
+Folders that :func:`artsim.export.export` wrote say more in ``meta.json``: the order of the parts, and which links only
+help to build a screw. Such objects are at rest at their file's zero.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +28,10 @@ class SideFiles:
         Link name -> semantic name, from ``semantics.txt``.
     num_movable : int or None
         Movable joints as first annotated (``mobility_v2.json``, else ``semantics.txt``).
+    parts : tuple of str
+        Links that are parts, in order; empty unless artsim itself wrote the folder.
+    helpers : tuple of str
+        Links without a shape that stand between the two joints of a screw, as far as ``meta.json`` says so.
     repairs : tuple of Repair
         Side files that could not be read.
     contents : tuple of bytes
@@ -34,6 +42,8 @@ class SideFiles:
     category: str | None = None
     labels: dict[str, str] = field(default_factory=dict)
     num_movable: int | None = None
+    parts: tuple[str, ...] = ()
+    helpers: tuple[str, ...] = ()
     repairs: tuple[Repair, ...] = ()
     contents: tuple[bytes, ...] = ()
 
@@ -66,6 +76,8 @@ def read_side_files(folder: Path) -> SideFiles:
     meta = parsed("meta.json")
     meta = meta if isinstance(meta, dict) else {}
     category, object_id = meta.get("model_cat"), meta.get("anno_id")
+    own = meta.get("artsim")
+    own = own if isinstance(own, dict) else {}
 
     rows = [line.split() for line in (content("semantics.txt") or b"").decode("utf-8", "replace").splitlines()]
     rows = [row for row in rows if len(row) >= 3]
@@ -82,6 +94,12 @@ def read_side_files(folder: Path) -> SideFiles:
         category=None if category is None else str(category),
         labels=labels,
         num_movable=num_movable,
+        parts=_names(own.get("parts")),
+        helpers=_names(own.get("helpers")),
         repairs=tuple(repairs),
         contents=tuple(contents),
     )
+
+
+def _names(value: object) -> tuple[str, ...]:
+    return tuple(map(str, value)) if isinstance(value, list) else ()

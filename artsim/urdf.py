@@ -7,7 +7,7 @@ here links are merged into rigid parts, joints are rewritten in the rest frame, 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -64,8 +64,8 @@ def load(
     if file.suffix == ".npz":
         return load_object(file)
     data = read_bounded(file, limits.max_urdf_bytes, "URDF file")
-    robot, repairs = parse_robot(data, file, limits.max_links)
     side = read_side_files(file.parent)
+    robot, repairs = parse_robot(data, file, limits.max_links, side.helpers)
     roots = {name: Path(folder) for name, folder in (package_roots or {}).items()}
     reader = MeshReader(file.parent, roots, limits)
 
@@ -73,14 +73,16 @@ def load(
     category = canonical_category(category or side.category or "unknown")
     bodies = _merge_fixed_links(robot, file, repairs)
     _read_geometry(bodies, robot, reader, file, repairs)
-    bodies = _join_screws(_without_empty_leaves(bodies, repairs), repairs)
+    bodies = _join_screws(_without_empty_leaves(bodies, repairs), side.helpers, repairs)
+    bodies, exported = _in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
     parts = [body.part(side.labels) for body in bodies]
     if side.num_movable is not None and len(tree) - 1 != side.num_movable:
         repairs.append(
             Repair("file", f"moves {len(tree) - 1} parts where its annotation lists {side.num_movable}: taken as it is")
         )
-    rest, reasons = rest_state(tree, parts, category)
+    # No rule holds for a category that nothing is known of: the zero of a file of our own needs no aligning.
+    rest, reasons = rest_state(tree, parts, "unknown" if exported else category)
     repairs += reasons
     tree, parts, T_base_rest = _to_rest_frame(tree, parts, rest)
     return ArticulatedObject(
@@ -280,8 +282,11 @@ def _without_empty_leaves(bodies: list[_Body], repairs: list[Repair]) -> list[_B
     return kept
 
 
-def _join_screws(bodies: list[_Body], repairs: list[Repair]) -> list[_Body]:
-    """One screw part in place of a helper link between a prismatic and a continuous joint on one axis."""
+def _join_screws(bodies: list[_Body], known: Collection[str], repairs: list[Repair]) -> list[_Body]:
+    """One screw part in place of a helper link between a prismatic and a continuous joint on one axis.
+
+    Helpers that the file's annotation knows of need no mention.
+    """
     kept = list(bodies)
     for helper in bodies:
         carried = [b for b in bodies if b.parent is helper]
@@ -301,17 +306,32 @@ def _join_screws(bodies: list[_Body], repairs: list[Repair]) -> list[_Body]:
             continue
         pitch = rate * _stretch(slide.joint) * float(np.sign(along))
         body.links = body.links + helper.links
-        repairs.append(
-            Repair(
-                f"link {helper.links[0]!r}",
-                f"helper of a screw: joints {helper.joint.name!r} and {body.joint.name!r} joined into one of "
-                f"{pitch:.6g} m/rad",
+        if helper.links[0] not in known:
+            repairs.append(
+                Repair(
+                    f"link {helper.links[0]!r}",
+                    f"helper of a screw: joints {helper.joint.name!r} and {body.joint.name!r} joined into one of "
+                    f"{pitch:.6g} m/rad",
+                )
             )
-        )
         body.slide, body.slide_rate, body.pitch = slide.joint, rate, pitch
         body.T_base_joint, body.joint, body.parent = turn.T_base_joint, turn.joint, helper.parent
         kept.remove(helper)
     return kept
+
+
+def _in_order(bodies: list[_Body], order: Sequence[str], repairs: list[Repair]) -> tuple[list[_Body], bool]:
+    """Bodies in the order of a list of their links, and whether there was one that fits."""
+    by_name = {body.links[0]: body for body in bodies}
+    ordered = [by_name[name] for name in order if name in by_name]
+    position = {body: i for i, body in enumerate(ordered)}
+    fits = len(order) == len(position) == len(bodies) and all(
+        (body.parent is None) == (i == 0) and (body.parent is None or position[body.parent] < i)
+        for i, body in enumerate(ordered)
+    )
+    if order and not fits:
+        repairs.append(Repair("meta.json", "its list of parts is not that of the file: ignored"))
+    return (ordered, True) if fits else (bodies, False)
 
 
 def _axis(body: _Body) -> Array:
@@ -350,7 +370,9 @@ def _tree(bodies: list[_Body], file: Path) -> tuple[KinematicTree, dict[str, tup
             lower, upper = float(joint.limit.lower), float(joint.limit.upper)
         if body.slide is not None:
             kind = "screw"
-            lower, upper = sorted(float(v) / body.slide_rate for v in (body.slide.limit.lower, body.slide.limit.upper))
+            lower, upper = sorted(
+                float(v) / body.slide_rate + 0.0 for v in (body.slide.limit.lower, body.slide.limit.upper)
+            )
             source_joints[body.slide.name] = (k, body.slide_rate)
         # Simulators move a prismatic joint by its value times its axis, whatever the axis's length.
         lower, upper = lower * _stretch(joint), upper * _stretch(joint)

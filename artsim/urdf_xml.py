@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,9 @@ def safe_xml(data: bytes, where: Path) -> etree._Element:
     return root
 
 
-def parse_robot(data: bytes, where: Path, max_links: int) -> tuple[yourdfpy.Robot, list[Repair]]:
+def parse_robot(
+    data: bytes, where: Path, max_links: int, shapeless: Collection[str] = ()
+) -> tuple[yourdfpy.Robot, list[Repair]]:
     """Check and mend a URDF document, then let yourdfpy read it.
 
     Parameters
@@ -58,6 +61,8 @@ def parse_robot(data: bytes, where: Path, max_links: int) -> tuple[yourdfpy.Robo
         Its path, for messages.
     max_links : int
         Limit on the number of links.
+    shapeless : collection of str
+        Links that are known to have no geometry.
 
     Returns
     -------
@@ -90,7 +95,7 @@ def parse_robot(data: bytes, where: Path, max_links: int) -> tuple[yourdfpy.Robo
     names = {link.get("name") for link in links}
     for joint in joints:
         _check_joint(joint, names, where, repairs)
-    _summarise_missing(links, joints, repairs)
+    _summarise_missing(links, shapeless, repairs)
     robot = yourdfpy.URDF.load(
         io.BytesIO(etree.tostring(root)), build_scene_graph=False, load_meshes=False, filename_handler=lambda f: f
     ).robot
@@ -224,7 +229,8 @@ def _check_limit(joint: etree._Element, kind: str, name: str, where: str, repair
     limit.set("upper", repr(upper + 0.0))
 
 
-def _summarise_missing(links: list[etree._Element], joints: list[etree._Element], repairs: list[Repair]) -> None:
+def _summarise_missing(links: list[etree._Element], shapeless: Collection[str], repairs: list[Repair]) -> None:
     empty = [link.get("name") for link in links if link.find("visual") is None and link.find("collision") is None]
+    empty = [name for name in empty if name not in shapeless]
     if empty:
         repairs.append(Repair("links", f"without geometry: {', '.join(map(str, empty))}"))

@@ -1,0 +1,121 @@
+"""Procedural objects as files: PartNet-style URDF folders, MJCF and USD.
+
+All lengths are metres, Z is up and the front towards -X: meshes are written in the object's rest frame, and each link's
+frame stands at its joint's origin with the axes of the rest frame. The root link is the robot's base; nothing fixes it
+to the world but what the simulator is asked to do.
+
+MuJoCo fuses a link that no joint moves into the world, unless its compiler has ``fusestatic="false"``. The URDF files
+say so themselves, in a ``<mujoco>`` element that other programs ignore, and the MJCF files do too.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from artsim.errors import ConfigError
+from artsim.export.robot import MeshShape, Robot, as_robot
+from artsim.objects import ArticulatedObject
+
+FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda"}
+"""File written in each format."""
+
+
+def export(obj: ArticulatedObject, folder: str | Path, formats: Sequence[str] = ("urdf",)) -> dict[str, Any]:
+    """Write a procedural object into a folder.
+
+    ``meta.json`` and, for URDF and MJCF, ``meshes/*.obj`` are shared by all formats; URDF comes with
+    ``semantics.txt``. The bytes depend on the object and the formats alone.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+        With bodies and at rest at q = 0, as :func:`artsim.make` makes them.
+    folder : path
+        Made if missing.
+    formats : sequence of str
+        Keys of ``FORMATS``.
+
+    Returns
+    -------
+    dict
+        Content of ``meta.json``.
+
+    Raises
+    ------
+    AssetError
+        When the object lacks what physics needs.
+    ConfigError
+        When a format is unknown.
+    """
+    check_formats(formats)
+    folder = Path(folder)
+    robot = as_robot(obj)
+    folder.mkdir(parents=True, exist_ok=True)
+    if "urdf" in formats or "mjcf" in formats:
+        _write_meshes(robot, folder / "meshes")
+    if "urdf" in formats:
+        from artsim.export.urdf import semantics_text, urdf_text
+
+        (folder / FORMATS["urdf"]).write_text(urdf_text(robot))
+        (folder / "semantics.txt").write_text(semantics_text(robot))
+    if "mjcf" in formats:
+        from artsim.export.mjcf import mjcf_text
+
+        (folder / FORMATS["mjcf"]).write_text(mjcf_text(robot))
+    if "usd" in formats:
+        from artsim.export.usd import usd_text
+
+        (folder / FORMATS["usd"]).write_text(usd_text(robot))
+    meta = describe(robot, formats)
+    (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n")
+    return meta
+
+
+def check_formats(formats: Sequence[str]) -> None:
+    """Refuse formats that cannot be written.
+
+    Raises
+    ------
+    ConfigError
+    """
+    unknown = sorted(set(formats) - set(FORMATS))
+    if unknown or not formats:
+        raise ConfigError(f"cannot write formats {unknown}", "formats", f"name some of {', '.join(FORMATS)}")
+
+
+def describe(robot: Robot, formats: Sequence[str]) -> dict[str, Any]:
+    """Content of ``meta.json``: PartNet-Mobility's two keys, and what artsim knows of its own object."""
+    obj = robot.obj
+    return {
+        "model_cat": obj.category,
+        "anno_id": obj.object_id,
+        "artsim": {
+            "version": version("artsim"),
+            "formats": [name for name in FORMATS if name in formats],
+            # Parts in the object's own order; helpers are links that stand between the two joints of a screw.
+            "parts": [part.name for part in obj.parts],
+            "helpers": [link.name for link in robot.links if link.part < 0],
+            "joints": list(obj.tree.types[1:]),
+            "free_joints": len(obj.tree.free_joints),
+            "mass_kg": sum(link.inertia.mass for link in robot.links),
+            "size_m": (obj.bounds[1] - obj.bounds[0]).tolist(),
+            "sha256": obj.sha256,
+        },
+    }
+
+
+def _write_meshes(robot: Robot, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for mesh in robot.meshes:
+        (folder / f"{mesh.name}.obj").write_text(obj_text(mesh))
+
+
+def obj_text(mesh: MeshShape) -> str:
+    """A mesh as Wavefront OBJ, to the nanometre."""
+    vertices = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.vertices.tolist()]
+    faces = [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
+    return "\n".join([*vertices, *faces, ""])

@@ -1,0 +1,262 @@
+"""An object as links and joints of the kinds that simulators know: what every file format is written from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.errors import AssetError
+from artsim.inertia import Inertia, joined_inertia, part_inertia
+from artsim.kinematics import Array, Joint
+from artsim.objects import ArticulatedObject, Mesh
+
+GRAVITY = 9.81
+DECAY = 0.5
+"""Seconds in which a joint's damping takes away most (1 - 1/e) of its speed."""
+SLIDING_FRICTION = 0.05
+"""Friction of a slide over the weight that it carries."""
+PIN_RADIUS = 0.002
+"""Metres; friction of a hinge is that of a pin of this radius that carries the weight."""
+STRENGTH = 5.0
+"""Effort limit over what holds the carried weight, held horizontally at its whole reach."""
+TURN_SPEED, SLIDE_SPEED = 4.0 * np.pi, 2.0
+"""Velocity limits, rad/s and m/s."""
+HELPER_SHARE = 0.01
+"""Share of a screw part's mass that its helper link takes over from it."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True, eq=False)
+class BoxShape:
+    """A box along the axes of the rest frame: centre and side lengths, (3,) metres."""
+
+    center: Array
+    size: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShape:
+    """A mesh in the rest frame, metres, with the name of its file."""
+
+    name: str
+    vertices: Array
+    faces: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """One rigid body.
+
+    Attributes
+    ----------
+    name : str
+    part : int
+        The part that it is; -1 for the helper link between the two joints of a screw, which has no shape.
+    origin : (3,) float
+        Its frame's origin in the rest frame, at rest, metres. Axes are those of the rest frame.
+    inertia : Inertia
+    visual : MeshShape or None
+    collision : tuple of BoxShape or MeshShape
+        Each convex.
+    """
+
+    name: str
+    part: int
+    origin: Array
+    inertia: Inertia
+    visual: MeshShape | None = None
+    collision: tuple[BoxShape | MeshShape, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LinkJoint:
+    """A revolute, continuous or prismatic joint between two links, at the child's frame origin.
+
+    Attributes
+    ----------
+    name, type : str
+    parent, child : int
+        Links.
+    axis : (3,) float
+        Unit.
+    lower, upper : float
+        Radians or metres; infinite where continuous.
+    effort, velocity : float
+        Limits: N m or N, rad/s or m/s.
+    damping, friction : float
+        N m s or N s/m; N m or N.
+    mimic : tuple or None
+        Name of the joint followed, multiplier, offset.
+    """
+
+    name: str
+    type: str
+    parent: int
+    child: int
+    axis: Array
+    lower: float
+    upper: float
+    effort: float
+    velocity: float
+    damping: float
+    friction: float
+    mimic: tuple[str, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """Links (the root first) and joints (each after its parent's) of an object."""
+
+    obj: ArticulatedObject
+    links: tuple[Link, ...]
+    joints: tuple[LinkJoint, ...]
+
+    @property
+    def meshes(self) -> list[MeshShape]:
+        """Every mesh that needs a file."""
+        shapes = [s for link in self.links for s in (link.visual, *link.collision)]
+        return [shape for shape in shapes if isinstance(shape, MeshShape)]
+
+    def states(self, q: Array) -> dict[str, float]:
+        """Value of each joint for a (K,) state of the object, metres and radians."""
+        q = self.obj.tree.complete_state(q)
+        values = {joint.name: float(q[self.links[joint.child].part]) for joint in self.joints}
+        for joint in self.joints:
+            if self.links[joint.child].part < 0 and joint.mimic is not None:
+                source, multiplier, offset = joint.mimic
+                values[joint.name] = multiplier * values[source] + offset
+        return values
+
+
+def as_robot(obj: ArticulatedObject) -> Robot:
+    """Write an object as links and joints.
+
+    A screw becomes a prismatic joint, a helper link and a continuous joint; the first follows the second.
+
+    Raises
+    ------
+    AssetError
+        When a part has no body or no proper name, or the object is not at rest at q = 0.
+    """
+    tree = obj.tree
+    where = f"{obj.category} {obj.object_id}"
+    for part in obj.parts:
+        for word in (part.name, part.label):
+            if not _NAME.fullmatch(word):
+                raise AssetError(f"cannot write the name {word!r}", where, "use letters, digits and _ only")
+    if np.any(tree.rest):
+        raise AssetError("is not at rest at q = 0", where, "only procedural objects (artsim.make) can be exported")
+    own = [part_inertia(obj, k) for k in range(len(obj))]
+    carried = [
+        joined_inertia(own[j] for j in range(k, len(obj)) if _carries(tree.parents, k, j)) for k in range(len(obj))
+    ]
+    used = {part.name for part in obj.parts} | {joint.name for joint in tree.joints}
+    links: list[Link] = []
+    joints: list[LinkJoint] = []
+    index: list[int] = []  # link of each part
+    for k, joint in enumerate(tree.joints):
+        origin = tree.origins[k] if k > 0 else np.zeros(3)
+        inertia = own[k]
+        if k > 0:
+            parent = index[joint.parent]
+            if joint.type == "screw":
+                links.append(
+                    Link(_unused(f"{obj.parts[k].name}_thread", used), -1, origin, inertia.share(HELPER_SHARE))
+                )
+                inertia = inertia.share(1.0 - HELPER_SHARE)
+                joints.append(_slide(obj, k, joint, parent, len(links) - 1, carried[k], used))
+                parent = len(links) - 1
+            joints.append(_joint(obj, joint, parent, len(links), carried[k]))
+        index.append(len(links))
+        links.append(_link(obj, k, origin, inertia))
+    return Robot(obj, tuple(links), tuple(joints))
+
+
+def _carries(parents: Sequence[int] | NDArray[np.int64], k: int, j: int) -> bool:
+    """Whether part j hangs on part k, or is it."""
+    while j > k:
+        j = int(parents[j])
+    return j == k
+
+
+def _unused(name: str, used: set[str]) -> str:
+    while name in used:
+        name += "_"
+    used.add(name)
+    return name
+
+
+def _link(obj: ArticulatedObject, k: int, origin: Array, inertia: Inertia) -> Link:
+    part = obj.parts[k]
+    pieces = () if part.body is None else part.body.pieces
+    return Link(
+        part.name,
+        k,
+        origin,
+        inertia,
+        MeshShape(part.name, part.vertices * obj.scale, part.faces),
+        tuple(_convex(f"{part.name}-hull{i}", piece, obj.scale) for i, piece in enumerate(pieces)),
+    )
+
+
+def _convex(name: str, piece: Mesh, scale: float) -> BoxShape | MeshShape:
+    """A box where the piece is one, else its mesh."""
+    vertices, faces = piece[0] * scale, piece[1]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    near = np.minimum(np.abs(vertices - low), np.abs(vertices - high)).max()
+    corners = np.unique(np.abs(vertices - low) < np.abs(vertices - high), axis=0)
+    if len(vertices) == len(corners) == 8 and near < 1e-12:
+        return BoxShape(0.5 * (low + high), high - low)
+    return MeshShape(name, vertices, faces)
+
+
+def _joint(obj: ArticulatedObject, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:
+    mimic = None
+    if joint.mimic is not None:
+        mimic = (obj.tree.joints[joint.mimic.source].name, joint.mimic.multiplier, joint.mimic.offset)
+    lower, upper = (-np.inf, np.inf) if joint.type == "screw" else (joint.lower, joint.upper)
+    kind = "continuous" if joint.type == "screw" else joint.type
+    return _driven(joint.name, kind, parent, child, joint, lower, upper, carried, mimic)
+
+
+def _slide(
+    obj: ArticulatedObject, k: int, joint: Joint, parent: int, child: int, carried: Inertia, used: set[str]
+) -> LinkJoint:
+    """The prismatic joint of a screw."""
+    name = _unused(f"{obj.parts[k].name}_slide", used)
+    lower, upper = sorted((joint.lower * joint.pitch, joint.upper * joint.pitch))
+    if not (np.isfinite(lower) and np.isfinite(upper)):
+        raise AssetError("a screw without limits cannot be written", f"joint of {obj.parts[k].name!r}", "limit it")
+    return _driven(name, "prismatic", parent, child, joint, lower, upper, carried, (joint.name, joint.pitch, 0.0))
+
+
+def _driven(
+    name: str,
+    kind: str,
+    parent: int,
+    child: int,
+    joint: Joint,
+    lower: float,
+    upper: float,
+    carried: Inertia,
+    mimic: tuple[str, float, float] | None,
+) -> LinkJoint:
+    """A joint with damping, friction and strength that fit what it carries."""
+    axis, origin = np.asarray(joint.axis), np.asarray(joint.origin)
+    weight = carried.mass * GRAVITY
+    if kind == "prismatic":
+        effort, velocity = STRENGTH * weight, SLIDE_SPEED
+        damping, friction = carried.mass / DECAY, SLIDING_FRICTION * weight
+    else:
+        moment = carried.about(origin, axis)
+        reach = np.sqrt(moment / carried.mass)
+        effort, velocity = STRENGTH * weight * reach, TURN_SPEED
+        damping, friction = moment / DECAY, weight * PIN_RADIUS * min(1.0, reach)
+    return LinkJoint(
+        name, kind, parent, child, axis, lower, upper, float(effort), float(velocity), damping, friction, mimic
+    )
