@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.assembly import Assembly
 from artsim.errors import ConfigError
-from artsim.families import drawer, laptop
+from artsim.families import drawer, laptop, robot_arm, storage_furniture
 from artsim.objects import ArticulatedObject
 
 Family = Callable[[np.random.Generator], Assembly]
@@ -22,6 +22,8 @@ Family = Callable[[np.random.Generator], Assembly]
 FAMILIES: dict[str, Family] = {
     "drawer": drawer.build,
     "laptop": laptop.build,
+    "robot_arm": robot_arm.build,
+    "storage_furniture": storage_furniture.build,
 }
 """Every category that :func:`make` knows."""
 

@@ -1,0 +1,287 @@
+"""What stands in an opening of a cabinet: drawers, doors, sliding doors, trays behind doors, shelves.
+
+Everything that belongs to a cell stays within the cell's own range of Y and Z, in whatever state; only doors hinged at
+the outer side of a body open beyond a right angle. So cells never collide with one another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from artsim.assembly import JointSpec, prismatic, revolute
+from artsim.families.details import bar_handle, bow_handle, knob, panel
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, hull_of, rounded_box, tray
+
+GAP = 0.0015
+OUTWARD = (-1.0, 0.0, 0.0)
+Moving = tuple[str, Solid, JointSpec]
+"""Label, solid and joint of a moving part; its parent is "body"."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Opening between boards: its edges in Y and Z, metres, and which of them are outer edges of the body."""
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    outer_low: tuple[bool, bool] = (True, True)
+    outer_high: tuple[bool, bool] = (True, True)
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Width and height."""
+        return self.high[0] - self.low[0], self.high[1] - self.low[1]
+
+    def between(self, axis: int, first: float, last: float) -> Cell:
+        """The part of the opening between two positions along ``axis`` (0: Y, 1: Z)."""
+
+        def changed(pair: tuple[float, float], value: float) -> tuple[float, float]:
+            return (value, pair[1]) if axis == 0 else (pair[0], value)
+
+        def inner(pair: tuple[bool, bool], moved: bool) -> tuple[bool, bool]:
+            return (pair[0] and not (moved and axis == 0), pair[1] and not (moved and axis == 1))
+
+        return replace(
+            self,
+            low=changed(self.low, first),
+            high=changed(self.high, last),
+            outer_low=inner(self.outer_low, first > self.low[axis]),
+            outer_high=inner(self.outer_high, last < self.high[axis]),
+        )
+
+
+@dataclass(frozen=True)
+class Style:
+    """What all fronts of one piece of furniture share; metres."""
+
+    face: float
+    """X of the front edges of the boards."""
+    back: float
+    """X of the front of the back board."""
+    board: float
+    thickness: float
+    """Of doors and drawer fronts."""
+    overlay: bool
+    """Fronts lie before the boards rather than between them."""
+    panel: str
+    rail: float
+    recess: float
+    handle: str
+    handle_length: float
+    reach: float
+    grip: float
+    """Radius of the handles' bars."""
+    travel: float
+    """Of drawers, as a share of their depth."""
+
+
+def drawer(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+    """A drawer that slides out towards -X."""
+    low, high = _front_box(cell, style)
+    solid = _face(low, high, style)
+    height = high[2] - low[2]
+    depth = style.back - high[0] - 0.01
+    wall, clear = 0.009, 0.005
+    bottom = cell.low[1] + clear
+    top = bottom + (cell.sides[1] - 2 * clear) * rng.uniform(0.55, 0.9)
+    solid += tray((high[0] - 0.001, cell.low[0] + clear, bottom), (high[0] + depth, cell.high[0] - clear, top), wall)
+    middle = 0.5 * (low + high)
+    rise = height * rng.choice([0.0, 0.0, 0.25])
+    half = 0.5 * min(style.handle_length, 0.75 * (high[1] - low[1]))
+    solid += _handle(style, (low[0], middle[1], middle[2] + rise), 1, half, low, high)
+    return Solid(), [("drawer", solid, prismatic("body", OUTWARD, 0.0, style.travel * depth, tuple(middle)))]
+
+
+def door(rng: np.random.Generator, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
+    """One door, hinged at its "left", "right" (as one stands before it), "top" or "bottom"."""
+    inside, trays = _interior(rng, cell, style)
+    leaf = _leaf(rng, cell, style, hinge, *_front_box(cell, style))
+    return inside, [leaf, *trays]
+
+
+def double_door(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+    """Two doors that meet in the middle."""
+    inside, trays = _interior(rng, cell, style)
+    low, high = _front_box(cell, style)
+    middle = 0.5 * (low[1] + high[1])
+    seed = int(rng.integers(2**31))
+    leaves = []
+    for hinge, first, last in (("left", middle + GAP, high[1]), ("right", low[1], middle - GAP)):
+        edges = np.array([low[0], first, low[2]]), np.array([high[0], last, high[2]])
+        leaves.append(_leaf(np.random.default_rng(seed), cell, style, hinge, *edges))
+    return inside, [*leaves, *trays]
+
+
+def sliding_doors(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+    """Two doors on two tracks, one behind the other."""
+    thickness, clear = 0.016, 0.003
+    width = 0.5 * cell.sides[0] + rng.uniform(0.01, 0.03)
+    travel = cell.sides[0] - 2 * clear - width
+    left_first = 1 if rng.random() < 0.5 else -1
+    leaves: list[Moving] = []
+    for track, side in enumerate((left_first, -left_first)):
+        x = style.face + clear + track * (thickness + clear)
+        outer = cell.high[0] - clear if side > 0 else cell.low[0] + clear
+        inner = outer - side * width
+        low = np.array([x, min(outer, inner), cell.low[1] + clear])
+        high = np.array([x + thickness, max(outer, inner), cell.high[1] - clear])
+        solid = panel(style.panel, low, high, style.rail, min(style.recess, 0.006))
+        grip = (x, outer - side * style.rail / 2, 0.5 * (low[2] + high[2]))
+        if track == 0 and style.handle != "none":
+            solid += _handle(style, grip, 2, min(0.5 * style.handle_length, 0.3 * (high[2] - low[2])), low, high)
+        else:
+            radius = min(0.4 * style.rail, 0.02)
+            solid += cylinder(grip, np.subtract(grip, (0.001, 0, 0)), radius) + cylinder(
+                grip, np.add(grip, (0.003, 0, 0)), radius
+            )
+        center = tuple(0.5 * (low + high))
+        leaves.append(("sliding_door", solid, prismatic("body", (0, -side, 0), 0.0, travel, center)))
+    depth = 2 * (thickness + clear) + clear
+    return _shelves(rng, cell, style.face + depth + 0.015, style), leaves
+
+
+def shelves(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+    """An open cell."""
+    return _shelves(rng, cell, style.face + rng.uniform(0.0, 0.02), style), []
+
+
+def _interior(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+    """Behind a door: shelves, or trays that stay inside even when they are pulled out behind a closed door."""
+    front = style.face + style.thickness + 0.02
+    room = style.back - 0.008 - front
+    width, height = cell.sides
+    if rng.random() > 0.22 or width < 0.25 or room < 0.25:
+        return _shelves(rng, cell, front, style), []
+    count = int(rng.integers(1, min(3, int(height // 0.16) + 1) + 1))
+    pitch = height / count
+    share = rng.uniform(0.5, 0.65)
+    wall = rng.uniform(0.25, 0.7) * pitch
+    trays: list[Moving] = []
+    for number in range(count):
+        z = cell.low[1] + number * pitch + 0.006
+        low = (style.back - 0.008 - share * room, cell.low[0] + 0.006, z)
+        solid = tray(low, (style.back - 0.008, cell.high[0] - 0.006, z + min(wall, 0.2)), 0.01)
+        trays.append(("drawer", solid, prismatic("body", OUTWARD, 0.0, 0.95 * (1 - share) * room, low)))
+    return Solid(), trays
+
+
+def _shelves(rng: np.random.Generator, cell: Cell, front: float, style: Style) -> Solid:
+    width, height = cell.sides
+    count = int(rng.integers(0, int(height // 0.2) + 1)) if height > 0.2 else 0
+    solid = Solid()
+    thick = min(style.board, 0.018)
+    for z in np.linspace(cell.low[1], cell.high[1], count + 2)[1:-1]:
+        low, high = (
+            (front, cell.low[0] - 0.001, z - thick / 2),
+            (style.back + 0.001, cell.high[0] + 0.001, z + thick / 2),
+        )
+        solid += box(low, high)
+    if count == 0 and width > 0.8 and rng.random() < 0.5:
+        y = 0.5 * (cell.low[0] + cell.high[0])
+        low, high = (
+            (front, y - thick / 2, cell.low[1] - 0.001),
+            (style.back + 0.001, y + thick / 2, cell.high[1] + 0.001),
+        )
+        solid += box(low, high)
+    return solid
+
+
+def _front_box(cell: Cell, style: Style) -> tuple[Array, Array]:
+    """Corners of a cell's front: before the boards, up to their middle, or between them."""
+    if not style.overlay:
+        margin = GAP + 0.001
+        return (
+            np.array([style.face, cell.low[0] + margin, cell.low[1] + margin]),
+            np.array([style.face + style.thickness, cell.high[0] - margin, cell.high[1] - margin]),
+        )
+    grow_low = [style.board - 0.001 if outer else style.board / 2 - GAP for outer in cell.outer_low]
+    grow_high = [style.board - 0.001 if outer else style.board / 2 - GAP for outer in cell.outer_high]
+    x = style.face - GAP
+    return (
+        np.array([x - style.thickness, cell.low[0] - grow_low[0], cell.low[1] - grow_low[1]]),
+        np.array([x, cell.high[0] + grow_high[0], cell.high[1] + grow_high[1]]),
+    )
+
+
+def _face(low: Array, high: Array, style: Style) -> Solid:
+    return panel(style.panel, low, high, style.rail, style.recess)
+
+
+# Of each hinge side: the axis of the front across which it lies (1: Y, 2: Z), whether it lies at that axis's high end,
+# and the direction of the hinge.
+_HINGES = {
+    "left": (1, True, (0.0, 0.0, -1.0)),
+    "right": (1, False, (0.0, 0.0, 1.0)),
+    "top": (2, True, (0.0, 1.0, 0.0)),
+    "bottom": (2, False, (0.0, -1.0, 0.0)),
+}
+
+
+def _leaf(rng: np.random.Generator, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
+    """A hinged panel with its handle near the edge that opens."""
+    across, at_high, axis = _HINGES[hinge]
+    along = 3 - across
+    edge = high[across] if at_high else low[across]
+    inward = -1.0 if at_high else 1.0
+    width, length = high[across] - low[across], high[along] - low[along]
+    solid = _face(low, high, style)
+
+    grip = np.array([low[0], 0.0, 0.0])
+    grip[across] = edge + inward * (width - max(style.rail / 2, 0.02))
+    half = 0.5 * min(style.handle_length, 0.6 * length)
+    place = rng.choice([0.5, 0.2, 0.8]) if across == 1 else 0.5
+    grip[along] = np.clip(low[along] + place * length, low[along] + half + 0.03, high[along] - half - 0.03)
+    handle = _handle(style, tuple(grip), along, half, low, high)
+    limit = np.deg2rad(88.0)
+    outer = (cell.outer_high if at_high else cell.outer_low)[across - 1] and across == 1
+    if handle.pieces:
+        bounds = handle.bounds()
+        reach = low[0] - bounds[0, 0]
+        near = (edge - bounds[1, across]) if at_high else (bounds[0, across] - edge)
+        folded = np.arctan2(near, reach)
+        limit = min(limit, folded - 0.01)
+        if outer:
+            limit = np.pi - max(np.arctan2(reach, near), 0.03) - 0.05
+    elif outer:
+        limit = np.pi - 0.08
+    if outer:
+        limit = min(limit, np.deg2rad(rng.choice([95.0, 110.0, 135.0, 170.0])))
+    origin = 0.5 * (low + high)
+    origin[across], origin[0] = edge, low[0] - 0.0005
+    return "door", solid + handle, revolute("body", axis, tuple(origin), 0.0, float(limit))
+
+
+def _handle(
+    style: Style, foot: tuple[float, float, float] | Array, along: int, half: float, low: Array, high: Array
+) -> Solid:
+    """The style's handle on a front, centred on ``foot``, along axis 1 or 2 (Y or Z), ``2 * half`` long."""
+    center = np.asarray(foot, dtype=np.float64)
+    framed = style.panel in ("shaker", "planks") and (high[1:] - low[1:]).min() >= 3.2 * style.rail
+    margin = np.minimum(center - low, high - center)[1:].min()
+    if framed and margin > style.rail:  # it stands on the sunken board
+        center = center + (style.recess, 0, 0)
+    ahead = np.zeros(3)
+    ahead[along] = half
+    radius = min(style.grip, 0.45 * margin)
+    reach = style.reach + (style.recess if framed else 0.0)
+    if style.handle == "bar":
+        return bar_handle(center - ahead, center + ahead, OUTWARD, reach, radius)
+    if style.handle == "bow":
+        return bow_handle(center - ahead, center + ahead, OUTWARD, reach, radius)
+    if style.handle == "knob":
+        return knob(center, OUTWARD, reach, min(2.4 * style.grip, 0.8 * margin))
+    if style.handle == "block":
+        wide = np.full(3, radius)
+        wide[along] = half
+        wide[0] = 0.5 * reach
+        middle = center - (0.5 * reach - 0.002, 0, 0)
+        return rounded_box(middle - wide, middle + wide, 0.3 * radius, axis=along)
+    if style.handle == "cup":
+        ends = [center + s * 0.8 * ahead for s in (-1, 1)]
+        thick = np.array([0.0, 0.0, 0.004]) if along == 1 else np.array([0.0, 0.004, 0.0])
+        lip = [box(e - (0.6 * reach, 0, 0) - thick - 0.001, e + (0.002, 0, 0) + thick + 0.001) for e in ends]
+        return hull_of(*lip)
+    return Solid()

@@ -1,0 +1,213 @@
+"""Storage furniture: kitchen units, wall cupboards, wardrobes, dressers, sideboards, nightstands.
+
+The front is divided again and again into cells; a cell holds a drawer, a door (hinged at the left, right, top or
+bottom), double doors, sliding doors or open shelves, and a door may hide trays that slide. Sizes, divisions, fronts
+before or between the boards, kinds of panels and handles, tops, plinths, legs and shelves vary.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from artsim.assembly import Assembly
+from artsim.families import fronts
+from artsim.families.fronts import Cell, Moving, Style
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, frame, union
+
+# Of each kind: the ranges of width, depth and height of the body and of the height of what it stands on, in metres;
+# how likely a low cell is a drawer; how common the kind is.
+KINDS: dict[str, tuple[tuple[tuple[float, float], ...], float, float]] = {
+    "base": (((0.3, 1.1), (0.5, 0.65), (0.6, 0.8), (0.08, 0.15)), 0.45, 0.25),
+    "wall": (((0.3, 1.2), (0.28, 0.42), (0.3, 1.0), (0.0, 0.0)), 0.05, 0.2),
+    "tall": (((0.35, 1.4), (0.35, 0.62), (1.2, 2.1), (0.0, 0.15)), 0.3, 0.15),
+    "dresser": (((0.6, 1.6), (0.38, 0.55), (0.5, 1.1), (0.0, 0.2)), 0.8, 0.15),
+    "nightstand": (((0.35, 0.6), (0.32, 0.5), (0.3, 0.6), (0.0, 0.35)), 0.7, 0.1),
+    "sideboard": (((1.0, 2.0), (0.35, 0.5), (0.4, 0.75), (0.0, 0.3)), 0.4, 0.15),
+}
+MOST_MOVING = 9
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A body with one to nine drawers, doors and trays, all closed at rest."""
+    kind = str(rng.choice(list(KINDS), p=[common for _, _, common in KINDS.values()]))
+    ranges, drawers, _ = KINDS[kind]
+    width, depth, height, stand = (rng.uniform(*span) for span in ranges)
+    stand = 0.0 if stand < 0.02 else stand
+    style = _style(rng, depth)
+    edge = style.board
+    whole = Cell((-width / 2 + edge, stand + edge), (width / 2 - edge, stand + height - edge))
+
+    cells, body = _divide(rng, whole, style, 0)
+    moving: list[Moving] = []
+    for cell, recipe in sorted(cells, key=lambda item: -np.prod(item[0].sides)):
+        inside, parts = _fill(np.random.default_rng(recipe), cell, style, drawers, must_move=not moving)
+        if len(moving) + len(parts) > MOST_MOVING:
+            inside, parts = fronts.shelves(rng, cell, style)
+        body += inside
+        moving += parts
+    body += _carcass(rng, kind, width, depth, height, stand, style)
+
+    furniture = Assembly()
+    furniture.add("body", body, density=650.0)
+    count: dict[str, int] = {}
+    for label, solid, joint in moving:
+        number = count[label] = count.get(label, -1) + 1
+        furniture.add(f"{label}_{number}", solid, joint, density=650.0)
+    return furniture
+
+
+def _style(rng: np.random.Generator, depth: float) -> Style:
+    return Style(
+        face=-depth / 2,
+        back=depth / 2 - rng.uniform(0.006, 0.015),
+        board=rng.uniform(0.015, 0.026),
+        thickness=rng.uniform(0.016, 0.024),
+        overlay=rng.random() < 0.7,
+        panel=str(rng.choice(["slab", "shaker", "raised", "planks", "glass"], p=[0.45, 0.2, 0.22, 0.05, 0.08])),
+        rail=rng.uniform(0.035, 0.075),
+        recess=rng.uniform(0.005, 0.009),
+        handle=str(rng.choice(["bar", "bow", "knob", "block", "cup", "none"], p=[0.3, 0.2, 0.22, 0.08, 0.08, 0.12])),
+        handle_length=rng.uniform(0.08, 0.35) if rng.random() < 0.8 else rng.uniform(0.35, 0.8),
+        reach=rng.uniform(0.018, 0.04),
+        grip=rng.uniform(0.004, 0.008),
+        travel=rng.uniform(0.5, 0.88),
+    )
+
+
+def _divide(rng: np.random.Generator, cell: Cell, style: Style, level: int) -> tuple[list[tuple[Cell, int]], Solid]:
+    """Cells, each with the seed of what it holds, and the boards between them. Equal cells often hold the same."""
+    width, height = cell.sides
+    large = max(width / 0.55, height / 0.75)
+    fits = [min(4, int(width / 0.24)), min(5, int(height / 0.13))]
+    if max(fits) < 2 or rng.random() > (0.85, 0.5, 0.2)[level] * min(1.0, 0.35 + 0.5 * large):
+        return [(cell, int(rng.integers(2**31)))], Solid()
+    lengthwise = width / (width + 0.8 * height)
+    axis = int(rng.random() > lengthwise) if min(fits) > 1 else int(np.argmax(fits))
+    low, high = cell.low[axis], cell.high[axis]
+    alike = rng.random() < 0.6
+    if alike:
+        count = int(rng.integers(2, fits[axis] + 1))
+        edges = np.linspace(low, high, count + 1)
+    else:
+        edges = np.array([low, low + rng.uniform(0.25, 0.75) * (high - low), high])
+    half = style.board / 2
+    cells: list[tuple[Cell, int]] = []
+    boards = Solid()
+    seed = int(rng.integers(2**31))
+    for first, last in pairwise(edges):
+        near, far = (first + half if first > low else first), (last - half if last < high else last)
+        below = np.random.default_rng(seed) if alike else rng
+        parts, more = _divide(below, cell.between(axis, near, far), style, level + 1 if level < 2 else 2)
+        cells += parts
+        boards += more
+    for edge in edges[1:-1]:
+        corner, far_corner = np.array([style.face, *cell.low]), np.array([style.back, *cell.high])
+        corner -= 0.001
+        far_corner += 0.001
+        corner[0] = style.face
+        corner[1 + axis], far_corner[1 + axis] = edge - half, edge + half
+        boards += box(corner, far_corner)
+    return cells, boards
+
+
+def _fill(
+    rng: np.random.Generator, cell: Cell, style: Style, drawers: float, must_move: bool
+) -> tuple[Solid, list[Moving]]:
+    """What stands in a cell: chosen by its shape."""
+    width, height = cell.sides
+    low_and_wide = 0.08 < height < 0.45 and width > 0.18 and height < 1.2 * width
+    chances = {
+        "drawer": drawers * low_and_wide,
+        "door": 0.5 * (0.18 < width < 0.75 and height > 0.2 and width < 1.3 * height),
+        "double": (0.5 if width < 0.7 else 1.2) * (width > 0.44 and height > 0.25 and width < 2.2 * height),
+        "flap": 0.3 * (width > 1.15 * height and 0.18 < height < 0.6),
+        "sliding": 0.2 * (width > 0.7 and height > 0.3),
+        "open": 0.0 if must_move else 0.1,
+    }
+    chances["drawer"] += sum(chances.values()) <= 0.0
+    weights = np.array(list(chances.values()))
+    what = str(rng.choice(list(chances), p=weights / weights.sum()))
+    if what == "drawer":
+        return fronts.drawer(rng, cell, style)
+    if what == "double":
+        return fronts.double_door(rng, cell, style)
+    if what == "sliding":
+        return fronts.sliding_doors(rng, cell, style)
+    if what == "open":
+        return fronts.shelves(rng, cell, style)
+    if what == "flap":
+        return fronts.door(rng, cell, style, "top" if rng.random() < 0.7 else "bottom")
+    outside = [name for name, outer in (("left", cell.outer_high[0]), ("right", cell.outer_low[0])) if outer]
+    return fronts.door(rng, cell, style, str(rng.choice(outside if outside else ["left", "right"])))
+
+
+def _carcass(
+    rng: np.random.Generator, kind: str, width: float, depth: float, height: float, stand: float, style: Style
+) -> Solid:
+    """Outer boards, top and what it stands on."""
+    x0, x1, y, board = style.face, depth / 2, width / 2, style.board
+    top = stand + height
+    to_floor = stand > 0 and rng.random() < 0.3
+    sides_from = 0.0 if to_floor else stand
+    solid = box((style.back, -y + 0.001, stand + 0.001), (x1, y - 0.001, top - 0.001))
+    solid += union(
+        box((x0, s - board / 2, sides_from), (x1, s + board / 2, top)) for s in (board / 2 - y, y - board / 2)
+    )
+    solid += box((x0, -y + 0.001, stand), (x1, y - 0.001, stand + board))
+    if kind == "base" and rng.random() < 0.4:  # open at the top, with rails for a worktop
+        rail = rng.uniform(0.06, 0.12)
+        for near, far in ((x0, x0 + rail), (style.back - rail, x1 - 0.001)):
+            solid += box((near, -y + 0.001, top - board), (far, y - 0.001, top))
+    else:
+        solid += box((x0, -y + 0.001, top - board), (x1, y - 0.001, top))
+        solid += _top(rng, kind, x0, x1, y, top)
+    if to_floor:
+        setback = x0 + rng.uniform(0.02, 0.07)
+        return solid + box((setback, -y + 0.001, 0), (setback + board, y - 0.001, stand + 0.001))
+    return solid + (_stand(rng, kind, x0, x1, y, stand, board) if stand > 0 else Solid())
+
+
+def _top(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
+    if kind == "wall" or rng.random() < 0.25:
+        return Solid()
+    over = rng.uniform(0.0, 0.035)
+    thick = rng.uniform(0.012, 0.04)
+    front = x0 - 0.022 - over
+    solid = box((front, -y - over, top - 0.001), (x1, y + over, top + thick))
+    if kind == "tall" and rng.random() < 0.4:  # cornice
+        for step in (1, 2):
+            more, z = over + 0.012 * step, top + thick * step
+            solid += box((x0 - 0.022 - more, -y - more, z - 0.001), (x1, y + more, z + thick))
+    if kind in ("dresser", "sideboard", "nightstand") and rng.random() < 0.12:  # board at the back
+        solid += box((x1 - 0.02, -y, top), (x1, y, top + thick + rng.uniform(0.05, 0.2)))
+    return solid
+
+
+def _stand(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, height: float, board: float) -> Solid:
+    """Plinth or legs below the body."""
+    if kind == "base" or (height < 0.1 and rng.random() < 0.6):
+        setback = rng.uniform(0.03, 0.08) if kind == "base" else rng.uniform(-0.015, 0.03)
+        low, high = (
+            (x0 + setback, -y + 0.5 * abs(setback) - 0.01, 0),
+            (x1, y - 0.5 * abs(setback) + 0.01, height + 0.001),
+        )
+        return frame(low, high, [board] * 4, 0, 1)
+    radius = rng.uniform(0.012, 0.03)
+    taper = rng.uniform(0.45, 1.0)
+    splay = rng.choice([0.0, rng.uniform(0.0, 0.25)]) * height
+    inset = radius + rng.uniform(0.0, 0.06)
+    corners: list[tuple[Array, Array]] = []
+    for sx, x in ((-1, x0 + inset), (1, x1 - inset)):
+        for sy in (-1, 1):
+            head = np.array([x, sy * (y - inset), height + 0.002])
+            corners.append((head + (0.8 * sx * splay, 0.8 * sy * splay, -height - 0.002), head))
+    sections = int(rng.choice([4, 16]))
+    legs = union(cylinder(foot, head, taper * radius, radius, sections) for foot, head in corners)
+    if height > 0.12 and rng.random() < 0.5:  # apron
+        drop = rng.uniform(0.02, 0.05)
+        legs += frame((x0 + inset - 0.008, -y + inset - 0.008, height - drop),
+                      (x1 - inset + 0.008, y - inset + 0.008, height + 0.001), [0.016] * 4, 0, 1)  # fmt: skip
+    return legs
