@@ -1,0 +1,330 @@
+"""Robot arms: serial chains of 3 to 9 joints on a column, a plinth or a rail, with or without a gripper.
+
+Joints turn across the links (bends), along them (rolls) or slide (telescopes, rails, the quills of SCARA arms). What
+varies: the order of the joints, lengths, thickness, the shape of links, the side that each bend steps to, the tool.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.families.clearance import Link, narrow_limits
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, hull, hull_of, ring, rotation_about, rounded_box, rounded_rectangle
+
+GAP = 0.0015
+
+# Y, R: roll about the link's own direction (Y: of the turret); P: bend; S: telescope.
+ARMS = (
+    "YPP", "YPS", "YPPR", "YPPP", "YPRP", "YPPPR", "YPPRP", "YPSRP", "YPPRPR", "YPPPRP", "YPPSRP",
+    "YPRPRP", "YPRPRPR", "YPRPPRP", "YPRPSRPR", "YPRPRPRP",
+)  # fmt: skip
+SCARAS = ("PPS", "PPSR", "PPPS", "PPPSR")
+
+
+class _Chain:
+    """Links built one after the other, each from a pose: a point, a direction along the link, a lateral axis."""
+
+    def __init__(self, rng: np.random.Generator, radius: float):
+        self.rng = rng
+        self.radius = radius
+        self.at: Array = np.zeros(3)
+        self.along: Array = np.array([0.0, 0.0, 1.0])
+        self.lateral: Array = np.array([0.0, 1.0, 0.0])
+        self.links = [Link("base")]
+        self.collars = rng.random() < 0.6
+        self.square = rng.random() < 0.35
+        self.side = float(rng.choice([-1.0, 1.0]))
+        self.same_side = rng.random() < 0.5
+
+    @property
+    def link(self) -> Link:
+        return self.links[-1]
+
+    def _next(self, joint: JointSpec) -> None:
+        self.links.append(Link(f"link_{len(self.links)}", joint))
+
+    @property
+    def name(self) -> str:
+        return self.link.name
+
+    def limb(self, length: float, end_radius: float, plate: bool = False) -> None:
+        """Go on along the link: a tube, a beam or, between two bends, a plate with round ends."""
+        end = self.at + length * self.along
+        r = self.radius
+        if plate:
+            half = 0.7 * self._half(end_radius) * self.lateral
+            discs = [cylinder(p - half, p + half, q) for p, q in ((self.at, r), (end, end_radius))]
+            self.link.solid += hull_of(*discs)
+            self.link.guard(self.at - r * self.along, end + end_radius * self.along, r)
+        elif self.square and length > 3 * r:
+            self._beam(self.at, end, 0.72 * r, 0.72 * end_radius)
+        else:
+            self.link.rod(self.at, end, 0.86 * r, 0.86 * end_radius)
+            if self.collars and length > 3 * r:
+                spot = self.at + 1.25 * r * self.along
+                self.link.solid += cylinder(spot, spot + 0.25 * r * self.along, 0.97 * r, sections=20)
+        self.at, self.radius = end, end_radius
+
+    def _beam(self, start: Array, end: Array, half: float, end_half: float) -> None:
+        """Tapering beam of square section with broken edges."""
+        outline = rounded_rectangle((-1, -1), (1, 1), 0.3, 2) @ [np.cross(self.lateral, self.along), self.lateral]
+        self.link.solid += hull(np.concatenate([start + half * outline, end + end_half * outline]))
+        self.link.guard(start, end, 1.2 * max(half, end_half))
+
+    def _half(self, radius: float) -> float:
+        """Half width of a bend's housing: no part of the link is wider."""
+        return 1.0 * radius
+
+    def roll(self, spin: bool = False) -> None:
+        """Joint about the link's direction, between two round flanges."""
+        r = self.radius
+        self.link.rod(self.at - 0.02 * r * self.along, self.at + 0.5 * r * self.along, r)
+        face = self.at + 0.5 * r * self.along
+        limit = np.deg2rad(self.rng.uniform(120, 175))
+        joint = (
+            continuous(self.name, self.along, face) if spin else revolute(self.name, self.along, face, -limit, limit)
+        )
+        self._next(joint)
+        self.at = face + GAP * self.along
+        self.link.rod(self.at, self.at + 0.5 * r * self.along, r)
+        self.at = self.at + 0.45 * r * self.along
+
+    def bend(self, angle: float, radius: float, reach: tuple[float, float]) -> None:
+        """Joint about the lateral axis: the next link lies beside this one and turns freely past it."""
+        r, half = self.radius, self._half(self.radius)
+        if not self.same_side:
+            self.side = -self.side
+        step = self.side * self.lateral
+        cap = 0.2 * half
+        self.link.rod(self.at - (half - cap) * step, self.at + half * step, r)
+        self.link.solid += cylinder(self.at - half * step, self.at, 0.75 * r, sections=20)
+        center = self.at + (half + GAP) * step
+        self._next(revolute(self.name, self.lateral, center, *reach))
+        self.radius = radius
+        half = self._half(radius)
+        self.link.rod(center, center + (2 * half - cap) * step, r)
+        self.link.solid += cylinder(center + half * step, center + 2 * half * step, 0.75 * r, sections=20)
+        self.at = center + half * step
+        self.along = rotation_about(self.lateral, angle) @ self.along
+
+    def slide(self, depth: float, travel: float) -> None:
+        """Telescope: a rod that comes out of a sleeve."""
+        r, d = self.radius, self.along
+        bore = 0.62 * r
+        self.link.solid += ring(self.at + 0.5 * depth * d, d, bore, r, depth, 20)
+        self.link.solid += cylinder(self.at - 0.3 * r * d, self.at + 0.2 * r * d, r, sections=20)
+        self.link.guard(self.at, self.at + depth * d, r)
+        mouth = self.at + depth * d
+        self._next(prismatic(self.name, d, 0.0, travel, mouth))
+        inner = bore - GAP
+        self.link.rod(mouth - min(depth - 0.3 * r, travel + 0.2 * depth) * d, mouth + 0.6 * r * d, inner)
+        self.at, self.radius = mouth + 0.3 * r * d, 0.9 * r
+        self.link.rod(mouth + GAP * d, mouth + 0.6 * r * d, 0.9 * r)
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A robot arm, stretched out or bent at rest."""
+    reach = rng.uniform(0.4, 1.6)
+    chain = _Chain(rng, reach * rng.uniform(0.055, 0.085))
+    if rng.random() < 0.17:
+        _scara(chain, reach, str(rng.choice(SCARAS)))
+    else:
+        _arm(chain, reach, str(rng.choice(ARMS)))
+    spread = _tool(chain)
+    narrow_limits(chain.links, 0.012 * reach)
+
+    arm = Assembly()
+    for link in chain.links:
+        arm.add(link.name, link.solid, link.joint, density=1800.0)
+    if spread is not None:
+        _fingers(arm, chain, spread)
+    return arm
+
+
+def _arm(chain: _Chain, reach: float, kinds: str) -> None:
+    """An upright arm with a turret, its elbow bent by chance."""
+    rng, r = chain.rng, chain.radius
+    _base(chain, reach)
+    bends = kinds.count("P")
+    angles = _rest_angles(rng, bends)
+    long_limbs = 2 if bends > 1 else 1
+    bend = 0
+    for k, kind in enumerate(kinds):
+        following = kinds[k + 1] if k + 1 < len(kinds) else ""
+        thin = chain.radius * rng.uniform(0.8, 0.97)
+        if kind in "YR":
+            chain.roll(spin=not following and rng.random() < 0.5)
+            length = 1.3 * chain.radius if following else 0.6 * chain.radius
+            if kind == "R" and bend <= long_limbs:  # the second half of a limb with a roll in it
+                length = max(length, reach * rng.uniform(0.14, 0.22))
+            chain.limb(length, thin if following else chain.radius)
+        elif kind == "P":
+            limit = np.deg2rad(rng.uniform(95, 150))
+            chain.bend(angles[bend], thin, (-limit * rng.uniform(0.6, 1.0), limit))
+            bend += 1
+            length = reach * rng.uniform(0.28, 0.42) if bend <= long_limbs else 2.3 * r * rng.uniform(0.8, 1.2)
+            if following in ("R", "S") and bend <= long_limbs:
+                length *= 0.5
+            plate = following == "P" and bend <= long_limbs and rng.random() < 0.4
+            chain.limb(length, chain.radius * rng.uniform(0.8, 0.95), plate)
+        else:
+            depth = reach * rng.uniform(0.16, 0.26)
+            chain.slide(depth, 0.7 * depth)
+            chain.limb(1.5 * chain.radius, chain.radius)
+
+
+def _rest_angles(rng: np.random.Generator, bends: int) -> Array:
+    """Angle of every bend at rest: upright, or as a crane stoops."""
+    if rng.random() < 0.25:
+        return np.zeros(bends)
+    angles = np.zeros(bends)
+    stoop = -np.deg2rad([rng.uniform(-25, 40), rng.uniform(40, 100), rng.uniform(10, 60)])
+    angles[: min(bends, 3)] = stoop[: min(bends, 3)]
+    return angles
+
+
+def _base(chain: _Chain, reach: float) -> None:
+    """Plate and column, on a rail by chance."""
+    rng, r = chain.rng, chain.radius
+    link = chain.link
+    if rng.random() < 0.15:
+        _rail(chain, reach)
+        link = chain.link
+    floor = chain.at.copy()
+    height = r * rng.uniform(1.0, 3.5)
+    wide = r * rng.uniform(1.15, 1.7)
+    thick = 0.25 * r
+    if rng.random() < 0.5:
+        link.rod(floor, floor + (0, 0, thick), wide)
+    else:
+        link.solid += rounded_box(floor - (wide, wide, 0), floor + (wide, wide, thick), 0.2 * wide, axis=2)
+        link.guard(floor, floor + (0, 0, thick), 1.3 * wide)
+    foot = r * rng.uniform(1.0, 1.15)
+    link.rod(floor + (0, 0, 0.5 * thick), floor + (0, 0, height), foot, r)
+    chain.at = floor + (0, 0, height - 0.1 * r)
+
+
+def _rail(chain: _Chain, reach: float) -> None:
+    """A linear axis under the arm: a beam, and a carriage that slides along it."""
+    rng, r = chain.rng, chain.radius
+    axis = int(rng.integers(2))
+    other = 1 - axis
+    half, travel = 1.6 * r, reach * rng.uniform(0.4, 0.9)
+    low, high = np.zeros(3), np.zeros(3)
+    low[axis], high[axis] = -half, half + travel
+    low[other], high[other] = -1.1 * r, 1.1 * r
+    high[2] = r
+    shift = np.zeros(3)
+    chain.link.solid += rounded_box(low, high, 0.15 * r)
+    for side in (-0.7, 0.7):
+        a, b = low.copy(), high.copy()
+        a[other], b[other] = (side - 0.15) * r, (side + 0.15) * r
+        a[2], b[2] = 0.9 * r, 1.15 * r
+        chain.link.solid += box(a, b)
+    ends = np.array([low, high])
+    ends[:, other], ends[:, 2] = 0.0, 0.5 * r
+    chain.link.guard(ends[0], ends[1], 1.25 * r)
+    direction = np.eye(3)[axis]
+    chain._next(prismatic(chain.name, direction, 0.0, travel, (0, 0, 1.15 * r)))
+    bottom = 1.15 * r + GAP
+    chain.link.solid += rounded_box((-half, -half, bottom), (half, half, bottom + 0.5 * r), 0.1 * r)
+    chain.link.guard((0, 0, bottom), (0, 0, bottom + 0.5 * r), 1.8 * r)
+    chain.at = np.array([0.0, 0.0, bottom + 0.49 * r]) + shift
+
+
+def _scara(chain: _Chain, reach: float, kinds: str) -> None:
+    """Flat links above one another on a column, with a quill that goes up and down."""
+    rng = chain.rng
+    r = chain.radius = 1.15 * chain.radius
+    height = reach * rng.uniform(0.35, 0.6)
+    wide = r * rng.uniform(1.2, 1.6)
+    chain.link.rod((0, 0, 0), (0, 0, 0.3 * r), wide)
+    chain.link.rod((0, 0, 0.2 * r), (0, 0, height), r)
+    chain.at = np.array([0.0, 0.0, height])
+    chain.along, chain.lateral = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    chain.side, chain.same_side = 1.0, True
+    bends = kinds.count("P")
+    for k in range(bends):
+        limit = np.deg2rad(rng.uniform(100, 150))
+        angle = 0.0 if k == 0 else np.deg2rad(rng.uniform(-60, 60))
+        chain.bend(angle, chain.radius * rng.uniform(0.85, 0.95), (-limit, limit))
+        chain.limb(reach * rng.uniform(0.55, 0.8) / bends, chain.radius * rng.uniform(0.75, 0.95), plate=True)
+    _quill(chain, height)
+    if kinds.endswith("R"):
+        chain.roll(spin=True)
+    chain.limb(0.4 * chain.radius, chain.radius)
+
+
+def _quill(chain: _Chain, height: float) -> None:
+    """A rod through an upright sleeve at the end of the last flat link; it sticks out above at rest."""
+    end, r = chain.radius, 0.8 * chain.radius
+    center = chain.at + (end + 0.8 * r) * chain.along
+    bore, travel = 0.6 * r, 0.45 * height
+    top, bottom = 1.6 * end, -0.9 * end
+    down = np.array([0.0, 0.0, -1.0])
+    middle = center + (0, 0, 0.5 * (top + bottom))
+    chain.link.solid += ring(middle, down, bore, r, top - bottom, 20)
+    chain.link.guard(center + (0, 0, bottom), center + (0, 0, top), r)
+    mouth = center + (0, 0, bottom)
+    chain._next(prismatic(chain.name, down, 0.0, travel, mouth))
+    chain.link.rod(center + (0, 0, top + travel), mouth + 1.9 * r * down, bore - GAP)
+    chain.along, chain.lateral, chain.radius = down, np.array([0.0, 1.0, 0.0]), 0.8 * r
+    chain.at = mouth + 1.8 * r * down
+
+
+def _tool(chain: _Chain) -> float | None:
+    """What the last link carries; for a gripper, half its width in metres."""
+    kind = chain.rng.choice(["gripper", "suction", "probe", "flange"], p=[0.55, 0.15, 0.15, 0.15])
+    r, d, link = chain.radius, chain.along, chain.link
+    end = chain.at
+    if kind == "flange":
+        link.rod(end - 0.1 * r * d, end + 0.2 * r * d, 0.7 * r)
+    elif kind == "suction":
+        link.rod(end - 0.1 * r * d, end + 0.9 * r * d, 0.35 * r)
+        link.rod(end + 0.8 * r * d, end + 1.3 * r * d, 0.35 * r, 0.8 * r)
+    elif kind == "probe":
+        link.rod(end - 0.1 * r * d, end + 0.6 * r * d, 0.5 * r)
+        link.rod(end + 0.5 * r * d, end + 2.2 * r * d, 0.35 * r, 0.08 * r)
+    else:
+        return _palm(chain)
+    return None
+
+
+def _palm(chain: _Chain) -> float:
+    """The body of a parallel gripper; returns half its width in metres."""
+    r, d, link = chain.radius, chain.along, chain.link
+    half = r * chain.rng.uniform(1.1, 1.5)
+    v = np.cross(d, chain.lateral)
+    outline = rounded_rectangle((-half, -0.6 * r), (half, 0.6 * r), 0.25 * r, 2) @ [chain.lateral, v]
+    low, high = chain.at - 0.1 * r * d, chain.at + 0.8 * r * d
+    link.solid += hull(np.concatenate([low + outline, high + outline]))
+    chain.at = high
+    link.guard(low, high + 2.6 * r * d, 1.05 * half)
+    return half
+
+
+def _fingers(arm: Assembly, chain: _Chain, half: float) -> None:
+    """Two fingers that open sideways, one as the mimic of the other."""
+    r, d, u = chain.radius, chain.along, chain.lateral
+    v = np.cross(d, u)
+    length = r * chain.rng.uniform(1.4, 2.3)
+    thick = 0.28 * half
+    tip = chain.rng.uniform(0.4, 1.0)
+    for number, side in enumerate((1.0, -1.0)):
+
+        def block(reach: tuple[float, float], low: float, high: float, wide: float, side: float = side) -> Solid:
+            corners = [
+                chain.at + side * a * u + b * d + c * v for a in reach for b in (low, high) for c in (-wide, wide)
+            ]
+            return hull(corners)
+
+        inner = 0.5 * GAP
+        finger = block((inner, inner + 1.6 * thick), GAP, 0.4 * r, 0.42 * r)
+        finger += block((inner + 0.3 * thick, inner + 1.3 * thick), 0.35 * r, length, 0.3 * r)
+        finger += block((inner, inner + 0.8 * thick), length - 0.5 * r * tip, length + 0.05 * r, 0.3 * r)
+        travel = half - inner - 1.6 * thick
+        mimic = ("finger_0", 1.0) if number else None
+        joint = prismatic(chain.name, side * u, 0.0, travel, chain.at, mimic=mimic)
+        arm.add(f"finger_{number}", finger, joint, density=1800.0)
