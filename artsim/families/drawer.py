@@ -1,139 +1,332 @@
-"""Cabinets with a grid of 1 to 6 drawers: chests, desks' pedestals, tables with drawers."""
+"""Furniture with drawers: chests and nightstands, tables with drawers under the top, desks with pedestals.
+
+What varies: the kind; number and grid of the drawers, on which side of a desk they are, in one row or at the back of a
+table as well; open compartments and fronts that do not move; legs, plinths and shelves; fronts and handles.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, prismatic
-from artsim.families.details import bar_handle, bow_handle, knob
+from artsim.assembly import Assembly, prismatic
+from artsim.families.details import bar_handle, bow_handle, knob, panel
 from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
 
 GAP = 0.002
+_FRONT = 0.018  # thickness of a front
+
+
+@dataclass(frozen=True)
+class _Style:
+    """What all drawers of a piece of furniture share."""
+
+    front: str
+    overlay: bool  # the fronts lie before the case, or within it
+    handle: str
+    size: float  # of the handle, over the front's width
+    reach: float
+    rise: float  # of the handle above the front's middle, over its height
+    side: float  # height of the drawer's sides over its front's
+    length: float  # of the drawer over the case's depth
+    travel: float  # over the drawer's length
+
+
+@dataclass
+class _Furniture:
+    """A body under construction, and its drawers with the direction in which they open and their travel."""
+
+    style: _Style
+    body: Solid = field(default_factory=Solid)
+    drawers: list[tuple[Solid, float, float]] = field(default_factory=list)
+
+    def add_case(
+        self,
+        low: Vector,
+        high: Vector,
+        wall: float,
+        edges_y: Array,
+        edges_z: Array,
+        contents: Sequence[str] = (),
+        back: bool = False,
+    ) -> None:
+        """A case that is open towards -X, with a grid of drawers, fixed fronts or open compartments.
+
+        Parameters
+        ----------
+        low, high : (3,) float
+            Outer corners.
+        edges_y, edges_z : (C + 1,), (R + 1,) float
+            Middles of the dividers; the first and last lie on the inner faces of the walls.
+        contents : sequence of str
+            Of each row from the bottom up: "drawer", "fixed" or "open".
+        back : bool
+            Turns it to open towards +X, reflected in the plane x = 0.
+        """
+        low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        thin = wall / 4
+        solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
+        for z in edges_z[1:-1]:
+            solid += box((low[0], low[1] + wall / 2, z - thin), (high[0] - wall / 4, high[1] - wall / 2, z + thin))
+        for y in edges_y[1:-1]:
+            solid += box((low[0], y - thin, low[2] + wall / 2), (high[0] - wall / 4, y + thin, high[2] - wall / 2))
+        for row in range(len(edges_z) - 2, -1, -1):
+            content = contents[row] if contents else "drawer"
+            for column in range(len(edges_y) - 1):
+                cell_low = np.array([low[0], edges_y[column] + thin, edges_z[row] + thin])
+                cell_high = np.array([high[0] - wall / 2, edges_y[column + 1] - thin, edges_z[row + 1] - thin])
+                if content == "drawer":
+                    drawer, travel = self._drawer(cell_low + GAP, cell_high - GAP, wall)
+                    self.drawers.append((drawer.mirrored(0) if back else drawer, 1.0 if back else -1.0, travel))
+                elif content == "fixed":
+                    face = low[0] - GAP - (_FRONT if self.style.overlay else 0.0)
+                    front_low = np.array([face, *(cell_low[1:] - thin / 2)])
+                    front_high = np.array([low[0] + 0.01, *(cell_high[1:] + thin / 2)])
+                    solid += panel(self.style.front, front_low, front_high, 0.045, 0.006)
+                    solid += _handle(self.style, front_low, front_high)
+        self.body += solid.mirrored(0) if back else solid
+
+    def _drawer(self, low: Array, high: Array, wall: float) -> tuple[Solid, float]:
+        """Box open at the top behind a front with a handle, and how far it comes out."""
+        style = self.style
+        face = low[0] - _FRONT - 2 * GAP if style.overlay else low[0]
+        spread = wall / 4 if style.overlay else 0.0
+        front_low = np.array([face, low[1] - spread, low[2] - spread])
+        front_high = np.array([face + _FRONT, high[1] + spread, high[2] + spread])
+        length = style.length * (high[0] - low[0])
+        solid = panel(style.front, front_low, front_high, 0.045, 0.006)
+        side_top = low[2] + style.side * (high[2] - low[2])
+        solid += tray(
+            (face + _FRONT - 0.005, low[1] + 0.004, low[2]), (low[0] + length, high[1] - 0.004, side_top), 0.010
+        )
+        return solid + _handle(style, front_low, front_high), style.travel * length
+
+    def build(self) -> Assembly:
+        """Body and drawers, the highest drawer first."""
+        furniture = Assembly()
+        furniture.add("body", self.body, density=650.0)
+        for number, (drawer, direction, travel) in enumerate(self.drawers):
+            low, high = drawer.bounds()
+            origin = (low[0] if direction < 0 else high[0], *(0.5 * (low + high)[1:]))
+            furniture.add(f"drawer_{number}", drawer, prismatic("body", (direction, 0, 0), 0.0, travel, origin))
+        return furniture
 
 
 def build(rng: np.random.Generator) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
-    columns = int(rng.choice([1, 2, 3], p=[0.65, 0.25, 0.1]))
+    furniture = _Furniture(_style(rng))
+    kinds = (_chest, _table, _desk)
+    kinds[rng.choice(3, p=[0.45, 0.3, 0.25])](rng, furniture)
+    return furniture.build()
+
+
+def _style(rng: np.random.Generator) -> _Style:
+    return _Style(
+        front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
+        overlay=bool(rng.random() < 0.5),
+        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.3, 0.3, 0.2, 0.1, 0.1])),
+        size=rng.uniform(0.15, 0.7),
+        reach=rng.uniform(0.015, 0.04),
+        rise=rng.uniform(-0.2, 0.3),
+        side=rng.uniform(0.6, 0.95),
+        length=rng.uniform(0.75, 1.0),
+        travel=rng.uniform(0.55, 0.92),
+    )
+
+
+def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
+    """One case from side to side; some of its rows may be open, or have fronts that do not move."""
+    columns = int(rng.choice([1, 2, 3], p=[0.68, 0.23, 0.09]))
     rows = int(rng.integers(1, max(2, 6 // columns) + 1))
-    on_legs = rng.random() < 0.4
-    width = columns * rng.uniform(0.28, 0.6)
-    depth = rng.uniform(0.3, 0.65)
-    height = rows * rng.uniform(0.1, 0.26)
+    width = columns * rng.uniform(0.28, 0.6) if columns > 1 else rng.uniform(0.3, 0.9)
+    depth, height = rng.uniform(0.3, 0.65), rows * rng.uniform(0.1, 0.28)
     wall = rng.uniform(0.012, 0.03)
-    legs = rng.uniform(0.08, 0.55) if on_legs else rng.uniform(0.0, 0.08)
-    bottom, top = legs, legs + height
+    raised = rng.random() < 0.4
+    legs = rng.uniform(0.08, 0.45) if raised else rng.uniform(0.0, 0.1)
+    x0, x1, y, top = -depth / 2, depth / 2, width / 2, legs + height
+    contents = ["drawer"] * rows
+    if rows > 1 and rng.random() < 0.3:  # the lower rows, the commonest first
+        others = int(rng.integers(1, rows))
+        contents[:others] = [str(rng.choice(["open", "fixed"], p=[0.7, 0.3]))] * others
+    furniture.add_case(
+        (x0, -y, legs), (x1, y, top), wall,
+        np.linspace(-y + wall, y - wall, columns + 1), _shares(rng, legs + wall, top - wall, rows), contents,
+    )  # fmt: skip
+    if rng.random() < 0.55:  # a top that stands over
+        over = rng.uniform(0.003, 0.04)
+        front = over + (_FRONT if furniture.style.overlay and rng.random() < 0.7 else 0.0)
+        thick = rng.uniform(0.01, 0.035)
+        furniture.body += rounded_box((x0 - front, -y - over, top - 0.001), (x1, y + over, top + thick), 0.3 * thick)
+    if raised:
+        size = rng.uniform(0.02, 0.06)
+        furniture.body += _legs(rng, x0, x1, y, legs + 0.001, size)
+    elif legs > 0.005:
+        recess = rng.uniform(0.0, 0.05)
+        furniture.body += frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
 
-    edges_y = np.linspace(-width / 2 + wall, width / 2 - wall, columns + 1)
-    edges_z = np.linspace(bottom + wall, top - wall, rows + 1)
-    if rows > 1 and rng.random() < 0.5:  # rows of different heights
-        inner = (
-            np.sort(rng.uniform(0.25, 0.75, rows - 1)) if rows == 2 else np.cumsum(rng.dirichlet([12.0] * rows))[:-1]
+
+def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
+    """A top on four legs with a row of drawers in the apron, at the front, the back or both."""
+    height = rng.uniform(0.35, 0.85)
+    width = height * rng.uniform(0.7, 3.2)
+    depth = min(max(width * rng.uniform(0.35, 1.0), 0.3), 1.0)
+    thick, over = rng.uniform(0.015, 0.05), rng.uniform(0.0, 0.07)
+    leg = height * rng.uniform(0.05, 0.13)
+    x0, x1, y = -depth / 2 + over, depth / 2 - over, width / 2 - over
+    top = height - thick
+    apron = max(height * rng.uniform(0.11, 0.25), 0.075)
+    wall = rng.uniform(0.012, 0.02)
+    furniture.body += _top(rng, depth, width, top, height) + _legs(rng, x0, x1, y, top + 0.001, leg)
+    between = y - leg + 0.002  # the apron reaches into the legs
+    inset = rng.uniform(0.0, 0.4) * leg
+    span = between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9))
+    middle = 0.0 if rng.random() < 0.8 else rng.choice([-1.0, 1.0]) * (between - span)
+    columns = int(np.clip(round(2 * span / rng.uniform(0.25, 0.7)), 1, 4))
+    sides = str(rng.choice(["front", "back", "both"], p=[0.82, 0.08, 0.1]))
+    deepest = depth - 2 * over - 2 * inset - wall
+    reach = deepest * (rng.uniform(0.3, 0.47) if sides == "both" else rng.uniform(0.45, 1.0))
+    edges = np.linspace(middle - span + wall, middle + span - wall, columns + 1)
+    for back in (False, True):
+        if sides in ("both", ("front", "back")[back]):
+            furniture.add_case(
+                (x0 + inset, middle - span, top - apron), (x0 + inset + reach, middle + span, top + 0.001), wall,
+                edges, np.array([top - apron + wall, top - wall]), back=back,
+            )  # fmt: skip
+            for near, far in ((-between, middle - span + 0.002), (middle + span - 0.002, between)):
+                if far - near > 0.003:
+                    board = box((x0 + inset, near, top - apron), (x0 + inset + wall, far, top + 0.001))
+                    furniture.body += board.mirrored(0) if back else board
+        else:
+            board = box((x1 - inset - wall, -between, top - apron), (x1 - inset, between, top + 0.001))
+            furniture.body += board if back else board.mirrored(0)
+    for side in (-1, 1):
+        beside = sorted((side * (y - inset), side * (y - inset - wall)))
+        furniture.body += box((x0 + leg - 0.002, beside[0], top - apron), (x1 - leg + 0.002, beside[1], top + 0.001))
+    if rng.random() < 0.25:  # a shelf between the legs
+        z = rng.uniform(0.12, 0.35) * height
+        furniture.body += box((x0 + 0.25 * leg, -y + 0.25 * leg, z), (x1 - 0.25 * leg, y - 0.25 * leg, z + 0.018))
+
+
+def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
+    """A top over one or two pedestals with drawers; legs or a panel elsewhere, perhaps flat drawers between."""
+    height = rng.uniform(0.62, 0.82)
+    width, depth = height * rng.uniform(1.4, 2.4), height * rng.uniform(0.55, 1.0)
+    thick, over = rng.uniform(0.018, 0.05), rng.uniform(0.0, 0.05)
+    wall = rng.uniform(0.014, 0.022)
+    x0, x1, y, top = -depth / 2 + over, depth / 2 - over, width / 2 - over, height - thick
+    furniture.body += _top(rng, depth, width, top, height)
+    pedestal = min(rng.uniform(0.28, 0.45), 0.4 * width)
+    sides = [(-1,), (1,), (-1, 1)][rng.choice(3, p=[0.35, 0.35, 0.3])]
+    on_legs = rng.random() < 0.4
+    leg = rng.uniform(0.035, 0.07)
+    low = height * rng.uniform(0.1, 0.6) if on_legs else (0.0 if rng.random() < 0.5 else rng.uniform(0.03, 0.1))
+    outer = y - leg + 0.002 if on_legs else y
+    rows = int(rng.integers(1, 4 if len(sides) == 2 else 5))
+    rows = min(rows, max(1, int((top - low) / 0.1)))
+    contents = ["drawer"] * rows
+    if rows > 1 and rng.random() < 0.3:
+        contents[0] = "open"
+    elif rows == 1 and top - low > 0.35:  # one drawer above an open compartment
+        rows, contents = 2, ["open", "drawer"]
+    levels = _shares(rng, low + wall, top - wall, rows)
+    if contents[0] == "open" and top - low > 0.3:  # the open compartment is higher than the drawers
+        levels = np.concatenate(
+            [levels[:1], np.linspace(low + wall + rng.uniform(0.4, 0.7) * (top - low), top - wall, rows)]
         )
-        edges_z[1:-1] = edges_z[0] + inner * (edges_z[-1] - edges_z[0])
+    for side in sides:
+        near, far = sorted((side * outer, side * (outer - pedestal)))
+        furniture.add_case(
+            (x0, near, low), (x1, far, top + 0.001), wall, np.array([near + wall, far - wall]), levels, contents
+        )
+        if not on_legs and low > 0:
+            furniture.body += frame((x0 + 0.03, near + 0.01, 0), (x1 - 0.01, far - 0.01, low + 0.001), [wall] * 4, 0, 1)
+    left = -outer + (pedestal if -1 in sides else wall) - 0.002
+    right = outer - (pedestal if 1 in sides else wall) + 0.002
+    if on_legs:
+        furniture.body += _legs(rng, x0, x1, y, top + 0.001, leg)
+    elif len(sides) == 1:  # a panel holds the other end
+        edge = -sides[0] * y
+        furniture.body += box((x0, min(edge, edge + sides[0] * wall), 0), (x1, max(edge, edge + sides[0] * wall), top))
+    if on_legs or rng.random() < 0.7:  # a board at the back
+        furniture.body += box(
+            (x1 - 0.06, left, top - rng.uniform(0.15, 0.9) * (top - low)), (x1 - 0.04, right, top + 0.001)
+        )
+    if rng.random() < 0.5:
+        flat = rng.uniform(0.08, 0.13)
+        columns = int(rng.choice([1, 2], p=[0.7, 0.3]))
+        edges = np.linspace(left + wall, right - wall, columns + 1)
+        furniture.add_case(
+            (x0, left, top - flat), (x1 - max(0.058, rng.uniform(0.05, 0.3) * depth), right, top + 0.001), wall, edges,
+            np.array([top - flat + wall, top - wall]),
+        )  # fmt: skip
 
-    cabinet = Assembly()
-    cabinet.add("body", _body(rng, width, depth, bottom, top, wall, edges_y, edges_z, on_legs), density=650.0)
-    overlay = rng.random() < 0.5  # fronts lie before the body, or within it
-    style = _handle_style(rng)
-    travel = depth * rng.uniform(0.5, 0.85)
-    number = 0
-    for row in range(rows - 1, -1, -1):
-        for column in range(columns):
-            low = np.array([-depth / 2, edges_y[column] + wall / 4, edges_z[row] + wall / 4])
-            high = np.array([depth / 2 - wall, edges_y[column + 1] - wall / 4, edges_z[row + 1] - wall / 4])
-            drawer = _drawer(rng, low + GAP, high - GAP, 0.018, wall, overlay, style)
-            cabinet.add(f"drawer_{number}", drawer, _slide(low, high, travel))
-            number += 1
-    return cabinet
+
+def _shares(rng: np.random.Generator, low: float, high: float, rows: int) -> Array:
+    """(rows + 1,) levels: equal, at random, or growing downwards."""
+    kind = rng.choice(3, p=[0.5, 0.3, 0.2])
+    heights = (np.ones(rows), rng.dirichlet([12.0] * rows), np.linspace(rng.uniform(1.2, 2.0), 1.0, rows))[kind]
+    heights = np.maximum(heights / heights.sum(), 0.6 / rows)
+    levels: Array = low + np.concatenate([[0.0], np.cumsum(heights) / heights.sum()]) * (high - low)
+    return levels
 
 
-def _slide(low: Array, high: Array, travel: float) -> JointSpec:
-    center = 0.5 * (low + high)
-    return prismatic("body", (-1, 0, 0), 0.0, travel, (low[0], center[1], center[2]))
+def _top(rng: np.random.Generator, depth: float, width: float, low: float, high: float) -> Solid:
+    radius = rng.choice([0.1, 0.45]) * (high - low)
+    corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
+    if rng.random() < 0.2:
+        return rounded_box(*corners, rng.uniform(0.02, 0.1), axis=2)
+    return rounded_box(*corners, radius)
 
 
-def _body(
-    rng: np.random.Generator,
-    width: float,
-    depth: float,
-    bottom: float,
-    top: float,
-    wall: float,
-    edges_y: Array,
-    edges_z: Array,
-    on_legs: bool,
-) -> Solid:
-    x0, x1, y = -depth / 2, depth / 2, width / 2
-    solid = tray((x0, -y, bottom), (x1, y, top), wall, wall / 2, axis=0, side=-1)
-    thin = wall / 4
-    for z in edges_z[1:-1]:
-        solid += box((x0, -y + wall, z - thin), (x1 - wall / 2, y - wall, z + thin))
-    for edge in edges_y[1:-1]:
-        solid += box((x0, edge - thin, bottom + wall), (x1 - wall / 2, edge + thin, top - wall))
-    if rng.random() < 0.5:  # a top that stands over
-        over = rng.uniform(0.005, 0.04)
-        solid += box((x0 - over, -y - over, top), (x1, y + over, top + rng.uniform(0.01, 0.035)))
-    if bottom > 0.005:
-        solid += _feet(rng, x0, x1, y, bottom, wall, on_legs)
+def _legs(rng: np.random.Generator, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
+    """Four legs with their outer edges on a rectangle: square or round, straight, tapered or turned."""
+    kind = str(rng.choice(["square", "tapered", "round", "turned"], p=[0.35, 0.25, 0.25, 0.15]))
+    taper = rng.uniform(0.45, 0.9)
+    half, middle = size / 2, 0.5 * (x0 + x1)
+    solid = Solid()
+    for x in (x0 + half, x1 - half):
+        for w in (-y + half, y - half):
+            if kind == "square":
+                solid += box((x - half, w - half, 0), (x + half, w + half, height))
+            elif kind == "round":
+                solid += cylinder((x, w, 0), (x, w, height), half * taper, half, 16)
+            elif kind == "tapered":  # below a straight block, its outer faces upright
+                block = box((x - half, w - half, 0.75 * height), (x + half, w + half, height))
+                foot = taper * half
+                corner = (x + np.sign(x - middle) * (half - foot), w + np.sign(w) * (half - foot), 0.0)
+                solid += block + hull_of(block, box((-foot, -foot, 0), (foot, foot, 0.01)).moved(corner))
+            else:
+                levels = np.array([0.0, 0.03, 0.1, 0.45, 0.5, 0.53, 0.56, 0.7]) * height
+                radii = half * np.array([0.5, 0.8, 0.5, 0.95, 0.6, 0.9, 0.6, 1.0])
+                solid += tube(np.column_stack([np.full(8, x), np.full(8, w), levels]), radii.tolist(), 12)
+                solid += box((x - half, w - half, 0.69 * height), (x + half, w + half, height))
     return solid
 
 
-def _feet(rng: np.random.Generator, x0: float, x1: float, y: float, height: float, wall: float, on_legs: bool) -> Solid:
-    if not on_legs:
-        recess = rng.uniform(0.0, 0.05)
-        return frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, height), [wall] * 4, 0, 1)
-    radius = rng.uniform(0.012, 0.03)
-    taper = rng.uniform(0.5, 1.0)
-    corners = [(x, s * (y - radius)) for x in (x0 + radius, x1 - radius) for s in (-1, 1)]
-    if rng.random() < 0.5:
-        return union(cylinder((x, w, 0), (x, w, height), radius * taper, radius, 16) for x, w in corners)
-    return union(box((x - radius, w - radius, 0), (x + radius, w + radius, height)) for x, w in corners)
-
-
-def _handle_style(rng: np.random.Generator) -> dict[str, float | str]:
-    """One style for all drawers of a cabinet."""
-    kind = str(rng.choice(["bar", "knob", "bow", "none"], p=[0.35, 0.35, 0.2, 0.1]))
-    return {
-        "kind": kind,
-        "size": rng.uniform(0.2, 0.6),
-        "reach": rng.uniform(0.018, 0.04),
-        "rise": rng.uniform(-0.2, 0.3),
-    }
-
-
-def _drawer(
-    rng: np.random.Generator,
-    low: Array,
-    high: Array,
-    front: float,
-    wall: float,
-    overlay: bool,
-    style: dict[str, float | str],
-) -> Solid:
-    """Box open at the top behind a front panel with a handle."""
-    face = low[0] - front - GAP if overlay else low[0]
-    spread = wall / 4 if overlay else 0.0
-    panel_low = np.array([face, low[1] - spread, low[2] - spread])
-    panel_high = np.array([face + front, high[1] + spread, high[2] + spread])
-    solid = rounded_box(panel_low, panel_high, 0.004)
-    side_top = high[2] - 0.15 * (high[2] - low[2])
-    solid += tray((face + front - 0.001, low[1] + 0.004, low[2]), (high[0], high[1] - 0.004, side_top), 0.010)
-    return solid + _handle(style, panel_low, panel_high)
-
-
-def _handle(style: dict[str, float | str], low: Array, high: Array) -> Solid:
-    kind, size, reach = str(style["kind"]), float(style["size"]), float(style["reach"])
+def _handle(style: _Style, low: Array, high: Array) -> Solid:
     width, height = high[1] - low[1], high[2] - low[2]
     x, y = low[0], 0.5 * (low[1] + high[1])
-    z = 0.5 * (low[2] + high[2]) + float(style["rise"]) * height
-    half = 0.5 * min(size * width, 0.3)
+    z = 0.5 * (low[2] + high[2])
+    if style.front == "slab":
+        z += style.rise * height
+    sunken = 0.007 if style.front in ("shaker", "planks") and min(width, height) > 0.144 else 0.0
+    half = 0.5 * min(style.size * width, 0.35)
     radius = min(0.006, 0.08 * height)
-    left, right, outward = (x, y - half, z), (x, y + half, z), (-1.0, 0.0, 0.0)
-    if kind == "bar":
-        return bar_handle(left, right, outward, reach, radius)
-    if kind == "knob":
-        return knob((x, y, z), outward, reach, min(0.018, 0.2 * height))
-    if kind == "bow":
-        return bow_handle(left, right, outward, reach, radius)
+    outward = (-1.0, 0.0, 0.0)
+    left, right = (x + sunken, y - half, z), (x + sunken, y + half, z)
+    if style.handle == "bar":
+        return bar_handle(left, right, outward, style.reach + sunken, radius)
+    if style.handle == "bow":
+        return bow_handle(left, right, outward, style.reach + sunken, radius)
+    button = min(0.018, 0.2 * height)
+    if style.handle == "knob" or (style.handle == "two knobs" and width < 0.35):
+        return knob((x + sunken, y, z), outward, style.reach + sunken, button)
+    if style.handle == "two knobs":
+        spots = [(x + sunken, y + s * 0.28 * width, z) for s in (-1, 1)]
+        return knob(spots[0], outward, style.reach + sunken, button) + knob(
+            spots[1], outward, style.reach + sunken, button
+        )
     return Solid()
