@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from artsim.errors import ConfigError
-from artsim.export.robot import MeshShape, Robot, as_robot
+from artsim.export.robot import Robot, as_robot
+from artsim.export.text import obj_text
 from artsim.objects import ArticulatedObject
 
 FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda"}
@@ -112,10 +113,3 @@ def _write_meshes(robot: Robot, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for mesh in robot.meshes:
         (folder / f"{mesh.name}.obj").write_text(obj_text(mesh))
-
-
-def obj_text(mesh: MeshShape) -> str:
-    """A mesh as Wavefront OBJ, to the nanometre."""
-    vertices = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.vertices.tolist()]
-    faces = [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
-    return "\n".join([*vertices, *faces, ""])

@@ -8,6 +8,7 @@ import numpy as np
 from lxml import etree
 
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
+from artsim.export.text import number, numbers
 
 _KINDS = {"free": "free", "revolute": "hinge", "continuous": "hinge", "prismatic": "slider", "screw": "screw"}
 """What ``semantics.txt`` calls the joint of each part."""
@@ -80,13 +81,3 @@ def _add_joint(root: etree._Element, robot: Robot, joint: LinkJoint) -> None:
 
 def _add_origin(element: etree._Element, xyz: Iterable[float]) -> None:
     etree.SubElement(element, "origin", xyz=numbers(xyz), rpy="0 0 0")
-
-
-def number(value: float) -> str:
-    """The shortest text that reads back as the same number; never -0."""
-    return repr(float(value) + 0.0)
-
-
-def numbers(values: Iterable[float]) -> str:
-    """Several numbers."""
-    return " ".join(map(number, values))

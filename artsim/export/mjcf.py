@@ -1,0 +1,108 @@
+"""MJCF, in full precision (``MjSpec.to_xml`` keeps six digits), and compiled by ``mujoco.MjSpec`` before it counts."""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from artsim.errors import AssetError
+from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
+from artsim.export.text import number, numbers, obj_text
+
+
+def mjcf_text(robot: Robot) -> str:
+    """The object as an MJCF document; its meshes lie in ``meshes/``.
+
+    Bodies, joints and inertias are those of the URDF file. What follows another joint (``mimic``, screws) is held by an
+    equality constraint. Geoms of group 2 are seen, those of group 3 collide, as MuJoCo's viewers take them. The root
+    body is fixed to the world: give it a ``<freejoint/>`` to let it move.
+
+    Raises
+    ------
+    AssetError
+        When MuJoCo refuses the model.
+    """
+    root = etree.Element("mujoco", model=f"{robot.obj.category}_{robot.obj.object_id}")
+    # Fused, a root that no joint moves would become part of the world.
+    etree.SubElement(root, "compiler", angle="radian", meshdir="meshes", autolimits="true", fusestatic="false")
+    default = etree.SubElement(root, "default")
+    for group, more in (("visual", {"group": "2", "contype": "0", "conaffinity": "0"}), ("collision", {"group": "3"})):
+        etree.SubElement(etree.SubElement(default, "default", {"class": group}), "geom", mass="0", **more)
+    asset = etree.SubElement(root, "asset")
+    for mesh in robot.meshes:
+        etree.SubElement(asset, "mesh", name=mesh.name, file=f"{mesh.name}.obj")
+    bodies: list[etree._Element] = []
+    incoming = {joint.child: joint for joint in robot.joints}
+    world = etree.SubElement(root, "worldbody")
+    for i, link in enumerate(robot.links):
+        joint = incoming.get(i)
+        parent = world if joint is None else bodies[joint.parent]
+        offset = link.origin if joint is None else link.origin - robot.links[joint.parent].origin
+        bodies.append(_add_body(parent, numbers(offset), link, joint))
+    _add_exclusions(root, robot)
+    _add_equalities(root, robot)
+    text: str = etree.tostring(root, pretty_print=True, encoding="unicode")
+    _compile(text, robot)
+    return text
+
+
+def _add_body(parent: etree._Element, pos: str, link: Link, joint: LinkJoint | None) -> etree._Element:
+    body = etree.SubElement(parent, "body", name=link.name, pos=pos)
+    inertia, tensor = link.inertia, link.inertia.tensor
+    entries = [tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    pos = numbers(inertia.center - link.origin)
+    etree.SubElement(body, "inertial", pos=pos, mass=number(inertia.mass), fullinertia=numbers(entries))
+    if joint is not None:
+        more = {} if joint.type == "continuous" else {"range": numbers((joint.lower, joint.upper))}
+        etree.SubElement(
+            body,
+            "joint",
+            name=joint.name,
+            type="slide" if joint.type == "prismatic" else "hinge",
+            axis=numbers(joint.axis),
+            damping=number(joint.damping),
+            frictionloss=number(joint.friction),
+            actuatorfrcrange=numbers((-joint.effort, joint.effort)),
+            **more,
+        )
+    if link.visual is not None:
+        _add_geom(body, "visual", link, link.visual)
+    for shape in link.collision:
+        _add_geom(body, "collision", link, shape)
+    return body
+
+
+def _add_geom(body: etree._Element, group: str, link: Link, shape: BoxShape | MeshShape) -> None:
+    if isinstance(shape, BoxShape):
+        pos, size = numbers(shape.center - link.origin), numbers(0.5 * shape.size)
+        etree.SubElement(body, "geom", {"class": group}, type="box", pos=pos, size=size)
+    else:
+        etree.SubElement(body, "geom", {"class": group}, type="mesh", pos=numbers(-link.origin), mesh=shape.name)
+
+
+def _add_exclusions(root: etree._Element, robot: Robot) -> None:
+    """Parts that a joint connects do not collide: MuJoCo leaves that out where the parent is fixed to the world."""
+    obj = robot.obj
+    contact = etree.SubElement(root, "contact")
+    for k in range(1, len(obj)):
+        parent = obj.parts[obj.tree.parents[k]]
+        etree.SubElement(contact, "exclude", body1=parent.name, body2=obj.parts[k].name)
+
+
+def _add_equalities(root: etree._Element, robot: Robot) -> None:
+    equality = etree.SubElement(root, "equality")
+    for joint in robot.joints:
+        if joint.mimic is not None:
+            source, multiplier, offset = joint.mimic
+            polycoef = numbers((offset, multiplier, 0.0, 0.0, 0.0))
+            etree.SubElement(equality, "joint", joint1=joint.name, joint2=source, polycoef=polycoef)
+
+
+def _compile(text: str, robot: Robot) -> None:
+    import mujoco
+
+    files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
+    try:
+        mujoco.MjSpec.from_string(text, assets=files).compile()
+    except ValueError as error:
+        where = f"{robot.obj.category} {robot.obj.object_id}"
+        raise AssetError(f"MuJoCo refuses it ({error})", where, "mend the part it names") from error

@@ -1,0 +1,136 @@
+"""USD with UsdPhysics: rigid bodies, joints, masses and collision shapes, ready for Isaac Sim and its like."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
+from artsim.kinematics import Array
+
+
+def usd_text(robot: Robot) -> str:
+    """The object as a USD layer in text form.
+
+    One prim for each link below an articulation root, in metres, kilograms and degrees as UsdPhysics has it, Z up. The
+    object stands freely: add a fixed joint between the world and its root link to hold it. UsdPhysics knows no joints
+    that follow others: such a joint carries ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres).
+    """
+    from pxr import Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    name = Tf.MakeValidIdentifier(f"{robot.obj.category}_{robot.obj.object_id}")
+    root = UsdGeom.Xform.Define(stage, f"/{name}")
+    stage.SetDefaultPrim(root.GetPrim())
+    Usd.ModelAPI(root.GetPrim()).SetKind(Kind.Tokens.component)
+    UsdPhysics.ArticulationRootAPI.Apply(root.GetPrim())
+    paths = [root.GetPath().AppendChild(link.name) for link in robot.links]
+    for link, path in zip(robot.links, paths, strict=True):
+        _add_link(stage, path, link)
+    scope = root.GetPath().AppendChild("joints" if all(link.name != "joints" for link in robot.links) else "joints_")
+    if robot.joints:
+        UsdGeom.Scope.Define(stage, scope)
+    for joint in robot.joints:
+        _add_joint(stage, scope.AppendChild(joint.name), joint, robot, paths)
+    for joint in robot.joints:
+        if joint.mimic is not None:
+            source, multiplier, offset = joint.mimic
+            prim = stage.GetPrimAtPath(scope.AppendChild(joint.name))
+            prim.CreateRelationship("artsim:mimic:joint").SetTargets([scope.AppendChild(source)])
+            prim.CreateAttribute("artsim:mimic:multiplier", Sdf.ValueTypeNames.Double).Set(multiplier)
+            prim.CreateAttribute("artsim:mimic:offset", Sdf.ValueTypeNames.Double).Set(offset)
+    text: str = stage.GetRootLayer().ExportToString()
+    return text
+
+
+def _add_link(stage: Any, path: Any, link: Link) -> None:
+    from pxr import Gf, UsdGeom, UsdPhysics
+
+    xform = UsdGeom.Xform.Define(stage, path)
+    xform.AddTranslateOp().Set(Gf.Vec3d(*link.origin.tolist()))
+    UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
+    moments, axes = principal_axes(link.inertia.tensor)
+    mass = UsdPhysics.MassAPI.Apply(xform.GetPrim())
+    mass.CreateMassAttr(link.inertia.mass)
+    mass.CreateCenterOfMassAttr(Gf.Vec3f(*(link.inertia.center - link.origin).tolist()))
+    mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
+    mass.CreatePrincipalAxesAttr(_quaternion(axes))
+    if link.visual is not None:
+        _add_mesh(stage, path.AppendChild("visual"), link, link.visual)
+    for i, shape in enumerate(link.collision):
+        here = path.AppendChild(f"collision_{i}")
+        if isinstance(shape, BoxShape):
+            cube = UsdGeom.Cube.Define(stage, here)
+            cube.CreateSizeAttr(1.0)
+            cube.CreateExtentAttr([(-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)])
+            cube.AddTranslateOp().Set(Gf.Vec3d(*(shape.center - link.origin).tolist()))
+            cube.AddScaleOp().Set(Gf.Vec3f(*shape.size.tolist()))
+            collider = cube
+        else:
+            collider = _add_mesh(stage, here, link, shape)
+            UsdPhysics.MeshCollisionAPI.Apply(collider.GetPrim()).CreateApproximationAttr("convexHull")
+        UsdPhysics.CollisionAPI.Apply(collider.GetPrim())
+        collider.CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+
+def _add_mesh(stage: Any, path: Any, link: Link, shape: MeshShape) -> Any:
+    from pxr import UsdGeom, Vt
+
+    points = (shape.vertices - link.origin).astype(np.float32)
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(shape.faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(shape.faces.ravel().astype(np.int32)))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateExtentAttr([tuple(points.min(axis=0).tolist()), tuple(points.max(axis=0).tolist())])
+    return mesh
+
+
+def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: list[Any]) -> None:
+    from pxr import Gf, UsdPhysics
+
+    slides = joint.type == "prismatic"
+    unit = 1.0 if slides else 180.0 / np.pi
+    schema = UsdPhysics.PrismaticJoint if slides else UsdPhysics.RevoluteJoint
+    added = schema.Define(stage, path)
+    added.CreateBody0Rel().SetTargets([paths[joint.parent]])
+    added.CreateBody1Rel().SetTargets([paths[joint.child]])
+    added.CreateLocalPos0Attr(Gf.Vec3f(*(robot.links[joint.child].origin - robot.links[joint.parent].origin).tolist()))
+    added.CreateLocalPos1Attr(Gf.Vec3f(0.0))
+    turn = _quaternion(frame_along(joint.axis))
+    added.CreateLocalRot0Attr(turn)
+    added.CreateLocalRot1Attr(turn)
+    added.CreateAxisAttr("X")
+    if joint.type != "continuous":
+        added.CreateLowerLimitAttr(joint.lower * unit)
+        added.CreateUpperLimitAttr(joint.upper * unit)
+    drive = UsdPhysics.DriveAPI.Apply(added.GetPrim(), "linear" if slides else "angular")
+    drive.CreateDampingAttr(joint.damping / unit)
+    drive.CreateStiffnessAttr(0.0)
+    drive.CreateTypeAttr("force")
+
+
+def principal_axes(tensor: Array) -> tuple[Array, Array]:
+    """Principal moments (3,) of an inertia tensor and the rotation (3, 3) whose columns are their axes."""
+    moments, axes = np.linalg.eigh(tensor)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return moments, axes
+
+
+def frame_along(axis: Array) -> Array:
+    """A rotation (3, 3) that carries the X axis to a unit vector."""
+    side = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+    side /= np.linalg.norm(side)
+    return np.column_stack([axis, side, np.cross(axis, side)])
+
+
+def _quaternion(rotation: Array) -> Any:
+    from pxr import Gf
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
+    return Gf.Quatf(w, x, y, z)
