@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
-from collections.abc import Sequence
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from artsim.kinematics import Array
-from artsim.solids import Solid, Vector, box, cylinder, frame, hull, prism, rounded_box, tube, union
+from artsim.solids import Solid, Vector, box, cylinder, frame, hull, prism, rounded_box, rounded_rectangle, tube, union
 
 
 def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
@@ -194,3 +194,74 @@ def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
     for y in np.linspace(low[1], high[1] - wire, bars + 2)[1:-1]:
         solid += box((low[0], y, low[2]), (high[0], y + wire, low[2] + min(wire, high[2] - low[2])))
     return solid
+
+
+def rounded_tray(
+    low: Vector,
+    high: Vector,
+    wall: float,
+    radius: float,
+    profile: ArrayLike = ((0.0, 0.0), (1.0, 0.0)),
+    axis: int = 2,
+    side: int = 1,
+    floor: float | None = None,
+    steps: int = 3,
+) -> Solid:
+    """Open box with round corners: a floor and one wall around.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Outer corners.
+    wall, floor : float
+        Thickness; the floor is as thick as the wall by default, and 0 leaves it out.
+    radius : float
+        Of the four corners seen along ``axis``.
+    profile : (N, 2) float
+        From the floor (0) to the opening (1): share of the depth, and metres by which the outline shrinks there.
+        Tapered bins and bevelled shells have more than zeros.
+    axis, side : int
+        It is open towards ``side`` (1 or -1) of coordinate ``axis``: upward by default.
+    steps : int
+        Segments of a quarter circle.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    depth = wall if floor is None else floor
+    across = [i for i in range(3) if i != axis]
+    start, end = (low[axis], high[axis]) if side > 0 else (high[axis], low[axis])
+
+    def outline(inset: float, share: float, thickness: float = 0.0) -> Array:
+        inset += thickness
+        plane = rounded_rectangle(low[across] + inset, high[across] - inset, max(radius - inset, 0.001), steps)
+        points = np.empty((len(plane), 3))
+        points[:, across], points[:, axis] = plane, start + share * (end - start)
+        return points
+
+    pieces = []
+    for (share0, inset0), (share1, inset1) in pairwise(np.asarray(profile, dtype=np.float64)):
+        rings = [outline(inset, share, w) for inset, share in ((inset0, share0), (inset1, share1)) for w in (0.0, wall)]
+        pieces += [hull(np.concatenate([r[[k - 1, k]] for r in rings])) for k in range(len(rings[0]))]
+    if depth > 0:
+        profile = np.asarray(profile, dtype=np.float64)
+        share = depth / abs(end - start)
+        levels = [0.0, *(s for s in profile[1:, 0] if s < share), share]
+        insets = np.interp(levels, profile[:, 0], profile[:, 1])
+        pieces.append(hull(np.concatenate([outline(i + 0.0002, s) for i, s in zip(insets, levels, strict=True)])))
+    return union(pieces)
+
+
+def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
+    """Button on a panel that faces -X, its front 8 mm before the panel, with 1.5 mm to travel and more to spare.
+
+    Parameters
+    ----------
+    face : (3,) float
+        Centre of the button, on the panel.
+    size : 2 float
+        Along Y and Z.
+    round_off : float
+        Radius of its corners.
+    """
+    face = np.asarray(face, dtype=np.float64)
+    half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
+    return rounded_box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), round_off, axis=0)
