@@ -96,6 +96,7 @@ class KinematicTree:
 
     def __init__(self, joints: Sequence[Joint]):
         self.joints = tuple(joints)
+        self._last_poses: tuple[bytes, Array] = (b"", np.empty(0))
         self._check()
 
     def _check(self) -> None:
@@ -275,11 +276,16 @@ class KinematicTree:
         KinematicsError
             When ``q`` does not fit the tree or is not finite.
         """
+        q = np.asarray(q, dtype=np.float64)
+        if q.ndim == 1 and self._last_poses[0] == q.tobytes():
+            return self._last_poses[1].copy()
         T_rest_part = self.motions(q)
         for k in range(1, len(self)):
             parent = self.parents[k]
             if parent > 0:
                 T_rest_part[..., k, :, :] = T_rest_part[..., parent, :, :] @ T_rest_part[..., k, :, :]
+        if q.ndim == 1:  # a state is often asked for twice: where to look from, then what is seen
+            self._last_poses = q.tobytes(), T_rest_part.copy()
         return T_rest_part
 
     def posed_joints(self, T_frame_part: ArrayLike) -> tuple[Array, Array]:

@@ -167,23 +167,28 @@ class ArticulatedObject:
         bounds[empty] = self.native_tree.origins[empty, None, :]
         return bounds * self.scale
 
-    @property
+    @cached_property
     def box_center(self) -> Array:
         """(K, 3) centre of each part's amodal box in the rest frame, metres."""
         return self.part_bounds.mean(axis=1)
 
-    @property
+    @cached_property
     def box_size(self) -> Array:
         """(K, 3) side lengths of each part's amodal box in the rest frame, metres."""
         return self.part_bounds[:, 1] - self.part_bounds[:, 0]
 
     @cached_property
+    def has_surface(self) -> NDArray[np.bool_]:
+        """(K,) whether each part has geometry."""
+        return np.array([len(p.faces) > 0 for p in self.parts])
+
+    @cached_property
     def bounds(self) -> Array:
         """(2, 3) corners of the box of the whole object in its rest state, metres."""
-        solid = np.array([len(p.faces) > 0 for p in self.parts])
+        solid = self.has_surface
         return np.stack([self.part_bounds[solid, 0].min(axis=0), self.part_bounds[solid, 1].max(axis=0)])
 
-    @property
+    @cached_property
     def diagonal(self) -> float:
         """Diagonal of the box of the whole object in its rest state, metres."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))

@@ -160,6 +160,7 @@ def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: A
 
 _TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right
 _TANGENTS = np.tan(_TILTS)
+_SLOPES = np.stack([_TANGENTS, -_TANGENTS]).astype(np.float32)  # for the left side, and for the negated right side
 _MARGIN = 0.05  # pixels: covers single precision
 _MARGINS = _MARGIN / np.cos(_TILTS)
 
@@ -180,20 +181,19 @@ def _spans(
     row_ranges = np.clip(np.ceil(heights - 0.5), 0, camera.height).astype(np.int64)
     # u + tan * v of the corners: the line through the outermost bounds the outline. Spans count from pixel centres.
     across = u[..., None] + v[..., None] * _TANGENTS
-    low = (across.min(axis=1) - _MARGINS - 0.5).astype(np.float32)
-    high = (across.max(axis=1) + _MARGINS - 0.5).astype(np.float32)
+    bounds = np.stack([across.min(axis=1) - _MARGINS, -across.max(axis=1) - _MARGINS], axis=1)
+    bounds -= [[0.5], [-0.5]]
     first_row, end_row = row_ranges[:, 0].min(), row_ranges[:, 1].max()
     rows = np.arange(first_row, end_row, dtype=np.float32) + np.float32(0.5)
-    slope = _TANGENTS.astype(np.float32)[:, None] * rows
-    spans = np.empty((len(obj), 2, camera.height), dtype=np.float32)
-    spans[:, 0], spans[:, 1] = np.inf, -np.inf
-    spans[:, 0, first_row:end_row] = (low[..., None] - slope).max(axis=1)
-    spans[:, 1, first_row:end_row] = (high[..., None] - slope).min(axis=1)
+    spans = np.full((len(obj), 2, camera.height), np.inf, dtype=np.float32)
+    lines = bounds.astype(np.float32)[..., None] - _SLOPES[..., None] * rows
+    spans[:, :, first_row:end_row] = lines.max(axis=2)
+    spans[:, 1] *= -1.0
     for k in range(len(obj)):
         spans[k, 1, : row_ranges[k, 0]] = spans[k, 1, row_ranges[k, 1] :] = -np.inf
     around = (depth <= 0).any(axis=1)  # reaches behind the camera: it may cover any pixel
     spans[around], row_ranges[around] = np.array([[-np.inf], [np.inf]]), (0, camera.height)
-    hidden = (depth <= 0).all(axis=1) | np.array([len(part.faces) == 0 for part in obj.parts])
+    hidden = (depth <= 0).all(axis=1) | ~obj.has_surface
     spans[hidden], row_ranges[hidden] = np.array([[np.inf], [-np.inf]]), 0
     return spans, row_ranges
 
