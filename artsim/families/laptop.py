@@ -1,103 +1,203 @@
-"""Laptops: a base with keyboard and touchpad, and a lid with a screen on a hinge at the back."""
+"""Laptops: a base with keyboard and touchpad, and a lid with a screen on a hinge at the back.
+
+What varies: proportions, thickness, round or bevelled shells, a base that is shorter than the lid or reaches behind
+the hinge, one long hinge or two short ones, keyboard with or without number block, touchpad and its buttons, the
+screen's frame, badges, feet, how far the lid opens.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
-from artsim.solids import Solid, box, cylinder, rounded_box, union
+from artsim.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+
+GAP = 0.0008
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Main measures. The lid reaches from x = ``front`` to ``back``; the base starts at ``base_front``."""
+
+    width: float
+    depth: float
+    height: float  # of the base
+    lid: float  # height of the lid
+    front: float
+    base_front: float
+    back: float
+    corner: float
+    hinge_x: float
+    hinge_z: float
+    hinge_radius: float
 
 
 def build(rng: np.random.Generator) -> Assembly:
     """A laptop, closed at rest. The lid opens about the Y axis at the back."""
-    width = rng.uniform(0.26, 0.42)
-    depth = width * rng.uniform(0.6, 0.78)
-    base_height = width * rng.uniform(0.025, 0.075)
-    lid_height = max(width * rng.uniform(0.015, 0.045), 0.004)
-    gap = 0.0008
-    corner = depth * rng.uniform(0.01, 0.08)
-    hinge_radius = rng.uniform(0.35, 0.5) * min(base_height, lid_height)
-    hinge_x = depth / 2 + hinge_radius * rng.uniform(-0.2, 1.1)
-    # The lid turns about a barrel between the two shells, in notches behind both.
-    hinge_z = base_height + 0.5 * gap
-    clear = hinge_radius + 0.0015
-    back = min(depth / 2, hinge_x - clear)
-
-    base = _base(rng, width, depth, base_height, corner, back)
-    lid = rounded_box(
-        (-depth / 2, -width / 2, base_height + gap), (back, width / 2, base_height + gap + lid_height), corner, axis=2
-    )
-    lid += _screen(rng, width, back, depth, base_height + gap, lid_height)
-    lid += _hinges(rng, width, back, hinge_x, hinge_z, hinge_radius, lid_height)
-
+    shape = _shape(rng)
     laptop = Assembly()
-    laptop.add("base", base, density=1400.0)
-    opening = np.deg2rad(rng.uniform(100.0, 178.0 if rng.random() < 0.7 else 135.0))
-    laptop.add("lid", lid, revolute("base", (0, 1, 0), (hinge_x, 0, hinge_z), 0.0, opening), density=1400.0)
+    laptop.add("base", _base(rng, shape), density=1400.0)
+    opening = np.deg2rad(rng.uniform(88.0, 178.0))
+    hinge = (shape.hinge_x, 0, shape.hinge_z)
+    lid = _lid(rng, shape) + _hinges(rng, shape)
+    laptop.add("lid", lid, revolute("base", (0, 1, 0), hinge, 0.0, opening), density=1400.0)
     return laptop
 
 
-def _base(rng: np.random.Generator, width: float, depth: float, height: float, corner: float, back: float) -> Solid:
+def _shape(rng: np.random.Generator) -> _Shape:
+    width = rng.uniform(0.26, 0.42)
+    depth = width * rng.triangular(0.54, 0.67, 0.9)
+    height = max(width * rng.triangular(0.012, 0.03, 0.085), 0.006)
+    lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
+    # The lid turns about a barrel between the two shells, in notches behind both.
+    radius = rng.uniform(0.3, 0.5) * min(height, lid, 0.012)
+    hinge_x = depth / 2 + radius * rng.uniform(-0.4, 0.9)
+    back = min(depth / 2, hinge_x - radius - 0.0012)
+    front = base_front = -depth / 2
+    odd = rng.random()
+    if odd < 0.12:
+        base_front += rng.uniform(0.01, 0.2) * depth
+    elif odd < 0.27:
+        front += rng.uniform(0.005, 0.06) * depth
+    corner = depth * rng.choice([rng.uniform(0.005, 0.03), rng.uniform(0.03, 0.13)])
+    return _Shape(width, depth, height, lid, front, base_front, back, corner,
+                  hinge_x, height + 0.5 * GAP, radius)  # fmt: skip
+
+
+def _shell(
+    rng: np.random.Generator, low: tuple[float, ...], high: tuple[float, ...], corner: float, side: int
+) -> Solid:
+    """Plate whose upper (side 1) or lower (-1) edges are bevelled or, seen from the side, wedge-shaped."""
+    plate = rounded_box(low, high, corner, axis=2)
+    kind = rng.choice(["plain", "bevel", "wedge"], p=[0.45, 0.4, 0.15])
+    if kind == "plain":
+        return plate
+    z0, z1 = low[2], high[2]
+    thick = z1 - z0
+    seam = thick * rng.uniform(0.3, 0.7)
+    outer = (z0, z0 + seam) if side > 0 else (z1 - seam, z1)
+    inner = (z1 - 0.001, z1) if side > 0 else (z0, z0 + 0.001)
+    bevel = rng.uniform(0.3, 2.0) * thick if kind == "bevel" else 0.1 * thick
+    recess = bevel if kind == "bevel" else rng.uniform(0.1, 0.5) * (high[0] - low[0])
+    return hull_of(
+        rounded_box((*low[:2], outer[0]), (*high[:2], outer[1]), corner, axis=2),
+        rounded_box(
+            (low[0] + recess, low[1] + bevel, inner[0]), (high[0] - min(bevel, 0.005), high[1] - bevel, inner[1]),
+            corner, axis=2,
+        ),
+    )  # fmt: skip
+
+
+def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
     """The lower shell: keys and touchpad lie in a sunken deck, so that the lid can close on the rim."""
+    width, height, front, back = shape.width, shape.height, shape.base_front, shape.back
     sink = min(0.0015, 0.2 * height)
     deck = height - sink
     rim = width * rng.uniform(0.01, 0.03)
-    solid = rounded_box((-depth / 2, -width / 2, 0), (back, width / 2, deck), corner, axis=2)
+    solid = _shell(rng, (front, -width / 2, 0), (back, width / 2, deck), shape.corner, -1)
     for y in (-width / 2, width / 2 - rim):
-        solid += box((-depth / 2 + corner, y, deck), (back - corner, y + rim, height))
-    key_depth = 0.5 * depth / 5 * rng.uniform(0.75, 1.0)
-    rows = 5
-    row_pitch = key_depth * rng.uniform(1.08, 1.2)
-    half = width / 2 - rim - width * rng.uniform(0.01, 0.06)
-    keys_back = back - depth * rng.uniform(0.06, 0.12)
-    for row in range(rows):
-        count = int(rng.integers(9, 14))
-        edges = np.linspace(-half, half, count + 1)
-        if row == rows - 1:  # the row with the space bar
-            edges = np.array([-half, -0.75 * half, -0.45 * half, 0.4 * half, 0.7 * half, half])
-        x = keys_back - row * row_pitch
-        slit = 0.06 * key_depth
-        for left, right in pairwise(edges):
-            solid += box((x - key_depth, left + slit, deck - 0.001), (x, right - slit, height - 0.0003))
-    pad_front, pad_back = -depth / 2 + depth * 0.04, keys_back - rows * row_pitch - depth * 0.03
-    if pad_back - pad_front > 0.03:
-        half_pad = width * rng.uniform(0.1, 0.2)
-        solid += box((pad_front, -half_pad, deck - 0.001), (pad_back, half_pad, deck + 0.3 * sink))
+        solid += box((front + shape.corner, y, deck - 0.001), (back - shape.corner, y + rim, height))
+    solid += _keyboard(rng, shape, deck, rim)
+    # Behind the hinge the base is low enough for the lid to swing past it.
+    room = shape.hinge_z - max(shape.hinge_radius, shape.lid + GAP) - 0.0015
+    if room > 0.004 and rng.random() < 0.6:
+        reach = shape.hinge_x + rng.uniform(0.0, 0.07) * shape.depth
+        half = width / 2 - rng.choice([0.0, rng.uniform(0.0, 0.2) * width]) - 0.5 * shape.corner
+        solid += rounded_box((back - 0.02, -half, 0.15 * room), (reach, half, room), 0.3 * room)
     if rng.random() < 0.7:
         foot = 0.02 * width
         solid += union(
-            cylinder((x, y, -0.5 * foot * 0.3), (x, y, 0.001), foot)
-            for x in (-depth / 2 + 2.5 * foot, back - 2.5 * foot)
-            for y in (-width / 2 + 2.5 * foot, width / 2 - 2.5 * foot)
+            cylinder((x, y, -0.15 * foot), (x, y, 0.5 * height), foot, sections=16)
+            for x in (front + 3.5 * foot, back - 2.5 * foot)
+            for y in (-width / 2 + 3.5 * foot, width / 2 - 3.5 * foot)
         )
+    if rng.random() < 0.15:  # a catch or a lip at the front
+        half, reach = rng.uniform(0.03, 0.2) * width, rng.uniform(0.002, 0.012)
+        solid += box((front - reach, -half, 0.3 * deck), (front + 0.2 * shape.depth, half, 0.8 * deck))
     return solid
 
 
-def _screen(rng: np.random.Generator, width: float, back: float, depth: float, low: float, lid_height: float) -> Solid:
-    """Details of the lid: a badge or ribs on its back; the panel itself is flush with the lid's inside."""
+def _keyboard(rng: np.random.Generator, shape: _Shape, deck: float, rim: float) -> Solid:
+    """Five or six rows of keys, a touchpad before them where there is room, its buttons."""
+    top = shape.height - 0.0003
+    length = shape.back - shape.base_front
+    rows = int(rng.integers(5, 7))
+    pitch = 0.55 * length / rows * rng.uniform(0.75, 1.05)
+    half = shape.width / 2 - rim - shape.width * rng.uniform(0.005, 0.06)
+    keys_back = shape.back - length * rng.uniform(0.05, 0.14)
+    slit = 0.05 * pitch
+    blocks = [(-half, half)]
+    if shape.width > 0.36 and rng.random() < 0.5:  # a number block on the right (-Y)
+        split = -half + 0.24 * half * 2
+        blocks = [(split, half), (-half, split - 0.02 * half)]
     solid = Solid()
-    top = low + lid_height
-    if rng.random() < 0.5:
-        radius = width * rng.uniform(0.03, 0.07)
-        x = rng.uniform(-0.1, 0.1) * depth
-        solid += cylinder((x, 0, top - 0.001), (x, 0, top + 0.0006), radius)
-    elif rng.random() < 0.4:
-        rib = width * rng.uniform(0.01, 0.03)
-        for y in (-0.3 * width, 0.3 * width):
-            solid += box((-0.4 * depth, y - rib, top - 0.001), (back - 0.1 * depth, y + rib, top + 0.0015))
+    for block, (right, left) in enumerate(blocks):
+        for row in range(rows):
+            count = 4 if block else int(rng.integers(9, 14))
+            edges = np.linspace(right, left, count + 1)
+            if row == rows - 1 and not block:  # the row with the space bar
+                edges = right + (left - right) * np.array([0.0, 0.13, 0.27, 0.7, 0.86, 1.0])
+            x = keys_back - row * pitch
+            for near, far in pairwise(edges):
+                solid += box((x - pitch + slit, near + slit, deck - 0.001), (x - slit, far - slit, top))
+    pad_front, pad_back = shape.base_front + length * 0.04, keys_back - rows * pitch - length * 0.03
+    if pad_back - pad_front > 0.03:
+        half_pad, middle = shape.width * rng.uniform(0.1, 0.2), shape.width * rng.choice([0.0, rng.uniform(-0.05, 0.1)])
+        left, right = middle + half_pad, middle - half_pad
+        if rng.random() < 0.4:  # two buttons before the pad
+            split = pad_front + 0.2 * (pad_back - pad_front)
+            for near, far in ((right, middle - 0.0005), (middle + 0.0005, left)):
+                solid += box((pad_front, near, deck - 0.001), (split - 0.001, far, 0.5 * (deck + top)))
+            pad_front = split
+        solid += box((pad_front, right, deck - 0.001), (pad_back, left, deck + 0.3 * (top - deck)))
     return solid
 
 
-def _hinges(
-    rng: np.random.Generator, width: float, back: float, hinge_x: float, hinge_z: float, radius: float, lid: float
-) -> Solid:
+def _lid(rng: np.random.Generator, shape: _Shape) -> Solid:
+    """The upper shell with a frame around the screen, a badge or ribs on its back."""
+    low = shape.height + GAP
+    top = low + shape.lid
+    front, back, half = shape.front, shape.back, shape.width / 2
+    sunken = rng.uniform(0.15, 0.4) * min(shape.lid, 0.006) if rng.random() < 0.75 else 0.0
+    solid = _shell(rng, (front, -half, low + sunken), (back, half, top), shape.corner, 1)
+    if sunken > 0:
+        inset = 0.3 * shape.corner
+        side, brow, chin = shape.width * rng.uniform(0.01, 0.05, 3) + inset
+        chin += shape.depth * rng.uniform(0.0, 0.06)
+        solid += frame(
+            (front + inset, -half + inset, low), (back - inset, half - inset, low + sunken + 0.0008),
+            [brow, chin, side, side], 0, 1,
+        )  # fmt: skip
+    middle = 0.5 * (front + back)
+    badge = rng.random()
+    if badge < 0.35:
+        radius = shape.width * rng.uniform(0.03, 0.07)
+        x = middle + rng.uniform(-0.1, 0.1) * shape.depth
+        solid += cylinder((x, 0, top - 0.0015), (x, 0, top + 0.0006), radius)
+    elif badge < 0.5:
+        long, wide = shape.width * rng.uniform(0.05, 0.12), shape.width * rng.uniform(0.02, 0.05)
+        solid += rounded_box((middle - wide, -long, top - 0.0015), (middle + wide, long, top + 0.0007), 0.01, axis=2)
+    elif badge < 0.65:
+        rib = shape.width * rng.uniform(0.01, 0.03)
+        for y in (-0.3 * shape.width, 0.3 * shape.width):
+            solid += box((front + 0.12 * shape.depth, y - rib, top - 0.0015), (middle, y + rib, top + 0.0012))
+    return solid
+
+
+def _hinges(rng: np.random.Generator, shape: _Shape) -> Solid:
     """Barrels on the hinge axis, joined to the lid by short arms above the gap."""
-    spans = [(-0.42, -0.28), (0.28, 0.42)] if rng.random() < 0.7 else [(-0.4, 0.4)]
+    inner, outer = rng.uniform(0.2, 0.34), rng.uniform(0.38, 0.46)
+    spans = [(-outer, -inner), (inner, outer)] if rng.random() < 0.5 else [(-outer, outer)]
+    x, z, radius = shape.hinge_x, shape.hinge_z, shape.hinge_radius
+    arm = z + 0.0004
     solid = Solid()
     for first, last in spans:
-        solid += cylinder((hinge_x, first * width, hinge_z), (hinge_x, last * width, hinge_z), radius, sections=16)
-        arm_low = hinge_z + 0.0004
-        solid += box((back - 0.004, first * width, arm_low), (hinge_x, last * width, arm_low + min(0.8 * lid, radius)))
+        right, left = first * shape.width, last * shape.width
+        solid += cylinder((x, right, z), (x, left, z), radius, sections=16)
+        solid += box(
+            (shape.back - 0.012, right, arm + 0.0004), (x, left, arm + max(min(0.8 * shape.lid, radius), 0.0015))
+        )
     return solid
