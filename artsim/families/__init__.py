@@ -14,12 +14,14 @@ import numpy as np
 
 from artsim.assembly import Assembly
 from artsim.errors import ConfigError
-from artsim.families import drawer, laptop, robot_arm, storage_furniture
+from artsim.families import box, dishwasher, drawer, laptop, robot_arm, storage_furniture
 from artsim.objects import ArticulatedObject
 
 Family = Callable[[np.random.Generator], Assembly]
 
 FAMILIES: dict[str, Family] = {
+    "box": box.build,
+    "dishwasher": dishwasher.build,
     "drawer": drawer.build,
     "laptop": laptop.build,
     "robot_arm": robot_arm.build,

@@ -1,0 +1,232 @@
+"""Dishwashers: a tub with a door that drops down about a hinge at its bottom.
+
+What varies: built-in, free-standing (with a worktop) or for the countertop; a door over the whole front, below a fixed
+strip of controls, or only over the upper half; between side panels or over them; where the hinge lies; handle, strips,
+relief and inner liner of the door; racks inside, fixed or on slides; spray arm; buttons and dials.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
+from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+
+GAP = 0.002
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Measures of one dishwasher, in metres; the back of its closed door is the plane x = 0."""
+
+    half: float
+    """Half the width of the body."""
+    depth: float
+    height: float
+    """Of the body, without a worktop."""
+    wall: float
+    thick: float
+    """Of the door."""
+    half_door: float
+    bottom: float
+    """Height of the door's lower edge."""
+    top: float
+    """Height of the door's upper edge."""
+    hinge_x: float
+    hinge_z: float
+    liner: float
+    """How far the inside of the door reaches into the tub; 0 for none."""
+
+    @property
+    def front(self) -> float:
+        """x of the tub's front: the lower back edge of the door swings clear of it."""
+        return float(np.hypot(self.hinge_x, self.hinge_z - self.bottom)) + self.hinge_x + GAP
+
+    @property
+    def floor(self) -> float:
+        """Height of the tub's floor."""
+        return self.bottom + 0.6 * self.wall
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A dishwasher, closed at rest."""
+    compact, half_door = rng.random(2) < (0.12, 0.12)
+    width = rng.uniform(0.42, 0.48) if rng.random() < 0.2 and not compact else rng.uniform(0.54, 0.64)
+    height = width * rng.uniform(0.75, 0.95) if compact else rng.uniform(0.70, 0.9)
+    wall, thick = rng.uniform(0.012, 0.04), rng.uniform(0.03, 0.075)
+    plinth = rng.uniform(0.02, 0.05) if compact or rng.random() < 0.4 else rng.uniform(0.06, 0.15)
+    strip = rng.uniform(0.07, 0.14) if rng.random() < 0.4 else 0.0
+    flush = bool(rng.random() < 0.3)  # what lies below the door is as far in front as the door
+    flanked = bool(rng.random() < 0.35)  # the door lies between the side panels
+    if half_door:
+        plinth, flush, strip = rng.uniform(0.35, 0.5) * height, True, max(strip, 0.09)
+    elif flanked:
+        strip = max(strip, wall)
+    hinge_x = -thick if flush else -thick * rng.choice([0.0, rng.uniform(0.0, 0.6)])
+    swing = float(np.hypot(hinge_x, height - plinth)) - (height - plinth)  # the upper back edge rises while it opens
+    shape = Shape(
+        half=0.5 * width,
+        depth=rng.uniform(0.42, 0.64),
+        height=height,
+        wall=wall,
+        thick=thick,
+        half_door=0.5 * width - (wall + GAP if flanked else rng.uniform(0.0, 0.004)),
+        bottom=plinth,
+        top=height - strip - 1.3 * swing - 2 * GAP,
+        hinge_x=hinge_x,
+        hinge_z=plinth + (0.0 if flush else rng.uniform(0.0, 0.012)),
+        liner=rng.uniform(0.005, 0.025) if rng.random() < 0.75 else 0.0,
+    )
+    machine = Assembly()
+    machine.add("body", _body(rng, shape, strip, flush, flanked, compact), density=300.0)
+    opening = 0.5 * np.pi if rng.random() < 0.7 else np.deg2rad(rng.uniform(75.0, 90.0))
+    hinge = (shape.hinge_x, 0.0, shape.hinge_z)
+    machine.add("door", _door(rng, shape, strip > 0.05), revolute("body", (0, -1, 0), hinge, 0.0, opening))
+    if strip > 0.05 and rng.random() < 0.6:
+        _controls(rng, machine, shape)
+    if rng.random() < 0.2:
+        _sliding_racks(rng, machine, shape)
+    return machine
+
+
+def _body(rng: np.random.Generator, s: Shape, strip: float, flush: bool, flanked: bool, compact: bool) -> Solid:
+    front, back, half, base = s.front, s.depth, s.half, s.floor - s.wall
+    solid = tray((front, -half, base), (back, half, s.height), s.wall, axis=0, side=-1)
+    face = -s.thick * (1.0 if rng.random() < 0.6 else rng.uniform(0.3, 0.95))  # front of the fixed panels
+    if flanked:
+        for y in (-half, half - s.wall):
+            solid += box((face, y, s.bottom - 0.01), (front + 0.01, y + s.wall, s.height))
+    if strip > 0:
+        y = half - (0.001 if flanked else 0.0)
+        solid += rounded_box((-s.thick, -y, s.height - strip), (front + s.wall, y, s.height), 0.004)
+    if flush:
+        foot = min(rng.uniform(0.0, 0.09), 0.5 * s.bottom)
+        solid += rounded_box((face, -half, foot), (front + 0.02, half, s.bottom - GAP), 0.003)
+        solid += box((front + 0.01, -half, foot), (back, half, base + 0.002))
+        solid += box((face + rng.uniform(0.02, 0.06), -half + 0.01, 0.0), (back - 0.02, half - 0.01, foot + 0.01))
+    elif compact or rng.random() < 0.25:
+        feet = ((x, y) for x in (front + 0.05, back - 0.05) for y in (-half + 0.05, half - 0.05))
+        solid += union(cylinder((x, y, 0), (x, y, base + 0.003), 0.018, sections=14) for x, y in feet)
+    else:
+        recess = front + rng.uniform(0.0, 0.08)
+        solid += box((recess, -half + 0.002, 0), (back, half - 0.002, base + 0.003))
+    if not compact and rng.random() < 0.4:  # a worktop
+        lip = rng.uniform(0.0, 0.02)
+        solid += rounded_box((-s.thick * rng.uniform(0.0, 1.4), -half - lip, s.height - 0.001),
+                             (back + lip, half + lip, s.height + rng.uniform(0.012, 0.04)), 0.004)  # fmt: skip
+    if rng.random() < 0.45:  # racks that stay where they are
+        for low in _rack_heights(s):
+            solid += _rack(rng, s.liner + front + 0.01, back - s.wall + 0.002, half - s.wall + 0.002, low)
+    return solid
+
+
+def _rack_heights(s: Shape) -> list[float]:
+    """Height of the lower rack, and of the upper one where there is room."""
+    lower = s.floor + 0.07
+    return [lower] if s.top - s.floor < 0.5 else [lower, s.floor + 0.55 * (s.top - s.floor)]
+
+
+def _rack(rng: np.random.Generator, front: float, back: float, half: float, low: float) -> Solid:
+    """Basket of wire, open at the top."""
+    wire, height = 0.005, rng.uniform(0.06, 0.11)
+    solid = wire_shelf((front, -half, low), (back, half, low + wire), 6, wire)
+    solid += frame((front, -half, low + height - wire), (back, half, low + height), [wire] * 4, 0, 1)
+    posts = [(x, y) for x in (front, back - wire) for y in np.linspace(-half, half - wire, 6)]
+    posts += [(0.5 * (front + back), y) for y in (-half, half - wire)]
+    return solid + union(box((x, y, low), (x + wire, y + wire, low + height)) for x, y in posts)
+
+
+def _sliding_racks(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
+    """Racks that stay behind the door in every state, and perhaps a spray arm below them."""
+    front, back = s.front + s.liner + 0.01, s.depth - s.wall - 0.005
+    half = s.half - s.wall - 0.006
+    travel = rng.uniform(0.25, 0.4) * (back - front)
+    for number, low in enumerate(_rack_heights(s), 1):
+        rack = _rack(rng, front + travel, back, half, low)
+        machine.add(f"rack_{number}", rack, prismatic("body", (-1, 0, 0), 0.0, travel, (back, 0, low)), density=900.0)
+    center = 0.5 * (front + back)
+    reach = min(0.5 * (back - front), half) - 0.02
+    low = s.floor + 0.02
+    arm = rounded_box((center - reach, -0.025, low), (center + reach, 0.025, low + 0.015), 0.02, axis=2)
+    arm += cylinder((center, 0, s.floor + GAP), (center, 0, low + 0.02), 0.03)
+    machine.add("spray_arm", arm, continuous("body", (0, 0, 1), (center, 0, low)))
+
+
+def _controls(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
+    """Buttons and perhaps a dial on the fixed strip."""
+    z = 0.5 * (s.top + 0.008 + s.height)
+    size = min(0.012, 0.22 * (s.height - s.top))
+    ys = np.linspace(-0.8, 0.8, 9) * s.half
+    first, count = int(rng.integers(0, 5)), int(rng.integers(1, 5))
+    for number, y in enumerate(ys[first : first + count], 1):
+        face = (-s.thick, y, z)
+        button = push_button(face, (2 * size, 2 * size), rng.choice([0.002, size]))
+        machine.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
+    if rng.random() < 0.5:
+        y, radius = ys[(first + count + 1) % 9], min(0.022, 0.4 * (s.height - s.top))
+        foot = (-s.thick, y, z)
+        machine.add("dial", dial(foot, (-1, 0, 0), 0.02, radius), continuous("body", (-1, 0, 0), foot))
+
+
+def _door(rng: np.random.Generator, s: Shape, controls_above: bool) -> Solid:
+    half, tall, x = s.half_door, s.top - s.bottom, -s.thick
+    kind = str(rng.choice(["bar", "bow", "flat", "pocket", "edge", "none"], p=[0.24, 0.24, 0.16, 0.18, 0.1, 0.08]))
+    band = rng.uniform(0.08, 0.14) if not controls_above and rng.random() < 0.5 else 0.0
+    z = s.top - band - rng.uniform(0.03, 0.1)  # height of the handle
+    if kind == "pocket":
+        deep, side, slot = rng.uniform(0.012, 0.02), rng.uniform(0.2, 0.75) * half, rng.uniform(0.02, 0.05)
+        solid = box((x + deep - 0.001, -half, s.bottom), (0, half, s.top))
+        widths = [half - side, half - side, z - slot - s.bottom, s.top - z]
+        solid += frame((x, -half, s.bottom), (x + deep, half, s.top), widths)
+    else:
+        solid = rounded_box((x, -half, s.bottom), (0, half, s.top), rng.uniform(0.002, 0.012))
+    if band > 0:  # a strip of controls, in front of the door or within an outline
+        lead = rng.uniform(0.003, 0.02)
+        solid += rounded_box((x - lead, -half, s.top - band), (x + 0.02, half, s.top), 0.003)
+        solid += _marks(rng, x - lead, half, s.top - 0.5 * band)
+    elif rng.random() < 0.3:
+        solid += box(
+            (x - 0.0015, -0.12 * half, s.bottom + 0.12 * tall), (x + 0.002, 0.12 * half, s.bottom + 0.15 * tall)
+        )
+    if kind != "pocket" and rng.random() < 0.25:  # a raised board
+        edge = rng.uniform(0.02, 0.07)
+        solid += rounded_box((x - 0.004, edge - half, s.bottom + edge), (x + 0.003, half - edge, z - 0.03), 0.003)
+    span = half * rng.uniform(0.45, 0.93)
+    reach, radius = rng.uniform(0.03, 0.06), rng.uniform(0.006, 0.013)
+    left, right = (x, -span, z), (x, span, z)
+    if kind == "bar":
+        solid += bar_handle(left, right, (-1, 0, 0), reach, radius)
+    elif kind == "bow":
+        solid += bow_handle(left, right, (-1, 0, 0), reach, radius)
+    elif kind == "flat":
+        solid += flat_handle(left, right, reach, rng.uniform(0.015, 0.04), rng.uniform(0.006, 0.014))
+    elif kind == "edge":  # a lip along the upper edge
+        solid += rounded_box((x - reach, -half, s.top - 0.02), (x + 0.01, half, s.top), 0.006)
+    return solid + _inside(rng, s)
+
+
+def _marks(rng: np.random.Generator, x: float, half: float, z: float) -> Solid:
+    """A display and keys that do not move."""
+    solid = (
+        box((x - 0.0015, -0.2 * half, z - 0.015), (x + 0.002, 0.2 * half, z + 0.015)) if rng.random() < 0.6 else Solid()
+    )
+    for y in np.linspace(0.4, 0.8, int(rng.integers(2, 6))) * half * rng.choice([-1, 1]):
+        solid += rounded_box((x - 0.002, y - 0.01, z - 0.007), (x + 0.002, y + 0.01, z + 0.007), 0.004, axis=0)
+    return solid
+
+
+def _inside(rng: np.random.Generator, s: Shape) -> Solid:
+    """The shallow tray on the inside of the door, with the box for the detergent."""
+    if s.liner == 0.0:
+        return Solid()
+    half = min(s.half_door, s.half - s.wall) - 0.012
+    low, high = s.floor + s.liner + 0.02, s.top - max(0.03, s.wall)
+    solid = tray((-0.002, -half, low), (s.liner, half, high), 0.03, 0.0035, axis=0, side=1)
+    if s.liner > 0.01:
+        y, z = rng.uniform(-0.2, 0.5) * half, low + rng.uniform(0.4, 0.7) * (high - low)
+        solid += rounded_box((0, y - 0.06, z - 0.05), (0.8 * s.liner, y + 0.09, z + 0.05), 0.006)
+        solid += cylinder((0, y - 0.12, z), (0.7 * s.liner, y - 0.12, z), 0.03)
+    return solid
