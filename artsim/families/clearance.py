@@ -11,10 +11,11 @@ from artsim.assembly import JointSpec
 from artsim.kinematics import Array, Joint, KinematicTree
 from artsim.solids import Solid, Vector, cylinder
 
-_STATES = 384
-_ROUNDS = 40
-_NARROW = 0.88
-_NARROW_ROLL = 0.97
+Index = NDArray[np.int64]
+
+_STATES = 192
+_DESCENTS = 4
+_ROUNDS = 30
 
 
 @dataclass
@@ -26,6 +27,9 @@ class Link:
     name : str
     joint : JointSpec or None
         To the link before; None for the first.
+    narrowing : float
+        Share of its limits that the joint keeps when two links come too close; nearly 1 for a joint that turns
+        about the link's own direction, as that matters little.
     solid : Solid
     capsules : list of (7,) float
         Start, end and radius of rods around the solid, in the assembly's frame at rest.
@@ -33,6 +37,7 @@ class Link:
 
     name: str
     joint: JointSpec | None = None
+    narrowing: float = 0.8
     solid: Solid = field(default_factory=Solid)
     capsules: list[Array] = field(default_factory=list)
 
@@ -52,8 +57,9 @@ class Link:
 def narrow_limits(links: list[Link], margin: float) -> None:
     """Narrow the limits of a chain's joints until links that no joint connects keep clear of one another.
 
-    Tested in fixed quasi-random states, every other one with most joints close to a limit. Two links that are close
-    at rest may be closer than ``margin``: half their distance at rest.
+    Tested in fixed random states, every other one with most joints close to a limit, and in states around the
+    closest of those, again and again. Two links that are close at rest may be closer than ``margin``: half their
+    distance at rest.
 
     Parameters
     ----------
@@ -62,36 +68,41 @@ def narrow_limits(links: list[Link], margin: float) -> None:
     margin : float
         Metres between the capsules.
     """
-    owner = np.repeat(np.arange(len(links)), [len(link.capsules) for link in links])
-    capsules = np.array([c for link in links for c in link.capsules])
-    first, second = np.nonzero(owner[:, None] + 1 < owner)
-    wanted = np.minimum(margin, 0.5 * _gaps(links, capsules, owner, first, second, np.zeros((1, len(links)))))
-    if wanted.size and wanted.min() <= 0:
+    pairs = _Pairs(links)
+    if not pairs.first.size:
+        return
+    wanted = np.minimum(margin, 0.5 * pairs.gaps(np.zeros((1, len(links)))))
+    if wanted.min() <= 0:
         raise ValueError("two links of the chain touch at rest")
     rng = np.random.default_rng(0)
     unit = rng.random((_STATES, len(links)))
     unit[::2] = 0.5 - 0.5 * np.cos(np.pi * unit[::2])
     for _ in range(_ROUNDS):
         bounds = np.array([_interval(link.joint) for link in links])
-        states = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
-        tight = (_gaps(links, capsules, owner, first, second, states) < wanted).any(axis=0)
+        tight = _tight_pairs(pairs, wanted, bounds, unit, rng)
         if not tight.any():
             return
-        pairs = zip(owner[first[tight]], owner[second[tight]], strict=True)
-        concerned = {k for a, b in pairs for k in range(a + 1, b + 1)}
-        for k in concerned:
+        for k in pairs.joints_between(tight):
             joint = links[k].joint
             assert joint is not None
             if np.isfinite(joint.lower):
-                share = _NARROW_ROLL if _rolls(links[k - 1], joint) else _NARROW
+                share = links[k].narrowing
                 links[k].joint = replace(joint, lower=share * joint.lower, upper=share * joint.upper)
 
 
-def _rolls(before: Link, joint: JointSpec) -> bool:
-    """Whether a joint turns about the direction of the link before it, so that its limits matter less."""
-    along = before.capsules[-1][3:6] - before.capsules[-1][:3]
-    across = np.linalg.norm(np.cross(along, joint.axis))
-    return joint.type == "revolute" and bool(across < 0.1 * np.linalg.norm(along))
+def _tight_pairs(
+    pairs: _Pairs, wanted: Array, bounds: Array, unit: Array, rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """(P,) which pairs come closer than wanted; ``unit`` is the share of its range that each joint goes first."""
+    for step in range(_DESCENTS + 1):
+        spare = pairs.gaps(bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])) - wanted
+        tight: NDArray[np.bool_] = np.any(spare < 0, axis=0)
+        if tight.any() or step == _DESCENTS:
+            break
+        closest = unit[np.argsort(spare.min(axis=1))[:24]]
+        near = np.repeat(closest, 8, axis=0)
+        unit = np.clip(near + rng.normal(0.0, 0.25 / (step + 1), near.shape), 0.0, 1.0)
+    return tight
 
 
 def _interval(joint: JointSpec | None) -> tuple[float, float]:
@@ -100,32 +111,54 @@ def _interval(joint: JointSpec | None) -> tuple[float, float]:
     return (joint.lower, joint.upper) if np.isfinite(joint.lower) else (-np.pi, np.pi)
 
 
-def _gaps(
-    links: list[Link], capsules: Array, owner: NDArray[np.intp], first: Array, second: Array, states: Array
-) -> Array:
-    """(S, P) distances of pairs of capsules in S states; negative where they overlap."""
-    joints = [Joint("root", "free", -1)]
-    for k, link in enumerate(links[1:], 1):
-        assert link.joint is not None
-        x, y, z = (np.asarray(link.joint.axis, dtype=np.float64) / np.linalg.norm(link.joint.axis)).tolist()
-        ox, oy, oz = (float(v) for v in link.joint.origin)
-        joints.append(Joint(link.name, link.joint.type, k - 1, (x, y, z), (ox, oy, oz), -np.inf, np.inf))
-    T = KinematicTree(joints).forward_kinematics(states)[:, owner]
-    starts = np.einsum("sncd,nd->snc", T[..., :3, :3], capsules[:, :3]) + T[..., :3, 3]
-    ends = np.einsum("sncd,nd->snc", T[..., :3, :3], capsules[:, 3:6]) + T[..., :3, 3]
-    apart = _segment_distance(starts[:, first], ends[:, first], starts[:, second], ends[:, second])
-    gaps: Array = apart - capsules[first, 6] - capsules[second, 6]
-    return gaps
+class _Pairs:
+    """Pairs of capsules on links that no joint connects.
+
+    Attributes
+    ----------
+    first, second : (P,) int
+        Capsules of each pair.
+    """
+
+    def __init__(self, links: list[Link]):
+        owner = np.repeat(np.arange(len(links)), [len(link.capsules) for link in links])
+        self.capsules = np.array([c for link in links for c in link.capsules])
+        self.first, self.second = np.nonzero(owner[:, None] + 1 < owner)
+        self.owner = owner
+        joints = [Joint("root", "free", -1)]
+        for k, link in enumerate(links[1:], 1):
+            assert link.joint is not None
+            x, y, z = (np.asarray(link.joint.axis, dtype=np.float64) / np.linalg.norm(link.joint.axis)).tolist()
+            ox, oy, oz = (float(v) for v in link.joint.origin)
+            joints.append(Joint(link.name, link.joint.type, k - 1, (x, y, z), (ox, oy, oz), -np.inf, np.inf))
+        self.tree = KinematicTree(joints)
+
+    def joints_between(self, chosen: NDArray[np.bool_]) -> set[int]:
+        """Joints between the two links of any chosen pair."""
+        ends = zip(self.owner[self.first[chosen]], self.owner[self.second[chosen]], strict=True)
+        return {k for a, b in ends for k in range(a + 1, b + 1)}
+
+    def gaps(self, states: Array) -> Array:
+        """(S, P) distances in S states, in metres; negative where two capsules overlap."""
+        T = self.tree.forward_kinematics(states)[:, self.owner]
+        start, end = (
+            np.einsum("sncd,nd->snc", T[..., :3, :3], self.capsules[:, i : i + 3]) + T[..., :3, 3] for i in (0, 3)
+        )
+        radius = self.capsules[:, 6]
+        middle = _segment_distance(start, end - start, self.first, self.second)
+        gaps: Array = middle - radius[self.first] - radius[self.second]
+        return gaps
 
 
-def _segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """Distances of segments from a to b and from c to d, (..., 3) each."""
-    u, v, w = b - a, d - c, a - c
-    uu, vv, uv = ((x * y).sum(axis=-1) for x, y in ((u, u), (v, v), (u, v)))
-    uw, vw = (u * w).sum(axis=-1), (v * w).sum(axis=-1)
-    uu, vv = np.maximum(uu, 1e-12), np.maximum(vv, 1e-12)
+def _segment_distance(start: Array, along: Array, first: Index, second: Index) -> Array:
+    """(S, P) distances of pairs of segments, which are (S, N, 3) start points and vectors to their ends."""
+    u, v, w = along[:, first], along[:, second], start[:, first] - start[:, second]
+    length = np.maximum((along * along).sum(axis=-1), 1e-12)
+    uu, vv = length[:, first], length[:, second]
+    uv, uw, vw, ww = (np.einsum("spc,spc->sp", a, b) for a, b in ((u, v), (u, w), (v, w), (w, w)))
     s = np.clip((uv * vw - vv * uw) / np.maximum(uu * vv - uv * uv, 1e-12), 0.0, 1.0)
     t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
-    distance: Array = np.linalg.norm(w + s[..., None] * u - t[..., None] * v, axis=-1)
+    squared = ww + s * (s * uu + 2.0 * uw - 2.0 * t * uv) + t * (t * vv - 2.0 * vw)
+    distance: Array = np.sqrt(np.maximum(squared, 0.0))
     return distance

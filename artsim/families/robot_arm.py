@@ -87,6 +87,7 @@ class _Chain:
             continuous(self.name, self.along, face) if spin else revolute(self.name, self.along, face, -limit, limit)
         )
         self._next(joint)
+        self.link.narrowing = 0.97
         self.at = face + GAP * self.along
         self.link.rod(self.at, self.at + 0.5 * r * self.along, r)
         self.at = self.at + 0.45 * r * self.along
@@ -133,7 +134,7 @@ def build(rng: np.random.Generator) -> Assembly:
     else:
         _arm(chain, reach, str(rng.choice(ARMS)))
     spread = _tool(chain)
-    narrow_limits(chain.links, 0.012 * reach)
+    narrow_limits(chain.links, 0.025 * reach)
 
     arm = Assembly()
     for link in chain.links:
