@@ -14,7 +14,16 @@ import numpy as np
 
 from artsim.assembly import Assembly
 from artsim.errors import ConfigError
-from artsim.families import box, dishwasher, drawer, laptop, robot_arm, storage_furniture
+from artsim.families import (
+    box,
+    dishwasher,
+    drawer,
+    eyeglasses,
+    laptop,
+    microwave,
+    robot_arm,
+    storage_furniture,
+)
 from artsim.objects import ArticulatedObject
 
 Family = Callable[[np.random.Generator], Assembly]
@@ -23,7 +32,9 @@ FAMILIES: dict[str, Family] = {
     "box": box.build,
     "dishwasher": dishwasher.build,
     "drawer": drawer.build,
+    "eyeglasses": eyeglasses.build,
     "laptop": laptop.build,
+    "microwave": microwave.build,
     "robot_arm": robot_arm.build,
     "storage_furniture": storage_furniture.build,
 }

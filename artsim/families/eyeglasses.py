@@ -1,0 +1,294 @@
+"""Eyeglasses: a frame with lenses, bridge and nose pads, and two temples that fold inwards, open at rest.
+
+Varied: the outline of the lenses (round, rectangular, aviator, cat eye), one lens each or a shield, the rim (wire,
+thick, above only, none), the bridge (one bar, two, saddle), nose pads, the wrap of the front, the temples (flat or
+wire, tapered, bent ends, sleeves), and which temple folds above the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from artsim.assembly import Assembly, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
+
+GAP = 0.0006
+MM = 0.001
+STEEPEST = np.deg2rad(8.5)
+"""Largest tilt of the hinges from the vertical."""
+
+
+@dataclass(frozen=True)
+class Front:
+    """Measures of the front, metres. The hinges lie at x = 0, the lenses before them.
+
+    Attributes
+    ----------
+    half : float
+        From the middle to a hinge.
+    ahead, wrap : float
+        The front lies at x = -ahead in the middle, and further back by wrap at the hinges.
+    hinge_z : float
+    height, thickness : float
+        Of the temples at the hinges.
+    barrel : float
+        Radius of the hinges.
+    """
+
+    half: float
+    ahead: float
+    wrap: float
+    hinge_z: float
+    height: float
+    thickness: float
+    barrel: float
+
+    def x(self, y: Array | float) -> Array:
+        """Middle surface of the front over y."""
+        depth: Array = self.wrap * (np.asarray(y) / self.half) ** 2 - self.ahead
+        return depth
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """Eyeglasses, open at rest; each temple turns inwards about its hinge."""
+    style = str(rng.choice(["wire", "thick", "half", "rimless", "shield"], p=[0.27, 0.36, 0.15, 0.08, 0.14]))
+    size = rng.uniform(0.92, 1.08) if rng.random() < 0.85 else rng.uniform(0.75, 0.9)
+    outline = size * _outline(rng)
+    apart = size * rng.uniform(14.0, 24.0) * MM + float(np.ptp(outline[:, 0]))
+    outline[:, 0] += apart / 2 - 0.5 * (outline[:, 0].min() + outline[:, 0].max())
+    rim = {"wire": 1.3, "thick": rng.uniform(2.0, 4.5), "half": rng.uniform(1.5, 3.5)}.get(style, 1.0) * MM
+    flat = style in ("thick", "shield") or rng.random() < 0.4
+    front = _front(rng, style, outline, rim, size, flat)
+
+    depth = max(rim * rng.uniform(0.8, 1.2), 2.2 * MM)
+    frame = _glass(rng, style, outline, front, rim, depth)
+    if style != "shield":
+        frame += _bridge(rng, style, outline, front, rim)
+    frame += _nose_pads(rng, style, outline, front, rim)
+
+    # The temples sweep two parallel planes: hinges tilted sideways by one angle keep one above the other however far
+    # each is folded, as real ones lie across one another. The tilt bounds how far their ends may bend down.
+    bend = float(min(rng.uniform(3.0, 26.0) * MM, 2 * front.half * np.sin(STEEPEST) - front.height - 2.5 * MM))
+    temple = _temple(rng, front, max(bend, 0.0), flat)
+    rise = float(np.ptp(temple.bounds()[:, 2])) + 2.0 * MM
+    tilt = float(rng.choice([-1, 1]) * np.arcsin(rise / (2 * front.half)))
+    limit = np.deg2rad(rng.uniform(77.0, 87.0))
+    hinge = _hinge(front)
+    parts = {}
+    for name, side in (("temple_left", -1), ("temple_right", 1)):
+        place = np.array([0.0, side * front.half, front.hinge_z])
+        fixed, moving = (half if side > 0 else half.mirrored(1) for half in hinge)
+        frame += fixed.turned((1, 0, 0), -tilt).moved(place) + _endpiece(front, outline, depth, side)
+        arm = temple if side > 0 else temple.mirrored(1)
+        axis = (0.0, -side * np.sin(tilt), -side * np.cos(tilt))
+        solid = arm.moved(place) + moving.turned((1, 0, 0), -tilt).moved(place)
+        parts[name] = solid, revolute("frame", axis, place, 0.0, limit)
+    glasses = Assembly()
+    glasses.add("frame", frame, density=1200.0)
+    for name, (solid, joint) in parts.items():
+        glasses.add(name, solid, joint, density=1200.0)
+    return glasses
+
+
+def _outline(rng: np.random.Generator) -> Array:
+    """(N, 2) y and z of the rim of the lens at +y, the outer side at larger y."""
+    kind = str(rng.choice(["round", "rectangular", "aviator", "cat", "panto"]))
+    wide = {"round": (42, 52), "aviator": (54, 62)}.get(kind, (47, 58))
+    tall = {"round": (0.9, 1.0), "rectangular": (0.48, 0.75), "aviator": (0.78, 0.92), "cat": (0.6, 0.82)}
+    power = {"round": (2.0, 2.2), "rectangular": (2.8, 5.0)}.get(kind, (2.2, 3.0))
+    a = 0.5 * rng.uniform(*wide) * MM
+    b = a * rng.uniform(*tall.get(kind, (0.72, 0.95)))
+    n = rng.uniform(*power)
+    angles = np.linspace(0.0, 2.0 * np.pi, 30, endpoint=False)
+    c, s = np.cos(angles), np.sin(angles)
+    y, z = np.sign(c) * np.abs(c) ** (2 / n), np.sign(s) * np.abs(s) ** (2 / n)
+    nasal = {"aviator": (0.25, 0.45), "round": (0.0, 0.05)}.get(kind, (0.05, 0.25))
+    y = y + rng.uniform(*nasal) * (1 - z) ** 2 / 4 * np.clip(-y, 0, 1)  # room for the nose below
+    y = y * (1 + rng.uniform(0.0, 0.12) * z * (kind != "round"))
+    if kind == "cat":
+        z = z + rng.uniform(0.12, 0.35) * np.clip(y, 0, 2) ** 2 * np.clip(z + 0.3, 0, 1)
+    if kind == "aviator":
+        z = z - rng.uniform(0.0, 0.15) * y * np.clip(-z, 0, 1)
+    return np.stack([a * y, b * z], axis=1)
+
+
+def _front(rng: np.random.Generator, style: str, outline: Array, rim: float, size: float, flat: bool) -> Front:
+    height = rng.uniform(5.0, 13.0 if style == "shield" else 10.0) if flat else rng.uniform(2.2, 4.0)
+    wrap = size * (rng.uniform(10.0, 20.0) if style == "shield" else rng.uniform(2.0, 9.0)) * MM
+    low, high = outline[:, 1].min(), outline[:, 1].max()
+    return Front(
+        half=float(outline[:, 0].max()) + rim + rng.uniform(0.5, 4.0) * MM,
+        ahead=wrap + rng.uniform(6.0, 11.0) * MM,
+        wrap=wrap,
+        hinge_z=float(high - rng.uniform(0.08, 0.42) * (high - low)) - 0.2 * height * MM,
+        height=height * MM,
+        thickness=(rng.uniform(2.4, 4.2) if flat else rng.uniform(1.8, 2.6)) * MM,
+        barrel=rng.uniform(1.0, 1.4) * MM,
+    )
+
+
+def _chains(outline: Array, y: Array) -> tuple[Array, Array]:
+    """Lower and upper z of the outline over y."""
+    half = len(outline) // 2
+    upper, lower = outline[: half + 1], np.concatenate([outline[half:], outline[:1]])
+    chains = [chain[np.argsort(chain[:, 0])] for chain in (lower, upper)]
+    low, high = (np.interp(y, chain[:, 0], chain[:, 1]) for chain in chains)
+    return low, high
+
+
+def _sheet(front: Front, y: Array, low: Array, high: Array, thickness: float) -> Solid:
+    """Curved pane along the front between two heights over y."""
+    x = front.x(y)
+    columns = [[(x[k] + s * thickness / 2, y[k], z) for z in (low[k], high[k]) for s in (-1, 1)] for k in range(len(y))]
+    return union(hull([*a, *b]) for a, b in pairwise(columns))
+
+
+def _glass(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float, depth: float) -> Solid:
+    """Lenses and rims."""
+    inner, outer = outline[:, 0].min(), outline[:, 0].max()
+    y = 0.5 * (inner + outer) - 0.5 * (outer - inner) * np.cos(np.linspace(0.06, np.pi - 0.06, 11))
+    low, high = _chains(outline, y)
+    lens = _sheet(front, y, low, high, 1.8 * MM)
+    if style in ("wire", "thick"):
+        lens += _rim(front, outline, rim, depth, closed=True)
+    elif style == "half":
+        lens += _rim(front, np.roll(outline, 1, axis=0)[: len(outline) // 2 + 3], rim, depth, closed=False)
+    solid = lens + lens.mirrored(1)
+    if style == "shield":
+        edge = inner + 0.3 * (outer - inner)
+        y = np.linspace(-edge, edge, 9)
+        top = float(_chains(outline, np.array([edge]))[1][0])
+        span = top - outline[:, 1].min()
+        nose = top - span * (rng.uniform(0.25, 0.4) + 0.5 * (y / edge) ** 2)
+        solid += _sheet(front, y, nose, np.full(9, top), 1.8 * MM)
+        if rng.random() < 0.6:
+            y = np.linspace(-outer, outer, 15)
+            brow = np.where(np.abs(y) < edge, top, _chains(outline, np.clip(np.abs(y), edge, 0.97 * outer))[1])
+            solid += _sheet(front, y, brow - rng.uniform(3.0, 7.0) * MM, brow + 1.0 * MM, rng.uniform(2.4, 4.0) * MM)
+    return solid
+
+
+def _rim(front: Front, points: Array, width: float, depth: float, closed: bool) -> Solid:
+    """Bar of rounded section along an outline; reaches inwards over the lens's edge."""
+    steps = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    if not closed:
+        steps[0], steps[-1] = points[1] - points[0], points[-1] - points[-2]
+    normals = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / np.linalg.norm(steps, axis=1, keepdims=True)
+    section = _octagon(0.5 * width + 0.4 * MM, 0.5 * depth) + (0.5 * width - 0.4 * MM, 0.0)
+    x = front.x(points[:, 0])
+    rings = []
+    for k in range(len(points)):
+        flat = points[k] + section[:, :1] * normals[k]
+        rings.append(np.column_stack([x[k] + section[:, 1], flat]))
+    return loft(rings, closed)
+
+
+def _octagon(a: float, b: float) -> Array:
+    """(8, 2) rectangle of half sides a and b with cut corners."""
+    cut = 0.55 * min(a, b)
+    corners = [(a, b - cut), (a - cut, b), (cut - a, b), (-a, b - cut), (-a, cut - b), (cut - a, -b), (a - cut, -b)]
+    return np.array([*corners, (a, cut - b)])
+
+
+def _bridge(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float) -> Solid:
+    """One bar, two, or a thick saddle between the rims."""
+    low, high = outline[:, 1].min(), outline[:, 1].max()
+    inner = outline[: len(outline)]
+    thick = style == "thick"
+    radius = 0.5 * max(rim, 1.8 * MM) if not thick else 0.5 * rng.uniform(3.0, 6.0) * MM
+
+    def bar(level: float, arch: float) -> Solid:
+        z = low + level * (high - low)
+        left = inner[inner[:, 0] < np.median(inner[:, 0])]
+        y = float(np.interp(z, *left[np.argsort(left[:, 1])].T[::-1])) + 0.3 * MM
+        share = np.linspace(-1.0, 1.0, 7)
+        bow = arch * (1 - share**2)
+        return tube(np.column_stack([front.x(share * y) - 0.4 * bow, share * y, z + bow]), radius, 8)
+
+    level = rng.uniform(0.6, 0.78)
+    solid = bar(level, rng.uniform(0.5, 4.0) * MM)
+    if not thick and style != "rimless" and rng.random() < 0.3:
+        solid += bar(0.95, rng.uniform(0.0, 1.5) * MM)
+    return solid
+
+
+def _nose_pads(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float) -> Solid:
+    """Two pads that slope along the nose, on wires or grown to the rims."""
+    low, high = outline[:, 1].min(), outline[:, 1].max()
+    z = low + rng.uniform(0.38, 0.55) * (high - low)
+    left = outline[outline[:, 0] < np.median(outline[:, 0])]
+    edge = float(np.interp(z, *left[np.argsort(left[:, 1])].T[::-1]))
+    x = float(front.x(edge))
+    if style == "shield":
+        return Solid()
+    if style == "thick" and rng.random() < 0.8:
+        pad = ellipsoid((0, 0, 0), (2.6 * MM, 0.5 * rim + 1.2 * MM, rng.uniform(4.5, 7.0) * MM), 12)
+        pad = pad.turned((1, 0, 0), 0.3).moved((x + 2.0 * MM, edge - 0.4 * rim, z))
+        return pad + pad.mirrored(1)
+    back = min(rng.uniform(4.5, 7.5) * MM, -x - 2.0 * MM)
+    y = edge - rim - rng.uniform(0.5, 2.0) * MM
+    pad = ellipsoid((0, 0, 0), (2.6 * MM, 1.1 * MM, rng.uniform(4.5, 6.5) * MM), 12)
+    pad = pad.turned((1, 0, 0), 0.3).turned((0, 0, 1), -0.5).moved((x + back, y, z - 1.0 * MM))
+    start = (x, edge - 0.3 * rim, z + 1.0 * MM)
+    wire = tube([start, (x + 0.6 * back, edge, z + 3.0 * MM), (x + back, y, z)], 0.6 * MM, 6)
+    return pad + wire + (pad + wire).mirrored(1)
+
+
+def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
+    """Corner from the lens or rim out and back to the hinge."""
+    right = outline[outline[:, 0] > np.median(outline[:, 0])]
+    right = right[np.argsort(right[:, 1])]
+    h, z = 0.5 * front.height, front.hinge_z
+    y = float(np.interp(z, right[:, 1], right[:, 0]))
+    x = float(front.x(front.half))
+    near, far = front.half + front.barrel, front.half + front.barrel + front.thickness
+    x_lens = float(front.x(y))
+    at_lens = box((x_lens - depth / 2, y - 1.2 * MM, z - h), (x_lens + depth / 2, y, z + h))
+    corner = box((x - depth / 2, near, z - h), (x + 0.7 * depth, far - 0.3 * front.thickness, z + h))
+    ahead = box((x, near, z - h), (x + depth, far, z + h))
+    back = box((-3.0 * MM, near, z - h), (-GAP, far, z + h))
+    solid = hull_of(at_lens, corner) + hull_of(corner, ahead) + hull_of(ahead, back)
+    return solid if side > 0 else solid.mirrored(1)
+
+
+def _hinge(front: Front) -> tuple[Solid, Solid]:
+    """Knuckles on the axis of the hinge at +y: the frame's, above and below, and the temple's between them."""
+    half, b = 0.5 * max(min(0.8 * front.height, 6.0 * MM), 3.6 * MM), front.barrel
+    third = half / 3
+
+    def knuckle(low: float, high: float, x0: float, x1: float) -> Solid:
+        leaf = box((x0, -0.3 * b, low), (x1, b + 0.8 * MM, high))
+        return cylinder((0, 0, low), (0, 0, high), 0.9 * b, sections=12) + leaf
+
+    fixed = knuckle(third, half, -3.0 * MM, -GAP) + knuckle(-half, -third, -3.0 * MM, -GAP)
+    return fixed, knuckle(-third + 0.3 * MM, third - 0.3 * MM, GAP, 3.0 * MM)
+
+
+def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> Solid:
+    """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
+    length = 2 * front.half * rng.uniform(0.92, 1.06)
+    x = np.concatenate([np.linspace(GAP, 0.6 * length, 6), np.linspace(0.68, 1.0, 9) * length])
+    share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
+    z = -bend * (share / share[-1]) ** rng.uniform(1.2, 1.8)
+    y = front.barrel + 0.5 * front.thickness - rng.uniform(0.0, 3.0) * MM * (x / length) ** 2
+    waist = rng.uniform(0.45, 0.95) if flat else 0.8
+    heights = front.height * (1 - (1 - waist) * np.clip(x / (0.55 * length), 0, 1))
+    thick = front.thickness * (1 - (0.3 if flat else 0.15) * x / length)
+    paddle = rng.uniform(1.0, 1.5) if flat else 1.0
+    heights = np.minimum(heights * (1 + (paddle - 1) * share / share[-1]), front.height)
+    if not flat and rng.random() < 0.8:  # a sleeve over the end of the wire
+        sleeve = x > 0.64 * length
+        heights, thick = np.where(sleeve, 4.0 * MM, heights), np.where(sleeve, 2.8 * MM, thick)
+    heights[-1] *= 0.75
+    slopes = np.gradient(z, x)
+    slopes[0] = 0.0
+    rings = []
+    for k in range(len(x)):
+        section = _octagon(0.5 * thick[k], 0.5 * heights[k])
+        up = np.array([-slopes[k], 0.0, 1.0]) / np.hypot(slopes[k], 1.0)
+        rings.append((x[k], y[k], z[k]) + section[:, :1] * (0, 1, 0) + section[:, 1:] * up)
+    return loft(rings)
