@@ -22,6 +22,7 @@ from artsim.families import (
     laptop,
     microwave,
     robot_arm,
+    scissors,
     storage_furniture,
 )
 from artsim.objects import ArticulatedObject
@@ -36,6 +37,7 @@ FAMILIES: dict[str, Family] = {
     "laptop": laptop.build,
     "microwave": microwave.build,
     "robot_arm": robot_arm.build,
+    "scissors": scissors.build,
     "storage_furniture": storage_furniture.build,
 }
 """Every category that :func:`make` knows."""

@@ -1,0 +1,217 @@
+"""Boxes: cartons with one, two or four flaps (see ``carton``), and rigid boxes, chests and cases with one lid or two.
+
+Sizes, the shape of lids (flat, hollow, domed, with a skirt), corners, bands, feet, dividers, handles and latches of
+rigid boxes vary.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, revolute
+from artsim.families.carton import carton
+from artsim.families.details import bow_handle, knob, rounded_tray
+from artsim.solids import Solid, box, cylinder, frame, hull, rounded_box, tray, union
+
+GAP = 0.0015
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A box, closed at rest."""
+    return carton(rng) if rng.random() < 0.45 else _rigid(rng)
+
+
+def _rigid(rng: np.random.Generator) -> Assembly:
+    """Chest, case or jewellery box; its hinge lies behind the back, so that the lid clears it in every state."""
+    width = rng.choice([rng.uniform(0.12, 0.35), rng.uniform(0.4, 1.3)])
+    depth = width * rng.uniform(0.42, 0.8)
+    height = width * rng.uniform(0.18, 0.6)
+    wall = max(0.003, width * rng.uniform(0.012, 0.035))
+    x, y = depth / 2, width / 2
+    radius = rng.choice([0.0, rng.uniform(0.02, 0.1) * depth])
+    band = rng.choice([0.0, wall * rng.uniform(0.3, 0.6)])
+    back = x + band + 0.001
+    seam = height + GAP
+
+    body = _rigid_body(rng, x, y, height, wall, radius)
+    body += _bands(rng, x, y, 0.0, height, band, wall, radius)
+    body += _interior(rng, x, y, height, wall, radius)
+    body += _feet(rng, x, y, wall)
+    if height > 0.12 and rng.random() < 0.25:
+        body += _side_handles(rng, x, y, height)
+
+    chest = Assembly()
+    chest.add("body", body, density=700.0)
+    halves = rng.random() < 0.12 and radius == 0.0
+    if halves:  # two lids, hinged at the left and the right
+        limit = np.deg2rad(rng.uniform(80.0, 175.0))
+        thick = wall * rng.uniform(0.6, 1.2)
+        for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
+            lid = box((-x, min(sign * y, sign * GAP), seam), (x, max(sign * y, sign * GAP), seam + thick))
+            lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)
+            chest.add(
+                f"lid_{number}", lid, revolute("body", axis, (0, sign * (y + 0.001), seam), 0.0, limit), density=700.0
+            )
+        return chest
+    lid, top, domed = _lid(rng, x, y, seam, height, wall, radius, band == 0.0)
+    lid += _bands(rng, x, y, seam, top, band, wall, radius) if top - seam > 3 * wall else Solid()
+    if not domed:
+        lid += _lid_handle(rng, x, y, top)
+    barrel = max(0.002, 0.25 * wall)
+    axis_x = back + barrel
+    spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
+    for first, last in spans:
+        lid += cylinder((axis_x, first * y, seam), (axis_x, last * y, seam), barrel, sections=12)
+        lid += box((x - wall, first * y, seam + 0.0003), (axis_x, last * y, seam + 0.9 * barrel))
+    limit = np.deg2rad(rng.choice([rng.uniform(75.0, 115.0), rng.uniform(115.0, 170.0)]))
+    chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit), density=700.0)
+    if top - seam > 0.02 and rng.random() < 0.2:
+        _latches(rng, chest, x + band, y, seam, top)
+    return chest
+
+
+def _rigid_body(rng: np.random.Generator, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
+    if radius == 0.0:
+        return tray((-x, -y, 0), (x, y, height), wall)
+    bevel = rng.choice([0.0, 0.4 * radius])
+    profile = [(0.0, bevel), (bevel / height, 0.0), (1.0, 0.0)] if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
+    return rounded_tray((-x, -y, 0), (x, y, height), wall, radius, profile, floor=wall + bevel)
+
+
+def _bands(
+    rng: np.random.Generator, x: float, y: float, low: float, high: float, band: float, wall: float, radius: float
+) -> Solid:
+    """Boards and straps that stand out all around: at the edges, or across the front."""
+    if band <= 0:
+        return Solid()
+    inner = wall + radius
+    ends = [(low, low + 1.5 * wall), (high - 1.5 * wall, high)]
+    solid = union(
+        frame((-x - band, -y - band, z0), (x + band, y + band, z1), [0.8 * wall + band] * 4, 0, 1)
+        for z0, z1 in ends[: int(rng.integers(1, 3))]
+    )
+    if rng.random() < 0.6:
+        half = 0.7 * wall
+        for share in ((-0.6, 0.6), (-0.7, 0.0, 0.7))[int(rng.integers(2))]:
+            middle = share * (y - inner)
+            for side in (-x - band, x - 0.8 * wall):
+                solid += box((side, middle - half, low), (side + band + 0.8 * wall, middle + half, high))
+    return solid
+
+
+def _interior(rng: np.random.Generator, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
+    """Dividers below the rim."""
+    if rng.random() < 0.5:
+        return Solid()
+    thin = max(0.0015, 0.3 * wall)
+    top = height * rng.uniform(0.4, 0.9)
+    solid = Solid()
+    for edge in np.linspace(-y, y, int(rng.integers(2, 5)) + 1)[1:-1]:
+        solid += box((-x + wall / 2, edge - thin, wall / 2), (x - wall / 2, edge + thin, top))
+    for edge in np.linspace(-x, x, int(rng.integers(1, 4)) + 1)[1:-1]:
+        solid += box((edge - thin, -y + wall / 2, wall / 2), (edge + thin, y - wall / 2, top))
+    return solid
+
+
+def _feet(rng: np.random.Generator, x: float, y: float, wall: float) -> Solid:
+    """Plinth, blocks or balls below the corners, or nothing."""
+    kind = str(rng.choice(["none", "plinth", "blocks", "balls"], p=[0.5, 0.2, 0.2, 0.1]))
+    drop = wall * rng.uniform(1.0, 3.0)
+    corners = [(s * (x - 2 * wall), t * (y - 2 * wall)) for s in (-1, 1) for t in (-1, 1)]
+    if kind == "plinth":
+        out = 0.0 if rng.random() < 0.3 else 0.8 * wall
+        return frame((-x - out, -y - out, -drop), (x, y + out, wall), [2 * wall + out] * 4, 0, 1)
+    if kind == "blocks":
+        return union(
+            box((a - 1.9 * wall, b - 1.9 * wall, -drop), (a + 1.9 * wall, b + 1.9 * wall, 0.5 * wall))
+            for a, b in corners
+        )
+    if kind == "balls":
+        return union(cylinder((a, b, -drop), (a, b, 0.5 * wall), 1.2 * wall, 1.8 * wall, 16) for a, b in corners)
+    return Solid()
+
+
+def _lid(
+    rng: np.random.Generator, x: float, y: float, seam: float, height: float, wall: float, radius: float, plain: bool
+) -> tuple[Solid, float, bool]:
+    """Lid above the seam, the top of its upright part, and whether a dome rises above that."""
+    kind = str(rng.choice(["flat", "hollow", "dome"], p=[0.35, 0.45, 0.2]))
+    if kind == "flat":
+        thick = wall * rng.uniform(0.7, 1.5)
+        over = rng.choice([0.0, rng.uniform(0.5, 1.2) * wall])
+        low, high = (-x - over, -y - over, seam), (x, y + over, seam + thick)
+        solid = rounded_box(low, high, radius, axis=2) if radius > 0 else rounded_box(low, high, 0.2 * thick, steps=2)
+        inner = 0.6 * over
+        if plain and radius == 0.0 and inner > GAP and over - inner > 0.0015 and rng.random() < 0.6:
+            skirt = min(rng.uniform(0.5, 3.0) * wall, 0.18 * height)  # on three sides, outside the body
+            widths = [over - inner, 0.0, over - inner, over - inner]
+            solid += frame((-x - over, -y - over, seam - skirt), (x, y + over, seam + 0.6 * thick), widths, 0, 1)
+        elif rng.random() < 0.4:  # a raised board on top
+            solid += rounded_box(
+                (-0.75 * x, -0.85 * y, seam + 0.5 * thick), (0.75 * x, 0.85 * y, seam + 1.4 * thick), 0.3 * thick
+            )
+        return solid, seam + thick, False
+    if kind == "hollow":
+        rise = height * rng.uniform(0.15, 0.9)
+        if radius == 0.0:
+            return tray((-x, -y, seam), (x, y, seam + rise), wall, side=-1), seam + rise, False
+        bevel = min(rng.choice([0.0, 0.6 * radius]), 0.5 * rise)
+        profile = [(0.0, bevel), (0.3 * bevel / rise, 0.3 * bevel), (bevel / rise, 0.0), (1.0, 0.0)]
+        shape = profile if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
+        return (
+            rounded_tray((-x, -y, seam), (x, y, seam + rise), wall, radius, shape, side=-1, floor=wall + bevel),
+            seam + rise,
+            False,
+        )
+    straight = height * rng.uniform(0.0, 0.25) + 2 * wall
+    rise = x * rng.uniform(0.35, 0.95)
+    angles = np.linspace(0.0, np.pi, 11)
+    arc = [(np.cos(angles) * (x - w), seam + straight + np.sin(angles) * (rise - w)) for w in (0.0, wall)]
+    rows = [np.stack([a, np.zeros(11), b], axis=1) for a, b in arc]
+    solid = frame((-x, -y, seam), (x, y, seam + straight + 0.001), [wall] * 4, 0, 1)
+    for k in range(10):
+        strip = np.concatenate([row[[k, k + 1]] for row in rows])
+        solid += hull(np.concatenate([strip - (0, y, 0), strip + (0, y, 0)]))
+    for end in (-y, y - wall):
+        solid += hull(np.concatenate([rows[0] + (0, end, 0), rows[0] + (0, end + wall, 0)]))
+    return solid, seam + straight, True
+
+
+def _lid_handle(rng: np.random.Generator, x: float, y: float, top: float) -> Solid:
+    """Knob or bow on a flat top, or nothing."""
+    size = min(x, 0.5 * y, 0.12)
+    kind = rng.random()
+    if kind < 0.1:
+        return knob((0, 0, top), (0, 0, 1), 0.1 * size, 0.13 * size)
+    if kind < 0.25:
+        return bow_handle((0, -0.6 * size, top), (0, 0.6 * size, top), (0, 0, 1), 0.3 * size, 0.05 * size)
+    return Solid()
+
+
+def _side_handles(rng: np.random.Generator, x: float, y: float, height: float) -> Solid:
+    """Bows at the two ends of a chest."""
+    half, z = min(0.4 * x, 0.06), rng.uniform(0.55, 0.75) * height
+    return union(
+        bow_handle((-half, s * y, z), (half, s * y, z), (0, s, 0), 0.5 * half, 0.09 * half) for s in (-1.0, 1.0)
+    )
+
+
+def _latches(rng: np.random.Generator, chest: Assembly, front: float, y: float, seam: float, top: float) -> None:
+    """Hasps on the lid's front that hang down over the body and flip up."""
+    width = min(0.08 * y, 0.02)
+    upper = min(0.4 * (top - seam), 0.1 * y, 0.025)
+    pin = 0.0025
+    for number, share in enumerate((0.0,) if rng.random() < 0.5 else (-0.6, 0.6)):
+        middle = share * y
+        axis_x = -front - 2.2 * pin
+        z = seam + upper
+        solid = cylinder((axis_x, middle - width, z), (axis_x, middle + width, z), pin, sections=12)
+        solid += rounded_box(
+            (axis_x - 0.002, middle - width, seam - 1.4 * upper), (axis_x + 0.001, middle + width, z), 0.001
+        )
+        chest.add(
+            f"latch_{number}",
+            solid,
+            revolute("lid", (0, 1, 0), (axis_x, middle, z), 0.0, np.deg2rad(85.0)),
+            density=2000.0,
+        )

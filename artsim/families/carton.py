@@ -1,0 +1,147 @@
+"""Cartons: cardboard boxes with flaps.
+
+Flaps share the opening without overlapping one another, so each of them moves freely: mitred, one pair between the
+other, around a hole, or with the inner pair folding down into the carton. Sizes, reach of the flaps and hand holes
+vary.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, JointSpec, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, frame, hull, tray
+
+GAP = 0.0015
+
+
+def carton(rng: np.random.Generator) -> Assembly:
+    """Cardboard box; the longer flaps hang on the front and the back."""
+    width = rng.uniform(0.18, 0.6)
+    depth = width * rng.uniform(0.5, 1.0)
+    height = width * rng.uniform(0.3, 1.3)
+    wall = rng.uniform(0.003, 0.005)
+    x, y = depth / 2, width / 2
+    result = Assembly()
+    result.add("body", _carton_body(rng, x, y, height, wall), density=150.0)
+    kind = str(rng.choice(["one", "two", "mitred", "long", "short", "wheel", "inner"],
+                          p=[0.12, 0.25, 0.14, 0.16, 0.11, 0.1, 0.12]))  # fmt: skip
+    flaps = _flaps(rng, kind, x, y, wall, height)
+    limit = np.deg2rad(rng.uniform(100.0, 250.0))
+    for number, (side, inward, outline) in enumerate(flaps):
+        z = height + GAP + (0.0007 if side in ("left", "right") else 0.0)
+        if inward:
+            result.add(f"flap_{number}", *_inner_flap(side, outline, x, y, height, wall), density=150.0)
+            continue
+        own_limit = limit if rng.random() < 0.7 else np.deg2rad(rng.uniform(95.0, 250.0))
+        lip = rng.uniform(0.03, 0.08) if kind == "one" and rng.random() < 0.5 else 0.0
+        solid, joint = _outer_flap(side, outline, x, y, z, wall, own_limit, min(lip, 0.6 * height))
+        result.add(f"flap_{number}", solid, joint, density=150.0)
+    return result
+
+
+def _carton_body(rng: np.random.Generator, x: float, y: float, height: float, wall: float) -> Solid:
+    holes = rng.random() < 0.35 and min(x, y) > 0.1 and height > 0.15
+    if not holes:
+        return tray((-x, -y, 0), (x, y, height), wall)
+    solid = box((-x, -y, 0), (x, y, wall))
+    solid += box((-x, -y, 0), (-x + wall, y, height)) + box((x - wall, -y, 0), (x, y, height))
+    low, high = height * rng.uniform(0.6, 0.68), height * rng.uniform(0.75, 0.82)
+    half = min(rng.uniform(0.035, 0.05), 0.6 * x)
+    for end in (-y, y - wall):
+        solid += frame((-x, end, 0), (x, end + wall, height), [x - half, x - half, low, height - high], 0, 2)
+    return solid
+
+
+Flap = tuple[str, bool, Array]
+"""Where it hangs, whether it folds inward, and its outline (N, 2): distance from the hinge, and position along it."""
+
+
+def _flaps(rng: np.random.Generator, kind: str, x: float, y: float, wall: float, height: float) -> list[Flap]:
+    c = 0.002  # between flaps
+
+    def bar(reach: float, low: float, high: float, tip: float = 0.0) -> Array:
+        return np.array([(0.0, low), (0.0, high), (reach, high - tip), (reach, low + tip)])
+
+    tip = rng.choice([0.0, rng.uniform(0.0, 0.03)])
+    if kind == "one":
+        return [("back", False, bar(2 * x, -y, y, 0.0))]
+    if kind == "two":
+        share = rng.choice([1.0, 1.0, rng.uniform(0.5, 1.5), rng.uniform(0.4, 0.9)])
+        second = 2.0 - share if share > 1.0 or rng.random() < 0.5 else share
+        if rng.random() < 0.7:
+            return [("front", False, bar(share * x - c, -y, y, tip)), ("back", False, bar(second * x - c, -y, y, tip))]
+        return [("left", False, bar(share * y - c, -x, x, tip)), ("right", False, bar(second * y - c, -x, x, tip))]
+    if kind == "mitred":  # at 45 degrees, whatever their reach; a raised flap's inner edge clears the next one's corner
+        corner = wall + c
+        longs = bar(x * (reach := rng.uniform(0.6, 1.0)) - c, -y + corner, y - corner, x * reach - c)
+        ends = bar(x * (reach := rng.uniform(0.6, 0.95)) - c, -x + corner, x - corner, x * reach - 2 * c - wall)
+        return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
+    if kind == "long":  # short flaps reach a little way, long ones lie between them
+        short = y * rng.uniform(0.15, 0.6)
+        longs = bar(x * rng.choice([1.0, 0.8]) - c, -y + short + 2 * c, y - short - 2 * c, tip)
+        ends = bar(short, -x, x, min(tip, 0.2 * x))
+        return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
+    if kind == "short":
+        reach = x * rng.uniform(0.25, 0.6)
+        longs = bar(reach, -y, y, min(tip, 0.2 * y))
+        ends = bar(y * rng.choice([1.0, 0.7]) - c, -x + reach + 2 * c, x - reach - 2 * c, tip)
+        return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
+    if kind == "wheel":  # each flap ends at the next one's side
+        p = y * rng.uniform(0.4, 0.9)
+        return [
+            ("front", False, bar(x - c, -y, y - p - c)),
+            ("left", False, bar(p - c, -x, -c)),
+            ("back", False, bar(x - c, -y + p + c, y)),
+            ("right", False, bar(p - c, c, x)),
+        ]
+    short = min(y * rng.uniform(0.5, 0.95), height - 0.02)
+    longs = bar(x - c, -y, y, tip)
+    ends = bar(short, -x + wall + c, x - wall - c, 0.01)
+    return [(side, False, longs) for side in ("front", "back")] + [(side, True, ends) for side in ("left", "right")]
+
+
+# Of each side: the axis across the hinge (0: X, 1: Y), its sign at that side, and the direction of the hinge.
+_SIDES = {
+    "front": (0, -1.0, (0.0, -1.0, 0.0)),
+    "back": (0, 1.0, (0.0, 1.0, 0.0)),
+    "left": (1, 1.0, (-1.0, 0.0, 0.0)),
+    "right": (1, -1.0, (1.0, 0.0, 0.0)),
+}
+
+
+def _prism(side: str, outline: Array, edge: float, low: float, high: float) -> Solid:
+    """Flat piece between two heights from an outline along a hinge at distance ``edge`` from the middle."""
+    across, sign, _ = _SIDES[side]
+    points = np.empty((2, len(outline), 3))
+    points[:, :, across] = sign * (edge - outline[:, 0])
+    points[:, :, 1 - across] = outline[:, 1]
+    points[0, :, 2], points[1, :, 2] = low, high
+    return hull(points.reshape(-1, 3))
+
+
+def _outer_flap(
+    side: str, outline: Array, x: float, y: float, z: float, wall: float, limit: float, lip: float
+) -> tuple[Solid, JointSpec]:
+    """A flap that lies on the walls and opens outward about its upper edge, so that it may hang down outside."""
+    across, sign, axis = _SIDES[side]
+    edge = (x, y)[across]
+    solid = _prism(side, outline, edge, z, z + wall)
+    if lip > 0:  # over the front
+        solid += box((-x - GAP - wall, -y, z - lip), (-x - GAP, y, z + wall)) + box(
+            (-x - GAP - wall, -y, z), (0, y, z + wall)
+        )
+    origin = np.array([0.0, 0.0, z + wall])
+    origin[across] = sign * edge
+    return solid, revolute("body", axis, tuple(origin), 0.0, limit)
+
+
+def _inner_flap(side: str, outline: Array, x: float, y: float, height: float, wall: float) -> tuple[Solid, JointSpec]:
+    """A flap below the others, within the walls, that folds down into the carton."""
+    across, sign, axis = _SIDES[side]
+    edge = (x, y)[across] - wall - GAP
+    solid = _prism(side, outline, edge, height - wall, height)
+    origin = np.array([0.0, 0.0, height - wall])
+    origin[across] = sign * edge
+    return solid, revolute("body", -np.asarray(axis), tuple(origin), 0.0, np.deg2rad(86.0))
