@@ -16,6 +16,7 @@ from artsim.assembly import Assembly
 from artsim.errors import ConfigError
 from artsim.families import (
     box,
+    bucket,
     dishwasher,
     drawer,
     eyeglasses,
@@ -31,6 +32,7 @@ Family = Callable[[np.random.Generator], Assembly]
 
 FAMILIES: dict[str, Family] = {
     "box": box.build,
+    "bucket": bucket.build,
     "dishwasher": dishwasher.build,
     "drawer": drawer.build,
     "eyeglasses": eyeglasses.build,

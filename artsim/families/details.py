@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from artsim.assembly import JointSpec, revolute
 from artsim.kinematics import Array
 from artsim.solids import Solid, Vector, box, cylinder, frame, hull, prism, rounded_box, rounded_rectangle, tube, union
 
@@ -265,3 +266,35 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     face = np.asarray(face, dtype=np.float64)
     half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
     return rounded_box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), round_off, axis=0)
+
+
+def side_hinge(x: float, y: float, upper: float, left: bool, parent: str = "body") -> JointSpec:
+    """Upright hinge of a door in a front that faces -X.
+
+    Parameters
+    ----------
+    x, y : float
+        Where the axis stands.
+    upper : float
+        How far the door opens, radians.
+    left : bool
+        Whether the door reaches from the axis towards -Y: its hinge is on the left of someone who looks at the front.
+    """
+    return revolute(parent, (0, 0, -1 if left else 1), (x, y, 0.0), 0.0, upper)
+
+
+def front_handle(kind: str, start: Vector, end: Vector, reach: float, radius: float) -> Solid:
+    """Handle on a front that faces -X: "bar", "bow" or "flat"; of another kind, nothing.
+
+    Parameters
+    ----------
+    start, end : (3,) float
+        On the front, one above or beside the other, start below or to the -Y side of end.
+    """
+    if kind == "bar":
+        return bar_handle(start, end, (-1, 0, 0), reach, radius)
+    if kind == "bow":
+        return bow_handle(start, end, (-1, 0, 0), reach, radius)
+    if kind == "flat":
+        return flat_handle(start, end, reach, 2.5 * radius, radius)
+    return Solid()

@@ -1,0 +1,176 @@
+"""Microwave ovens: a door with a window beside a panel of controls, and a turntable.
+
+What varies: hinge on the left, on the right or at the bottom; controls beside, below or none at all; window, handle or
+a key that opens the door; dials, keys that move or stay; turntable or a flat floor; feet, vents.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, rounded_box, tray, union
+
+GAP = 0.0015
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A microwave oven, closed at rest. The back of its door is the plane x = 0."""
+    width, depth, height = rng.uniform(0.42, 0.62), rng.uniform(0.30, 0.48), rng.uniform(0.23, 0.37)
+    wall, thick = rng.uniform(0.012, 0.03), rng.uniform(0.018, 0.045)
+    foot = rng.uniform(0.006, 0.018)
+    drops = bool(rng.random() < 0.15)  # the door falls open, its controls below or above it
+    mirrored = bool(rng.random() < 0.15)
+    half = 0.5 * width
+    # Controls take the strip of the front that the door leaves: at -Y (before mirroring), or below it.
+    strip = rng.uniform(0.17, 0.33) * width if rng.random() < 0.88 else 0.0
+    low, high = np.array([-thick, strip - half, foot]), np.array([0.0, half, foot + height])
+    panel_low, panel_high = np.array([-thick, -half, foot]), np.array([0.0, strip - half - GAP, foot + height])
+    if drops:
+        strip = rng.uniform(0.16, 0.26) * height
+        low[1:], high[1:] = (-half, foot + strip), (half, foot + height)
+        panel_high[1:] = half, foot + strip - GAP
+    elif rng.random() < 0.25:  # door and panel within a rim
+        low[2] += wall
+        high[2] -= wall
+
+    hollow_low = np.array([GAP, low[1] + wall, (low[2] if drops else foot) + wall])
+    hollow_high = np.array([depth - wall, half - wall, foot + height - wall])
+    body = _body(rng, panel_low[1], half, foot, foot + height, depth, hollow_low, hollow_high)
+    if low[2] > foot and not drops:
+        for z in (foot, high[2] + GAP):
+            body += box((-thick, -half, z), (0.01, half, z + wall - GAP))
+    oven = Assembly()
+    has_panel = strip > 0
+    if has_panel:
+        body += rounded_box(panel_low, panel_high + (0.01, 0, 0), 0.004, axis=1)
+    opener = bool(has_panel and not drops and rng.random() < 0.35)
+    controls, movers = _controls(rng, panel_low, panel_high, opener) if has_panel else (Solid(), [])
+    door = _door(rng, low, high, drops, "none" if opener else str(rng.choice(["bar", "bow", "flat", "none"])))
+
+    def placed(solid: Solid) -> Solid:
+        return solid.mirrored(1) if mirrored else solid
+
+    sign = -1.0 if mirrored else 1.0
+    oven.add("body", placed(body + controls), density=350.0)
+    angle = np.deg2rad(rng.uniform(90.0, 90.0 if drops else 150.0))
+    drop = revolute("body", (0, -1, 0), (-thick, 0, low[2]), 0.0, angle)
+    oven.add("door", placed(door), drop if drops else side_hinge(0.0, sign * half, angle, not mirrored))
+    for name, solid, point in movers:
+        point = point * (1.0, sign, 1.0)
+        turns = continuous("body", (-1, 0, 0), point)
+        oven.add(name, placed(solid), turns if "dial" in name else prismatic("body", (1, 0, 0), 0.0, 0.0015, point))
+    if rng.random() < 0.75:
+        center = 0.5 * (hollow_low + hollow_high)
+        plate = _turntable(rng, hollow_low, hollow_high, center)
+        oven.add("turntable", placed(plate), continuous("body", (0, 0, 1), center * (1, sign, 1)), density=2000.0)
+    return oven
+
+
+def _body(
+    rng: np.random.Generator,
+    right: float,
+    left: float,
+    low: float,
+    high: float,
+    depth: float,
+    inner: Array,
+    outer: Array,
+) -> Solid:
+    """Case around the hollow from ``inner`` to ``outer``, which is open to the front."""
+    shell = 0.012
+    solid = tray((GAP, right, low), (depth, left, high), shell, axis=0, side=-1)
+    solid += box((GAP, right + 0.002, low + 0.002), (depth - 0.002, inner[1], high - 0.002))  # the electronics
+    solid += box((GAP, inner[1] - 0.01, low + 0.002), (outer[0] + 0.01, left - 0.002, inner[2]))
+    solid += box((GAP, inner[1] - 0.01, outer[2]), (outer[0] + 0.01, left - 0.002, high - 0.002))
+    solid += box((GAP, outer[1], low + 0.002), (outer[0] + 0.01, left - 0.002, high - 0.002))
+    solid += box((outer[0], inner[1] - 0.01, low + 0.002), (depth - 0.002, left - 0.002, high - 0.002))
+    spots = ((x, y) for x in (0.05, depth - 0.05) for y in (right + 0.05, left - 0.05))
+    solid += union(cylinder((x, y, 0), (x, y, low + 0.004), 0.015, sections=14) for x, y in spots)
+    if rng.random() < 0.4:  # ribs over the vents
+        for x in np.linspace(0.4, 0.8, 7) * depth:
+            solid += box(
+                (x, left - 0.005, low + 0.55 * (high - low)), (x + 0.006, left + 0.0025, low + 0.85 * (high - low))
+            )
+    return solid
+
+
+def _door(rng: np.random.Generator, low: Array, high: Array, drops: bool, handle: str) -> Solid:
+    """Door with a window, handle at the side away from its hinge."""
+    tall, wide = high[2] - low[2], high[1] - low[1]
+    edge = rng.uniform(0.02, 0.06)
+    margins = np.array([edge + (0.0 if drops or handle == "none" else 0.035), edge, edge, edge])
+    margins[3] += 0.045 if drops and handle != "none" else 0.0
+    if rng.random() < 0.75:
+        solid = windowed_panel(low, high, list(margins), 0.004, rng.uniform(0.0015, 0.008))
+    else:
+        solid = rounded_box(low, high, 0.004)
+        solid += box(low + (-0.0015, margins[0], margins[2]), high - (0.004, margins[1], margins[3]))
+    radius, reach = rng.uniform(0.005, 0.009), rng.uniform(0.025, 0.042)
+    inside = rng.uniform(0.08, 0.25)
+    start = low + (0, 0.024, inside * tall)
+    end = np.array([low[0], start[1], high[2] - inside * tall])
+    if drops:
+        start = np.array([low[0], low[1] + inside * wide, high[2] - 0.03])
+        end = start + (0, (1 - 2 * inside) * wide, 0)
+    return solid + front_handle(handle, start, end, reach, radius)
+
+
+def _controls(
+    rng: np.random.Generator, low: Array, high: Array, opener: bool
+) -> tuple[Solid, list[tuple[str, Solid, Array]]]:
+    """What stays on the panel, and what moves: names, solids and places."""
+    upright = high[2] - low[2] > high[1] - low[1]
+    long, short = (2, 1) if upright else (1, 2)
+    center, size = 0.5 * (low + high), high - low
+    center[0] = low[0]
+
+    def at(along: float, across: float = 0.0) -> Array:
+        point = center.copy()
+        point[long] += along * size[long]
+        point[short] += across * size[short]
+        return point
+
+    fixed, movers = Solid(), []
+    span = np.zeros(3)
+    span[long], span[short] = 0.06 * size[long], 0.36 * size[short]
+    middle = at(0.37)
+    fixed += box(middle - span - (0.0015, 0, 0), middle + span + (0.003, 0, 0))  # the display
+    if opener:
+        keys = [0.12 * size[long], 0.75 * size[short]]
+        movers.append(("button_1", push_button(at(-0.39), keys if short == 2 else keys[::-1], 0.003), at(-0.39)))
+    if rng.random() < 0.5:
+        radius = min(0.36 * size[short], 0.1 * size[long], 0.03)
+        for number, along in enumerate((0.15, -0.15)[: int(rng.integers(1, 3))], 1):
+            movers.append((f"dial_{number}", dial(at(along), (-1, 0, 0), rng.uniform(0.012, 0.022), radius), at(along)))
+        return fixed, movers
+    rows, columns = int(rng.integers(3, 6)), int(rng.integers(2, 4))
+    moving = rng.random() < 0.35
+    key = (0.7 * 0.72 / columns * size[short], 0.45 / rows * 0.6 * size[long])
+    count = 2 if opener else 1
+    for along in np.linspace(0.2, -0.22, rows):
+        for across in np.linspace(-0.27, 0.27, columns):
+            point = at(along, across)
+            wide, tall = key if upright else key[::-1]
+            if moving and count < 6:
+                movers.append((f"button_{count}", push_button(point, (wide, tall), 0.002), point))
+                count += 1
+            else:
+                half = np.array([0.002, 0.5 * wide, 0.5 * tall])
+                fixed += box(point - half, point + half)
+    return fixed, movers
+
+
+def _turntable(rng: np.random.Generator, low: Array, high: Array, center: Array) -> Solid:
+    """Glass plate with a raised rim of beads, 3 mm above the floor."""
+    x, y, z = center[0], center[1], low[2] + 0.002
+    radius = 0.5 * min(high[0] - low[0], high[1] - low[1]) - rng.uniform(0.006, 0.02)
+    solid = cylinder((x, y, z + 0.006), (x, y, z + 0.012), 0.93 * radius, radius, 32)
+    solid += cylinder((x, y, z), (x, y, z + 0.008), rng.uniform(0.03, 0.05), sections=12)
+    for k in range(3):
+        a = 2.0 * np.pi * k / 3
+        point = np.array([x + 0.8 * radius * np.cos(a), y + 0.8 * radius * np.sin(a), z + 0.012])
+        solid += box(point - (0.012, 0.006, 0.003), point + (0.012, 0.006, 0.0015))
+    return solid
