@@ -23,8 +23,10 @@ from artsim.families import (
     laptop,
     microwave,
     oven,
+    random_tree,
     robot_arm,
     scissors,
+    stapler,
     storage_furniture,
 )
 from artsim.objects import ArticulatedObject
@@ -40,8 +42,10 @@ FAMILIES: dict[str, Family] = {
     "laptop": laptop.build,
     "microwave": microwave.build,
     "oven": oven.build,
+    "random_tree": random_tree.build,
     "robot_arm": robot_arm.build,
     "scissors": scissors.build,
+    "stapler": stapler.build,
     "storage_furniture": storage_furniture.build,
 }
 """Every category that :func:`make` knows."""

@@ -1,0 +1,273 @@
+"""Random trees of 2 to 12 parts, up to six joints deep, with every type of joint.
+
+Parts are simple shapes. No two can touch in any state: a tree is put together from the leaves on, every branch knows
+the box that it can reach, and a branch is moved away from its parent until that box is clear of all others there.
+What varies: everything.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from artsim.assembly import Assembly, JointSpec
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, ellipsoid, hull, ring, rounded_box, tube
+
+GAP = 0.002
+_LONGEST_STUB = 4.0
+SHAPES = ("box", "rounded", "cylinder", "cone", "ball", "frame", "ring", "bar", "cross", "wedge")
+JOINTS = ("revolute", "continuous", "prismatic", "screw")
+
+
+@dataclass
+class _Motion:
+    """A joint in its own branch's frame; z leads away from the parent."""
+
+    type: str
+    axis: Array
+    origin: Array
+    lower: float
+    upper: float
+    pitch: float = 0.0
+    follows: int | None = None
+    multiplier: float = 1.0
+
+    def reached(self, bounds: Array) -> Array:
+        """(2, 3) box that holds a box of the moved part in all states."""
+        low, high = (-np.pi, np.pi) if self.type == "continuous" else (self.lower, self.upper)
+        states = np.linspace(low, high, 2 if self.type == "prismatic" else 25)
+        turns = np.zeros(len(states)) if self.type == "prismatic" else states
+        shifts = {"prismatic": states, "screw": self.pitch * states}.get(self.type, np.zeros(len(states)))
+        arms = _corners(bounds) - self.origin
+        turned = Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ arms.T
+        points = (turned.transpose(0, 2, 1) + self.origin + (shifts[:, None] * self.axis)[:, None]).reshape(-1, 3)
+        # Between two of the states a corner leaves the box of the samples by less than the sagitta of its arc.
+        radius = np.linalg.norm(np.cross(arms, self.axis), axis=1).max()
+        sagitta = radius * (1.0 - np.cos(0.5 * (turns[1] - turns[0])))
+        return np.stack([points.min(axis=0) - sagitta, points.max(axis=0) + sagitta])
+
+
+@dataclass
+class _Branch:
+    """A part with all that hangs on it. Its frame: z leads away from the parent, the part stands on the origin."""
+
+    solid: Solid
+    boxes: list[Array]
+    """(2, 3) each; together they hold the part and all that hangs on it, in all states."""
+    hinge_height: float | None = None
+    """Where a hinge across z goes, if the part has a neck for one."""
+    children: list[tuple[_Branch, _Motion, Array, Array]] = field(default_factory=list)
+    """Branch, joint, and where the branch's frame stands: rotation (3, 3) and position (3,)."""
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A random articulated object."""
+    count = int(rng.integers(2, 13))
+    parents = _parents(rng, count, int(rng.integers(1, 7)))
+    scale = rng.uniform(0.04, 0.12)
+    root = _grow(rng, 0, parents, scale)
+    tree = Assembly()
+    _put(tree, root, (f"part_{k}" for k in itertools.count()), None, np.eye(3), np.zeros(3))
+    return tree
+
+
+def _parents(rng: np.random.Generator, count: int, depth: int) -> list[int]:
+    """Parent of every part; -1 for the root. Long chains are as likely as bushes."""
+    parents, depths = [-1], [0]
+    eager = rng.uniform(0.0, 1.0)
+    for k in range(1, count):
+        allowed = [i for i in range(k) if depths[i] < depth and parents.count(i) < 5]
+        if not allowed:
+            break
+        parent = allowed[-1] if rng.random() < eager else int(rng.choice(allowed))
+        parents.append(parent)
+        depths.append(depths[parent] + 1)
+    return parents
+
+
+def _grow(rng: np.random.Generator, k: int, parents: list[int], scale: float) -> _Branch:
+    """Part ``k`` with everything that hangs on it."""
+    size = scale * rng.uniform(0.6, 1.5, 3) * (1.6 if k == 0 else 1.0)
+    solid = _shape(rng, size)
+    bounds = solid.bounds()
+    branch = _Branch(solid, [bounds])
+    if k > 0:  # stand on z = 0, on a neck by chance
+        neck = 0.12 * float(size.min()) + 0.002
+        hinged = rng.random() < 0.4
+        lift = neck + rng.uniform(0.5, 1.0) * float(bounds[1, :2].max()) if hinged else 0.0
+        branch.solid = solid.moved((0, 0, lift - bounds[0, 2]))
+        branch.boxes = [branch.solid.bounds()]
+        if hinged:
+            rod = tube([(0, 0, 0.3 * neck), (0, 0, lift - bounds[0, 2])], neck, 10) + ellipsoid((0, 0, neck), neck, 12)
+            branch.boxes.append(np.array([[-neck, -neck, 0], [neck, neck, lift]]))
+            branch.solid += rod
+            branch.hinge_height = neck
+    bounds = branch.boxes[0]
+    motions: list[_Motion] = []
+    faces = [f for f in product(range(3), (-1, 1)) if k == 0 or f != (2, -1)]
+    for child in (i for i, parent in enumerate(parents) if parent == k):
+        grown = _grow(rng, child, parents, scale * rng.uniform(0.8, 1.0))
+        motion = _motion(rng, grown, motions)
+        faces.remove(_attach(rng, branch, grown, motion, faces, bounds))
+        motions.append(motion)
+    return branch
+
+
+def _shape(rng: np.random.Generator, size: Array) -> Solid:
+    """A simple solid about the origin with roughly the given sides."""
+    kind = str(rng.choice(SHAPES))
+    half = 0.5 * size
+    x, y, z = half
+    thin = 0.22 * float(size.min())
+    if kind == "rounded":
+        return rounded_box(-half, half, 0.3 * size.min(), steps=2)
+    if kind == "cylinder":
+        return cylinder((0, 0, -z), (0, 0, z), min(x, y))
+    if kind == "cone":
+        return cylinder((0, 0, -z), (0, 0, z), min(x, y), rng.uniform(0.2, 0.7) * min(x, y))
+    if kind == "ball":
+        return ellipsoid((0, 0, 0), 0.5 * (half + half.min()))
+    if kind == "frame":
+        bars = [(np.array([x, thin, thin]), np.array([0, s * (y - thin), 0])) for s in (-1, 1)]
+        bars += [(np.array([thin, y, thin]), np.array([s * (x - thin), 0, 0])) for s in (-1, 1)]
+        solid = Solid()
+        for extent, middle in bars:
+            solid += box(middle - extent, middle + extent)
+        return solid + box((-x + thin, -0.5 * thin, -0.8 * thin), (x - thin, 0.5 * thin, 0.8 * thin))
+    if kind == "ring":  # with a spoke, to carry stubs
+        radius = min(x, y)
+        spoke = box((-radius + thin, -0.5 * thin, -0.8 * thin), (radius - thin, 0.5 * thin, 0.8 * thin))
+        return ring((0, 0, 0), (0, 0, 1), radius - 2 * thin, radius, 2 * thin, 16) + spoke
+    if kind == "bar":
+        return box((-0.4 * x, -0.4 * y, -1.6 * z), (0.4 * x, 0.4 * y, 1.6 * z))
+    if kind == "cross":
+        return box((-x, -thin, -thin), (x, thin, thin)) + box((-thin, -y, -thin), (thin, y, thin)) + box(
+            (-thin, -thin, -z), (thin, thin, z)
+        )  # fmt: skip
+    if kind == "wedge":
+        return hull([(-x, -y, -z), (x, -y, -z), (-x, y, -z), (x, y, -z), (-x, -y, z), (-x, y, z)])
+    return box(-half, half)
+
+
+def _motion(rng: np.random.Generator, branch: _Branch, siblings: list[_Motion]) -> _Motion:
+    """A joint for a branch; by chance one that follows the joint of a sibling."""
+    bounds = branch.boxes[0]
+    extent = float((bounds[1] - bounds[0]).max())
+    axis, origin = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    if branch.hinge_height is not None:
+        axis, origin = np.eye(3)[int(rng.integers(2))], np.array([0.0, 0.0, branch.hinge_height])
+        return _Motion("revolute", axis, origin, -rng.uniform(0.0, 1.3), rng.uniform(0.3, 1.3))
+    leaders = [i for i, motion in enumerate(siblings) if motion.follows is None and motion.type != "screw"]
+    if leaders and rng.random() < 0.4:
+        source = leaders[int(rng.integers(len(leaders)))]
+        leader, multiplier = siblings[source], float(rng.choice([-1.0, 0.5, 1.0]))
+        lower, upper = sorted((multiplier * leader.lower, multiplier * leader.upper))
+        return _Motion(leader.type, axis, origin, lower, upper, 0.0, source, multiplier)
+    kind = str(rng.choice(JOINTS, p=[0.25, 0.3, 0.28, 0.17]))
+    if rng.random() < 0.15:  # oblique
+        axis = axis + rng.normal(0.0, 0.2, 3)
+        axis /= np.linalg.norm(axis)
+    if kind == "prismatic":
+        return _Motion(kind, axis, origin, 0.0, rng.uniform(0.2, 0.9) * extent)
+    if kind == "screw":
+        turns = rng.uniform(0.5, 3.0) * 2.0 * np.pi
+        return _Motion(kind, axis, origin, 0.0, turns, rng.uniform(0.2, 0.6) * extent / turns)
+    if kind == "continuous":
+        return _Motion(kind, axis, origin, -np.inf, np.inf)
+    return _Motion(kind, axis, origin, -rng.uniform(0.0, 1.5), rng.uniform(0.3, 1.5))
+
+
+def _attach(
+    rng: np.random.Generator,
+    parent: _Branch,
+    child: _Branch,
+    motion: _Motion,
+    faces: list[tuple[int, int]],
+    bounds: Array,
+) -> tuple[int, int]:
+    """Hang a branch on a free face of its parent, on a stub just long enough to keep all boxes apart.
+
+    Of three faces drawn, the one that needs the shortest stub is taken, and returned.
+    """
+    radius = 0.1 * float((bounds[1] - bounds[0]).min()) + 0.002
+    swept = np.array([motion.reached(b) for b in child.boxes])
+    # Boxes over the stub's end must lie above it.
+    over = (swept[:, 0, :2] < 1.5 * radius).all(axis=1) & (swept[:, 1, :2] > -1.5 * radius).all(axis=1)
+    lift = GAP - min(0.0, float(swept[over, 0, 2].min()))
+    inner = 0.5 * (bounds[0] + bounds[1])
+    shortest, chosen = np.inf, None
+    for choice in rng.permutation(len(faces)):
+        if chosen is not None and shortest < 0.05:
+            break
+        axis, side = faces[choice]
+        turn = rng.uniform(0, 2 * np.pi) if rng.random() < 0.3 else 0.5 * np.pi * rng.integers(4)
+        rotation = _towards(side * np.eye(3)[axis]) @ Rotation.from_rotvec([0, 0, turn]).as_matrix()
+        reach = np.array([_box_around(_corners(b) @ rotation.T) for b in swept])
+        across = np.arange(3) != axis
+        surface = float(bounds[1, axis] if side > 0 else bounds[0, axis])
+        for stub in np.concatenate([[0.0], np.geomspace(0.005, _LONGEST_STUB, 50)]):
+            if stub >= shortest:
+                break
+            start, end = (np.where(across, inner, surface + side * s) for s in (0.0, stub))
+            rod = _box_around(np.stack([start, end])) + np.array([[-radius], [radius]]) * across
+            foot = np.where(across, inner, surface + side * (stub + lift))
+            if not _meet(reach + foot, np.array(parent.boxes)) and not _meet(rod[None], np.array(parent.boxes[1:])):
+                shortest, chosen = stub, (choice, rotation, foot, end, [*(reach + foot), rod])
+                break
+    if chosen is None:
+        raise ValueError("no room for a branch")
+    choice, rotation, foot, end, taken = chosen
+    parent.solid += tube([inner, end], radius, 8)
+    parent.boxes += taken
+    parent.children.append((child, motion, rotation, foot))
+    return faces[choice]
+
+
+def _corners(bounds: Array) -> Array:
+    """(8, 3) corners of a box."""
+    return np.array(list(product(*bounds.T)))
+
+
+def _box_around(points: Array) -> Array:
+    """(2, 3) box of points."""
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def _meet(first: Array, second: Array) -> bool:
+    """Whether any of (M, 2, 3) boxes comes closer than nearly the gap to any of (N, 2, 3) others."""
+    if not len(second):
+        return False
+    below = (first[:, None, 0] < second[None, :, 1] + 0.9 * GAP).all(axis=-1)
+    above = (second[None, :, 0] < first[:, None, 1] + 0.9 * GAP).all(axis=-1)
+    return bool((below & above).any())
+
+
+def _towards(normal: Array) -> Array:
+    """(3, 3) rotation that takes z to a coordinate direction."""
+    u = np.abs(np.roll(normal, 1))
+    return np.column_stack([u, np.cross(normal, u), normal])
+
+
+def _put(
+    tree: Assembly, branch: _Branch, names: Iterator[str], joint: JointSpec | None, rotation: Array, position: Array
+) -> str:
+    """Add a branch to the assembly, its frame standing at the given pose; returns the name of its part."""
+    turn = Rotation.from_matrix(rotation).as_rotvec()
+    angle = float(np.linalg.norm(turn))
+    solid = branch.solid.turned(turn, angle) if angle > 0 else branch.solid
+    name = tree.add(next(names), solid.moved(position), joint)
+    siblings: list[str] = []
+    for child, motion, R_branch_child, foot in branch.children:
+        R, at = rotation @ R_branch_child, rotation @ foot + position
+        mimic = None if motion.follows is None else (siblings[motion.follows], motion.multiplier)
+        spec = JointSpec(
+            motion.type, name, R @ motion.axis, R @ motion.origin + at, motion.lower, motion.upper, motion.pitch, mimic
+        )
+        siblings.append(_put(tree, child, names, spec, R, at))
+    return name
