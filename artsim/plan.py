@@ -46,6 +46,8 @@ class SampleOptions:
     """raycast needs nothing installed; the others need the extra 'pybullet'."""
     images: tuple[Literal["depth", "part_mask", "rgb"], ...] = ()
     """Images to keep beside the cloud; rgb needs a pybullet renderer."""
+    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
+    """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.num_points <= 1_000_000:
@@ -71,6 +73,7 @@ class SampleOptions:
             views=ViewOptions(**{k: pair(v) if isinstance(v, list) else v for k, v in views.items()}),
             renderer=data["renderer"],
             images=tuple(data["images"]),
+            noise=data.get("noise", "none"),  # older plans do not say
         )
 
 
@@ -95,6 +98,7 @@ def draw_sample(obj: ArticulatedObject, options: SampleOptions, seed: int, index
                 num_points=options.num_points,
                 renderer=renderer,
                 images=options.images,
+                noise=options.noise,
                 rng=rng,
                 seed=seed,
                 index=index,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 
 import numpy as np
@@ -15,12 +14,10 @@ from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer, shared_renderer
 from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visibility
+from artsim.sensor import Look, Sensor, View, find_sensor
 
 IMAGES = ("depth", "part_mask", "rgb")
 """Images that a sample can carry besides its cloud."""
-
-Look = Callable[[NDArray[np.int64], NDArray[np.int64]], tuple[NDArray[np.float32], NDArray[np.uint8]]]
-"""What stands at some pixels, by row and column: depth (N,) and part ids (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +27,12 @@ class Sample:
     Attributes
     ----------
     points : (N, 3) float32
-        Partial cloud in the camera frame.
+        Partial cloud in the camera frame, as the sensor reports it: each point on the ray through its pixel's centre.
     part : (N,) uint8
-        Part of each point.
+        Part of each point: that which its ray truly meets.
     npcs : (N, 3) float32
-        Normalised part coordinates ``(p_rest - box_center) / ||box_size|| + 0.5``.
+        Normalised part coordinates ``(p_rest - box_center) / ||box_size|| + 0.5`` of the place that its ray truly
+        meets, whatever the sensor reports.
     T_camera_part : (K, 4, 4) float64
         Maps the rest frame, as carried by part k, to the camera.
     box_center, box_size : (K, 3) float64
@@ -63,10 +61,12 @@ class Sample:
     seed, index : int
         What the sample was drawn from; -1 when it was asked for directly.
     renderer, artsim_version : str
+    noise : str
+        Name of the depth sensor.
     depth : (H, W) float32 or None
-        z-depth in metres, 0 = no return.
+        z-depth in metres as the sensor reports it, 0 = no return.
     part_mask : (H, W) uint8 or None
-        Part ids, 255 = background.
+        Part ids without noise, 255 = background.
     rgb : (H, W, 3) uint8 or None
     """
 
@@ -100,6 +100,7 @@ class Sample:
     index: int
     renderer: str
     artsim_version: str
+    noise: str = "none"
     depth: NDArray[np.float32] | None = None
     part_mask: NDArray[np.uint8] | None = None
     rgb: NDArray[np.uint8] | None = None
@@ -113,6 +114,7 @@ def observe(
     num_points: int = 2048,
     renderer: str | Renderer = "raycast",
     images: tuple[str, ...] = (),
+    noise: str | Sensor = "none",
     rng: np.random.Generator | None = None,
     seed: int = -1,
     index: int = -1,
@@ -121,7 +123,8 @@ def observe(
 
     The cloud is ``num_points`` pixels drawn uniformly without replacement from those that show the object (with
     replacement once there are fewer). Without images, ``raycast`` casts only as many of them as the cloud needs:
-    the same pixels are looked at in both cases, so that the same ``rng`` gives the same cloud.
+    the same pixels are looked at in both cases, so that the same ``rng`` gives the same cloud. With noise, those are
+    pixels at which the sensor reports something; all else that the sample says stays free of noise.
 
     Parameters
     ----------
@@ -136,6 +139,8 @@ def observe(
         "raycast", "pybullet" or "pybullet-egl".
     images : tuple of str
         Which of ``IMAGES`` to keep.
+    noise : str or Sensor
+        Depth sensor: one of ``artsim.sensor.SENSORS``, or one of your own.
     rng : numpy Generator, optional
         Seeded with 0 by default.
     seed, index : int
@@ -158,21 +163,28 @@ def observe(
     if unknown:
         raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")
     rng = rng or np.random.default_rng(0)
-    name = renderer if isinstance(renderer, str) else renderer.name
+    name, sensor = renderer if isinstance(renderer, str) else renderer.name, find_sensor(noise)
+    key = int(rng.integers(2**63)) if sensor.steps else 0
     posed = pose(obj, q, camera, T_world_object)
     frame = None
     if images or name != "raycast":
         drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
         frame = drawer.render(obj, q, camera, T_world_object)
-        pixels, depth, part = draw_visible(posed, _lookup(frame), num_points, rng)
+        look = _lookup(frame)
+        pixels, depth, part = draw_visible(posed, _sensed(look, look, camera, sensor, key), num_points, rng)
         visible_fraction = _exact_visible_fraction(posed, frame)
     else:
-        rays = _Rays(posed)
-        pixels, depth, part = draw_visible(posed, rays, num_points, rng)
+        rays, look = _Rays(posed), _in_any_order(posed)
+        pixels, depth, part = draw_visible(posed, _sensed(rays, look, camera, sensor, key), num_points, rng)
         visible_fraction = rays.visible_fraction()
     if len(pixels) == 0:
         raise RenderError("the camera does not see the object", obj.object_id, "move the camera or the object")
-    points = camera.unproject(pixels, depth)
+    points = true_points = camera.unproject(pixels, depth)
+    if sensor.steps:
+        true_points = camera.unproject(pixels, look(*np.divmod(pixels, camera.width))[0])
+        if "depth" in images:
+            assert frame is not None
+            frame = replace(frame, depth=sensor.read_image(frame.depth, camera, key))
     wanted = {image: None if frame is None else getattr(frame, field) for image, field in _FRAME_FIELDS.items()}
     if "rgb" in images and wanted["rgb"] is None:
         raise ConfigError(f"renderer {name!r} makes no rgb", "images", "use a renderer that does, such as pybullet")
@@ -181,7 +193,7 @@ def observe(
     return Sample(
         points=points.astype(np.float32),
         part=part,
-        npcs=_npcs(points, part, posed).astype(np.float32),
+        npcs=_npcs(true_points, part, posed).astype(np.float32),
         T_camera_part=posed.T_camera_part,
         box_center=obj.box_center,
         box_size=obj.box_size,
@@ -209,6 +221,7 @@ def observe(
         index=index,
         renderer=name,
         artsim_version=ARTSIM_VERSION,
+        noise=sensor.name,
         **{image: value if image in images else None for image, value in wanted.items()},
     )
 
@@ -219,6 +232,46 @@ _FRAME_FIELDS = {"depth": "depth", "part_mask": "part_ids", "rgb": "rgb"}
 
 def _lookup(frame: Frame) -> Look:
     return lambda row, column: (frame.depth[row, column], frame.part_ids[row, column])
+
+
+def _in_any_order(posed: PosedObject) -> Look:
+    """Casts one ray through each pixel asked for, however often it is asked for."""
+    width = posed.camera.width
+
+    def look(row: NDArray[np.int64], column: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        pixels, back = np.unique(row * width + column, return_inverse=True)
+        depth, part, _ = cast(posed, *np.divmod(pixels, width))
+        return depth[back], part[back]
+
+    return look
+
+
+def _sensed(look: Look, around: Look, camera: Camera, sensor: Sensor, key: int) -> Look:
+    """What a sensor reports: pixels without a return show nothing.
+
+    Parameters
+    ----------
+    look : Look
+        The noise-free scene at the pixels asked for.
+    around : Look
+        The noise-free scene anywhere else.
+    camera : Camera
+    sensor : Sensor
+    key : int
+        Of all chance.
+    """
+    if not sensor.steps:
+        return look
+
+    def sensed(row: NDArray[np.int64], column: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        depth, part = look(row, column)
+        hit = (part != BACKGROUND).nonzero()[0]
+        reading, shown = np.zeros_like(depth), np.full_like(part, BACKGROUND)
+        reading[hit] = sensor.read(View(around, camera, row[hit], column[hit], depth[hit], key))
+        shown[reading > 0] = part[reading > 0]
+        return reading, shown
+
+    return sensed
 
 
 def draw_visible(

@@ -15,7 +15,7 @@ from artsim.camera import Camera
 from artsim.dataset import Dataset
 from artsim.errors import ArtsimError, DatasetError
 from artsim.files import file_sha256
-from artsim.kinematics import invert_transform, transform_points
+from artsim.kinematics import Array, invert_transform, transform_points
 from artsim.objects import ArticulatedObject
 from artsim.plan import Plan, ShardRecord
 from artsim.renderers.raycast import cast, pose
@@ -133,6 +133,8 @@ def _unplanned(sample: Sample, plan: Plan, index: int) -> Iterator[str]:
         yield f"has {len(sample.points)} points instead of {options.num_points}"
     if sample.renderer != options.renderer:
         yield f"was drawn by {sample.renderer} instead of {options.renderer}"
+    if sample.noise != options.noise:
+        yield f"has the noise of sensor {sample.noise} instead of {options.noise}"
     images = {name for name in ("depth", "part_mask", "rgb") if getattr(sample, name) is not None}
     if images != set(options.images):
         yield f"has images {sorted(images)} instead of {sorted(options.images)}"
@@ -172,8 +174,9 @@ def sample_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
     if sample.part.max() >= len(obj):
         yield f"a point belongs to part {sample.part.max()} of {len(obj)}"
         return
-    yield from _cloud_problems(sample)
-    yield from _image_problems(sample, obj)
+    true_points = _true_points(sample)
+    yield from _cloud_problems(sample, true_points)
+    yield from _image_problems(sample, obj, true_points)
 
 
 def _malformed(sample: Sample, num_parts: int) -> Iterator[str]:
@@ -250,12 +253,24 @@ def _pose_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
         yield f"joint states of parts {np.flatnonzero(outside).tolist()} are outside their limits"
 
 
-def _cloud_problems(sample: Sample) -> Iterator[str]:
+def _true_points(sample: Sample) -> Array:
+    """(N, 3) places that the rays truly meet, camera frame: with noise, the points need not lie there."""
+    if sample.noise == "none":
+        return sample.points.astype(np.float64)
+    k = sample.part
+    size = np.linalg.norm(sample.box_size, axis=1)[k, None]
+    p_rest = (sample.npcs - 0.5) * size + sample.box_center[k]
+    T = sample.T_camera_part[k]
+    points: Array = np.einsum("nij,nj->ni", T[:, :3, :3], p_rest) + T[:, :3, 3]
+    return points
+
+
+def _cloud_problems(sample: Sample, true_points: Array) -> Iterator[str]:
     tolerance = _TOLERANCE * sample.diagonal
     T_part_camera = invert_transform(sample.T_camera_part)
     for k in np.unique(sample.part):
         mine = sample.part == k
-        p_rest = transform_points(T_part_camera[k], sample.points[mine].astype(np.float64))
+        p_rest = transform_points(T_part_camera[k], true_points[mine])
         offset = np.abs(p_rest - sample.box_center[k]) - 0.5 * sample.box_size[k]
         if offset.max() > tolerance:
             yield f"points of part {k} lie {offset.max():.2g} m outside its box"
@@ -267,17 +282,19 @@ def _cloud_problems(sample: Sample) -> Iterator[str]:
             yield f"part {k} has points but a visible fraction of 0"
 
 
-def _image_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
+def _image_problems(sample: Sample, obj: ArticulatedObject, true_points: Array) -> Iterator[str]:
     """Points against the camera, the images, and rays cast anew."""
     tolerance = _TOLERANCE * sample.diagonal
     camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
-    if (sample.points[:, 2] <= 0).any():
+    if (sample.points[:, 2] <= 0).any() or (true_points[:, 2] <= 0).any():
         yield "a point lies behind the camera"
         return
     image = camera.project(sample.points)
     # Rays start at pixel centres; single precision moves them by far less than this.
     if np.abs(image - np.floor(image) - 0.5).max() > 0.05:
         yield "a point does not project onto the centre of a pixel"
+    if not _close(camera.project(true_points), image, 0.1):
+        yield "a point does not lie on the ray to the place that its npcs name"
     column, row = np.floor(image).astype(np.int64).T
     if min(column.min(), row.min()) < 0 or column.max() >= sample.width or row.max() >= sample.height:
         yield "a point projects outside the image"
@@ -293,6 +310,6 @@ def _image_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
         order = np.lexsort((column, row))
         posed = pose(obj, sample.joint_state, camera, T_world_object)
         depth, part, _ = cast(posed, row[order], column[order])
-        wrong = (part != sample.part[order]) | (np.abs(depth - sample.points[order, 2]) > tolerance)
+        wrong = (part != sample.part[order]) | (np.abs(depth - true_points[order, 2]) > tolerance)
         if wrong.sum() > max(2, _STRAY_RAYS * len(wrong)):
             yield f"{wrong.sum()} points do not lie where a ray through their pixel meets their part"
