@@ -1,4 +1,4 @@
-"""The program ``artsim``: generate, view, inspect, verify."""
+"""The program ``artsim``: generate, generate-objects, view, inspect, verify."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -94,6 +94,44 @@ class Generate:
 
 
 @dataclass(frozen=True)
+class GenerateObjects:
+    """Write procedural objects as files: simulation-ready URDF folders in PartNet-Mobility's style, MJCF, USD.
+
+    Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: the same
+    command goes on where it stopped. The bytes depend on category, seed and formats alone.
+
+    Example: artsim generate-objects --category drawer --count 1000 --out out/drawers
+    """
+
+    category: tuple[str, ...]
+    """Categories, such as drawer laptop."""
+    out: Path
+    """Folder to write to; made if missing."""
+    count: int = 1000
+    """Objects of each category."""
+    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    seed: int = 0
+    """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
+    workers: int = field(default_factory=_cores)
+    """Worker processes; by default one for each core."""
+
+    def run(self) -> None:
+        from artsim.export.batch import generate_objects
+
+        try:
+            result = generate_objects(self.category, self.out, self.count, self.seed, self.formats, self.workers)
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")
+            raise
+        if result.made == 0:
+            print(f"{result.folder}: already complete, {result.objects} objects")
+            return
+        rate = result.made / result.seconds
+        print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")
+
+
+@dataclass(frozen=True)
 class View:
     """Draw samples of a dataset, or an object in several states.
 
@@ -159,6 +197,7 @@ class Verify:
 
 Verb = (
     Annotated[Generate, tyro.conf.subcommand("generate")]
+    | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]

@@ -76,8 +76,7 @@ def in_pybullet(file: Path) -> Loaded:
     client = _bullet_client()
     bullet.resetSimulation(physicsClientId=client)
     flags = bullet.URDF_USE_INERTIA_FROM_FILE
-    with silent():
-        body = bullet.loadURDF(str(file), useFixedBase=True, flags=flags, physicsClientId=client)
+    body = bullet.loadURDF(str(file), useFixedBase=True, flags=flags, physicsClientId=client)
     infos = [bullet.getJointInfo(body, j, physicsClientId=client) for j in range(bullet.getNumJoints(body, client))]
     base = bullet.getBodyInfo(body, physicsClientId=client)[0].decode()
     moving = {info[1].decode(): info[0] for info in infos if info[2] != bullet.JOINT_FIXED}
@@ -207,7 +206,8 @@ def _compare(
     joints: int,
 ) -> Agreement:
     try:
-        loaded = SIMULATORS[name](file)
+        with silent():
+            loaded = SIMULATORS[name](file)
     except ImportError as error:
         raise ConfigError(f"{name} is not installed", mend="pip install 'artsim[sim,pybullet]'") from error
     except ArtsimError:
