@@ -1,0 +1,144 @@
+"""PointNet++ for unordered clouds (Qi et al., 2017), arranged to be fast on a CPU.
+
+Who is whose neighbour is worked out once for each cloud and shared by every layer and head. The first layer of each
+edge MLP is decomposed: ``W (f_j, x_j - x_i) = (W_f f_j + W_x x_j) - W_x x_i``, so that its matrix products run once for
+each point, and only sums and a maximum once for each edge.
+
+Clouds come in random order (as artsim's do), so the first points of a cloud are a random sample of it: they serve as
+the centres of the coarser levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+
+@dataclass(frozen=True)
+class Neighbourhoods:
+    """Neighbours in B clouds at every level. Level 0 is the cloud itself; level l has ``sizes[l]`` of its points.
+
+    Attributes
+    ----------
+    points : list of (B, N_l, 3) float
+    down : list of (B, N_l+1, k) int64
+        For each centre of level l + 1, its nearest points of level l.
+    up, up_weight : list of (B, N_l, 3)
+        For each point of level l, its nearest centres of level l + 1, and weights that fall with distance.
+    """
+
+    points: list[Tensor]
+    down: list[Tensor]
+    up: list[Tensor]
+    up_weight: list[Tensor]
+
+    @staticmethod
+    @torch.no_grad()
+    def of(points: Tensor, sizes: Sequence[int], neighbours: int) -> Neighbourhoods:
+        """Neighbourhoods of (B, N, 3) clouds in random order, with ``sizes`` points at the coarser levels."""
+        levels, down, up, weights = [points], [], [], []
+        for size in sizes:
+            fine = levels[-1]
+            coarse = fine[:, :size]
+            # Squared distances by one matrix product; small negative values are rounding.
+            squared = torch.baddbmm((coarse**2).sum(-1, keepdim=True), coarse, fine.transpose(1, 2), alpha=-2.0)
+            squared = (squared + (fine**2).sum(-1)[:, None]).clamp(min=0.0)
+            down.append(squared.topk(min(neighbours, fine.shape[1]), dim=2, largest=False, sorted=False).indices)
+            near, index = squared.topk(min(3, coarse.shape[1]), dim=1, largest=False, sorted=False)
+            weight = 1.0 / (near + 1e-8)
+            up.append(index.transpose(1, 2))
+            weights.append((weight / weight.sum(1, keepdim=True)).transpose(1, 2))
+            levels.append(coarse)
+        return Neighbourhoods(levels, down, up, weights)
+
+
+def gather(features: Tensor, index: Tensor) -> Tensor:
+    """Rows (B, M, k, C) of features (B, N, C) by indices (B, M, k)."""
+    B, N, C = features.shape
+    flat = index + torch.arange(B, device=index.device)[:, None, None] * N
+    return features.reshape(B * N, C)[flat.reshape(-1)].reshape(*index.shape, C)
+
+
+class SetAbstraction(nn.Module):
+    """Features of coarse centres from the edges to their neighbours: decomposed edge layer, maximum, dense layer."""
+
+    def __init__(self, inputs: int, outputs: int):
+        super().__init__()
+        self.features = nn.Linear(inputs, outputs)
+        self.positions = nn.Linear(3, outputs, bias=False)
+        self.dense = nn.Sequential(nn.LayerNorm(outputs), nn.Linear(outputs, outputs), nn.ReLU())
+
+    def forward(self, features: Tensor, fine: Tensor, coarse: Tensor, index: Tensor, radius: float) -> Tensor:
+        """(B, M, outputs); positions are taken over ``radius``, the typical reach of a neighbourhood."""
+        point_term = self.features(features) + self.positions(fine / radius)
+        strongest = gather(point_term, index).amax(2) - self.positions(coarse / radius)
+        return self.dense(torch.relu(strongest))
+
+
+class FeaturePropagation(nn.Module):
+    """Features of fine points from coarse ones (inverse-distance weights) and from their own."""
+
+    def __init__(self, coarse: int, fine: int, outputs: int):
+        super().__init__()
+        self.coarse = nn.Linear(coarse, outputs)
+        self.fine = nn.Linear(fine, outputs, bias=False)
+        self.dense = nn.Sequential(nn.LayerNorm(outputs), nn.ReLU(), nn.Linear(outputs, outputs), nn.ReLU())
+
+    def forward(self, coarse: Tensor, fine: Tensor, index: Tensor, weight: Tensor) -> Tensor:
+        """(B, N, outputs)."""
+        spread = (gather(self.coarse(coarse), index) * weight[..., None]).sum(2)
+        return self.dense(spread + self.fine(fine))
+
+
+class PointNet2(nn.Module):
+    """Encoder and decoder: a feature for each point, and one for the whole cloud.
+
+    Parameters
+    ----------
+    width : int
+        Channels of the finest level; they double from level to level.
+    sizes : sequence of int
+        Points of the coarser levels.
+    neighbours : int
+    """
+
+    def __init__(self, width: int = 48, sizes: Sequence[int] = (256, 64, 16), neighbours: int = 16):
+        super().__init__()
+        self.sizes, self.neighbours = tuple(sizes), neighbours
+        channels = [width * 2**level for level in range(len(sizes) + 1)]
+        self.stem = nn.Sequential(nn.Linear(3, width), nn.ReLU())
+        self.down = nn.ModuleList(SetAbstraction(a, b) for a, b in pairwise(channels))
+        self.whole = nn.Sequential(nn.Linear(channels[-1], channels[-1]), nn.ReLU())
+        above = [2 * channels[-1], *channels[-2:0:-1]]
+        self.up = nn.ModuleList(
+            FeaturePropagation(coarse, fine, fine) for coarse, fine in zip(above, channels[-2::-1], strict=True)
+        )
+        self.point_channels, self.cloud_channels = width, channels[-1]
+
+    def forward(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Features of clouds.
+
+        Parameters
+        ----------
+        points : (B, N, 3) float
+            Centred, of unit radius, in random order.
+
+        Returns
+        -------
+        (B, N, point_channels) and (B, cloud_channels)
+        """
+        near = Neighbourhoods.of(points, self.sizes, self.neighbours)
+        features = [self.stem(points)]
+        for level, layer in enumerate(self.down):
+            radius = (self.neighbours / near.points[level].shape[1]) ** 0.5
+            features.append(layer(features[-1], near.points[level], near.points[level + 1], near.down[level], radius))
+        cloud = self.whole(features[-1]).amax(1)
+        decoded = torch.cat([features[-1], cloud[:, None].expand(-1, features[-1].shape[1], -1)], dim=-1)
+        for step, layer in enumerate(self.up):
+            level = len(self.sizes) - 1 - step
+            decoded = layer(decoded, features[level], near.up[level], near.up_weight[level])
+        return decoded, cloud
