@@ -28,6 +28,7 @@ from artsim.families import (
     scissors,
     stapler,
     storage_furniture,
+    trash_can,
 )
 from artsim.objects import ArticulatedObject
 
@@ -47,6 +48,7 @@ FAMILIES: dict[str, Family] = {
     "scissors": scissors.build,
     "stapler": stapler.build,
     "storage_furniture": storage_furniture.build,
+    "trash_can": trash_can.build,
 }
 """Every category that :func:`make` knows."""
 

@@ -1,0 +1,117 @@
+"""Buckets and pails: a vessel with a bail on two pins.
+
+Round or oval, tapered, straight or bulging; rims, hoops, ribs, feet and spouts, round or D-shaped bails with or without
+a grip, and how far the bail swings vary. The bail stands upright at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, ring, tube, vessel
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A bucket whose bail swings to both sides."""
+    top = rng.uniform(0.09, 0.18)
+    height = top * rng.uniform(1.2, 2.4)
+    wall = rng.uniform(0.0018, 0.004)
+    profile = _profile(rng, top, height)
+    body = vessel(profile, wall, sections=28) + _rim(rng, top, height, wall, profile)
+    oval = rng.uniform(0.7, 0.95) if rng.random() < 0.15 else 1.0  # narrower from front to back
+    body = body.scaled((oval, 1.0, 1.0))
+    rim_z = height + 0.004
+
+    pin = rng.uniform(0.003, 0.005)
+    pivot = height * rng.uniform(0.88, 0.95)
+    wire = rng.uniform(0.0022, 0.0045)
+    outer = top + 0.012  # beyond the rim
+    bail_y = outer + 0.0015 + max(wire, 0.0025)
+    wall_y = float(np.interp(pivot, profile[:, 1], profile[:, 0])) - 0.7 * wall
+    half, boxy = rng.uniform(0.008, 0.016), rng.random() < 0.5
+    for side in (-1.0, 1.0):
+        body += _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
+    # In every position a point of a round bail lies this far from the middle of the pins; the rim keeps within.
+    reach = np.hypot(outer, rim_z - pivot) + 2 * wire + 0.006
+    bail = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
+
+    narrowing = profile[0, 0] < 0.85 * profile[-1, 0]  # so that the bail may hang below the rim
+    limit = np.deg2rad(rng.choice([80.0, 90.0, 103.0 if narrowing else 85.0]))
+    bucket = Assembly()
+    bucket.add("body", body, density=1500.0)
+    bucket.add("handle", bail, revolute("body", (0, 1, 0), (0, 0, pivot), -limit, limit), density=3000.0)
+    return bucket
+
+
+def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
+    """Outer radius and height, from the bottom up."""
+    bottom = top * rng.uniform(0.6, 0.98)
+    kind = str(rng.choice(["taper", "steps", "belly", "foot"], p=[0.5, 0.2, 0.15, 0.15]))
+    if kind == "steps":
+        bend = rng.uniform(0.6, 0.8)
+        middle = bottom + (top - bottom) * bend
+        return np.array(
+            [(bottom, 0.0), (0.97 * middle, bend * height), (middle, (bend + 0.03) * height), (top, height)]
+        )
+    if kind == "belly":
+        shares = np.linspace(0.0, 1.0, 5)
+        bulge = np.sin(np.pi * shares) * top * rng.uniform(0.02, 0.06)
+        return np.column_stack([bottom + (top - bottom) * shares + bulge * (shares < 1), shares * height])
+    if kind == "foot":
+        return np.array([(bottom, 0.0), (0.97 * bottom, 0.1 * height), (top, height)])
+    return np.array([(bottom, 0.0), (top, height)])
+
+
+def _rim(rng: np.random.Generator, top: float, height: float, wall: float, profile: Array) -> Solid:
+    """Rolled rim, hoops around the side, and a spout."""
+    solid = ring((0, 0, height), (0, 0, 1), top - wall - 0.001, top + rng.uniform(0.002, 0.006), 0.006, 28)
+    for share in rng.uniform(0.2, 0.8, int(rng.choice([0, 1, 2], p=[0.5, 0.3, 0.2]))):
+        radius = float(np.interp(share * height, profile[:, 1], profile[:, 0]))
+        slack = np.abs(np.diff(profile[:, 0])).max() * 0.06
+        solid += ring(
+            (0, 0, share * height), (0, 0, 1), radius - wall, radius + slack + 0.002, rng.uniform(0.006, 0.02), 28
+        )
+    if rng.random() < 0.3:
+        foot = profile[0, 0]
+        solid += ring((0, 0, -0.003), (0, 0, 1), foot - 0.012, foot - 0.001, 0.012, 28)
+    return solid
+
+
+def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float, half: float, boxy: bool) -> Solid:
+    """Plate or boss from the wall outward, with the pin that the bail hangs on; ``span`` holds where they end in Y."""
+    wall, outer, tip = (side * y for y in span)
+    if boxy:
+        solid = box((-half, min(wall, outer), pivot - 1.3 * half), (half, max(wall, outer), pivot + half))
+    else:
+        solid = cylinder((0, wall, pivot), (0, outer, pivot), 1.2 * half, 0.9 * half, 20)
+    solid += cylinder((0, outer - side * 0.001, pivot), (0, tip, pivot), 0.85 * pin, sections=12)
+    return solid + cylinder((0, tip, pivot), (0, tip + side * 0.002, pivot), 1.6 * pin, sections=12)
+
+
+def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin: float, wire: float) -> Solid:
+    """Wire from eye to eye over the opening, with a grip in the middle."""
+    curved = rng.random() < 0.85
+    height = reach * rng.uniform(1.0, 1.35)
+    if curved:  # from a half circle to a rounded rectangle
+        angles = np.linspace(0.0, np.pi, 21)
+        cosine, sine, power = np.cos(angles), np.sin(angles), rng.choice([0.95, rng.uniform(0.5, 0.95)])
+        path = np.column_stack(
+            [np.zeros(21), half * np.sign(cosine) * np.abs(cosine) ** power, pivot + height * sine**power]
+        )
+    else:
+        straight, flat = 0.55 * height, rng.uniform(0.4, 0.8)
+        side = [(0.0, half, pivot), (0.0, half, pivot + straight), (0.0, flat * half, pivot + height)]
+        path = np.array(side + [(0.0, -y, z) for _, y, z in side[::-1]])
+    lift = (2.2 * pin) / np.linalg.norm(path[1] - path[0])
+    path[0] += (path[1] - path[0]) * lift
+    path[-1] += (path[-2] - path[-1]) * lift
+    solid = tube(path, wire, 8)
+    for side_y in (-half, half):
+        solid += ring((0, side_y, pivot), (0, 1, 0), 1.1 * pin, 2.0 * pin + wire, 0.004, 16)
+    if rng.random() < 0.6:
+        z = path[:, 2].max()
+        radius, length = rng.uniform(0.007, 0.013), 0.35 * half
+        solid += cylinder((0, -length, z), (0, length, z), radius, sections=16)
+    return solid

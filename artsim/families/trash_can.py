@@ -1,0 +1,199 @@
+"""Trash cans: pedal bins, bins with a swinging flap, bins with two lids, wheelie bins.
+
+Round or rectangular, straight or tapered; the lid turns at the back, about its middle, or in two halves at the sides.
+A pedal follows the lid; wheelie bins have two wheels and a grip at the back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, revolute
+from artsim.families.details import rounded_tray
+from artsim.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
+
+GAP = 0.0015
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Half depth, half width and height of a bin, radius of its corners, how much it narrows below; metres."""
+
+    x: float
+    y: float
+    height: float
+    radius: float
+    taper: float
+    foot: float
+    """Height of the base."""
+    steps: int
+
+    @property
+    def low(self) -> tuple[float, float]:
+        """Front right corner."""
+        return -self.x, -self.y
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A bin, closed at rest."""
+    kind = str(rng.choice(["pedal", "swing", "wheelie", "halves"], p=[0.45, 0.2, 0.2, 0.15]))
+    if kind == "wheelie":
+        return _wheelie(rng)
+    size = _size(rng)
+    can = Assembly()
+    body = _body(rng, size)
+    if kind == "swing":
+        _swinging_flap(rng, can, body, size)
+    elif kind == "halves":
+        _two_lids(rng, can, body, size)
+    else:
+        _pedal_bin(rng, can, body, size)
+    return can
+
+
+def _size(rng: np.random.Generator) -> Bin:
+    x, y = rng.uniform(0.1, 0.2), rng.uniform(0.1, 0.24)
+    radius = rng.uniform(0.015, 0.5) * min(x, y)
+    if round_one := rng.random() < 0.35:
+        y, radius = x, 0.999 * x
+    return Bin(
+        x=x,
+        y=y,
+        height=min(rng.uniform(1.5, 3.6) * max(x, y), 0.75),
+        radius=radius,
+        taper=float(rng.choice([0.0, rng.uniform(0.02, 0.16)])) * min(x, y),
+        foot=rng.uniform(0.02, 0.05),
+        steps=6 if round_one else 3,
+    )
+
+
+def _body(rng: np.random.Generator, size: Bin) -> Solid:
+    x, y, wall = size.x, size.y, 0.003
+    body = rounded_tray((-x, -y, size.foot), (x, y, size.height), wall, size.radius, [(0.0, size.taper), (1.0, 0.0)],
+                        steps=size.steps)  # fmt: skip
+    out = rng.choice([0.004, -0.006]) - size.taper
+    body += rounded_box((-x - out, -y - out, 0), (x + out, y + out, size.foot + 0.002), size.radius, axis=2,
+                        steps=size.steps)  # fmt: skip
+    if rng.random() < 0.5:  # a collar around the opening
+        body += rounded_tray((-x - 0.003, -y - 0.003, size.height - rng.uniform(0.01, 0.04)),
+                             (x + 0.003, y + 0.003, size.height), 0.005, size.radius, floor=0.0,
+                             steps=size.steps)  # fmt: skip
+    return body
+
+
+def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -> None:
+    """A lid hinged at the back, mostly with a pedal."""
+    x, seam = size.x, size.height + GAP
+    hinge = (x + 0.013, 0.0, seam)
+    half = 0.4 * (size.y - 0.5 * size.radius)
+    rise = rng.uniform(0.12, 0.45) * min(size.x, size.y)
+    inset = rng.choice([0.25, 0.7, 1.0]) * rise
+    profile = [(0.0, inset), (0.12, 0.45 * inset), (0.5, 0.06 * inset), (1.0, 0.0)]
+    lid = rounded_tray((-x - 0.003, -size.y - 0.003, seam), (x + 0.003, size.y + 0.003, seam + rise), 0.003,
+                       size.radius, profile, side=-1, steps=size.steps)  # fmt: skip
+    lid += box((x - 0.012, -half, seam), (hinge[0], half, seam + 0.007))
+    lid += cylinder((hinge[0], -half, seam + 0.002), (hinge[0], half, seam + 0.002), 0.006, sections=12)
+    if rng.random() < 0.6:  # housing of the hinge
+        body += box(
+            (x - 0.006 - size.taper, -0.8 * half, size.height - 0.14), (x + 0.014, 0.8 * half, size.height - 0.02)
+        )
+    limit = np.deg2rad(rng.uniform(70.0, 100.0))
+    joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
+    if rng.random() < 0.25:  # a lip to lift it by, instead of a pedal
+        tip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
+        lid += rounded_box(tip, (-x + 0.002, 0.4 * half, seam + 0.008), 0.003)
+        can.add("body", body, density=500.0)
+        can.add("lid", lid, joint, density=500.0)
+        return
+    wide = rng.uniform(0.025, 0.05)
+    base = -x + size.taper - 0.005
+    cheeks = [s * (wide + 0.007) for s in (-1, 1)]
+    body += union(box((base - 0.025, c - 0.004, 0), (base + 0.03, c + 0.004, size.foot + 0.012)) for c in cheeks)
+    can.add("body", body, density=500.0)
+    can.add("lid", lid, joint, density=500.0)
+    tip, middle = base - rng.uniform(0.03, 0.06), 0.5 * size.foot + 0.01
+    pedal = hull_of(
+        rounded_box((tip, -wide, middle - 0.004), (tip + 0.02, wide, middle + 0.004), 0.004, axis=1),
+        box((base - 0.003, -wide, middle - 0.003), (base - 0.0015, wide, middle + 0.003)),
+    )
+    ratio = min(0.2, 0.8 * (middle - 0.006) / (base - tip)) / limit
+    turn = revolute("body", (0, -1, 0), (base - 0.002, 0.0, middle), 0.0, ratio * limit, mimic=("lid", ratio))
+    can.add("pedal", pedal, turn, density=800.0)
+
+
+def _swinging_flap(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -> None:
+    """A hood that narrows to an opening, in which a flap turns about its middle."""
+    rise = rng.uniform(0.3, 1.0) * size.x
+    shrink = rng.uniform(0.1, 0.3) * size.x
+    x, y, top = size.x, size.y, size.height + rise
+    profile = [(0.0, 0.0), (1.0, shrink)]
+    body += rounded_tray((-x, -y, size.height - 0.001), (x, y, top), 0.004, size.radius, profile, floor=0.0,
+                         steps=size.steps)  # fmt: skip
+    can.add("body", body, density=500.0)
+    rim = shrink + 0.004 + 0.003
+    flap = rounded_box((-x + rim, -y + rim, top - 0.012), (x - rim, y - rim, top - 0.006),
+                       max(size.radius - rim, 0.002), axis=2, steps=size.steps)  # fmt: skip
+    flap += box((-0.006, -0.8 * (y - rim), top - 0.016), (0.006, 0.8 * (y - rim), top - 0.011))
+    limit = np.deg2rad(rng.uniform(40.0, 80.0))
+    can.add("flap", flap, revolute("body", (0, 1, 0), (0, 0, top - 0.009), -limit, limit), label="lid", density=500.0)
+
+
+def _two_lids(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -> None:
+    """Two leaves that turn at the left and the right and meet in the middle."""
+    seam, thick = size.height + GAP, rng.uniform(0.006, 0.012)
+    can.add("body", body, density=500.0)
+    limit = np.deg2rad(rng.uniform(70.0, 95.0))
+    whole = rounded_box((-size.x, -size.y, seam), (size.x, size.y, seam + thick), size.radius, axis=2, steps=6)
+    for number, s in enumerate((1.0, -1.0)):
+        hinge = s * (size.y + 0.009)
+        lid = Solid((whole.pieces[0].trim_by_plane((0.0, s, 0.0), GAP),))
+        barrel = 0.25 * size.x
+        lid += cylinder((-barrel, hinge, seam + 0.001), (barrel, hinge, seam + 0.001), 0.0045, sections=12)
+        inner = s * 0.9 * size.y
+        lid += box((-barrel, min(hinge, inner), seam + 0.0005), (barrel, max(hinge, inner), seam + 0.005))
+        can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit), density=500.0)
+
+
+def _wheelie(rng: np.random.Generator) -> Assembly:
+    """Household bin: tapered body, lid hinged at the grip, two wheels below the back."""
+    x, y = rng.uniform(0.22, 0.34), rng.uniform(0.2, 0.32)
+    height = rng.uniform(0.75, 1.05)
+    radius, taper, wheel = rng.uniform(0.02, 0.06), rng.uniform(0.03, 0.07), rng.uniform(0.07, 0.12)
+    lift = rng.uniform(0.01, 0.03)
+    profile = [(0.0, taper), (0.86, 0.012), (0.865, 0.0), (1.0, 0.0)]
+    body = rounded_tray((-x, -y, lift), (x, y, height), 0.006, radius, profile)
+    inner = y - 0.6 * taper
+    wide = rng.uniform(0.035, 0.05)
+    axle = (x - taper + rng.uniform(0.0, 0.4) * wheel, wheel)
+    body += cylinder((axle[0], -inner + 0.001, axle[1]), (axle[0], inner - 0.001, axle[1]), 0.012, sections=16)
+    body += box((x - taper - 0.02, -0.6 * y, axle[1] - 0.03), (axle[0] + 0.014, 0.6 * y, axle[1] + 0.03))
+    front = -x + taper
+    body += box((front + 0.002, -0.6 * y, 0.0), (front + 0.05, 0.6 * y, lift + 0.003))
+    grip_z, grip_x = height - rng.uniform(0.06, 0.08), x + rng.uniform(0.045, 0.06)
+    for s in (-1.0, 1.0):
+        body += tube([(x - 0.004, s * 0.7 * y, grip_z - 0.02), (grip_x, s * 0.7 * y, grip_z)], 0.011, 10)
+    body += cylinder((grip_x, -0.75 * y, grip_z), (grip_x, 0.75 * y, grip_z), 0.014, sections=16)
+
+    can = Assembly()
+    can.add("body", body, density=600.0)
+    seam = height + GAP
+    hinge = (x + 0.012, 0.0, seam)
+    rise = rng.uniform(0.03, 0.07)
+    shape = [(0.0, rng.uniform(0.2, 0.9) * rise + 0.02), (0.6, 0.01), (0.62, 0.0), (1.0, 0.0)]
+    lid = rounded_tray((-x - 0.02, -y - 0.012, seam), (x, y + 0.012, seam + rise), 0.005, radius, shape, side=-1)
+    lid += box((x - 0.02, -0.6 * y, seam), (hinge[0], 0.6 * y, seam + 0.009))
+    lid += cylinder((hinge[0], -0.6 * y, seam + 0.002), (hinge[0], 0.6 * y, seam + 0.002), 0.008, sections=12)
+    limit = np.deg2rad(rng.uniform(85.0, 108.0))
+    can.add("lid", lid, revolute("body", (0, 1, 0), hinge, 0.0, limit), density=600.0)
+    for number, s in enumerate((1.0, -1.0)):
+        near, far = s * inner, s * (inner + wide)
+        tyre = cylinder((axle[0], near, wheel), (axle[0], far, wheel), wheel, sections=28)
+        tyre += cylinder(
+            (axle[0], far - s * 0.001, wheel), (axle[0], far + s * 0.008, wheel), 0.45 * wheel, 0.3 * wheel, 20
+        )
+        can.add(
+            f"wheel_{number}", tyre, continuous("body", (0, 1, 0), (axle[0], 0.5 * (near + far), wheel)), density=900.0
+        )
+    return can
