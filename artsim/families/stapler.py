@@ -1,0 +1,189 @@
+"""Staplers: a base with an anvil, a magazine and a pressing arm on one hinge at the back; the arm closed at rest.
+
+Varied: length and slenderness, a low desk base, a wide round base or a long flat one, magazine apart from the arm or
+one part with it, the profile of the arm (straight, arched, with a nose, stepped), its plan, cheeks at the hinge, a
+rubber pad, and how far each opens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.assembly import Assembly, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_box, rounded_rectangle
+
+GAP = 0.0008
+SKIRT = 0.0016
+"""Thickness of the arm's sides beside the magazine."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Measures in metres. The hinge lies at x = 0, the front at x = -length.
+
+    Attributes
+    ----------
+    length : float
+        From the hinge to the front of the arm.
+    width : float
+        Of the magazine.
+    base : float
+        Height of the base.
+    hinge : float
+        Height of the hinge.
+    tail : float
+        Radius of what turns about the hinge.
+    magazine : float
+        Height of the magazine's top.
+    inside : float
+        From the middle to a cheek beside the hinge.
+    run : float
+        By how far the cheeks reach forward.
+    """
+
+    length: float
+    width: float
+    base: float
+    hinge: float
+    tail: float
+    magazine: float
+    inside: float
+    run: float
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A stapler, closed at rest; what turns about the hinge opens upwards."""
+    length = rng.uniform(0.075, 0.17)
+    width = rng.uniform(0.011, 0.016)
+    base = rng.uniform(0.005, 0.011)
+    tail = rng.uniform(0.0065, 0.01)
+    hinge = base + tail + rng.uniform(0.001, 0.004)
+    lay = Layout(
+        length=length,
+        width=width,
+        base=base,
+        hinge=hinge,
+        tail=tail,
+        magazine=hinge + rng.uniform(0.3, 0.6) * tail,
+        inside=0.5 * width + SKIRT + 2 * GAP,
+        run=rng.uniform(1.2, 2.5) * tail,
+    )
+    arm_width = max(width * rng.uniform(1.25, 1.9), 2 * lay.inside)
+    stapler = Assembly()
+    stapler.add("base", _base(rng, lay, arm_width), density=2500.0)
+    magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
+    widest = _opening(arm, lay)
+    wide = min(np.deg2rad(rng.uniform(60, 110) if rng.random() < 0.6 else rng.uniform(110, 165)), widest)
+    axis, origin = (0, 1, 0), (0, 0, hinge)
+    if rng.random() < 0.55:
+        lift = min(np.deg2rad(rng.uniform(12, 50)), 0.5 * wide)
+        stapler.add("magazine", magazine, revolute("base", axis, origin, 0.0, lift), density=3500.0)
+        stapler.add("arm", arm, revolute("magazine", axis, origin, 0.0, wide - lift), density=2000.0)
+    else:
+        joined = box((-0.9 * length, -0.3 * width, lay.magazine - 0.001), (0, 0.3 * width, lay.magazine + 0.002))
+        stapler.add("arm", magazine + joined + arm, revolute("base", axis, origin, 0.0, wide), density=2500.0)
+    return stapler
+
+
+def _opening(solid: Solid, lay: Layout) -> float:
+    """Angle up to which what turns stays above the base's top."""
+    points = np.concatenate([vertices for vertices, _ in solid.piece_meshes()])
+    angles = np.deg2rad(np.arange(0.0, 171.0, 2.0))
+    heights = lay.hinge + (points[:, 2] - lay.hinge) * np.cos(angles)[:, None] - points[:, 0] * np.sin(angles)[:, None]
+    low = heights.min(axis=1) < lay.base + 2 * GAP
+    low[angles < 0.5] = False  # near rest only the front is low, and it rises
+    return float(angles[np.argmax(low) - 1]) if low.any() else float(angles[-1])
+
+
+def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
+    """Plate with an anvil at the front and cheeks beside the hinge."""
+    front = -lay.length - rng.uniform(0.0, 0.012)
+    back = lay.tail + rng.uniform(0.0, 0.012)
+    cheek = rng.uniform(0.0015, 0.003)
+    inside, run = lay.inside, lay.run
+    half = max(0.5 * arm_width * rng.uniform(0.95, 1.35), inside + cheek + 0.001)
+    kind = str(rng.choice(["plain", "boat", "round"], p=[0.5, 0.3, 0.2]))
+    if kind == "round":
+        half *= rng.uniform(1.3, 1.9)
+        ends = [cylinder((x, 0, 0), (x, 0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
+        solid = hull_of(*ends) + rounded_box(
+            (front + 0.4 * half, -0.5 * arm_width, 0.001), (back, 0.5 * arm_width, lay.base), 0.003, axis=2
+        )
+    else:
+        outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.1, 0.9) * half, 5)
+        inner = outline * (1.0, rng.uniform(0.8, 0.97))
+        solid = hull_of(prism(outline, 0, 0.6 * lay.base), prism(inner, 0.5 * lay.base, lay.base))
+        if kind == "boat":  # a rounded rear block
+            solid += rounded_box((-0.3 * lay.length, -half * 0.9, 0.001), (back, 0.9 * half, lay.base), 0.002)
+    anvil = -lay.length + 0.012
+    solid += box((anvil - 0.006, -0.0065, lay.base - 0.002), (anvil + 0.006, 0.0065, lay.base + 0.0005))
+    if rng.random() < 0.5:
+        step = rng.uniform(0.15, 0.3) * lay.length
+        solid += rounded_box(
+            (anvil + 0.012, -0.4 * inside, lay.base - 0.002), (-step, 0.4 * inside, lay.base + 0.0006), 0.001, 2
+        )
+    rise = lay.hinge + rng.uniform(0.3, 0.6) * lay.tail
+    for side in (-1, 1):
+        y = sorted((side * inside, side * (inside + cheek)))
+        foot = [(-run, lay.base - 0.002), (0.95 * lay.tail, lay.base - 0.002)]
+        crown = [(-0.5 * lay.tail, rise), (0.4 * lay.tail, rise), (0.9 * lay.tail, lay.hinge)]
+        solid += prism(foot + crown, y[0], y[1], axis=1)
+        head = side * (inside + cheek)
+        solid += cylinder((0, head - side * 0.001, lay.hinge), (0, head + side * 0.0008, lay.hinge), 0.3 * lay.tail)
+    if rng.random() < 0.4:
+        solid += rounded_box((front + 0.008, -0.8 * half, -0.0015), (back - 0.006, 0.8 * half, 0.001), 0.003, axis=2)
+    return solid
+
+
+def _magazine(rng: np.random.Generator, lay: Layout) -> Solid:
+    """Channel of the staples: a long box that ends in a round tongue at the hinge."""
+    half = 0.5 * lay.width
+    low = lay.base + rng.uniform(0.0025, 0.005)
+    high = lay.magazine
+    start = -lay.length + rng.uniform(0.0, 0.004)
+    solid = box((start, -half, low), (-1.4 * lay.tail, half, high))
+    tongue = cylinder((0, -half, lay.hinge), (0, half, lay.hinge), high - lay.hinge, sections=20)
+    solid += hull_of(tongue, box((-1.6 * lay.tail, -half, low), (-1.4 * lay.tail, half, high)))
+    return solid + box((start - 0.0015, -0.8 * half, low + 0.001), (start + 0.001, 0.8 * half, high - 0.001))
+
+
+def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
+    """Shell above the magazine, with skirts that reach down beside it; narrow between the cheeks."""
+    low = lay.magazine + GAP
+    tall = lay.length * rng.uniform(0.1, 0.17)
+    narrow = lay.inside - GAP
+    front = -lay.length - rng.uniform(0.0, 0.006)
+    neck = -lay.run - 0.001
+    x = np.array([front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, 0.8 * lay.tail])
+    kind = str(rng.choice(["straight", "arched", "nosed", "wedge"]))
+    heights: Array = {
+        "straight": np.array([0.85, 0.95, 1.0, 1.0, 0.9, 0.8, 0.5]),
+        "arched": np.array([0.5, 0.8, 1.05, 1.05, 0.85, 0.7, 0.4]),
+        "nosed": np.array([1.0, 1.1, 0.85, 0.75, 0.7, 0.65, 0.45]),
+        "wedge": np.array([1.15, 1.1, 0.95, 0.8, 0.7, 0.6, 0.45]),
+    }[kind]
+    top = low + np.maximum(tall * heights, 0.004)
+    waist = rng.uniform(0.75, 1.0)
+    plan = np.array([0.5 * width * rng.uniform(0.8, 1.0), 0.5 * width, 0.5 * width, 0.5 * waist * width, 0, 0, 0])
+    plan = np.maximum(plan, narrow)
+    plan[-1] = 0.9 * narrow
+    bevel = rng.uniform(0.15, 0.6)
+    sections = []
+    for k in range(len(x)):
+        cut = bevel * min(plan[k], top[k] - low)
+        corners = [(plan[k], low), (plan[k], top[k] - cut), (plan[k] - 0.5 * cut, top[k] - 0.3 * cut)]
+        corners.append((plan[k] - 1.2 * cut, top[k]))
+        sections.append(np.array([(x[k], side * max(y, 0.0), z) for y, z in corners for side in (-1, 1)]))
+    solid = loft(sections)
+    hem = rng.uniform(0.15, 0.85) * (low - lay.base - 0.003)
+    for side in (-1, 1):
+        y = sorted((side * (0.5 * lay.width + GAP), side * narrow))
+        skirt = [(0.92 * front, low + 0.001), (0.88 * front, low - hem), (neck, low - hem), (neck, low + 0.001)]
+        solid += prism(skirt, y[0], y[1], axis=1)
+        eye = cylinder((0, y[0], lay.hinge), (0, y[1], lay.hinge), 0.7 * lay.tail, sections=16)
+        ends = box((neck, y[0], low), (0.5 * lay.tail, y[1], low + 0.002))
+        solid += hull_of(eye, ends)
+    return solid
