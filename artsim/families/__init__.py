@@ -17,6 +17,7 @@ from artsim.errors import ConfigError
 from artsim.families import (
     box,
     bucket,
+    cutter,
     dishwasher,
     drawer,
     eyeglasses,
@@ -37,6 +38,7 @@ Family = Callable[[np.random.Generator], Assembly]
 FAMILIES: dict[str, Family] = {
     "box": box.build,
     "bucket": bucket.build,
+    "cutter": cutter.build,
     "dishwasher": dishwasher.build,
     "drawer": drawer.build,
     "eyeglasses": eyeglasses.build,

@@ -1,0 +1,179 @@
+"""Ovens: cookers with a hob, and ovens to build in.
+
+What varies: one door or two that drop down, or one that opens sideways; a drawer below; a hob with gas grates, coils or
+a glass top; a guard at the back; dials in front or on the guard, with or without stops; window, handle, racks, feet.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+
+GAP = 0.002
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """An oven, closed at rest. The back of its doors is the plane x = 0."""
+    built_in = rng.random() < 0.25
+    half = 0.5 * (rng.uniform(0.54, 0.62) if built_in else rng.uniform(0.48, 0.78))
+    depth = rng.uniform(0.5, 0.66)
+    height = rng.uniform(0.44, 0.62) if built_in else rng.uniform(0.82, 0.95)
+    two = not built_in and rng.random() < 0.2
+    wall, thick = rng.uniform(0.03, 0.05), rng.uniform(0.03, 0.06)
+    guard = 0.0 if built_in or rng.random() < 0.55 else rng.uniform(0.06, 0.2)
+    on_guard = guard > 0.11 and rng.random() < 0.6  # the dials
+    strip = rng.uniform(0.02, 0.05) if on_guard else rng.uniform(0.08, 0.13)
+    plinth = 0.01 if built_in else rng.uniform(0.03, 0.11)
+    drawer = rng.uniform(0.13, 0.2) if not built_in and not two and rng.random() < 0.55 else 0.0
+    ceiling = height - strip
+
+    oven = Assembly()
+    body = _shell(half, depth, plinth, height, wall)
+    body += rounded_box((-thick, -half, ceiling), (0.02, half, height), 0.004, axis=1)
+    feet = ((x, y) for x in (0.05, depth - 0.05) for y in (0.05 - half, half - 0.05))
+    body += union(cylinder((x, y, 0), (x, y, plinth + 0.01), 0.02, sections=14) for x, y in feet)
+    if not built_in:
+        body += _hob(rng, half, depth, height, thick)
+        if rng.random() < 0.6:  # a plinth set back
+            body += box((0.03, 0.004 - half, 0.0), (depth - 0.01, half - 0.004, plinth + 0.002))
+    if guard > 0:
+        body += rounded_box((depth - 0.05, -half, height - 0.01), (depth, half, height + guard), 0.006, axis=1)
+    floor = plinth + drawer
+    if drawer > 0:
+        body += box((GAP, 0.01 - half, floor - 0.012), (depth - 0.01, half - 0.01, floor + 0.01))
+    edges = [floor, ceiling] if not two else [floor, floor + rng.uniform(0.5, 0.62) * (ceiling - floor), ceiling]
+    for low, high in pairwise(edges):
+        body += box((GAP, 0.01 - half, high - wall), (depth - 0.01, half - 0.01, high + 0.01))
+        body += box((GAP, 0.01 - half, low), (depth - 0.01, half - 0.01, low + wall))
+        for z in np.linspace(low + wall, high - wall, int(rng.integers(2, 4)))[1:-1]:
+            body += wire_shelf(
+                (0.05, wall - half - 0.002, z), (depth - wall + 0.002, half - wall + 0.002, z + 0.006), 7, 0.006
+            )
+    oven.add("body", body, density=350.0)
+
+    sideways = bool(not two and rng.random() < 0.1)
+    kind, reach = str(rng.choice(["bar", "bow", "flat"])), rng.uniform(0.035, 0.055)
+    for number, (low, high) in enumerate(pairwise(edges), 1):
+        corner_low = np.array([-thick, 0.001 - half, low + GAP])
+        corner_high = np.array([0.0, half - 0.001, high - 3 * GAP])
+        name = f"door_{number}" if two else "door"
+        door, grip = _door(rng, corner_low, corner_high, kind, reach)
+        oven.add(name, door, _hinge(rng, corner_low, corner_high, sideways, grip, reach if number == 2 else 0.0))
+    if drawer > 0:
+        # The handle of the open door hangs down: the drawer stops before it.
+        travel = min(0.65 * depth, grip - floor - 0.09)
+        oven.add("drawer", _drawer(rng, half, depth, thick, wall, plinth, floor, kind),
+                 prismatic("body", (-1, 0, 0), 0.0, travel, (0, 0, 0.5 * (plinth + floor))))  # fmt: skip
+    face, middle = (depth - 0.05, height + 0.5 * guard) if on_guard else (-thick, height - 0.5 * strip)
+    _dials(rng, oven, half, face, middle, min(0.5 * guard, 0.06) if on_guard else 0.5 * strip)
+    return oven
+
+
+def _shell(half: float, depth: float, low: float, high: float, wall: float) -> Solid:
+    return tray((GAP, -half, low), (depth, half, high), wall, 0.02, axis=0, side=-1)
+
+
+def _hob(rng: np.random.Generator, half: float, depth: float, z: float, thick: float) -> Solid:
+    """Worktop with four to six burners."""
+    top = z + rng.uniform(0.008, 0.03)
+    over = rng.uniform(0.0, 0.012)
+    solid = rounded_box((-thick - over, -half - over, z - 0.001), (depth, half + over, top), 0.004)
+    columns = 3 if half > 0.34 else 2
+    ys = (np.arange(columns) - 0.5 * (columns - 1)) * (1.9 * half / columns)
+    kind = str(rng.choice(["gas", "coil", "glass"], p=[0.5, 0.25, 0.25]))
+    if kind == "glass":
+        solid += rounded_box(
+            (-thick + 0.02, 0.02 - half, top - 0.001), (depth - 0.07, half - 0.02, top + 0.003), 0.01, axis=2
+        )
+    for x in np.array([0.24, 0.68]) * depth:
+        for y in ys:
+            radius = rng.uniform(0.06, 0.1) if kind != "gas" else rng.uniform(0.025, 0.045)
+            if kind == "glass":
+                solid += cylinder((x, y, top), (x, y, top + 0.0045), radius, sections=28)
+            elif kind == "coil":
+                solid += cylinder((x, y, top - 0.001), (x, y, top + 0.006), radius, sections=28)
+                solid += cylinder((x, y, top), (x, y, top + 0.014), 0.75 * radius, sections=24)
+            else:
+                solid += cylinder((x, y, top - 0.001), (x, y, top + 0.012), radius, 0.8 * radius, 20)
+    if kind == "gas":
+        solid += union(_grate(0.46 * depth, y, 0.4 * depth, 0.92 * half / columns, top) for y in ys)
+    return solid
+
+
+def _grate(x: float, y: float, long: float, wide: float, low: float) -> Solid:
+    """Iron grate over the burners of one column."""
+    bar, lift = 0.009, low + 0.02
+    solid = frame((x - long, y - wide, lift), (x + long, y + wide, lift + bar), [bar] * 4, 0, 1)
+    solid += box((x - long, y - 0.5 * bar, lift), (x + long, y + 0.5 * bar, lift + 1.5 * bar))
+    for u in (x - 0.55 * long, x, x + 0.55 * long):
+        solid += box((u - 0.5 * bar, y - wide, lift), (u + 0.5 * bar, y + wide, lift + 1.5 * bar))
+    feet = [(u, v) for u in (x - long, x + long - bar) for v in (y - wide, y + wide - bar)]
+    return solid + union(box((u, v, low - 0.001), (u + bar, v + bar, lift + 0.001)) for u, v in feet)
+
+
+def _door(rng: np.random.Generator, low: Array, high: Array, kind: str, reach: float) -> tuple[Solid, float]:
+    """Door with a window or a board, and the height of its handle."""
+    tall, half = high[2] - low[2], high[1]
+    grip = high[2] - rng.uniform(0.03, 0.05)
+    side = rng.uniform(0.05, 0.12)
+    margins = [side, side, rng.uniform(0.05, 0.1) if tall > 0.3 else 0.05, high[2] - grip + 0.03]
+    if rng.random() < 0.75:
+        solid = windowed_panel(low, high, margins, rng.uniform(0.006, 0.02), rng.uniform(0.001, 0.006))
+    else:
+        solid = rounded_box(low, high, 0.005)
+        if rng.random() < 0.6:
+            solid += rounded_box(low + (-0.003, side, margins[2]), high - (0.01, side, margins[3]), 0.002)
+    span = half * rng.uniform(0.6, 0.93)
+    radius = rng.uniform(0.007, 0.012)
+    return solid + front_handle(kind, (low[0], -span, grip), (low[0], span, grip), reach, radius), float(grip)
+
+
+def _hinge(rng: np.random.Generator, low: Array, high: Array, sideways: bool, grip: float, reach: float) -> JointSpec:
+    """Hinge at the side, or along the lower front edge; its handle must not sink by ``reach`` onto a door below."""
+    if sideways:
+        left = bool(rng.random() < 0.5)
+        return side_hinge(0.0, high[1] if left else low[1], np.deg2rad(rng.uniform(85.0, 130.0)), left)
+    upper = np.deg2rad(90.0 if rng.random() < 0.7 else rng.uniform(75.0, 90.0))
+    if reach > 0:
+        upper = min(upper, float(np.arctan2(grip - low[2] - 0.03, reach + 0.015)))
+    return revolute("body", (0, -1, 0), (low[0], 0.0, low[2]), 0.0, upper)
+
+
+def _drawer(
+    rng: np.random.Generator, half: float, depth: float, thick: float, wall: float, low: float, high: float, kind: str
+) -> Solid:
+    """Drawer below the oven, for trays."""
+    solid = rounded_box((-thick, 0.001 - half, low + GAP), (0.0, half - 0.001, high - GAP), 0.005)
+    side = half - wall - 0.004
+    inner = max(low + 0.023, low + wall + 0.003) if wall > 0.02 else low + 0.023
+    solid += tray((-0.003, -side, inner), (depth - 0.05, side, high - 0.03), 0.006)
+    if rng.random() < 0.6:
+        z, span = 0.5 * (low + high) + 0.02, half * rng.uniform(0.3, 0.8)
+        solid += front_handle(kind, (-thick, -span, z), (-thick, span, z), 0.03, 0.007)
+    return solid
+
+
+def _dials(rng: np.random.Generator, oven: Assembly, half: float, face: float, z: float, room: float) -> None:
+    """A row of dials, perhaps around a display, and perhaps buttons."""
+    count = int(rng.integers(2, 8))
+    reach = rng.uniform(0.018, 0.035)
+    stops = rng.random() < 0.35
+    ys = np.linspace(-0.85, 0.85, count + 2)[1:-1] * half
+    if rng.random() < 0.4:  # in two groups
+        ys = np.sign(ys + 1e-6) * (0.25 + 0.65 * np.abs(ys) / half) * half
+    radius = min(rng.uniform(0.016, 0.026), 0.75 * room, 0.42 * float(np.diff(ys).min()))
+    for number, y in enumerate(ys, 1):
+        foot = (face, float(y), z)
+        turn = revolute("body", (-1, 0, 0), foot, 0.0, 5.0) if stops else continuous("body", (-1, 0, 0), foot)
+        oven.add(f"knob_{number}", dial(foot, (-1, 0, 0), reach, radius), turn)
+    if count < 4 and rng.random() < 0.5:
+        for number, y in enumerate(0.5 * (ys[:-1] + ys[1:]), 1):
+            point = (face, float(y), z)
+            button = push_button(point, (0.018, 0.012), 0.003)
+            oven.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, point))
