@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.camera import Camera
 from artsim.errors import ConfigError, RenderError
 from artsim.kinematics import Array
+from artsim.noise import Look, View
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer, shared_renderer
 from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visibility
-from artsim.sensor import Look, Sensor, View, find_sensor
+from artsim.sensor import Sensor, find_sensor
 
 IMAGES = ("depth", "part_mask", "rgb")
 """Images that a sample can carry besides its cloud."""

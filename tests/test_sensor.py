@@ -13,20 +13,12 @@ import artsim
 from artsim import Camera, ViewOptions, observe, sample_state, sample_view
 from artsim.errors import ConfigError
 from artsim.kinematics import Array
+from artsim.noise import AxialNoise, DisparityQuantisation, EdgeDropout, FlyingPixels, LateralJitter, View
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions
 from artsim.renderers import BACKGROUND
 from artsim.sampling import StateOptions
-from artsim.sensor import (
-    SENSORS,
-    AxialNoise,
-    DisparityQuantisation,
-    EdgeDropout,
-    FlyingPixels,
-    LateralJitter,
-    Sensor,
-    View,
-)
+from artsim.sensor import SENSORS, Sensor
 from artsim.sources import find_sources
 from artsim.verify import sample_problems, verify
 from tests.conftest import ASSETS
