@@ -163,6 +163,8 @@ class Inspect:
 
     path: tyro.conf.Positional[Path]
     """URDF file or its folder."""
+    gates: bool = False
+    """Also pass the object through the sim-readiness gates, and list what each finds."""
     package_root: Mapping[str, Path] = field(default_factory=dict)
     """Folders of package:// names: NAME FOLDER ..."""
 
@@ -170,7 +172,14 @@ class Inspect:
         from artsim.inspect import describe
         from artsim.urdf import load
 
-        print(describe(load(self.path, package_roots=self.package_root)))
+        obj = load(self.path, package_roots=self.package_root)
+        print(describe(obj))
+        if self.gates:
+            from artsim.validity import check_file
+
+            print("\ngates")
+            for gate in check_file(obj, self.path):
+                print(f"  {gate}")
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from artsim.collision import Collision, Sweep
 from artsim.errors import ArtsimError
-from artsim.inertia import mass_properties
+from artsim.inertia import part_inertia
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
-from artsim.strict import strict_kinematics
+from artsim.strict import strict_kinematics, strict_urdf
 
 CONVEX = 1e-6
 """Share of its hull's volume by which a collision piece may fall short of it."""
+
+
+_SHOWN = 5
 
 
 @dataclass(frozen=True)
@@ -42,14 +47,15 @@ class Gate:
         return not self.problems
 
     def __str__(self) -> str:
-        return f"{self.name}: {'passed' if self.passed else '; '.join(self.problems)}"
+        shown = "; ".join(self.problems[:_SHOWN])
+        more = f"; and {len(self.problems) - _SHOWN} more" if len(self.problems) > _SHOWN else ""
+        return f"{self.name}: {shown}{more}" if self.problems else f"{self.name}: passed"
 
 
 def check(obj: ArticulatedObject) -> list[Gate]:
     """All gates that need nothing but the object.
 
-    Those that read its URDF file are in :mod:`artsim.strict`, those that load it into simulators in
-    :mod:`artsim.simulators`.
+    :func:`check_file` adds those of its URDF file; :mod:`artsim.simulators` loads it into simulators.
     """
     sweep = Sweep(obj)
     gates: dict[str, Callable[[], list[str]]] = {
@@ -61,6 +67,11 @@ def check(obj: ArticulatedObject) -> list[Gate]:
         "inertia": lambda: _inertia(obj),
     }
     return [Gate(name, tuple(_closed(gate))) for name, gate in gates.items()]
+
+
+def check_file(obj: ArticulatedObject, path: str | Path) -> list[Gate]:
+    """All gates of a loaded object: those of its URDF file, then its own."""
+    return [Gate("strict URDF", tuple(strict_urdf(path))), *check(obj)]
 
 
 def _closed(gate: Callable[[], list[str]]) -> list[str]:
@@ -89,7 +100,7 @@ def _collision_geometry(obj: ArticulatedObject) -> list[str]:
     return problems
 
 
-def _is_convex(vertices: Array, faces: Array) -> bool:
+def _is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
     corners = (vertices - vertices[0])[faces]
     volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
     try:
@@ -101,12 +112,10 @@ def _is_convex(vertices: Array, faces: Array) -> bool:
 
 def _inertia(obj: ArticulatedObject) -> list[str]:
     problems = []
-    for part in obj.parts:
-        if part.body is None:
-            problems.append(f"{part.name} has no density")
-            continue
-        properties = mass_properties(part)
-        moments = np.linalg.eigvalsh(properties.inertia)
-        if not (properties.mass > 0 and moments[0] > 0 and moments[2] <= moments[0] + moments[1] * (1 + 1e-9)):
-            problems.append(f"{part.name} has mass {properties.mass:.3g} kg, principal moments {moments}")
+    for k, part in enumerate(obj.parts):
+        inertia = part_inertia(obj, k)
+        moments = np.linalg.eigvalsh(inertia.tensor)
+        possible = moments[0] > 0 and moments[2] <= (moments[0] + moments[1]) * (1 + 1e-9)
+        if not (inertia.mass > 0 and possible):
+            problems.append(f"{part.name} has mass {inertia.mass:.3g} kg, principal moments {moments}")
     return problems
