@@ -1,0 +1,133 @@
+"""Cutters (slide knives): a handle with a channel, a blade that slides out to -X by a button, and some end caps.
+
+Varied: size, nose of the handle, angle of the blade's point, button, grooves and bulges of the
+handle, a cap at the back that pulls out, and a locking wheel on the blade's button.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, prismatic
+from artsim.solids import Solid, box, cylinder, prism, ring, rounded_box, rounded_rectangle, union
+
+GAP = 0.0005
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A cutter lying flat, its blade drawn in at rest."""
+    length = rng.uniform(0.12, 0.19)
+    half = 0.5 * length * rng.uniform(0.1, 0.19)
+    height = max(2 * half * rng.uniform(0.38, 0.7), 0.009)
+    wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
+    blade_half = (half - wall - GAP) * rng.uniform(0.8, 1.0)
+    slot = blade_half * rng.uniform(0.3, 0.5)
+    nose = length * rng.uniform(0.06, 0.16)
+    capped = rng.random() < 0.45
+    front, back = -0.5 * length, 0.5 * length
+    cap = rng.uniform(0.008, 0.018) if capped else 0.0
+    end = back - cap
+
+    channel = 0.5 * height - 0.0006  # bottom of the blade
+    sheet = 0.0014
+    roof = channel + sheet + GAP
+    inner = blade_half + GAP
+    cutter = Assembly()
+    body = _body(rng, front, end, half, height, inner, slot + GAP, channel - GAP, roof, nose, wall, capped)
+    cutter.add("body", body, density=1100.0)
+
+    blade_end = end - wall - 0.002 - length * rng.uniform(0.02, 0.1)
+    blade = _blade(rng, front + rng.uniform(0.0005, 0.003), blade_end, blade_half, channel, sheet)
+    button = min(length * rng.uniform(0.1, 0.2), 0.03)
+    button_end = blade_end - rng.uniform(0.0, 0.2) * length
+    top = height + rng.uniform(0.002, 0.006)
+    blade += _button(rng, button_end - button, button_end, slot, roof - GAP, height, top, half)
+    # The button stops before the bridge over the slot at the nose.
+    travel = (button_end - button) - (front + nose) - 0.004
+    travel *= rng.uniform(0.8, 1.0)
+    cutter.add("blade", blade, prismatic("body", (-1, 0, 0), 0.0, travel, (front, 0, channel)), density=5000.0)
+    if capped:
+        plug = rounded_box((end + GAP, -half * 0.97, 0.03 * height), (back, half * 0.97, 0.97 * height), 0.002)
+        plug += box((end - wall, -0.8 * inner, channel), (end + 0.003, 0.8 * inner, channel + sheet))
+        pull = rng.uniform(0.015, 0.03)
+        cutter.add("cap", plug, prismatic("body", (1, 0, 0), 0.0, pull, (end, 0, 0.5 * height)), density=1000.0)
+    if rng.random() < 0.25:
+        at, radius = button_end - 0.5 * button, min(0.35 * button, 0.9 * half)
+        wheel = ring((at, 0, top + 0.0006 + 0.0015), (0, 0, 1), 0.0, radius, 0.003, 16)
+        wheel += union(
+            cylinder((at + x, y, top + 0.001), (at + x, y, top + 0.0034), 0.14 * radius, sections=6)
+            for x, y in ((radius * np.cos(a), radius * np.sin(a)) for a in np.arange(12) * np.pi / 6)
+        )
+        cutter.add("wheel", wheel, continuous("blade", (0, 0, 1), (at, 0, top)), density=1100.0)
+    return cutter
+
+
+def _body(
+    rng: np.random.Generator,
+    front: float,
+    back: float,
+    half: float,
+    height: float,
+    inner: float,
+    slot: float,
+    floor: float,
+    roof: float,
+    nose: float,
+    wall: float,
+    capped: bool,
+) -> Solid:
+    """Floor, two sides and two lips that leave a slot along the top, closed over it at the back."""
+    mouth = nose * rng.uniform(0.0, 0.4)  # one side of the channel begins further back
+    narrow = inner + 0.3 * (half - inner)
+    outer = np.array([(front, narrow), (front + nose, half), (back, half)])
+    bulge = half * rng.uniform(0.0, 0.15) * (rng.random() < 0.5)
+    solid = prism(np.concatenate([outer, outer * (1, -1)]), 0.12 * height, floor)
+    solid += prism(np.concatenate([outer, outer * (1, -1)]) * (0.99, 0.86), 0.0, 0.2 * height)
+    for side in (-1, 1):
+        inside = np.array([(back, inner), (front + mouth * (side < 0), inner)])
+        wall_outline = np.concatenate([outer, inside]) * (1, side)
+        solid += prism(wall_outline, 0.12 * height, 0.88 * height)
+        lip = np.array([(front + nose, slot), (back, slot)])
+        lip_outline = np.concatenate([outer, lip]) * (1, side)
+        solid += prism(lip_outline, roof, 0.9 * height)
+        crown = np.concatenate([outer * (0.99, 0.86), lip * (0.99, 1.0)]) * (1, side)
+        solid += prism(crown, 0.85 * height, height)
+    tail = 0.004
+    if capped:
+        solid += box((back - tail, -half, roof), (back, half, 0.9 * height))
+    else:
+        outline = rounded_rectangle((back - 2 * tail, -half), (back + 0.3 * half, half), 0.6 * half)
+        solid += prism(outline[outline[:, 0] > back - tail - 1e-6], 0.05 * height, 0.95 * height)
+    for x in np.linspace(0.15, 0.15 + 0.04 * rng.integers(0, 7), int(rng.integers(0, 6))):
+        at = front + nose + x * (back - front)
+        for side in (-1, 1):
+            solid += cylinder((at, side * (half - 0.0008), 0.2 * height), (at, side * (half - 0.0008), 0.8 * height),
+                              0.0016, sections=8)  # fmt: skip
+    if bulge > 0:
+        start, stop = front + nose + 0.3 * (back - front), back - 0.005
+        for side in (-1, 1):
+            grip = np.array([(start, half - 0.001), (start + 0.02, half + bulge), (stop - 0.02, half + bulge),
+                             (stop, half - 0.001)])  # fmt: skip
+            solid += prism(grip * (1, side), 0.2 * height, 0.8 * height)
+    return solid
+
+
+def _blade(rng: np.random.Generator, front: float, back: float, half: float, low: float, thick: float) -> Solid:
+    """Strip with a slanted point."""
+    slant = 2 * half * np.tan(rng.uniform(0.35, 1.0))
+    side = float(rng.choice([-1, 1]))
+    outline = np.array([(front, -half), (front + slant, half), (back, half), (back, -half)])
+    return prism(outline * (1, side), low, low + thick)
+
+
+def _button(
+    rng: np.random.Generator, start: float, end: float, slot: float, low: float, height: float, top: float, half: float
+) -> Solid:
+    """Stem through the slot and a ribbed button above it."""
+    solid = box((start, -slot, low - 0.0008), (end, slot, top - 0.0005))
+    wide = min(slot * rng.uniform(1.2, 2.2), 0.9 * half)
+    solid += rounded_box((start, -wide, height + GAP), (end, wide, top), 0.002)
+    count = int(rng.integers(0, 6))
+    for x in np.linspace(start + 0.003, end - 0.003, count):
+        solid += box((x - 0.0006, -0.9 * wide, top - 0.001), (x + 0.0006, 0.9 * wide, top + 0.0005))
+    return solid
