@@ -1,0 +1,301 @@
+"""Refinement under kinematic constraints (ArtPERL, section 4.4), on Theta: what every result obeys, by construction.
+
+Two solvers: :func:`refine`, Levenberg-Marquardt on robust distances from the observed points to the reference's
+surface, takes milliseconds; :func:`refine_by_gradient` minimises the paper's energy (equations 6 and 7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from artperl.batch import Batch
+from artperl.matching import GLIDE, Matches, match
+from artperl.pose import Posed, Theta, Trees, clamp_state, complete_state, joint_axes, parent_pose
+from artperl.rotations import rotate, rotation_from_vector
+from artperl.shapes import Observed, Shapes
+from artsim.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """How the reference is fitted. Lengths are in diagonals of the observed object.
+
+    A sigma says how far a property of the object may differ from the reference's; 0 keeps the reference's.
+    """
+
+    iterations: int = 25
+    """At most; fewer when nothing improves any more."""
+    rigid_iterations: int = 8
+    """Of these, the first that leave the reference's shape as it is."""
+    robust_start: float = 0.2
+    robust_end: float = 0.03
+    narrowing: float = 0.7
+    """Distance at which a point loses its say (Geman-McClure): at first, at last, and its share kept per iteration."""
+    sigma_scale: float = 0.2
+    """Logarithm of the overall scale."""
+    sigma_aspect: float = 0.15
+    """Logarithm of the scale along each axis against the overall scale."""
+    sigma_stretch: float = 0.1
+    """Logarithm of a part's own scale against that of the whole."""
+    sigma_shift: float = 0.04
+    """Position of a joint's anchor."""
+    prior_weight: float = 2e-5
+    """Squared distance that a deviation of one sigma costs."""
+    tolerance: float = 1e-4
+    """Relative decrease of the energy below which an object counts as done."""
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1 or not 0.0 < self.robust_end <= self.robust_start:
+            raise ConfigError("refinement needs at least one iteration and 0 < robust_end <= robust_start")
+
+
+@dataclass(frozen=True, eq=False)
+class Refined(Batch):
+    """Outcome of a refinement of B objects.
+
+    Attributes
+    ----------
+    theta : Theta
+    energy, start_energy : (B,) float
+        Of the result and of the start; the first is never larger.
+    iterations : (B,) int64
+        That changed something.
+    """
+
+    theta: Theta
+    energy: Tensor
+    start_energy: Tensor
+    iterations: Tensor
+
+
+def refine(shapes: Shapes, observed: Observed, start: Theta, options: RefineOptions | None = None) -> Refined:
+    """Fit references to observed clouds by Levenberg-Marquardt on Theta.
+
+    Every iteration matches the points anew, and a step is taken only if the robust energy, matched anew, falls; for an
+    object whose step fails, damping grows. Joint states stay within their limits.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    observed : Observed
+    start : Theta
+        For several starts of one object, repeat the rows of shapes and clouds.
+    options : RefineOptions, optional
+
+    Returns
+    -------
+    Refined
+    """
+    options = options or RefineOptions()
+    unit = shapes.diagonal * start.log_scale.mean(-1).exp()
+    prior = _Prior.of(shapes, unit, options)
+    start = replace(start, state=clamp_state(shapes.trees, start.state))
+    current, posed = match(shapes, observed, start, unit)
+    first = _energy(observed, current, prior, options.robust_end)
+    best, best_energy = start, first
+    damping = torch.full_like(unit, 1e-2)
+    steps = torch.zeros_like(unit, dtype=torch.int64)
+    settled = torch.zeros_like(unit, dtype=torch.bool)
+    width = options.robust_start
+    for i in range(options.iterations):
+        rigid = i < options.rigid_iterations
+        before = _energy(observed, current, prior, width)
+        step = _step(shapes, observed, current, posed, prior, width, damping, rigid)
+        candidate, candidate_posed = match(shapes, observed, _moved(shapes.trees, current.theta, step, observed), unit)
+        after = _energy(observed, candidate, prior, width)
+        better = after < before
+        current, posed = candidate.where(better, current), candidate_posed.where(better, posed)
+        final = _energy(observed, current, prior, options.robust_end)
+        improved = final < best_energy
+        best, best_energy = current.theta.where(improved, best), torch.where(improved, final, best_energy)
+        steps += better
+        if width == options.robust_end and not rigid:
+            settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 10.0)
+            if bool(settled.all()):
+                break
+        damping = torch.where(better, 0.3 * damping, 8.0 * damping).clamp(1e-6, 1e8)
+        width = max(options.robust_end, options.narrowing * width)
+    return Refined(best, best_energy, first, steps)
+
+
+@dataclass(frozen=True, eq=False)
+class _Prior(Batch):
+    """Which parameters move, and how freely. Parameters are ordered as :func:`_columns` says."""
+
+    active: Tensor
+    precision: Tensor
+    unit: Tensor
+
+    @staticmethod
+    def of(shapes: Shapes, unit: Tensor, options: RefineOptions) -> _Prior:
+        """``active (B, D)`` and ``precision (B, D, D)``, the quadratic form that deviations cost."""
+        trees = shapes.trees
+        B, P = trees.valid.shape
+        jointed = trees.valid & (trees.depth > 0)
+        eye, mean = torch.eye(3, device=unit.device), torch.full((3, 3), 1.0 / 3.0, device=unit.device)
+        always = torch.ones(B, 6, dtype=torch.bool, device=unit.device)
+        scaled = torch.full((B, 3), options.sigma_scale > 0 or options.sigma_aspect > 0, device=unit.device)
+        stretched = (trees.valid & shapes.has_surface & (options.sigma_stretch > 0)).repeat_interleave(3, dim=1)
+        shifted = (jointed & (options.sigma_shift > 0)).repeat_interleave(3, dim=1)
+        active = torch.cat([always, trees.free, scaled, stretched, shifted], dim=1)
+        tight = 1e-4  # a sigma of 0 for one of two that share the same parameters
+        precision = unit.new_zeros(B, active.shape[1], active.shape[1])
+        first = 6 + P
+        precision[:, first : first + 3, first : first + 3] = (
+            mean / 3.0 / max(options.sigma_scale, tight) ** 2 + (eye - mean) / max(options.sigma_aspect, tight) ** 2
+        )
+        diagonal = precision.diagonal(dim1=1, dim2=2)
+        diagonal[:, first + 3 : first + 3 + 3 * P] = max(options.sigma_stretch, tight) ** -2
+        diagonal[:, first + 3 + 3 * P :] = (unit[:, None] * max(options.sigma_shift, tight)) ** -2
+        return _Prior(active, options.prior_weight * precision * active[:, None] * active[:, :, None], unit)
+
+    def cost(self, theta: Theta) -> Tensor:
+        """(B,)"""
+        values = self.values(theta)
+        return (values * (self.precision @ values[..., None])[..., 0]).sum(-1)
+
+    def values(self, theta: Theta) -> Tensor:
+        """(B, D) deviations of the reference's shape; the other parameters count as 0."""
+        pose = torch.zeros_like(self.active[:, : 6 + theta.state.shape[1]], dtype=theta.state.dtype)
+        return torch.cat([pose, theta.log_scale, theta.stretch.flatten(1), theta.shift.flatten(1)], dim=1)
+
+
+def _energy(observed: Observed, matches: Matches, prior: _Prior, width: float) -> Tensor:
+    """(B,) mean robust squared distance in diagonals, plus what the prior costs.
+
+    Geman-McClure's ``w^2 e^2 / (w^2 + e^2)``: it falls when the width w shrinks, so that narrowing it on the way never
+    raises the energy either.
+    """
+    square = matches.square
+    robust = width**2 * square / (width**2 + square)
+    total = observed.weight.sum(1).clamp(min=1e-12)
+    return (observed.weight * robust).sum(1) / total + prior.cost(matches.theta)
+
+
+def _step(
+    shapes: Shapes,
+    observed: Observed,
+    matches: Matches,
+    posed: Posed,
+    prior: _Prior,
+    width: float,
+    damping: Tensor,
+    rigid: bool,
+) -> Tensor:
+    """(B, D) damped Gauss-Newton step of the reweighted least squares; shape parameters stay when ``rigid``."""
+    robust = (width**2 / (width**2 + matches.square)) ** 2
+    weight = observed.weight * robust / observed.weight.sum(1, keepdim=True).clamp(min=1e-12)
+    directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
+    residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
+    rows = _columns(shapes, observed, matches, posed, directions.flatten(1, 2), rigid) / prior.unit[:, None, None]
+    D = rows.shape[-1]
+    active = prior.active[:, :D]
+    rows = rows * active[:, None]
+    weighted = rows * weight.repeat_interleave(2, dim=1)[..., None]
+    precision = prior.precision[:, :D, :D]
+    curvature = (weighted.transpose(1, 2) @ rows + precision).double()
+    slope = (weighted.transpose(1, 2) @ residual[..., None])[..., 0]
+    slope = (slope + (precision @ prior.values(matches.theta)[:, :D, None])[..., 0]).double()
+    # A state at its limit stays there while the energy falls beyond it.
+    D_states = slice(6, 6 + shapes.trees.num_rows)
+    state = matches.theta.state
+    held = torch.zeros_like(active)
+    held[:, D_states] = ((state <= shapes.trees.lower) & (slope[:, D_states] > 0)) | (
+        (state >= shapes.trees.upper) & (slope[:, D_states] < 0)
+    )
+    moves = (active & ~held).double()
+    curvature = curvature * moves[:, None] * moves[:, :, None]
+    diagonal = curvature.diagonal(dim1=1, dim2=2)
+    floor = 1e-6 * diagonal.mean(-1, keepdim=True) + 1e-30
+    curvature = curvature + torch.diag_embed(damping[:, None] * diagonal + floor + (1.0 - moves))
+    step = torch.linalg.solve(curvature, -(slope * moves)[..., None])[..., 0].to(rows.dtype)
+    return torch.nn.functional.pad(step, (0, prior.active.shape[1] - D))
+
+
+def _columns(
+    shapes: Shapes, observed: Observed, matches: Matches, posed: Posed, directions: Tensor, rigid: bool
+) -> Tensor:
+    """Derivatives of the points' offsets from the reference along given directions.
+
+    Parameters
+    ----------
+    directions : (B, 2 N, 3) float
+        Two for each point, in the camera frame; they turn with the part.
+
+    Returns
+    -------
+    (B, 2 N, D) float
+        Columns: turn about the middle of the cloud (3), motion (3), states (P), and unless ``rigid`` log_scale (3),
+        stretch (3 P), shift (3 P).
+    """
+    trees = shapes.trees
+    B, R, _ = directions.shape
+    P = trees.num_rows
+    part = observed.part.repeat_interleave(2, dim=1)
+    moment = torch.linalg.cross(
+        (observed.points - middle(observed)).repeat_interleave(2, dim=1), directions
+    )  # the turning effect of a push along each direction
+    axis, origin = joint_axes(trees, posed)
+    moment_axis = torch.linalg.cross(axis, origin - middle(observed))
+    pitch = (trees.slide * posed.reach)[..., None]
+    turning = moment @ (trees.turn[..., None] * axis).transpose(1, 2)
+    sliding = directions @ (pitch * axis - trees.turn[..., None] * moment_axis).transpose(1, 2)
+    carried = trees.carries.to(moment.dtype).gather(2, part[:, None].expand(-1, P, -1)).transpose(1, 2)
+    states = carried * (turning + sliding)
+    follow = trees.multiplier[..., None] * torch.nn.functional.one_hot(trees.source, P)
+    blocks = [moment, directions, states @ follow]
+    if not rigid:
+        rotation = _rows(posed.rotation.flatten(2), part).reshape(B, R, 3, 3)
+        local = (directions[..., None, :] @ rotation)[..., 0, :]
+        above, _ = parent_pose(trees, posed)
+        offset = matches.local.repeat_interleave(2, dim=1) - _rows(shapes.box_center, part)
+        own = local * _rows(posed.scale, part) * offset
+        lever = _scale_lever(shapes, matches.theta, posed, above)
+        whole = own + (directions[..., None, :] @ _rows(lever.flatten(2), part).reshape(B, R, 3, 3))[..., 0, :]
+        stretch = torch.nn.functional.one_hot(part, P)[..., None] * own[..., None, :]
+        shift = carried[..., None] * torch.einsum("bri,bpij->brpj", directions, above)
+        blocks += [whole, stretch.flatten(2), shift.flatten(2)]
+    return -torch.cat(blocks, dim=-1)
+
+
+def _scale_lever(shapes: Shapes, theta: Theta, posed: Posed, above: Tensor) -> Tensor:
+    """(B, P, 3, 3) how each part's box centre moves in the camera frame when log_scale grows along each axis."""
+    trees = shapes.trees
+    whole = theta.log_scale.exp()[:, None]
+    center = posed.rotation * (whole * shapes.box_center)[:, :, None]
+    # Anchors move too, and with them all that they carry; what a joint's own turn does to that cancels its parent's.
+    anchor = (above - posed.rotation) * (whole * trees.origin)[:, :, None]
+    # Prismatic joints reach farther: d reach / d log_scale_i = (scale_i axis_i)^2 / reach.
+    step = (complete_state(trees, theta.state) - trees.rest) * trees.slide
+    longer = step[..., None] * (whole * trees.axis) ** 2 / posed.reach[..., None]
+    along = rotate(above, trees.axis)[..., None] * longer[:, :, None]
+    return center + torch.einsum("bjk,bjxi->bkxi", trees.carries.to(center.dtype), anchor + along)
+
+
+def _moved(trees: Trees, theta: Theta, step: Tensor, observed: Observed) -> Theta:
+    """Theta after a step of the parameters that :func:`_columns` lists; states stay within their limits."""
+    P = trees.num_rows
+    turn = rotation_from_vector(step[:, :3])
+    pivot = middle(observed)[:, 0]
+    parts = step[:, 9 + P :].reshape(len(step), 2, P, 3)
+    return Theta(
+        turn @ theta.rotation,
+        rotate(turn, theta.translation - pivot) + pivot + step[:, 3:6],
+        theta.log_scale + step[:, 6 + P : 9 + P],
+        clamp_state(trees, theta.state + step[:, 6 : 6 + P]),
+        theta.shift + parts[:, 1],
+        theta.stretch + parts[:, 0],
+    )
+
+
+def middle(observed: Observed) -> Tensor:
+    """(B, 1, 3) mean of the points."""
+    return observed.points.mean(dim=1, keepdim=True)
+
+
+def _rows(values: Tensor, part: Tensor) -> Tensor:
+    """(B, R, ...) the row of (B, P, C) that each part index (B, R) names."""
+    return values.gather(1, part[..., None].expand(-1, -1, values.shape[-1]))
