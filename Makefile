@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
 
-.PHONY: demo test lint bench clean system assets
+.PHONY: demo test lint bench audit clean system assets
 
 demo: $(VENV)/.ready
 	$(PY) examples/demo/main.py out/demo
@@ -22,9 +22,17 @@ bench: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.agreement
 	$(PY) -m benchmarks.generation
 	$(PY) -m benchmarks.resume
+	$(PY) -m benchmarks.objects
+	$(PY) -m benchmarks.simulators
+	$(PY) -m benchmarks.realism
 
-assets: $(VENV)/.ready
+# Sim-readiness of 10,000 procedural objects, and of the real ones in ARTSIM_PARTNET_DIR.
+audit: $(VENV)/.ready-dev
+	$(PY) -m benchmarks.audit
+
+assets: $(VENV)/.ready-dev
 	$(PY) urdf_assets/build.py
+	$(VENV)/bin/artsim generate-objects --category all --count 1 --out urdf_assets/procedural
 
 # System libraries that PyBullet's EGL renderer needs; everything else comes from pip.
 system:

@@ -61,13 +61,11 @@ class Generate:
     """Leave out objects that do not load, and say which, instead of stopping."""
 
     def run(self) -> None:
-        from artsim.families import FAMILIES
         from artsim.pipeline import generate
         from artsim.sources import Source, family_sources, find_sources
 
-        categories = tuple(FAMILIES) if "all" in self.categories else self.categories
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
-        sources += family_sources(categories, self.objects_per_category, self.first_object)
+        sources += family_sources(_categories(self.categories), self.objects_per_category, self.first_object)
         try:
             result = generate(
                 sources,
@@ -104,7 +102,7 @@ class GenerateObjects:
     """
 
     category: tuple[str, ...]
-    """Categories, such as drawer laptop."""
+    """Categories, such as drawer laptop; 'all' for every one."""
     out: Path
     """Folder to write to; made if missing."""
     count: int = 1000
@@ -120,7 +118,9 @@ class GenerateObjects:
         from artsim.export.batch import generate_objects
 
         try:
-            result = generate_objects(self.category, self.out, self.count, self.seed, self.formats, self.workers)
+            result = generate_objects(
+                _categories(self.category), self.out, self.count, self.seed, self.formats, self.workers
+            )
         except KeyboardInterrupt:
             print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")
             raise
@@ -155,6 +155,31 @@ class View:
 
         for written in view_path(self.path, self.out, self.samples, self.split, self.rerun):
             print(f"wrote {written}")
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Draw procedural objects, each at rest and opened further and further, as one picture."""
+
+    categories: tuple[str, ...] = ("all",)
+    """Categories, such as faucet; 'all' for every one."""
+    objects: int = 1
+    """Objects of each category."""
+    first_object: int = 0
+    """Seed of the first object of each."""
+    states: int = 3
+    """Pictures of each object."""
+    out: Path = Path("gallery.png")
+    """PNG to write."""
+
+    def run(self) -> None:
+        from artsim.files import write_atomic
+        from artsim.gallery import gallery
+        from artsim.sources import family_sources
+
+        sources = family_sources(_categories(self.categories), self.objects, self.first_object)
+        write_atomic(self.out, gallery([source.load() for source in sources], self.states))
+        print(f"wrote {self.out}")
 
 
 @dataclass(frozen=True)
@@ -204,8 +229,16 @@ class Verify:
         print(f"{self.path}: sound")
 
 
+def _categories(named: tuple[str, ...]) -> tuple[str, ...]:
+    """Categories by name; 'all' stands for every one."""
+    from artsim.families import FAMILIES
+
+    return tuple(sorted(FAMILIES)) if "all" in named else named
+
+
 Verb = (
     Annotated[Generate, tyro.conf.subcommand("generate")]
+    | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
