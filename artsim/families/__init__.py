@@ -30,6 +30,7 @@ from artsim.families import (
     scissors,
     stapler,
     storage_furniture,
+    suitcase,
     trash_can,
 )
 from artsim.objects import ArticulatedObject
@@ -52,6 +53,7 @@ FAMILIES: dict[str, Family] = {
     "scissors": scissors.build,
     "stapler": stapler.build,
     "storage_furniture": storage_furniture.build,
+    "suitcase": suitcase.build,
     "trash_can": trash_can.build,
 }
 """Every category that :func:`make` knows."""

@@ -10,7 +10,19 @@ from numpy.typing import ArrayLike
 
 from artsim.assembly import JointSpec, revolute
 from artsim.kinematics import Array
-from artsim.solids import Solid, Vector, box, cylinder, frame, hull, prism, rounded_box, rounded_rectangle, tube, union
+from artsim.solids import (
+    Solid,
+    Vector,
+    box,
+    cylinder,
+    frame,
+    hull,
+    prism,
+    rounded_box,
+    rounded_rectangle,
+    tube,
+    union,
+)
 
 
 def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
@@ -298,3 +310,23 @@ def front_handle(kind: str, start: Vector, end: Vector, reach: float, radius: fl
     if kind == "flat":
         return flat_handle(start, end, reach, 2.5 * radius, radius)
     return Solid()
+
+
+def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: int = 4) -> Solid:
+    """Tunnel along X with round edges, open at both ends.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Outer corners.
+    wall : float
+        Thickness.
+    radius : float
+        Of the outer edges.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    outer = rounded_rectangle(low[1:], high[1:], radius, steps)
+    inner = rounded_rectangle(low[1:] + wall, high[1:] - wall, max(radius - wall, 0.1 * wall), steps)
+    corners = np.stack([outer, inner], axis=1)
+    pairs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    return union(prism(np.concatenate(pair), low[0], high[0], 0) for pair in pairs)
