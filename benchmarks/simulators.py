@@ -1,7 +1,7 @@
 """Do simulators agree on exported objects? ``python -m benchmarks.simulators``.
 
-Exports objects of every category, loads each into PyBullet, MuJoCo and SAPIEN, and compares numbers of links and joints,
-and the places of all parts at random states, with artsim. The last line is one JSON object: for each simulator the
+Exports objects of every category, loads each into PyBullet, MuJoCo and SAPIEN, and compares numbers of links and
+joints, and the places of all parts at random states, with artsim. The last line is one JSON object: for each simulator the
 share of objects loaded with equal counts and kinematics, and the largest difference in metres.
 """
 
@@ -54,9 +54,7 @@ def main(options: Options) -> None:
         loaded = sum(a.links >= 0 for a in agreements) / len(agreements)
         equal = sum(not a.problem for a in agreements) / len(agreements)
         metres = max(a.metres for a in agreements)
-        print(
-            f"  {name:10s} loaded {100 * loaded:6.2f} %   equal {100 * equal:6.2f} %   largest difference {metres:.2g} m"
-        )
+        print(f"  {name:10s} loaded {100 * loaded:6.2f} %   equal {100 * equal:6.2f} %   off by {metres:.2g} m at most")
         result[name] = {"loaded": loaded, "equal": equal, "metres": metres}
     print(json.dumps(result))
 
