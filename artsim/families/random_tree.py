@@ -21,6 +21,9 @@ from artsim.solids import Solid, box, cylinder, ellipsoid, hull, ring, rounded_b
 
 GAP = 0.002
 _LONGEST_STUB = 4.0
+_DEEPEST_DIP = 0.02  # metres by which a branch on a hinge may swing below the foot of its neck
+_BELOW = np.array([[-9.0, -9.0, -9.0], [9.0, 9.0, -GAP]])
+"""Where nothing may hang on a part: towards its own parent."""
 SHAPES = ("box", "rounded", "cylinder", "cone", "ball", "frame", "ring", "bar", "cross", "wedge")
 JOINTS = ("revolute", "continuous", "prismatic", "screw")
 
@@ -108,14 +111,18 @@ def _grow(rng: np.random.Generator, k: int, parents: list[int], scale: float) ->
             branch.boxes.append(np.array([[-neck, -neck, 0], [neck, neck, lift]]))
             branch.solid += rod
             branch.hinge_height = neck
+        branch.boxes.append(_BELOW)
     bounds = branch.boxes[0]
     motions: list[_Motion] = []
     faces = [f for f in product(range(3), (-1, 1)) if k == 0 or f != (2, -1)]
     for child in (i for i, parent in enumerate(parents) if parent == k):
         grown = _grow(rng, child, parents, scale * rng.uniform(0.8, 1.0))
         motion = _motion(rng, grown, motions)
-        faces.remove(_attach(rng, branch, grown, motion, faces, bounds))
-        motions.append(motion)
+        face = _attach(rng, branch, grown, motion, faces, bounds)
+        if face is not None:
+            faces.remove(face)
+            motions.append(motion)
+    branch.boxes = [b for b in branch.boxes if b is not _BELOW]
     return branch
 
 
@@ -190,13 +197,17 @@ def _attach(
     motion: _Motion,
     faces: list[tuple[int, int]],
     bounds: Array,
-) -> tuple[int, int]:
+) -> tuple[int, int] | None:
     """Hang a branch on a free face of its parent, on a stub just long enough to keep all boxes apart.
 
-    Of three faces drawn, the one that needs the shortest stub is taken, and returned.
+    The first face that a short stub will do for is taken, or else the one with the shortest, and returned; None, and
+    no branch, where there is no room on any.
     """
     radius = 0.1 * float((bounds[1] - bounds[0]).min()) + 0.002
     swept = np.array([motion.reached(b) for b in child.boxes])
+    while child.hinge_height is not None and swept[:, 0, 2].min() < -_DEEPEST_DIP:
+        motion.lower, motion.upper = 0.8 * motion.lower, 0.8 * motion.upper
+        swept = np.array([motion.reached(b) for b in child.boxes])
     # Boxes over the stub's end must lie above it.
     over = (swept[:, 0, :2] < 1.5 * radius).all(axis=1) & (swept[:, 1, :2] > -1.5 * radius).all(axis=1)
     lift = GAP - min(0.0, float(swept[over, 0, 2].min()))
@@ -221,7 +232,7 @@ def _attach(
                 shortest, chosen = stub, (choice, rotation, foot, end, [*(reach + foot), rod])
                 break
     if chosen is None:
-        raise ValueError("no room for a branch")
+        return None
     choice, rotation, foot, end, taken = chosen
     parent.solid += tube([inner, end], radius, 8)
     parent.boxes += taken
