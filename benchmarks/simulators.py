@@ -1,8 +1,8 @@
 """Do simulators agree on exported objects? ``python -m benchmarks.simulators``.
 
 Exports objects of every category, loads each into PyBullet, MuJoCo and SAPIEN, and compares numbers of links and
-joints, and the places of all parts at random states, with artsim. The last line is one JSON object: for each simulator the
-share of objects loaded with equal counts and kinematics, and the largest difference in metres.
+joints, and the places of all parts at random states, with artsim. The last line is one JSON object: for each simulator
+the share of objects loaded with equal counts and kinematics, and the largest difference in metres.
 """
 
 from __future__ import annotations
