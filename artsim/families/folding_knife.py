@@ -1,0 +1,153 @@
+"""Folding knives: a handle with one or more blades and tools that turn out of it; folded at rest, lying flat.
+
+Varied: length, outline and thickness of the handle (straight, curved, swelling), bolsters and rivets, the outline of
+the blades (drop point, clip, sheep's foot, spear), a pocket knife with up to six blades and tools in several layers
+from both ends, and the angle to which each opens.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, loft, prism, union
+
+GAP = 0.0005
+RING = 16
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
+    length = rng.uniform(0.075, 0.135)
+    half = 0.5 * length * rng.uniform(0.17, 0.27)
+    many = rng.random() < 0.4
+    layers = int(rng.integers(2, 5)) if many else 1
+    sheet = rng.uniform(0.0018, 0.0028)
+    liner = 0.0016
+    scale = rng.uniform(0.002, 0.003 if many else 0.0045)
+    pin = rng.uniform(0.55, 0.75) * half  # radius of the blades' tangs
+    pitch = sheet + 2 * GAP + liner
+    ends = np.array([-0.5 * length + half, 0.5 * length - half])
+
+    knife = Assembly()
+    handle = Solid()
+    bow = 0.0 if many else half * rng.uniform(-0.1, 0.35)
+    swell = rng.uniform(0.0, 0.15)
+    outline = _outline(length, half, bow, swell)
+    low = scale + liner
+    for k in range(layers + 1):  # liners, and the scales outside
+        z = low - liner + k * pitch
+        handle += _plate(outline, z, z + liner)
+    thick = low + layers * pitch
+    handle += _plate(outline, 0.35 * scale, scale + 0.0005) + _plate(outline * (0.985, 0.85), 0.0, 0.4 * scale)
+    handle += _plate(outline, thick - 0.0005, thick + 0.65 * scale)
+    handle += _plate(outline * (0.985, 0.85), thick + 0.6 * scale, thick + scale)
+    # The back holds the layers together; it leaves room for the tangs at the ends.
+    spine = half * rng.uniform(0.25, 0.4)
+    back = _back(outline, spine, ends - np.array([-1.0, 1.0]) * (pin + 2 * GAP))
+    handle += union(prism(piece, low - 0.0005, thick + 0.0005) for piece in back)
+    pins = np.column_stack([ends, [float(np.interp(x, outline[0, :, 0], outline.mean(axis=0)[:, 1])) for x in ends]])
+    knife.add("handle", handle + _details(rng, outline, pins, thick + scale), density=1600.0)
+
+    edge = min(float(piece[:, 1].min()) for piece in back) - pins[0, 1] - 2 * GAP
+    open_to = rng.uniform(165.0, 180.0)
+    number = 0
+    for k in range(layers):
+        z = low + k * pitch + GAP
+        pair = many and rng.random() < 0.5
+        for side in (-1, 1) if pair else (-1,):
+            room = (ends[1] - ends[0]) * (0.48 if pair else 1.0) + (0.0 if pair else 0.5 * half)
+            kind = "blade" if number == 0 or rng.random() < 0.5 else "tool"
+            back_edge = -half * rng.uniform(0.7, 1.05)
+            pieces = _blade(rng, room * rng.uniform(0.88, 1.0), back_edge, edge, pin, kind)
+            blade = union(prism(piece, z, z + sheet) for piece in pieces)
+            x, y = pins[0 if side < 0 else 1]
+            blade = (blade if side < 0 else blade.mirrored(0)).moved((x, y, 0))
+            angle = np.deg2rad(open_to if kind == "blade" else rng.uniform(85.0, 180.0))
+            joint = revolute("handle", (0, 0, side), (x, y, z), 0.0, angle)
+            knife.add(f"{kind}_{number}" if many else kind, blade, joint, density=6000.0)
+            number += 1
+    return knife
+
+
+def _outline(length: float, half: float, bow: float, swell: float) -> Array:
+    """(2, N, 2) lower and upper edge of the handle, the ends round."""
+    cap = 0.5 * length - half * (1 - np.cos(np.linspace(0.0, 0.5 * np.pi, 6)))
+    x = np.concatenate([-cap, np.linspace(-cap[-1], cap[-1], 7)[1:-1], cap[::-1]])
+    share = 2 * x / length
+    over = np.clip((np.abs(x) - (0.5 * length - half)) / half, 0.0, 0.995)
+    width = half * np.sqrt(1 - over**2) * (1 - swell + swell * np.cos(0.5 * np.pi * share) ** 2)
+    middle = bow * (share**2 - 0.5)
+    return np.stack([np.column_stack([x, middle - width]), np.column_stack([x, middle + width])])
+
+
+def _plate(outline: Array, low: float, high: float) -> Solid:
+    """Plate with the handle's outline."""
+    rings = []
+    for a, b in zip(*outline, strict=True):
+        rings.append(np.array([(*point, z) for point in (a, b) for z in (low, high)]))
+    return loft(rings)
+
+
+def _back(outline: Array, spine: float, reach: Array) -> list[Array]:
+    """Convex outlines along the upper edge between the tangs."""
+    x = np.linspace(reach[0], reach[1], 8)
+    edge = np.interp(x, outline[1][:, 0], outline[1][:, 1])
+    top = np.column_stack([x, edge])
+    bottom = np.column_stack([x, edge - spine])
+    return [np.concatenate([top[k : k + 2], bottom[k : k + 2]]) for k in range(len(x) - 1)]
+
+
+def _blade(rng: np.random.Generator, length: float, low: float, high: float, pin: float, kind: str) -> list[Array]:
+    """Convex outlines of a blade along +X from its pin at the origin: its back at ``low``, its edge at ``high``."""
+    x = np.linspace(0.0, 1.0, 10)
+    if kind == "tool":
+        taper = rng.uniform(0.4, 1.0)
+        back, edge = low * (1 - (1 - taper) * x), high * (1 - (1 - taper) * x)
+        back[-1], edge[-1] = 0.8 * back[-1], 0.8 * edge[-1]
+    else:
+        shape = str(rng.choice(["drop", "clip", "sheep", "spear"]))
+        power, level, turn = {
+            "drop": (2.2, 0.4, 0.5),
+            "clip": (1.0, 0.45, rng.uniform(0.55, 0.7)),
+            "sheep": (2.5, 0.92, 0.75),
+            "spear": (2.0, 0.5, 0.6),
+        }[shape]
+        point = low + level * (high - low)
+        if shape == "sheep":  # the back falls to a straight edge
+            back = low + (point - low) * np.clip((x - turn) / (1 - turn), 0, 1) ** power
+            edge = np.full(10, high)
+        else:
+            back = low + (point - low - 0.0003) * np.clip((x - turn) / (1 - turn), 0, 1) ** power
+            edge = high - (high - point) * np.clip((x - 0.45) / 0.55, 0, 1) ** 2.2
+        choil = 0.12
+        edge = np.where(x < choil, 0.7 * high, edge)
+    lower, upper = np.column_stack([x * length, back]), np.column_stack([x * length, np.maximum(edge, back + 0.0006)])
+    angles = np.arange(RING) * (2.0 * np.pi / RING)
+    tang = pin * np.column_stack([np.cos(angles), np.sin(angles)])
+    return [tang, *(np.concatenate([lower[k : k + 2], upper[k : k + 2]]) for k in range(9))]
+
+
+def _details(rng: np.random.Generator, outline: Array, pins: Array, top: float) -> Solid:
+    """Rivets, bolsters or a badge on both faces of the handle."""
+    solid = Solid()
+    x, half = 0.5 * (pins[0, 0] + pins[1, 0]), pins[1, 0] - pins[0, 0]
+    radius = rng.uniform(0.0012, 0.0025)
+    for face, outward in ((0.0, -1), (top, 1)):
+        for px, py in pins:
+            solid += cylinder((px, py, face - outward * 0.001), (px, py, face + outward * 0.0005), radius, sections=12)
+    kind = str(rng.choice(["none", "bolster", "badge", "clip"]))
+    if kind == "bolster":
+        shown = outline[:, outline[0, :, 0] < pins[0, 0] + rng.uniform(0.05, 0.2) * half] * 0.97
+        solid += _plate(shown, top - 0.0008, top + 0.0006) + _plate(shown, -0.0006, 0.0008)
+    elif kind == "badge":
+        y = float(outline[:, len(outline[0]) // 2, 1].mean())
+        size = rng.uniform(0.04, 0.09) * half
+        solid += box((x - 1.4 * size, y - size, top - 0.001), (x + 1.4 * size, y + size, top + 0.0005))
+    elif kind == "clip":  # belt clip
+        y = float(outline[:, len(outline[0]) // 2, 1].mean())
+        lift = top + 0.0025
+        solid += box((x + 0.32 * half, y - 0.003, top - 0.001), (x + 0.42 * half, y + 0.003, lift + 0.0015))
+        solid += box((x - 0.25 * half, y - 0.003, lift), (x + 0.42 * half, y + 0.003, lift + 0.0015))
+    return solid
