@@ -89,8 +89,8 @@ def build(rng: np.random.Generator) -> Assembly:
             fridge.add(f"drawer_{drawers}", solid, slide, density=200.0)
             continue
         doors += 1
-        solid = _door(rng, corner_low, corner_high, style, side, level_at_top=low < foot + 0.01 and layout in ("single", "stacked"),
-                      inner_edge=layout in ("beside", "french"))  # fmt: skip
+        grip_at_top = low < foot + 0.01 and layout in ("single", "stacked")
+        solid = _door(rng, corner_low, corner_high, style, side, grip_at_top, layout in ("beside", "french"))
         if dispenser and side > 0:
             y, z = 0.5 * (right + left), low + rng.uniform(0.45, 0.6) * (high - low)
             solid += frame(
@@ -147,7 +147,7 @@ def _body(
 
 
 def _door(
-    rng: np.random.Generator, low: Array, high: Array, style: Style, side: int, level_at_top: bool, inner_edge: bool
+    rng: np.random.Generator, low: Array, high: Array, style: Style, side: int, grip_at_top: bool, inner_edge: bool
 ) -> Solid:
     """Door with its handle at the side away from the hinge."""
     solid = rounded_box(low, high, style.corner, axis=None if rng.random() < 0.5 else 2)
@@ -156,7 +156,7 @@ def _door(
         solid += rounded_box(low + (-0.004, 0.09, 0.06), high - (0.006, 0.09, 0.06), 0.003)
     free = low[1] if side > 0 else high[1]
     if style.level:
-        z = high[2] - 0.05 if level_at_top else low[2] + 0.05
+        z = high[2] - 0.05 if grip_at_top else low[2] + 0.05
         start, end = (low[0], low[1] + 0.12 * wide, z), (low[0], high[1] - 0.12 * wide, z)
     else:
         y = free + side * 0.045

@@ -1,0 +1,231 @@
+"""Safes: a box with thick walls, a heavy door, and a lock on the door.
+
+What varies: proportions from a hotel's safe to a gun cabinet; door within the walls or over them, hinge on the left or
+right, inside or on barrels outside; dial, keypad or keyhole; lever, wheel with spokes or pull handle; bolts, shelves,
+feet, round edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, revolute
+from artsim.families.details import front_handle, rounded_shell, side_hinge
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, ellipsoid, ring, rounded_box, tube, union
+
+GAP = 0.0015
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Measures of one safe in metres. The front of its walls is the plane x = 0; the hinge is at +Y."""
+
+    half: float
+    depth: float
+    low: float
+    high: float
+    wall: float
+    thick: float
+    """Of the door."""
+    inset: bool
+    """Whether the door lies within the walls."""
+    barrel: float
+    """Radius of the barrels on the hinge axis; 0 for a hidden hinge."""
+
+    @property
+    def door(self) -> tuple[Array, Array]:
+        """Low and high corner of the door."""
+        if not self.inset:
+            return np.array([-GAP - self.thick, -self.half, self.low]), np.array([-GAP, self.half, self.high])
+        reach = 2.0 * (self.half - self.wall)
+        swing = self.thick**2 / (2.0 * reach) + 2 * GAP  # the inner edge swings past the wall
+        y, z = self.half - self.wall, self.wall + GAP
+        return np.array([0.0, swing - y, self.low + z]), np.array([self.thick, y - GAP, self.high - z])
+
+    @property
+    def hinge(self) -> tuple[float, float]:
+        """x and y of the axis."""
+        if self.inset:
+            return -self.barrel, self.half - self.wall
+        return -GAP, self.half
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A safe, closed at rest."""
+    kind = str(rng.choice(["small", "cube", "tall"], p=[0.35, 0.35, 0.3]))
+    width = {"small": (0.3, 0.45), "cube": (0.35, 0.6), "tall": (0.45, 0.75)}[kind]
+    half = 0.5 * rng.uniform(*width)
+    height = 2 * half * rng.uniform(*{"small": (0.55, 0.85), "cube": (0.9, 1.35), "tall": (1.5, 2.2)}[kind])
+    inset = bool(rng.random() < 0.65)
+    wall = half * rng.uniform(0.08, 0.26)
+    foot = rng.uniform(0.008, 0.06) if rng.random() < 0.65 else 0.0
+    shape = Shape(
+        half=half,
+        depth=half * rng.uniform(1.4, 2.3),
+        low=foot,
+        high=foot + height,
+        wall=wall,
+        thick=half * rng.uniform(0.06, 0.3),
+        inset=inset,
+        barrel=float(np.clip(0.3 * wall, 0.006, 0.014)) if inset and rng.random() < 0.6 else 0.0,
+    )
+    left = bool(rng.random() < 0.35)
+    sign = 1.0 if left else -1.0
+
+    def placed(solid: Solid) -> Solid:
+        return solid if left else solid.mirrored(1)
+
+    safe = Assembly()
+    safe.add("body", placed(_body(rng, shape)), density=2500.0)
+    x, y = shape.hinge
+    upper = np.deg2rad(rng.uniform(95.0, 165.0))
+    face = shape.door[0][0]
+    opener = str(rng.choice(["lever", "wheel", "pull"], p=[0.45, 0.3, 0.25]))
+    combination = bool(rng.random() < 0.6)
+    door = _door(rng, shape, combination, opener)
+    safe.add("door", placed(door), side_hinge(x, sign * y, upper, left), density=2500.0)
+
+    low, high = shape.door
+    size = min(high[1] - low[1], high[2] - low[2])
+    along = low[1] + (0.5 if kind == "tall" or rng.random() < 0.4 else 0.35) * (high[1] - low[1])
+    upright = high[2] - low[2] > 0.85 * (high[1] - low[1])
+    # The lock above the handle, or beside it on a low door.
+    spots = (
+        [(along, low[2] + s * (high[2] - low[2])) for s in (0.66, 0.4)]
+        if upright
+        else [(low[1] + s * (high[1] - low[1]), 0.5 * (low[2] + high[2])) for s in (0.66, 0.33)]
+    )
+    (lock_y, lock_z), (grip_y, grip_z) = spots
+    if combination:
+        radius = min(0.13 * size, 0.055)
+        foot_at = (face, sign * lock_y, lock_z)
+        solid = _combination(rng, face, lock_y, lock_z, radius)
+        safe.add("dial", placed(solid), continuous("door", (-1, 0, 0), foot_at), density=3000.0)
+    if opener != "pull":
+        foot_at = (face, sign * grip_y, grip_z)
+        radius = min(rng.uniform(0.13, 0.22) * size, 0.11)
+        if opener == "wheel":
+            solid = _wheel(rng, face, grip_y, grip_z, radius)
+            joint = continuous("door", (-1, 0, 0), foot_at)
+        else:
+            solid = _lever(rng, face, grip_y, grip_z, radius)
+            joint = revolute("door", (sign, 0, 0), foot_at, 0.0, np.deg2rad(rng.uniform(45.0, 95.0)))
+        safe.add("wheel" if opener == "wheel" else "handle", placed(solid), joint, density=3000.0)
+    return safe
+
+
+def _body(rng: np.random.Generator, s: Shape) -> Solid:
+    corner = min(rng.choice([0.004, rng.uniform(0.01, 0.05)]), 0.9 * s.wall)
+    solid = rounded_shell((0.0, -s.half, s.low), (s.depth, s.half, s.high), s.wall, corner, 3)
+    solid += rounded_box((s.depth - s.wall, 0.002 - s.half, s.low + 0.002), (s.depth, s.half - 0.002, s.high - 0.002),
+                         corner, axis=0)  # fmt: skip
+    inside = s.half - s.wall + 0.002
+    if rng.random() < 0.6:
+        front = (s.thick if s.inset else 0.0) + 0.06
+        tall = s.high - s.low
+        for z in np.linspace(s.low + s.wall, s.high - s.wall, int(2 + tall // 0.35 + (tall > 0.3)))[1:-1]:
+            solid += box((front, -inside, z), (s.depth - s.wall + 0.002, inside, z + 0.005))
+    if s.low > 0:
+        spots = [(x, y) for x in (0.16 * s.half, s.depth - 0.16 * s.half) for y in (-0.82 * s.half, 0.82 * s.half)]
+        radius = 0.1 * s.half
+        if rng.random() < 0.5:
+            solid += union(cylinder((x, y, 0), (x, y, s.low + 0.004), radius, sections=16) for x, y in spots)
+        else:
+            solid += union(box((x - radius, y - radius, 0), (x + radius, y + radius, s.low + 0.004)) for x, y in spots)
+    if s.barrel > 0:
+        x, y = s.hinge
+        for low, high in _knuckles(s, of_door=False):
+            solid += cylinder((x, y, low), (x, y, high), s.barrel - 0.0005, sections=16)
+            solid += box((x, y, low), (0.002, y + 0.6 * s.wall, high))
+    return solid
+
+
+def _knuckles(s: Shape, of_door: bool) -> list[tuple[float, float]]:
+    """Lowest and highest point of the barrels: two pairs, the door's standing on the body's."""
+    length = 0.05 * (s.high - s.low) + 0.01
+    spans = []
+    for share in (0.2, 0.75):
+        z = s.low + share * (s.high - s.low)
+        spans.append((z + GAP, z + length) if of_door else (z - length, z))
+    return spans
+
+
+def _door(rng: np.random.Generator, s: Shape, combination: bool, opener: str) -> Solid:
+    low, high = s.door
+    wide, tall = high[1] - low[1], high[2] - low[2]
+    if s.inset:
+        solid = rounded_box(low, high, 0.003, axis=0)
+    else:
+        solid = rounded_box(low, high, min(0.4 * s.thick, 0.012))
+        # The plug that fills the opening; its inner edge swings past the wall.
+        plug, inner = rng.uniform(0.01, 0.03), s.half - s.wall
+        swing = plug**2 / (4.0 * inner) + 0.004
+        solid += box(
+            (high[0] - 0.002, swing - inner, low[2] + s.wall + 0.004), (plug, inner - 0.004, high[2] - s.wall - 0.004)
+        )
+    if rng.random() < 0.5:  # a raised board; the hinge side stays free for the barrels
+        edge = 0.1 * min(wide, tall)
+        solid += rounded_box(low + (-0.003, edge, edge), (low[0] + 0.004, *(high[1:] - edge)), 0.0015)
+    if s.barrel > 0:
+        x, y = s.hinge
+        for bottom, top in _knuckles(s, of_door=True):
+            solid += cylinder((x, y, bottom), (x, y, top), s.barrel - 0.0005, sections=16)
+            solid += box((x, y - 0.14 * wide, bottom), (0.003, y, top))
+    if not combination:  # a keypad with its keys
+        y, z, unit = low[1] + 0.66 * wide, low[2] + 0.66 * tall if tall > 0.85 * wide else low[2] + 0.5 * tall, 0.014
+        solid += rounded_box(
+            (low[0] - 0.008, y - 2.3 * unit, z - 3 * unit), (low[0] + 0.003, y + 2.3 * unit, z + 3 * unit), 0.004
+        )
+        for row in range(4):
+            for column in (-1, 0, 1):
+                center = np.array([low[0] - 0.008, y + column * 1.4 * unit, z + (row - 1.9) * 1.3 * unit])
+                solid += box(center - (0.002, 0.5 * unit, 0.45 * unit), center + (0.002, 0.5 * unit, 0.45 * unit))
+    if opener == "pull":
+        y, z = low[1] + 0.16 * wide, 0.5 * (low[2] + high[2])
+        start, end = (low[0], y, z - 0.18 * tall), (low[0], y, z + 0.18 * tall)
+        solid += front_handle(str(rng.choice(["bar", "bow", "flat"])), start, end, 0.035, 0.007)
+    return solid
+
+
+def _combination(rng: np.random.Generator, x: float, y: float, z: float, radius: float) -> Solid:
+    """Combination dial: a skirt, a grip and the mark it is read at."""
+    x -= 0.0045
+    skirt, reach = rng.uniform(0.006, 0.012), rng.uniform(0.02, 0.03)
+    solid = cylinder((x, y, z), (x - skirt, y, z), radius, 0.85 * radius, 28)
+    solid += cylinder((x - 0.5 * skirt, y, z), (x - skirt - reach, y, z), 0.55 * radius, 0.45 * radius, 16)
+    return solid + box(
+        (x - skirt - 0.002, y - 0.03 * radius - 0.001, z + 0.5 * radius),
+        (x - 0.001, y + 0.03 * radius + 0.001, z + 0.9 * radius),
+    )
+
+
+def _wheel(rng: np.random.Generator, x: float, y: float, z: float, radius: float) -> Solid:
+    """Hub with three to five spokes that end in balls or in a rim."""
+    x -= 0.0045
+    reach, spokes = rng.uniform(0.03, 0.05), int(rng.integers(3, 6))
+    solid = cylinder((x, y, z), (x - reach, y, z), 0.3 * radius, 0.22 * radius, 18)
+    rim = rng.random() < 0.4
+    hub = np.array([x - 0.8 * reach, y, z])
+    for k in range(spokes):
+        a = 2.0 * np.pi * (k + 0.25) / spokes
+        end = hub + radius * np.array([0.0, np.cos(a), np.sin(a)])
+        solid += tube(np.stack([hub, end]), 0.006, 10)
+        solid += Solid() if rim else ellipsoid(end, 0.011, 12)
+    if rim:
+        solid += ring((x - 0.8 * reach, y, z), (1, 0, 0), 0.9 * radius, 1.05 * radius, 0.012, 24)
+    return solid
+
+
+def _lever(rng: np.random.Generator, x: float, y: float, z: float, radius: float) -> Solid:
+    """Lever on a round boss, level at rest."""
+    x -= 0.0045
+    reach = rng.uniform(0.025, 0.04)
+    solid = cylinder((x, y, z), (x - 0.008, y, z), 0.35 * radius, 0.3 * radius, 18)
+    solid += cylinder((x - 0.004, y, z), (x - reach, y, z), 0.16 * radius + 0.003, sections=14)
+    tip = np.array([x - reach, y - 1.1 * radius, z])
+    if rng.random() < 0.5:
+        return solid + tube(np.stack([tip + (0.004, 1.1 * radius, 0.0), tip]), [0.010, 0.007], 12)
+    return solid + rounded_box(tip - (0.0, 0.0, 0.011), (x - reach + 0.012, y + 0.012, z + 0.011), 0.005)
