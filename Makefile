@@ -34,9 +34,10 @@ assets: $(VENV)/.ready-dev
 	$(PY) urdf_assets/build.py
 	$(VENV)/bin/artsim generate-objects --category all --count 1 --out urdf_assets/procedural
 
-# System libraries that PyBullet's EGL renderer needs; everything else comes from pip.
+# System libraries that PyBullet's EGL renderer needs, and SAPIEN's Vulkan driver; everything else comes from pip.
 system:
 	scripts/install-system.sh
+	scripts/install-vulkan.sh
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)

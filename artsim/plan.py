@@ -42,10 +42,10 @@ class SampleOptions:
     """Size of the object: native (as in its file), unit (diagonal of 1 m), or a range of diagonals in metres."""
     states: StateOptions = field(default_factory=StateOptions)
     views: ViewOptions = field(default_factory=ViewOptions)
-    renderer: Literal["raycast", "pybullet", "pybullet-egl"] = "raycast"
-    """raycast needs nothing installed; the others need the extra 'pybullet'."""
+    renderer: Literal["raycast", "pybullet", "pybullet-egl", "sapien"] = "raycast"
+    """raycast needs nothing installed; the others need the extra 'pybullet' or 'sapien'."""
     images: tuple[Literal["depth", "part_mask", "rgb"], ...] = ()
-    """Images to keep beside the cloud; rgb needs a pybullet renderer."""
+    """Images to keep beside the cloud; rgb needs a renderer other than raycast."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
 

@@ -137,7 +137,7 @@ def observe(
         Pose of the rest frame in the world; identity by default.
     num_points : int
     renderer : str or Renderer
-        "raycast", "pybullet" or "pybullet-egl".
+        One of ``artsim.renderers.RENDERERS``, or one of your own.
     images : tuple of str
         Which of ``IMAGES`` to keep.
     noise : str or Sensor

@@ -11,7 +11,7 @@ from artsim.errors import ConfigError
 from artsim.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND, Frame, Renderer
 
-RENDERERS = ("raycast", "pybullet", "pybullet-egl")
+RENDERERS = ("raycast", "pybullet", "pybullet-egl", "sapien")
 
 
 def make_renderer(name: str) -> Renderer:
@@ -32,6 +32,10 @@ def make_renderer(name: str) -> Renderer:
         from artsim.renderers.bullet import BulletRenderer
 
         return BulletRenderer(egl=name == "pybullet-egl")
+    if name == "sapien":
+        from artsim.renderers.sapien import SapienRenderer
+
+        return SapienRenderer()
     raise ConfigError(f"there is no renderer {name!r}", "renderer", f"use one of {', '.join(RENDERERS)}")
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
-from artsim.objects import ArticulatedObject
+from artsim.kinematics import Array
+from artsim.objects import ArticulatedObject, Part
 
 BACKGROUND = 255
 """Part id of pixels that show no part."""
@@ -65,3 +66,26 @@ class Renderer(Protocol):
     def close(self) -> None:
         """Release what the renderer holds (contexts, scenes)."""
         ...
+
+
+def two_sided_faces(part: Part) -> NDArray[np.int32]:
+    """(F, 3) triangles of a part; unless it is a closed solid, each facing both ways.
+
+    Rasterisers leave out triangles that face away, and real meshes are wound any way.
+    """
+    import trimesh
+
+    mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
+    mesh.merge_vertices()
+    return part.faces if mesh.is_volume else np.concatenate([part.faces, part.faces[:, ::-1]])
+
+
+def depth_range(obj: ArticulatedObject, T_camera_part: Array) -> tuple[float, float]:
+    """Near and far planes close around the posed object, native units: depth buffers have 24 bits."""
+    bounds = obj.part_bounds / obj.scale
+    center, half = bounds.mean(axis=1), 0.5 * (bounds[:, 1] - bounds[:, 0])
+    depth = (T_camera_part[:, 2, :3] * center).sum(axis=1) + T_camera_part[:, 2, 3]
+    reach = (np.abs(T_camera_part[:, 2, :3]) * half).sum(axis=1)
+    margin = 1e-3 * obj.diagonal / obj.scale
+    far = max(float((depth + reach).max()), 2 * margin) + margin
+    return max(float((depth - reach).min()) - margin, 1e-4 * far), far

@@ -22,7 +22,7 @@ from artsim.camera import Camera
 from artsim.errors import RenderError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
-from artsim.renderers.base import BACKGROUND, Frame
+from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
 from artsim.renderers.raycast import pose
 
 # As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
@@ -61,7 +61,7 @@ class BulletRenderer:
         """Render one posed object; see :class:`artsim.renderers.base.Renderer`."""
         T_camera_part = pose(obj, q, camera, T_world_object).T_camera_part
         T_camera_part[:, :3, 3] /= obj.scale  # drawn in native units
-        depth, part_ids, rgb = self._world(obj).draw(camera, T_camera_part, *_depth_range(obj, T_camera_part))
+        depth, part_ids, rgb = self._world(obj).draw(camera, T_camera_part, *depth_range(obj, T_camera_part))
         return Frame((depth * obj.scale).astype(np.float32), part_ids, rgb=rgb)
 
     def _world(self, obj: ArticulatedObject) -> _World:
@@ -162,29 +162,10 @@ def _disconnect(bullet: ModuleType, client: int) -> None:
 
 
 def _obj_text(part: Part) -> str:
-    """A part as a Wavefront file; unless it is a closed solid, with every triangle facing both ways.
-
-    Both rasterisers leave out triangles that face away, and real meshes are wound any way.
-    """
-    import trimesh
-
-    mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
-    mesh.merge_vertices()
-    faces = part.faces if mesh.is_volume else np.concatenate([part.faces, part.faces[:, ::-1]])
+    """A part as a Wavefront file."""
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in part.vertices.tolist()]
-    lines += [f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist()]
+    lines += [f"f {a} {b} {c}\n" for a, b, c in (two_sided_faces(part) + 1).tolist()]
     return "".join(lines)
-
-
-def _depth_range(obj: ArticulatedObject, T_camera_part: Array) -> tuple[float, float]:
-    """Near and far planes close around the posed object, native units: depth buffers have 24 bits."""
-    bounds = obj.part_bounds / obj.scale
-    center, half = bounds.mean(axis=1), 0.5 * (bounds[:, 1] - bounds[:, 0])
-    depth = (T_camera_part[:, 2, :3] * center).sum(axis=1) + T_camera_part[:, 2, 3]
-    reach = (np.abs(T_camera_part[:, 2, :3]) * half).sum(axis=1)
-    margin = 1e-3 * obj.diagonal / obj.scale
-    far = max(float((depth + reach).max()), 2 * margin) + margin
-    return max(float((depth - reach).min()) - margin, 1e-4 * far), far
 
 
 def _projection(camera: Camera, near: float, far: float, shift: tuple[float, float]) -> NDArray[np.float64]:
