@@ -43,9 +43,9 @@ Half = Literal["dev", "test"]
 
 _VIEWS = ViewOptions(preset="sphere", width=320, height=320)
 _NUM_VIEWS = 12
-_POINTS_PER_VIEW = 700
-_WHOLE, _PART = 1024, 256  # points kept of an object and of a part
-_CELL = 0.015  # points are thinned to one in each cube of this side, which evens out their density
+_POINTS_PER_VIEW = 2000
+_CELL = 0.01  # points are thinned to one in each cube of this side, which evens out their density
+_WHOLE, _PART = 1024, 256  # points of an object and of a part whose distance from another's whole cloud is averaged
 _LEVER = 0.5  # diagonals: where angles are turned into lengths
 _ODD_JOINT = 1.0  # placement and range of joints that move differently, or of one without a partner
 
@@ -156,10 +156,10 @@ class Likeness:
 
     Attributes
     ----------
-    points : (N, 3) float
-        Of the whole surface, at rest.
-    part_points : tuple of (N, 3) float
-        Of each part's surface, at rest.
+    cloud : (N, 3) float
+        Dense points of the whole surface, at rest.
+    part_clouds : tuple of (N, 3) float
+        Dense points of each part's surface, at rest.
     box_center, box_size : (K, 3) float
     turns : (K,) bool
         Whether the part's joint turns (revolute, continuous, screw).
@@ -169,8 +169,8 @@ class Likeness:
         From the rest state on, in radians or diagonals; a full turn either way where there are none.
     """
 
-    points: Array
-    part_points: tuple[Array, ...]
+    cloud: Array
+    part_clouds: tuple[Array, ...]
     box_center: Array
     box_size: Array
     turns: NDArray[np.bool_]
@@ -179,14 +179,28 @@ class Likeness:
     limits: Array
 
     @cached_property
-    def tree(self) -> cKDTree:
-        """Of the whole surface."""
-        return cKDTree(self.points)
+    def surface(self) -> Surface:
+        """Of the whole object."""
+        return Surface(self.cloud[:_WHOLE], cKDTree(self.cloud))
 
     @cached_property
-    def part_trees(self) -> tuple[cKDTree, ...]:
-        """Of each part's surface."""
-        return tuple(cKDTree(points) for points in self.part_points)
+    def part_surfaces(self) -> tuple[Surface, ...]:
+        """Of each part."""
+        return tuple(Surface(cloud[:_PART], cKDTree(cloud)) for cloud in self.part_clouds)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A few points of a surface to measure distances from, and many to measure distances to.
+
+    Attributes
+    ----------
+    points : (N, 3) float
+    tree : cKDTree
+    """
+
+    points: Array
+    tree: cKDTree
 
 
 def likeness(obj: ArticulatedObject) -> Likeness:
@@ -194,17 +208,15 @@ def likeness(obj: ArticulatedObject) -> Likeness:
     rng = np.random.default_rng(0)
     obj = obj.with_diagonal(1.0)
     points, part = _visible_surface(obj, rng)
-    part_points = []
-    for k in range(len(obj)):
-        seen = points[part == k]
-        if len(seen) == 0:  # hidden in all states: its box stands for it
-            seen = obj.part_bounds[k]
-        part_points.append(seen[rng.permutation(len(seen))[:_PART]])
+    order = rng.permutation(len(points))
+    points, part = points[order], part[order]
+    clouds = [points[part == k] for k in range(len(obj))]
     tree = obj.tree
     limits = tree.limits - tree.rest[:, None]
     return Likeness(
-        points=points[rng.permutation(len(points))[:_WHOLE]],
-        part_points=tuple(part_points),
+        cloud=points,
+        # What is hidden in all states is stood for by the corners of its box.
+        part_clouds=tuple(cloud if len(cloud) else obj.part_bounds[k] for k, cloud in enumerate(clouds)),
         box_center=obj.box_center,
         box_size=obj.box_size,
         turns=np.array([kind in ("revolute", "continuous", "screw") for kind in tree.types]),
@@ -236,8 +248,8 @@ def _visible_surface(obj: ArticulatedObject, rng: np.random.Generator) -> tuple[
 def distances(a: Likeness, b: Likeness) -> Array:
     """(5,) distance of two objects by each of ``MEASURES``; symmetric."""
     pairs, alone = _match(a, b)
-    surface = _chamfer(a.points, a.tree, b.points, b.tree)
-    parts = [_chamfer(a.part_points[i], a.part_trees[i], b.part_points[j], b.part_trees[j]) for i, j in pairs]
+    surface = _chamfer(a.surface, b.surface)
+    parts = [_chamfer(a.part_surfaces[i], b.part_surfaces[j]) for i, j in pairs]
     parts += [_chamfer_to_center(side, k) for side, k in alone]
     boxes = [_box_distance(a, i, b, j) for i, j in pairs] + [float(np.linalg.norm(s.box_size[k])) for s, k in alone]
     joints = [_joint_distances(a, i, b, j) for i, j in pairs if i > 0] + [(_ODD_JOINT, _ODD_JOINT) for _ in alone]
@@ -257,13 +269,13 @@ def _match(a: Likeness, b: Likeness) -> tuple[list[tuple[int, int]], list[tuple[
     return pairs, alone
 
 
-def _chamfer(points: Array, tree: cKDTree, other_points: Array, other_tree: cKDTree) -> float:
+def _chamfer(a: Surface, b: Surface) -> float:
     """Mean distance to the other's nearest point, averaged over both directions."""
-    return 0.5 * float(other_tree.query(points)[0].mean() + tree.query(other_points)[0].mean())
+    return 0.5 * float(b.tree.query(a.points)[0].mean() + a.tree.query(b.points)[0].mean())
 
 
 def _chamfer_to_center(side: Likeness, k: int) -> float:
-    away = np.linalg.norm(side.part_points[k] - side.box_center[k], axis=1)
+    away = np.linalg.norm(side.part_surfaces[k].points - side.box_center[k], axis=1)
     return 0.5 * float(away.mean() + away.min())
 
 

@@ -33,13 +33,14 @@ class _Shape:
     hinge_x: float
     hinge_z: float
     hinge_radius: float
+    tilt: float  # of the base, its front lower, radians
 
 
 def build(rng: np.random.Generator) -> Assembly:
     """A laptop, closed at rest. The lid opens about the Y axis at the back."""
     shape = _shape(rng)
     laptop = Assembly()
-    laptop.add("base", _base(rng, shape), density=1400.0)
+    laptop.add("base", _propped(rng, shape) if shape.tilt else _base(rng, shape), density=1400.0)
     opening = np.deg2rad(rng.uniform(88.0, 178.0))
     hinge = (shape.hinge_x, 0, shape.hinge_z)
     lid = _lid(rng, shape) + _hinges(rng, shape)
@@ -53,18 +54,21 @@ def _shape(rng: np.random.Generator) -> _Shape:
     height = max(width * rng.triangular(0.012, 0.03, 0.085), 0.006)
     lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
     # The lid turns about a barrel between the two shells, in notches behind both.
-    radius = rng.uniform(0.3, 0.5) * min(height, lid, 0.012)
+    radius = rng.uniform(0.3, 0.45) * min(height, lid, 0.009)
     hinge_x = depth / 2 + radius * rng.uniform(-0.4, 0.9)
     back = min(depth / 2, hinge_x - radius - 0.0012)
     front = base_front = -depth / 2
-    odd = rng.random()
-    if odd < 0.12:
+    tilt, odd = 0.0, rng.random()
+    if odd < 0.07:  # a flat keyboard dock, propped up by a thick bar at the back
+        height, tilt = max(width * rng.uniform(0.012, 0.03), 0.005), rng.uniform(0.04, 0.11)
+        base_front += rng.uniform(0.05, 0.22) * depth
+    elif odd < 0.13:
         base_front += rng.uniform(0.01, 0.2) * depth
     elif odd < 0.27:
         front += rng.uniform(0.005, 0.06) * depth
     corner = depth * rng.choice([rng.uniform(0.005, 0.03), rng.uniform(0.03, 0.13)])
     return _Shape(width, depth, height, lid, front, base_front, back, corner,
-                  hinge_x, height + 0.5 * GAP, radius)  # fmt: skip
+                  hinge_x, height + 0.5 * GAP, radius, tilt)  # fmt: skip
 
 
 def _shell(
@@ -118,6 +122,19 @@ def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
         half, reach = rng.uniform(0.03, 0.2) * width, rng.uniform(0.002, 0.012)
         solid += box((front - reach, -half, 0.3 * deck), (front + 0.2 * shape.depth, half, 0.8 * deck))
     return solid
+
+
+def _propped(rng: np.random.Generator, shape: _Shape) -> Solid:
+    """A tilted plate with the keyboard, held up by a bar below its back edge."""
+    half, height, back = shape.width / 2, shape.height, shape.back
+    deck = height - 0.0015
+    plate = rounded_box((shape.base_front, -half, 0), (back, half, deck), shape.corner, axis=2)
+    plate += _keyboard(rng, shape, deck, 0.01 * shape.width)
+    drop = np.tan(shape.tilt) * (back - shape.base_front) + height
+    radius = 0.5 * drop * rng.uniform(0.7, 1.1)
+    x, z = back - radius, height - 0.0015 - radius
+    end = half - rng.uniform(0.0, 0.1) * shape.width
+    return plate.turned((0, 1, 0), -shape.tilt, (back, 0, height)) + cylinder((x, -end, z), (x, end, z), radius)
 
 
 def _keyboard(rng: np.random.Generator, shape: _Shape, deck: float, rim: float) -> Solid:
@@ -190,7 +207,7 @@ def _lid(rng: np.random.Generator, shape: _Shape) -> Solid:
 def _hinges(rng: np.random.Generator, shape: _Shape) -> Solid:
     """Barrels on the hinge axis, joined to the lid by short arms above the gap."""
     inner, outer = rng.uniform(0.2, 0.34), rng.uniform(0.38, 0.46)
-    spans = [(-outer, -inner), (inner, outer)] if rng.random() < 0.5 else [(-outer, outer)]
+    spans = [(-outer, -inner), (inner, outer)] if rng.random() < 0.4 else [(-outer, outer)]
     x, z, radius = shape.hinge_x, shape.hinge_z, shape.hinge_radius
     arm = z + 0.0004
     solid = Solid()
