@@ -26,6 +26,7 @@ from artsim.families import (
     laptop,
     microwave,
     oven,
+    pliers,
     random_tree,
     refrigerator,
     robot_arm,
@@ -34,7 +35,9 @@ from artsim.families import (
     stapler,
     storage_furniture,
     suitcase,
+    switch,
     trash_can,
+    washing_machine,
 )
 from artsim.objects import ArticulatedObject
 
@@ -52,6 +55,7 @@ FAMILIES: dict[str, Family] = {
     "laptop": laptop.build,
     "microwave": microwave.build,
     "oven": oven.build,
+    "pliers": pliers.build,
     "random_tree": random_tree.build,
     "refrigerator": refrigerator.build,
     "robot_arm": robot_arm.build,
@@ -60,7 +64,9 @@ FAMILIES: dict[str, Family] = {
     "stapler": stapler.build,
     "storage_furniture": storage_furniture.build,
     "suitcase": suitcase.build,
+    "switch": switch.build,
     "trash_can": trash_can.build,
+    "washing_machine": washing_machine.build,
 }
 """Every category that :func:`make` knows."""
 

@@ -1,0 +1,123 @@
+"""Pliers: two levers that cross at a lap joint, closed at rest, lying flat with the jaws at -X.
+
+Varied: size, the jaws (combination, long nose, flat, cutting, round hole of a gripper), how the handles bow, their
+grips (bare, dipped, thick with a guard), the rivet, and how far they open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, hull_of, loft, prism, union
+
+GAP = 0.0006
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """Pliers, closed at rest. One lever turns about the vertical rivet."""
+    length = rng.uniform(0.12, 0.24)
+    kind = str(rng.choice(["combination", "nose", "flat", "cutting", "hollow"]))
+    jaw = length * {"nose": 0.34, "cutting": 0.13, "flat": 0.26}.get(kind, 0.22) * rng.uniform(0.85, 1.15)
+    thick = length * rng.uniform(0.045, 0.07)
+    disc = length * rng.uniform(0.05, 0.075)
+    jaws = _jaw(rng, kind, jaw, disc)
+    path, radii = _grip(rng, length - jaw, disc, length)
+    near = jaws[0][:, 1].min()  # the jaw's outer edge next to the joint
+    covered = rng.random() < 0.85
+    guard = covered and rng.random() < 0.4
+    rivet = disc * rng.uniform(0.3, 0.5)
+    teeth = rng.random() < 0.7 and kind in ("combination", "flat")
+
+    pliers = Assembly()
+    for k, name in enumerate(("lever_1", "lever_2")):
+        # The first lever has its handle at +Y and its jaw at -Y; the second lies across it.
+        side = 1.0 if k == 0 else -1.0
+        low = 0.0 if k == 0 else 0.5 * (thick + GAP)
+        high = low + 0.5 * (thick - GAP)
+        solid = union(prism(piece * (1, side), 0.0, thick) for piece in jaws)
+        solid += cylinder((0, 0, low), (0, 0, high), disc)
+        start = jaws[0][0, 0]
+        anchor = np.array([(x, side * y) for x in (start, start - 0.0015) for y in (0.4 * near, 0.95 * near)])
+        solid += hull_of(cylinder((0, 0, low), (0, 0, high), 0.75 * disc), prism(anchor, low, high))
+        neck = path[0] * (1, side)
+        root = cylinder((neck[0], neck[1], low), (neck[0], neck[1], high), radii[0])
+        solid += hull_of(cylinder((0, 0, low), (0, 0, high), 0.75 * disc), root)
+        solid += _handle(path * (1, side), radii, thick, covered, guard, side)
+        if teeth:  # ribs across the front of the jaw, in front of its hollow
+            for x in np.linspace(-0.6 * jaw, -0.95 * jaw, 6):
+                y = sorted((-side * 0.3 * GAP, -side * 0.003))
+                solid += box((x - 0.0006, y[0], 0.1 * thick), (x + 0.0006, y[1], 0.9 * thick))
+        face, outward = (0.0, -1) if k == 0 else (thick, 1)
+        solid += cylinder((0, 0, face - 0.001 * outward), (0, 0, face + 0.001 * outward), rivet, 0.85 * rivet)
+        joint = None
+        if k:
+            joint = revolute("lever_1", (0, 0, -1), (0, 0, thick / 2), 0.0, np.deg2rad(rng.uniform(25, 60)))
+        pliers.add(name, solid, joint, label="lever", density=6000.0)
+    return pliers
+
+
+def _jaw(rng: np.random.Generator, kind: str, length: float, disc: float) -> list[Array]:
+    """Convex outlines of the jaw at -Y, clear of the joint's disc, from the joint to the tip."""
+    share = np.linspace(0.0, 1.0, 11)
+    start, tip = {
+        "nose": (1.0, rng.uniform(0.16, 0.3)),
+        "flat": (1.05, rng.uniform(0.45, 0.7)),
+        "cutting": (1.25, rng.uniform(0.2, 0.4)),
+    }.get(kind, (1.1, rng.uniform(0.5, 0.75)))
+    belly = rng.uniform(0.6, 1.6) if kind != "cutting" else rng.uniform(1.8, 2.6)
+    outer = disc * (start + (tip - start) * share**belly)
+    outer[-1] *= 0.8
+    inner = np.full(11, 0.5 * GAP)
+    if kind in ("combination", "hollow"):  # a round hollow that holds pipes
+        first, last = (0.08, 0.42) if kind == "combination" else (0.12, 0.8)
+        inside = np.clip((share - first) / (last - first), 0, 1)
+        inner += disc * rng.uniform(0.25, 0.45) * np.sin(np.pi * inside)
+    x = -(disc + GAP) - share * (length - disc)
+    upper, lower = np.column_stack([x, -inner]), np.column_stack([x, -np.maximum(outer, inner + 0.002)])
+    return [np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(10)]
+
+
+def _grip(rng: np.random.Generator, reach: float, disc: float, length: float) -> tuple[Array, Array]:
+    """(N, 2) middle line of the handle at +Y and (N,) its half width."""
+    half = length * rng.uniform(0.018, 0.026)
+    share = np.linspace(0.0, 1.0, 12)
+    first = half + disc * rng.uniform(0.25, 0.5)
+    widest, last = length * rng.uniform(0.09, 0.14), length * rng.uniform(0.06, 0.12)
+    middle = rng.uniform(0.45, 0.65)
+    y = np.where(
+        share < middle,
+        first + (widest - first) * np.sin(0.5 * np.pi * share / middle),
+        widest + (last - widest) * ((share - middle) / (1 - middle)) ** 2,
+    )
+    start = np.sqrt(max((disc + half + 2 * GAP) ** 2 - first**2, 0.0)) + half
+    return np.column_stack([start + share * (reach - start), y]), half * (1 - rng.uniform(0.0, 0.3) * share)
+
+
+def _handle(path: Array, radii: Array, thick: float, covered: bool, guard: bool, side: float) -> Solid:
+    """Metal bar, and a thicker grip over most of it."""
+    solid = _bar(path, 0.8 * radii, np.full(len(path), 0.5 * thick), 0.5 * thick)
+    if covered:
+        swell = np.interp(np.linspace(0, 1, len(path)), [0, 0.25, 0.5, 0.9, 1], [1.25, 1.1, 1.3, 1.2, 0.9])
+        grip = radii * swell
+        solid += _bar(path[2:], grip[2:], 0.5 * thick + 0.35 * radii[2:] * swell[2:], 0.5 * thick)
+        if guard:
+            at = path[3]
+            out = np.array([0.0, side])
+            tip = at + 2.2 * radii[3] * out
+            bump = [(at[0], at[1], 0.5 * thick), (tip[0], tip[1], 0.5 * thick)]
+            solid += cylinder(bump[0], bump[1], 1.2 * radii[3], 0.6 * radii[3], 12)
+    return solid
+
+
+def _bar(path: Array, half_width: Array, half_height: Array, middle: float) -> Solid:
+    """Bar of octagonal section along a level path."""
+    along = np.gradient(path, axis=0)
+    across = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+    corners = np.array([(1, 0.5), (0.6, 1), (-0.6, 1), (-1, 0.5), (-1, -0.5), (-0.6, -1), (0.6, -1), (1, -0.5)])
+    rings = []
+    for point, u, w, h in zip(path, across, half_width, half_height, strict=True):
+        flat = point + corners[:, :1] * w * u
+        rings.append(np.column_stack([flat, middle + corners[:, 1] * h]))
+    return loft(rings)
