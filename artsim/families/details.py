@@ -330,3 +330,69 @@ def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: 
     corners = np.stack([outer, inner], axis=1)
     pairs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     return union(prism(np.concatenate(pair), low[0], high[0], 0) for pair in pairs)
+
+
+def grid_panel(
+    low: Vector,
+    high: Vector,
+    widths: Sequence[float],
+    columns: Sequence[float],
+    rows: Sequence[float],
+    bar: float,
+    board: float,
+    bore: tuple[float, float, float] | None = None,
+) -> Solid:
+    """Frame across the X axis with crossbars and a thinner board or pane between them: a door's leaf, a window's sash.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Outer corners.
+    widths : 4 float
+        Of the frame at low Y, high Y, low Z, high Z.
+    columns, rows : sequence of float
+        Y of upright bars and Z of level ones.
+    bar : float
+        Width of these bars.
+    board : float
+        Thickness of the board, in the middle of the frame's own.
+    bore : 3 float, optional
+        Y, Z and radius of a hole through one of the upright sides of the frame, as for a handle.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    inner_low = low + (0, widths[0], widths[2])
+    inner_high = high - (0, widths[1], widths[3])
+    solid = box((low[0], inner_low[1], low[2]), (high[0], inner_high[1], inner_low[2]))
+    solid += box((low[0], inner_low[1], inner_high[2]), (high[0], inner_high[1], high[2]))
+    for y0, y1 in ((low[1], inner_low[1]), (inner_high[1], high[1])):
+        if bore is None or not y0 < bore[0] < y1:
+            solid += box((low[0], y0, low[2]), (high[0], y1, high[2]))
+            continue
+        z0, z1 = bore[1] - 2 * bore[2], bore[1] + 2 * bore[2]
+        solid += box((low[0], y0, low[2]), (high[0], y1, z0)) + box((low[0], y0, z1), (high[0], y1, high[2]))
+        solid += holed_plate((low[0], y0, z0), (high[0], y1, z1), bore[:2], bore[2], sections=12)
+    inset = np.array([0.1 * (high[0] - low[0]), 0.0, 0.0])
+    for y in columns:
+        solid += box(inner_low + inset + (0, y - inner_low[1] - bar / 2, -0.001),
+                     (high[0] - inset[0], y + bar / 2, inner_high[2] + 0.001))  # fmt: skip
+    for z in rows:
+        solid += box(inner_low + inset + (0, -0.001, z - inner_low[2] - bar / 2),
+                     (high[0] - inset[0], inner_high[1] + 0.001, z + bar / 2))  # fmt: skip
+    middle = 0.5 * (low[0] + high[0])
+    pane_low, pane_high = inner_low - 0.001, inner_high + 0.001
+    pane_low[0], pane_high[0] = middle - board / 2, middle + board / 2
+    return solid + box(pane_low, pane_high)
+
+
+def swing_limits(near: float, reach: float) -> tuple[float, float]:
+    """How far a hinged panel may open, radians: so as to stay in front of its own opening, and at all.
+
+    Parameters
+    ----------
+    near : float
+        Distance from the hinge to the nearest point of what stands out of the panel.
+    reach : float
+        How far that stands out beyond the hinge's plane; 0 for nothing.
+    """
+    slant = float(np.arctan2(max(reach, 0.0), near))
+    return min(np.pi / 2 - slant - 0.01, np.deg2rad(88.0)), np.pi - max(slant, 0.03) - 0.05

@@ -30,11 +30,6 @@ class Bin:
     """Height of the base."""
     steps: int
 
-    @property
-    def low(self) -> tuple[float, float]:
-        """Front right corner."""
-        return -self.x, -self.y
-
 
 def build(rng: np.random.Generator) -> Assembly:
     """A bin, closed at rest."""
@@ -102,8 +97,8 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
     limit = np.deg2rad(rng.uniform(70.0, 100.0))
     joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
     if rng.random() < 0.25:  # a lip to lift it by, instead of a pedal
-        tip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
-        lid += rounded_box(tip, (-x + 0.002, 0.4 * half, seam + 0.008), 0.003)
+        lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
+        lid += rounded_box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), 0.003)
         can.add("body", body, density=500.0)
         can.add("lid", lid, joint, density=500.0)
         return
