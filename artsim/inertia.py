@@ -57,9 +57,9 @@ def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     where = f"{obj.category} {obj.object_id}: part {part.name!r}"
     if part.body is None:
         raise AssetError("has no body, so no density", where, "only procedural objects (artsim.make) have one")
-    found = trimesh.triangles.mass_properties(
-        (part.vertices * obj.scale)[part.faces], density=part.body.density, skip_inertia=False
-    )
+    triangles = (part.vertices * obj.scale)[part.faces]
+    with np.errstate(divide="ignore", invalid="ignore"):  # without a volume, which is looked at below
+        found = trimesh.triangles.mass_properties(triangles, density=part.body.density, skip_inertia=False)
     inertia = Inertia(float(found.mass), np.asarray(found.center_mass), np.asarray(found.inertia))
     moments = np.linalg.eigvalsh(inertia.tensor) if np.isfinite(inertia.tensor).all() else np.zeros(3)
     # Moments of any real body are positive, and none is larger than the sum of the other two.

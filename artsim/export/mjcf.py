@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 from lxml import etree
 
 from artsim.errors import AssetError
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers, obj_text
+
+STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
+"""How stiffly joints follow others. MuJoCo weighs a metre of the one like a radian of the other, which by its default
+leaves a screw's thread far too soft."""
 
 
 def mjcf_text(robot: Robot) -> str:
@@ -52,7 +57,7 @@ def _add_body(parent: etree._Element, pos: str, link: Link, joint: LinkJoint | N
     pos = numbers(inertia.center - link.origin)
     etree.SubElement(body, "inertial", pos=pos, mass=number(inertia.mass), fullinertia=numbers(entries))
     if joint is not None:
-        more = {} if joint.type == "continuous" else {"range": numbers((joint.lower, joint.upper))}
+        more = {"range": numbers((joint.lower, joint.upper))} if np.isfinite(joint.lower) else {}
         etree.SubElement(
             body,
             "joint",
@@ -94,7 +99,7 @@ def _add_equalities(root: etree._Element, robot: Robot) -> None:
         if joint.mimic is not None:
             source, multiplier, offset = joint.mimic
             polycoef = numbers((offset, multiplier, 0.0, 0.0, 0.0))
-            etree.SubElement(equality, "joint", joint1=joint.name, joint2=source, polycoef=polycoef)
+            etree.SubElement(equality, "joint", joint1=joint.name, joint2=source, polycoef=polycoef, **STIFF)
 
 
 def _compile(text: str, robot: Robot) -> None:

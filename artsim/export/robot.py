@@ -85,7 +85,8 @@ class LinkJoint:
     axis : (3,) float
         Unit.
     lower, upper : float
-        Radians or metres; infinite where continuous.
+        Radians or metres; infinite where it turns without end. A screw's turning joint is ``continuous`` and has limits
+        nevertheless: URDF holds them in the sliding joint alone.
     effort, velocity : float
         Limits: N m or N, rad/s or m/s.
     damping, friction : float
@@ -219,9 +220,8 @@ def _joint(obj: ArticulatedObject, joint: Joint, parent: int, child: int, carrie
     mimic = None
     if joint.mimic is not None:
         mimic = (obj.tree.joints[joint.mimic.source].name, joint.mimic.multiplier, joint.mimic.offset)
-    lower, upper = (-np.inf, np.inf) if joint.type == "screw" else (joint.lower, joint.upper)
     kind = "continuous" if joint.type == "screw" else joint.type
-    return _driven(joint.name, kind, parent, child, joint, lower, upper, carried, mimic)
+    return _driven(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
 
 
 def _slide(

@@ -105,7 +105,7 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
     added.CreateLocalRot0Attr(turn)
     added.CreateLocalRot1Attr(turn)
     added.CreateAxisAttr("X")
-    if joint.type != "continuous":
+    if np.isfinite(joint.lower):
         added.CreateLowerLimitAttr(joint.lower * unit)
         added.CreateUpperLimitAttr(joint.upper * unit)
     drive = UsdPhysics.DriveAPI.Apply(added.GetPrim(), "linear" if slides else "angular")
