@@ -1,0 +1,240 @@
+"""Washing machines: front loaders with a porthole, top loaders with a lid.
+
+What varies: round or square door, hinged left or right, with a glass bowl or closed; drawer for the detergent; dials,
+keys and display; console of a top loader, its lid with or without a window; a drum or agitator that turns; feet,
+plinth, worktop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, frame, hull, ring, rounded_box, tray, union, vessel
+
+GAP = 0.002
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Measures of the cabinet in metres; its front is the plane x = 0."""
+
+    half: float
+    depth: float
+    low: float
+    high: float
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A washing machine, closed at rest."""
+    low = rng.uniform(0.012, 0.03)
+    front_loader = rng.random() < 0.7
+    shape = Shape(
+        half=0.5 * rng.uniform(0.56, 0.7),
+        depth=rng.uniform(0.45, 0.66) if front_loader else rng.uniform(0.55, 0.7),
+        low=low,
+        high=low + (rng.uniform(0.8, 0.95) if front_loader else rng.uniform(0.85, 0.98)),
+    )
+    return _front_loader(rng, shape) if front_loader else _top_loader(rng, shape)
+
+
+def _feet(shape: Shape) -> Solid:
+    spots = ((x, y) for x in (0.06, shape.depth - 0.06) for y in (0.06 - shape.half, shape.half - 0.06))
+    return union(cylinder((x, y, 0), (x, y, shape.low + 0.01), 0.025, sections=14) for x, y in spots)
+
+
+# --- front loaders ---------------------------------------------------------------------------------------------------
+
+
+def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
+    left = bool(rng.random() < 0.75)
+    sign = 1.0 if left else -1.0
+    strip = s.high - rng.uniform(0.1, 0.15)  # lower edge of the strip of controls
+    hole = rng.uniform(0.13, 0.175)
+    z = s.low + (strip - s.low) * rng.uniform(0.5, 0.56)
+    drum = min(s.half - 0.03, strip - z - 0.015, hole + 0.09)
+    plate = 0.02
+    box_half, box_side = rng.uniform(0.07, 0.12), rng.choice([-1.0, 1.0])
+    drawer = bool(rng.random() < 0.75)
+
+    body = tray((0.5 * plate, -s.half, s.low), (s.depth, s.half, s.high), 0.012, axis=0, side=-1) + _feet(s)
+    body += holed_plate((0, -s.half, s.low), (plate, s.half, strip + 0.001), (0.0, z), hole, 0)
+    slot = np.array([box_side * (s.half - box_half - 0.03), 0.5 * (strip + s.high)])
+    room = 0.5 * (s.high - strip) - 0.016
+    proud = rng.choice([0.0, rng.uniform(0.005, 0.02)])  # of the strip
+    if drawer:
+        widths = [slot[0] - box_half + s.half, s.half - slot[0] - box_half, 0.016, 0.016]
+        body += frame((-proud, -s.half, strip), (plate, s.half, s.high), widths)
+    else:
+        body += rounded_box((-proud, -s.half, strip), (plate, s.half, s.high), 0.003)
+    if rng.random() < 0.6:
+        body += rounded_box((-rng.uniform(0.0, 0.02), -s.half - 0.002, s.high - 0.001),
+                            (s.depth, s.half + 0.002, s.high + rng.uniform(0.01, 0.035)), 0.005)  # fmt: skip
+    if rng.random() < 0.5:  # plinth and the flap of the filter
+        body += box((0.012, 0.005 - s.half, 0.0), (s.depth - 0.01, s.half - 0.005, s.low + 0.002))
+        body += rounded_box((-0.0025, s.half - 0.2, s.low + 0.03), (0.01, s.half - 0.05, s.low + 0.12), 0.004, axis=0)
+    turning = bool(rng.random() < 0.6)
+    bowl = rng.uniform(0.03, 0.06)
+    tub = _drum(s, z, drum, hole, plate, bowl if turning else -plate / 2)
+    machine = Assembly()
+    machine.add("body", body if turning else body + tub, density=350.0)
+
+    outer = hole + rng.uniform(0.03, 0.055)
+    thick = rng.uniform(0.025, 0.05)
+    door = _porthole(rng, z, hole, outer, thick, bowl)
+    upper = np.deg2rad(rng.uniform(95.0, 160.0))
+    hinge = side_hinge(-GAP - thick, sign * (outer + 0.012), upper, left)
+    machine.add("door", door if left else door.mirrored(1), hinge)
+    if turning:
+        machine.add("drum", tub, continuous("body", (-1, 0, 0), (0, 0, z)), density=900.0)
+    if drawer:
+        solid = rounded_box((-proud - 0.016, slot[0] - box_half + GAP, strip + 0.012),
+                            (-proud - GAP, slot[0] + box_half - GAP, s.high - 0.012), 0.004)  # fmt: skip
+        inner = np.array([box_half - 0.004, room - 0.003])
+        solid += tray((-proud - 0.006, *(slot - inner)), (0.55 * s.depth, *(slot + inner)), 0.003)
+        solid += box(
+            (-proud - 0.024, slot[0] - 0.4 * box_half, strip + 0.022),
+            (-proud - 0.012, slot[0] + 0.4 * box_half, strip + 0.032),
+        )
+        travel = rng.uniform(0.3, 0.45) * s.depth
+        machine.add("detergent_drawer", solid, prismatic("body", (-1, 0, 0), 0.0, travel, (0, *slot)))
+        free = (slot[0] + box_half, s.half) if box_side < 0 else (-s.half, slot[0] - box_half)
+    else:
+        free = (-s.half, s.half)
+    _controls(rng, machine, free, -proud, strip, s.high)
+    return machine
+
+
+def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: float) -> Solid:
+    """Drum behind the porthole with three paddles; ``gap`` behind the front plate."""
+    front, back = plate + gap + 0.008, s.depth - 0.05
+    solid = ring((0.5 * (front + back), 0, z), (1, 0, 0), radius - 0.008, radius, back - front, 18)
+    solid += cylinder((back - 0.004, 0, z), (back + 0.01, 0, z), radius, sections=18)
+    solid += ring((front + 0.004, 0, z), (1, 0, 0), hole + 0.012, radius - 0.004, 0.008, 18)
+    for k in range(3):
+        a = 2.0 * np.pi * k / 3 + 0.4
+        out, across = np.array([0.0, np.cos(a), np.sin(a)]), np.array([0.0, -np.sin(a), np.cos(a)])
+        feet = [
+            np.array([x, 0, z]) + (radius - 0.005) * out + v * across
+            for x in (front + 0.03, back)
+            for v in (-0.03, 0.03)
+        ]
+        tips = [np.array([x, 0, z]) + (radius - 0.05) * out for x in (front + 0.06, back)]
+        solid += hull(feet + tips)
+    return solid
+
+
+def _porthole(rng: np.random.Generator, z: float, hole: float, outer: float, thick: float, bowl: float) -> Solid:
+    """Door with its hinge at +Y; the glass reaches into the hole."""
+    x0, x1 = -GAP - thick, -GAP
+    glass = hole * rng.uniform(0.72, 0.9)
+    closed = rng.random() < 0.15
+    if rng.random() < 0.75:
+        solid = ring((0.5 * (x0 + x1), 0, z), (1, 0, 0), 0.97 * glass, outer, thick)
+        solid += ring((x0, 0, z), (1, 0, 0), glass + 0.012, outer - 0.012, 0.012, 20) if rng.random() < 0.5 else Solid()
+    else:
+        solid = holed_plate((x0, -outer, z - outer), (x1, outer, z + outer), (0.0, z), 0.97 * glass, 0)
+    if closed:
+        solid += cylinder((x0 - 0.004, 0, z), (x1, 0, z), glass, sections=28)
+    else:
+        solid += cylinder((x0 + 0.3 * thick, 0, z), (x1 + 0.002, 0, z), glass * 1.02, sections=28)
+    # The bowl is narrow enough to swing past the rim of the hole.
+    solid += cylinder((x1 - 0.002, 0, z), (x1 + bowl, 0, z), hole - 0.008, 0.78 * hole, 28)
+    for side in (-0.35, 0.35):  # hinges
+        solid += box((x1 - 0.014, 0.6 * outer, z + side * outer - 0.02), (x1, outer + 0.01, z + side * outer + 0.02))
+    y, reach = 0.018 - outer, rng.uniform(0.03, 0.05)
+    if rng.random() < 0.5:
+        grip = 0.25 * outer
+        return solid + box((x0 - 0.012, y - 0.004, z - grip), (x0 + 0.01, y + 0.014, z + grip))
+    start, end = (x0, 0.02 - 0.97 * outer, z - 0.1 * outer), (x0, 0.02 - 0.97 * outer, z + 0.1 * outer)
+    return solid + front_handle(str(rng.choice(["bow", "flat"])), start, end, reach, 0.006)
+
+
+# --- top loaders -----------------------------------------------------------------------------------------------------
+
+
+def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
+    console = rng.uniform(0.09, 0.16)  # depth of the console at the back
+    rise = rng.uniform(0.08, 0.18)
+    back = s.depth - console
+    deck, thick = 0.03, rng.uniform(0.02, 0.04)
+    radius = min(0.5 * back - 0.05, s.half - 0.05)
+    center = np.array([0.5 * back, 0.0])
+    body = tray((0, -s.half, s.low), (s.depth, s.half, s.high - 0.5 * deck), 0.012) + _feet(s)
+    body += holed_plate((0, -s.half, s.high - deck), (s.depth, s.half, s.high), center, radius, 2)
+    slope = rng.uniform(0.0, 0.5) * console
+    face = [
+        (back + 0.004, s.high - 0.002),
+        (back + 0.004 + slope, s.high + rise),
+        (s.depth, s.high + rise),
+        (s.depth, s.high - 0.002),
+    ]
+    body += hull([(x, y, z) for x, z in face for y in (-s.half, s.half)])
+    upright = slope < 0.2 * console
+    if upright:  # dials stand on its face
+        body += box(
+            (back + 0.003, -0.95 * s.half, s.high + 0.02), (back + 0.02 + slope, 0.95 * s.half, s.high + rise - 0.01)
+        )
+    if rng.random() < 0.5:  # a raised board in front
+        body += rounded_box((-0.003, 0.06 - s.half, s.low + 0.08), (0.01, s.half - 0.06, s.high - 0.1), 0.002)
+    machine = Assembly()
+    machine.add("body", body, density=350.0)
+
+    # The open lid stays clear of the dials.
+    front, hinge = -rng.uniform(0.0, 0.015), back - (0.04 if upright else 0.0)
+    low, high = np.array([front, 0.004 - s.half, s.high + GAP]), np.array([hinge, s.half - 0.004, s.high + GAP + thick])
+    if rng.random() < 0.4:  # narrower than the deck
+        low[:2] += (0.03, 0.06)
+        high[1] -= 0.06
+    edge = rng.uniform(0.04, 0.09)
+    if rng.random() < 0.5:  # a window
+        lid = frame(low, high, [edge] * 4, 0, 1)
+        lid += box(low + (edge - 0.002, edge - 0.002, 0.3 * thick), high - (edge - 0.002, edge - 0.002, 0.3 * thick))
+    else:
+        lid = rounded_box(low, high, 0.008)
+    lid += rounded_box((low[0] - 0.012, -0.07, low[2] + 0.004), (low[0] + 0.01, 0.07, high[2] - 0.003), 0.004)
+    upper = np.deg2rad(rng.uniform(75.0, 89.0))
+    machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
+    machine.add(
+        "drum", _agitator(rng, center, radius, s), continuous("body", (0, 0, 1), (*center, s.low)), density=900.0
+    )
+    if upright:
+        _controls(rng, machine, (-s.half, s.half), back + 0.003, s.high + thick + 0.01, s.high + rise)
+    return machine
+
+
+def _agitator(rng: np.random.Generator, center: Array, radius: float, s: Shape) -> Solid:
+    """Drum with a column and its vanes, or with a low impeller."""
+    low, high, r = s.low + 0.05, s.high - 0.08, radius - 0.01
+    solid = vessel([(r, low), (r, high)], 0.006, (*center, 0.0), 18)
+    x, y = center
+    top = low + (rng.uniform(0.6, 0.85) * (high - low) if rng.random() < 0.5 else 0.05)
+    solid += cylinder((x, y, low + 0.001), (x, y, top), 0.3 * r, 0.15 * r, 16)
+    for k in range(4):
+        vane = box((x, y - 0.01, low + 0.001), (x + 0.6 * r, y + 0.01, low + 0.06))
+        solid += vane.turned((0, 0, 1), 0.5 * np.pi * k, (x, y, 0))
+    return solid
+
+
+def _controls(
+    rng: np.random.Generator, machine: Assembly, free: tuple[float, float], x: float, low: float, high: float
+) -> None:
+    """A dial and a row of buttons on a strip that faces -X."""
+    z, room = 0.5 * (low + high), high - low
+    places = np.linspace(free[0], free[1], 9)[1:-1]
+    middle, reverse = places[3], -1 if rng.random() < 0.5 else 1
+    radius = min(rng.uniform(0.022, 0.035), 0.4 * room)
+    spot = (x, float(rng.choice([middle, places[1], places[5]])), z)
+    machine.add("knob", dial(spot, (-1, 0, 0), rng.uniform(0.018, 0.03), radius), continuous("body", (-1, 0, 0), spot))
+    number = 0
+    for y in places[::reverse]:
+        if abs(y - spot[1]) < radius + 0.02 or number >= 4 or rng.random() < 0.4:
+            continue
+        number += 1
+        face = (x, float(y), z)
+        button = push_button(face, (0.016, 0.012), rng.choice([0.002, 0.006]))
+        machine.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
