@@ -1,4 +1,4 @@
-"""From URDF files to labelled partial clouds, and a look at them: the whole of artsim in one page."""
+"""From objects, made and loaded, to labelled partial clouds, and a look at them: the whole of artsim in one page."""
 
 import importlib.util
 import os
@@ -6,8 +6,10 @@ import sys
 from pathlib import Path
 
 import artsim
+from artsim.families import FAMILIES
+from artsim.gallery import gallery
 from artsim.plan import SampleOptions
-from artsim.sources import find_sources
+from artsim.sources import family_sources, find_sources
 from artsim.verify import verify
 from artsim.view import view_path
 
@@ -15,7 +17,9 @@ ASSETS = Path(__file__).resolve().parents[2] / "urdf_assets"
 
 
 def main(out: Path) -> None:
-    # 1. Objects: our own, the Franka Panda that comes with PyBullet, and real ones where there are any.
+    # 1. Objects: procedural ones, a few URDF folders, PyBullet's Franka Panda, and real ones where there are any.
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "gallery.png").write_bytes(gallery([artsim.make(category) for category in sorted(FAMILIES)]))
     objects = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
     data = importlib.util.find_spec("pybullet_data")
     if data is not None and data.submodule_search_locations:
@@ -24,8 +28,10 @@ def main(out: Path) -> None:
         objects.append(Path(os.environ["ARTSIM_PARTNET_DIR"]))
 
     # 2. Samples: random joint states and views, 2,048 points each, with full ground truth.
-    sources = find_sources(objects)
-    made = artsim.generate(sources, out, num_samples=500, sample=SampleOptions(num_points=2048), splits=(1, 0, 0))
+    sources = [*find_sources(objects), *family_sources(sorted(FAMILIES), 2)]
+    made = artsim.generate(
+        sources, out / "dataset", num_samples=500, sample=SampleOptions(num_points=2048), splits=(1, 0, 0)
+    )
 
     # 3. Checks: checksums, and what must hold of every sample.
     problems = verify(made.folder)
@@ -41,7 +47,8 @@ def main(out: Path) -> None:
 
     # 5. Pictures.
     sheet, recording = view_path(made.folder, rerun=made.folder / "recording.rrd")
-    print(f"\nlook at   {sheet}\nor with   rerun {recording}")
+    print(f"\nlook at   {out / 'gallery.png'}: every procedural category in three joint states")
+    print(f"and at    {sheet}: samples with their ground truth\nor with   rerun {recording}")
 
 
 if __name__ == "__main__":

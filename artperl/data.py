@@ -1,0 +1,158 @@
+"""Training data: batches of partial clouds with what the perception network is to say about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from torch import Tensor
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
+
+from artperl.batch import Batch
+from artsim.errors import ConfigError
+from artsim.kinematics import Array
+from artsim.plan import SampleOptions
+from artsim.sample import Sample
+from artsim.stream import FamilyStream
+
+
+@dataclass(frozen=True, eq=False)
+class Clouds(Batch):
+    """B partial clouds of N points, brought to a common place and size.
+
+    Attributes
+    ----------
+    points : (B, N, 3) float
+        ``(camera-frame points - center) / radius``, in random order.
+    center : (B, 3) float
+        Mean of the points, metres, camera frame.
+    radius : (B,) float
+        Root of the mean squared distance from it, times two, metres.
+    """
+
+    points: Tensor
+    center: Tensor
+    radius: Tensor
+
+    @staticmethod
+    def of(points: Tensor) -> Clouds:
+        """Clouds of (B, N, 3) camera-frame points."""
+        center = points.mean(1)
+        local = points - center[:, None]
+        radius = 2.0 * local.square().sum(-1).mean(1).sqrt().clamp(min=1e-9)
+        return Clouds(local / radius[:, None, None], center, radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Truth(Batch):
+    """What is true of B clouds. Lengths of the rest frame are in diagonals of the object.
+
+    Attributes
+    ----------
+    part : (B, N) int64
+    canonical : (B, N, 3) float
+        Where each point lies in the rest frame, at rest.
+    part_valid : (B, P) bool
+    box_center, box_size : (B, P, 3) float
+    diagonal : (B,) float
+        Over the cloud's radius.
+    """
+
+    part: Tensor
+    canonical: Tensor
+    part_valid: Tensor
+    box_center: Tensor
+    box_size: Tensor
+    diagonal: Tensor
+
+
+def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
+    """One sample as arrays for :class:`Clouds` and :class:`Truth`.
+
+    Raises
+    ------
+    ConfigError
+        When the sample has more parts than rows.
+    """
+    K = len(sample.joint_type)
+    if num_rows < K:
+        raise ConfigError(f"{sample.category} {sample.object_id} has {K} parts", mend=f"allow more than {num_rows}")
+    points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
+    size = np.linalg.norm(sample.box_size, axis=1)
+    rest = (sample.npcs[:num_points] - 0.5) * size[part, None] + sample.box_center[part]
+
+    def pad(rows: Array) -> Array:
+        padded = np.zeros((num_rows, *rows.shape[1:]), dtype=np.float32)
+        padded[:K] = rows
+        return padded
+
+    return {
+        "points": points.astype(np.float32),
+        "part": part,
+        "canonical": (rest / sample.diagonal).astype(np.float32),
+        "part_valid": np.arange(num_rows) < K,
+        "box_center": pad(sample.box_center / sample.diagonal),
+        "box_size": pad(sample.box_size / sample.diagonal),
+        "diagonal": np.float32(sample.diagonal),
+    }
+
+
+def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
+    """Collated rows of :func:`training_rows` as records."""
+    clouds = Clouds.of(rows["points"])
+    truth = Truth(**{name: rows[name] for name in ("part", "canonical", "part_valid", "box_center", "box_size")},
+                  diagonal=rows["diagonal"] / clouds.radius)  # fmt: skip
+    return clouds, truth
+
+
+class _Rows(IterableDataset[dict[str, Array]]):
+    """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch."""
+
+    def __init__(self, stream: FamilyStream, num_points: int, num_rows: int, batch_size: int, first: int):
+        self.stream, self.num_points, self.num_rows = stream, num_points, num_rows
+        self.batch_size, self.first = batch_size, first
+
+    def __iter__(self) -> Iterator[dict[str, Array]]:
+        info = get_worker_info()
+        worker, workers = (info.id, info.num_workers) if info else (0, 1)
+        batch = self.first // self.batch_size + worker
+        while True:
+            for i in range(batch * self.batch_size, (batch + 1) * self.batch_size):
+                yield training_rows(self.stream[i], self.num_points, self.num_rows)
+            batch += workers
+
+
+def batches(
+    categories: Sequence[str],
+    num_rows: int,
+    num_points: int = 1024,
+    batch_size: int = 32,
+    first_batch: int = 0,
+    seed: int = 0,
+    workers: int = 1,
+    sample: SampleOptions | None = None,
+) -> Iterator[tuple[Clouds, Truth]]:
+    """Endless batches of fresh procedural objects.
+
+    Batch ``n`` is always the same, whatever the number of workers and wherever the run was begun.
+
+    Parameters
+    ----------
+    categories : sequence of str
+    num_rows : int
+        Rows for parts.
+    num_points, batch_size : int
+    first_batch : int
+        Number of the first batch, to go on with a stopped run.
+    seed : int
+    workers : int
+        Processes that make samples; 0 makes them in this one.
+    sample : SampleOptions, optional
+        View preset, noise and the like; ``num_points`` overrides its own.
+    """
+    options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
+    stream = FamilyStream(categories, options, seed, views_per_object=batch_size // 4)
+    rows = _Rows(stream, num_points, num_rows, batch_size, first_batch * batch_size)
+    loader = DataLoader(rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None)
+    yield from map(to_batch, loader)
