@@ -1,0 +1,167 @@
+"""Toasters: a body with one to four slots, levers at the front end, a dial to set them.
+
+What varies: slots, short or long, one lever or two; box, arch or loaf; guides of the levers; dials, buttons; crumb tray
+at the back; feet or a base; rack for buns on top.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, prismatic, revolute
+from artsim.families.details import dial, push_button
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, frame, hull_of, prism, rounded_box, rounded_rectangle, tube, union
+
+GAP = 0.001
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A toaster with its levers up at rest. The slots run along X, the levers are at -X."""
+    kind = str(rng.choice(["two", "four", "long"], p=[0.6, 0.2, 0.2]))
+    count = {"two": 2, "four": 4, "long": int(rng.integers(1, 3))}[kind]
+    length = rng.uniform(0.36, 0.42) if kind == "long" else rng.uniform(0.25, 0.32)
+    wide = rng.uniform(0.028, 0.038)  # of a slot
+    pitch = wide + rng.uniform(0.02, 0.035)
+    half = 0.5 * (count - 1) * pitch + 0.5 * wide + rng.uniform(0.028, 0.05)
+    foot, height = rng.uniform(0.006, 0.02), rng.uniform(0.16, 0.21)
+    low, high = np.array([0.0, -half, foot]), np.array([length, half, foot + height])
+    shape = str(rng.choice(["box", "arch", "loaf", "block"]))
+    block = _block(rng, shape, low, high, count, pitch, wide)
+
+    margin = rng.uniform(0.03, 0.05) + (0.03 if shape == "loaf" else 0.0)
+    slots = np.asarray((np.arange(count) - 0.5 * (count - 1)) * pitch, dtype=np.float64)
+    body = _slotted(block, slots, wide, (margin, length - margin), foot + 0.03)
+    if rng.random() < 0.6:
+        spots = ((x, y) for x in (0.04, length - 0.04) for y in (0.75 * -half, 0.75 * half))
+        body += union(cylinder((x, y, 0), (x, y, foot + 0.012), 0.011, 0.014, 14) for x, y in spots)
+        base = False
+    else:
+        body += rounded_box((0.012, 0.008 - half, 0.0), (length - 0.012, half - 0.008, foot + 0.012), 0.01, axis=2)
+        base = True
+    if rng.random() < 0.5:  # a collar around the slots
+        start = (margin - 0.01, slots[0] - 0.5 * wide - 0.008, high[2] - 0.006)
+        end = (length - margin + 0.01, slots[-1] + 0.5 * wide + 0.008, high[2] + 0.002)
+        body += frame(start, end, [0.01, 0.01, 0.007, 0.007], 0, 1)
+    if rng.random() < 0.12:
+        body += _bun_rack(length, half, high[2])
+
+    toaster = Assembly()
+    levers = 2 if count == 4 else 1
+    places = [-0.5 * half, 0.5 * half] if levers == 2 else [rng.choice([0.0, rng.uniform(-0.35, 0.35)]) * half]
+    top = foot + height * rng.uniform(0.68, 0.76)
+    travel = min(rng.uniform(0.05, 0.085), top - foot - 0.06)
+    guided = rng.random() < 0.8
+    for y in places if guided else []:
+        body += frame((-0.0035, y - 0.012, top - travel - 0.014), (0.005, y + 0.012, top + 0.014), [0.007] * 4)
+    toaster.add("body", body, density=500.0)
+    grip = _lever_style(rng)
+    for number, y in enumerate(places, 1):
+        name = f"lever_{number}" if levers == 2 else "lever"
+        solid = grip.moved((0, y, top))
+        toaster.add(name, solid, prismatic("body", (0, 0, -1), 0.0, travel, (0, y, top)), density=1000.0)
+    _controls(rng, toaster, places, half, top - travel - 0.02, foot)
+    if not base and rng.random() < 0.4:
+        side = 0.75 * half - 0.017
+        tray = box((0.06, -side, foot - 0.0045), (length + 0.001, side, foot - 0.0015))
+        tray += rounded_box(
+            (length + 0.0015, -0.4 * half, foot - 0.0045), (length + 0.012, 0.4 * half, foot + 0.008), 0.002
+        )
+        tray += box((length, -0.4 * half, foot - 0.0045), (length + 0.004, 0.4 * half, foot - 0.0015))
+        toaster.add("crumb_tray", tray, prismatic("body", (1, 0, 0), 0.0, 0.6 * length, (length, 0, foot)))
+    return toaster
+
+
+def _block(
+    rng: np.random.Generator, shape: str, low: Array, high: Array, count: int, pitch: float, wide: float
+) -> Solid:
+    """Convex body, still without slots; its top is level where they will be."""
+    side = high[1] - 0.5 * (count - 1) * pitch - 0.5 * wide
+    if shape == "arch":  # round edges along the slots
+        outline = rounded_rectangle(low[1:] - (0.0, 0.1), high[1:], rng.uniform(0.5, 0.95) * side, 6)
+        outline = np.stack([outline[:, 0], np.maximum(outline[:, 1], low[2])], axis=1)
+        return prism(outline, low[0], high[0], 0)
+    if shape == "loaf":  # round edges over the ends
+        outline = rounded_rectangle((low[0], low[2] - 0.1), (high[0], high[2]), rng.uniform(0.03, 0.06), 7)
+        outline = np.stack([outline[:, 0], np.maximum(outline[:, 1], low[2])], axis=1)
+        return prism(outline, low[1], high[1], 1)
+    if shape == "block":  # wider below
+        narrow = 0.3 * side
+        upper = rounded_box((low[0] + 0.008, low[1] + narrow, high[2] - 0.02), high - (0.008, narrow, 0.0), 0.009)
+        return hull_of(upper, rounded_box(low, (high[0], high[1], low[2] + 0.03), 0.012, axis=2))
+    return rounded_box(low, high, rng.uniform(0.006, 0.02))
+
+
+def _slotted(block: Solid, slots: Array, wide: float, span: tuple[float, float], floor: float) -> Solid:
+    """The block cut into convex pieces that leave the slots free, each piece overlapping its neighbours."""
+
+    def cut(*planes: tuple[int, float, float]) -> Solid:
+        piece = block.pieces[0]
+        for axis, low, high in planes:
+            normal = np.eye(3)[axis]
+            piece = piece.trim_by_plane(normal, low).trim_by_plane(-normal, -high)
+        return Solid((piece,))
+
+    far = 1.0
+    edges = np.concatenate([[-far], np.stack([slots - 0.5 * wide, slots + 0.5 * wide], axis=1).ravel(), [far]])
+    solid = union(cut((1, a, b)) for a, b in edges.reshape(-1, 2))
+    for y in slots:
+        across = (1, y - 0.5 * wide - 0.001, y + 0.5 * wide + 0.001)
+        solid += cut(across, (0, -far, span[0])) + cut(across, (0, span[1], far))
+        solid += cut(across, (0, span[0] - 0.001, span[1] + 0.001), (2, -far, floor))
+        for x in np.linspace(*span, 5)[1:-1]:  # wires that hold the bread
+            for side in (-1, 1):
+                v = y + side * 0.5 * wide
+                solid += box(
+                    (x - 0.0015, v - 0.002, floor - 0.001), (x + 0.0015, v + 0.002, block.bounds()[1, 2] - 0.012)
+                )
+    return solid
+
+
+def _lever_style(rng: np.random.Generator) -> Solid:
+    """Lever before the plane x = 0, centred on the origin, with a tongue in its guide."""
+    solid = box((-0.014, -0.0035, -0.006), (-GAP, 0.0035, 0.006))
+    half = rng.uniform(0.012, 0.026)
+    kind = int(rng.integers(3))
+    if kind == 0:
+        return solid + rounded_box((-0.032, -half, -0.007), (-0.006, half, 0.007), 0.004)
+    if kind == 1:
+        tip = rounded_box((-0.034, -half, -0.004), (-0.028, half, 0.004), 0.0015)
+        return solid + hull_of(tip, rounded_box((-0.012, -0.6 * half, -0.009), (-0.006, 0.6 * half, 0.009), 0.0015))
+    return solid + cylinder((-0.006, 0, 0), (-0.026, 0, 0), 0.5 * half + 0.003, 0.6 * half + 0.004, 18)
+
+
+def _controls(
+    rng: np.random.Generator, toaster: Assembly, places: list[float], half: float, top: float, foot: float
+) -> None:
+    """A dial below each lever or beside it, and buttons in a row."""
+    room = top - foot - 0.004
+    buttons = 0
+    for number, y in enumerate(places, 1):
+        radius = min(rng.uniform(0.012, 0.018), 0.42 * room)
+        spot = (0.0, float(y), foot + 0.012 + 0.45 * room)
+        if rng.random() < 0.8 and radius > 0.006:
+            name = f"knob_{number}" if len(places) > 1 else "knob"
+            turn = revolute("body", (-1, 0, 0), spot, 0.0, np.deg2rad(rng.uniform(180.0, 290.0)))
+            toaster.add(name, dial(spot, (-1, 0, 0), rng.uniform(0.012, 0.02), radius), turn)
+    if len(places) == 1 and rng.random() < 0.6:
+        y = places[0] - 0.6 * half if places[0] >= 0 else places[0] + 0.6 * half
+        y = float(np.clip(y, 0.02 - half, half - 0.02))
+        if abs(y - places[0]) < 0.042:
+            return
+        for z in np.linspace(0.0, 0.05, int(rng.integers(1, 4))):
+            buttons += 1
+            face = (0.0, y, foot + 0.03 + z)
+            button = push_button(face, (0.016, 0.009), rng.choice([0.002, 0.0045]))
+            toaster.add(f"button_{buttons}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
+
+
+def _bun_rack(length: float, half: float, z: float) -> Solid:
+    """Wire rack that stands on the top."""
+    lift, solid = z + 0.03, Solid()
+    for y in (-0.6 * half, 0.6 * half):
+        path = [(0.06, y, z - 0.006), (0.07, y, lift), (length - 0.07, y, lift), (length - 0.06, y, z - 0.006)]
+        solid += tube(path, 0.002, 8)
+    for x in (0.08, length - 0.08):
+        solid += tube([(x, -0.6 * half, lift), (x, 0.6 * half, lift)], 0.002, 8)
+    return solid
