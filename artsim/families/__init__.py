@@ -41,6 +41,7 @@ from artsim.families import (
     toaster,
     trash_can,
     washing_machine,
+    window,
 )
 from artsim.objects import ArticulatedObject
 
@@ -73,6 +74,7 @@ FAMILIES: dict[str, Family] = {
     "toaster": toaster.build,
     "trash_can": trash_can.build,
     "washing_machine": washing_machine.build,
+    "window": window.build,
 }
 """Every category that :func:`make` knows."""
 

@@ -1,0 +1,145 @@
+"""Wall switches: one to four rockers, toggles or dimmer knobs on a plate.
+
+What varies: how many, what kind, side by side or above one another, square and long plates, screws, bevels.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from artsim.assembly import Assembly, JointSpec, revolute
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+
+GAP = 0.0007
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A switch on a wall at x = 0; its front faces -X. A switch is off, its upper half out, at rest."""
+    kind = str(rng.choice(["rocker", "toggle", "dimmer"], p=[0.65, 0.25, 0.1]))
+    count = int(rng.choice([1, 2, 3, 4], p=[0.35, 0.35, 0.18, 0.12]))
+    upright = kind == "rocker" and count > 1 and rng.random() < 0.2
+    depth = rng.uniform(0.008, 0.013)
+    height = rng.uniform(0.078, 0.12)
+    border = height * rng.uniform(0.08, 0.2)
+    pitch = {"rocker": rng.uniform(0.022, 0.045), "toggle": rng.uniform(0.036, 0.046), "dimmer": 0.06}[kind]
+    width = max(count * pitch + 2 * border, 0.06 if upright else 0.07)
+    if upright:
+        width, height = rng.uniform(0.07, 0.09), max(count * pitch + 2 * border, 0.08)
+    bar = rng.uniform(0.0015, 0.006) if kind == "rocker" else 0.0
+    inner = np.array([[-width / 2 + border, -height / 2 + border], [width / 2 - border, height / 2 - border]])
+    cells = _cells(inner, count, 1 if upright else 0, bar)
+
+    switch = Assembly()
+    plate = _plate(rng, width, height, depth, kind != "rocker" or border > 0.013)
+    if kind == "rocker":
+        half = 0.5 * np.array([width, height]) - 0.004
+        plate += frame((-depth, *-half), (0, *half), [border - 0.004] * 4)
+        plate += union(_bar(a, b, 1 if upright else 0, depth) for a, b in pairwise(cells))
+    else:
+        plate += rounded_box((-depth, -width / 2, -height / 2), (0, width / 2, height / 2), 0.004)
+    buttons: list[tuple[Solid, JointSpec]] = []
+    tilt, style = np.deg2rad(rng.uniform(3.0, 7.0)), int(rng.integers(1 << 30))
+    for cell in cells:
+        center = cell.mean(axis=0)
+        alike = np.random.default_rng(style)
+        if kind == "rocker":
+            solid = _rocker(alike, cell, depth, tilt)
+            joint = revolute("frame", (0, 1, 0), (-0.8 * depth, *center), 0.0, 2 * tilt)
+        elif kind == "toggle":
+            low, high = center - (0.0095, 0.013), center + (0.0095, 0.013)
+            plate += frame((-depth - 0.0025, *low), (-depth + 0.001, *high), [0.002, 0.002, 0.003, 0.003])
+            swing = alike.uniform(0.3, 0.5)
+            solid = _toggle(alike, center, depth).turned((0, 1, 0), -swing, (-depth - 0.006, *center))
+            joint = revolute("frame", (0, 1, 0), (-depth - 0.006, *center), 0.0, 2 * swing)
+        else:
+            solid = _dimmer(alike, center, depth, min(0.4 * pitch, 0.35 * height))
+            joint = revolute("frame", (-1, 0, 0), (-depth, *center), 0.0, alike.uniform(3.5, 5.2))
+        buttons.append((solid, joint))
+    switch.add("frame", plate, density=1200.0)
+    for number, (solid, joint) in enumerate(buttons):
+        switch.add(f"button_{number}", solid, joint, density=1200.0)
+    return switch
+
+
+def _cells(inner: Array, count: int, axis: int, bar: float) -> list[Array]:
+    """(2, 2) corners in y and z of every cell of a row."""
+    edges = np.linspace(inner[0, axis], inner[1, axis], count + 1)
+    cells = []
+    for k in range(count):
+        cell = inner.copy()
+        cell[0, axis] = edges[k] + (bar / 2 if k else 0.0)
+        cell[1, axis] = edges[k + 1] - (bar / 2 if k < count - 1 else 0.0)
+        cells.append(cell)
+    return cells
+
+
+def _bar(first: Array, second: Array, axis: int, depth: float) -> Solid:
+    """The bar between two neighbouring cells."""
+    low, high = first[0].copy(), first[1].copy()
+    low[axis], high[axis] = first[1, axis], second[0, axis]
+    low[1 - axis] -= 0.001
+    high[1 - axis] += 0.001
+    return box((-0.9 * depth, *low), (0, *high))
+
+
+def _plate(rng: np.random.Generator, width: float, height: float, depth: float, screws: bool) -> Solid:
+    """The back, a rounded rim, and screws by chance."""
+    half = 0.5 * np.array([width, height])
+    rim = 0.0065
+    edge = depth * rng.uniform(0.7, 1.0)
+    solid = box((-0.0025, *(-half + 0.002)), (0, *(half - 0.002)))
+    for axis in (0, 1):
+        for side in (-1, 1):
+            low, high = -half.copy(), half.copy()
+            low[axis], high[axis] = (-half[axis], -half[axis] + rim) if side < 0 else (half[axis] - rim, half[axis])
+            solid += rounded_box((-edge, *low), (0, *high), 0.0025)
+    if screws and rng.random() < 0.5:
+        z = half[1] - 0.008
+        solid += union(cylinder((-depth - 0.0006, 0, s * z), (-0.001, 0, s * z), 0.0028, sections=14) for s in (-1, 1))
+    return solid
+
+
+def _rocker(rng: np.random.Generator, cell: Array, depth: float, tilt: float) -> Solid:
+    """A plate bent in its middle: at rest its upper half stands out, and tips in when pressed."""
+    low, high = cell
+    x, center = -0.8 * depth, cell.mean(axis=0)
+    half_y = 0.5 * (high[0] - low[0]) - GAP
+    thick = min(0.3 * depth, 0.004)
+    proud = rng.uniform(0.0005, 0.0025)
+    half_z = 0.5 * (high[1] - low[1]) - GAP - (thick + proud) * np.sin(2 * tilt) - 0.0003
+    ridge = rounded_box((x - thick, -half_y, -0.001), (x + 0.3 * thick, half_y, 0.001), 0.0008)
+    solid = Solid()
+    for side in (-1.0, 1.0):
+        # Bent outward by the tilt: either half stands flush when the switch is tipped its way.
+        end = rounded_box((x - thick - proud, -half_y, -0.0015), (x + 0.2 * thick, half_y, 0.0015), 0.001)
+        solid += hull_of(ridge, end.moved((-0.5 * half_z * np.tan(tilt), 0, side * (half_z - 0.0015))))
+    if rng.random() < 0.5:
+        mark = 0.12 * half_z
+        z, w = 0.7 * half_z, 0.1 * half_y
+        front = x - thick - proud - 0.45 * half_z * np.tan(tilt)
+        solid += box((front - 0.0006, -w, z - mark), (x, w, z))
+    return solid.moved((0, *center)).turned((0, 1, 0), -tilt, (x, *center))
+
+
+def _toggle(rng: np.random.Generator, center: Array, depth: float) -> Solid:
+    """A bat on a round hub, straight out."""
+    x = -depth - 0.006
+    wide, r = rng.uniform(0.0035, 0.006), 0.0045
+    length = rng.uniform(0.012, 0.02)
+    hub = cylinder((x, -wide, 0), (x, wide, 0), r, sections=18)
+    root = rounded_box((x - 0.003, -wide, -0.003), (x, wide, 0.003), 0.001)
+    tip_half = rng.uniform(0.003, 0.0043)
+    tip = rounded_box((x - length, -wide * 1.1, -tip_half), (x - length + 0.004, wide * 1.1, tip_half), 0.0015)
+    return (hub + hull_of(root, tip)).moved((0, *center))
+
+
+def _dimmer(rng: np.random.Generator, center: Array, depth: float, radius: float) -> Solid:
+    """A round knob with a pointer."""
+    r, tall = min(radius, rng.uniform(0.012, 0.02)), rng.uniform(0.009, 0.016)
+    x = -depth - GAP
+    solid = cylinder((x, 0, 0), (x - tall, 0, 0), r, rng.uniform(0.8, 0.98) * r, 32)
+    solid += box((x - tall - 0.0008, -0.0012, 0.2 * r), (x - 0.5 * tall, 0.0012, 0.75 * r))
+    return solid.moved((0, *center))
