@@ -40,6 +40,7 @@ from artsim.families import (
     switch,
     toaster,
     trash_can,
+    valve,
     washing_machine,
     window,
 )
@@ -73,6 +74,7 @@ FAMILIES: dict[str, Family] = {
     "switch": switch.build,
     "toaster": toaster.build,
     "trash_can": trash_can.build,
+    "valve": valve.build,
     "washing_machine": washing_machine.build,
     "window": window.build,
 }
