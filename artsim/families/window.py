@@ -1,0 +1,218 @@
+"""Windows: one to three sashes in a frame, hinged at a side, at the top or bottom, or sliding sideways or upward.
+
+Sashes open towards -X, the room; hinged ones have a handle that turns. Sizes, glazing bars, mullions, fixed lights,
+sills, the surrounding wall, and how far the sashes open vary.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, prismatic, revolute
+from artsim.families.details import bar_handle, grid_panel, swing_limits
+from artsim.kinematics import Array
+from artsim.solids import Solid, box, cylinder, frame, rounded_box
+
+GAP = 0.003
+PANE = 0.006
+HINGES = {
+    "left": (1, 1, (0, 0, -1)),
+    "right": (1, -1, (0, 0, 1)),
+    "top": (2, 1, (0, 1, 0)),
+    "bottom": (2, -1, (0, -1, 0)),
+}
+"""Of each hinge: the axis of the front across which it lies, its end there, and its direction."""
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A window, closed at rest."""
+    kind = str(rng.choice(["hinged", "sliding", "hung"], p=[0.6, 0.22, 0.18]))
+    count = int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2]))
+    if kind == "sliding":
+        count = max(count, 2)
+    width = rng.uniform(0.45, 0.8) * (count if kind != "hung" else 1)
+    height = rng.uniform(0.7, 1.5) if kind != "hung" else width * rng.uniform(1.3, 2.0)
+    bar = rng.uniform(0.035, 0.065)
+    depth = rng.uniform(0.06, 0.12)
+    sash = float(rng.uniform(0.03, 0.045))
+    if kind != "hinged":
+        sash = min(sash, 0.035)
+        depth = max(depth, (count if kind == "sliding" else 2) * (sash + GAP) + 0.015)
+    glazing = int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])), int(rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))
+    rail = rng.uniform(0.035, 0.065)
+    window = Assembly()
+    body = _frame(rng, width, height, depth, bar)
+    if kind == "hinged":
+        _hinged(rng, window, body, width, height, depth, sash, rail, count, glazing)
+    elif kind == "sliding":
+        _sliding(rng, window, body, width, height, depth, sash, rail, count, glazing)
+    else:
+        _hung(rng, window, body, width, height, depth, sash, rail, glazing)
+    return window
+
+
+def _frame(rng: np.random.Generator, width: float, height: float, depth: float, bar: float) -> Solid:
+    """Frame around an opening of ``width`` x ``height`` above Z = 0, with a sill, a casing or a piece of wall."""
+    x0, x1, y = -depth / 2, depth / 2, width / 2
+    solid = frame((x0, -y - bar, -bar), (x1, y + bar, height + bar), [bar] * 4)
+    if rng.random() < 0.4:  # sill
+        out, over = rng.uniform(0.02, 0.12), rng.uniform(0.0, 0.08)
+        solid += rounded_box(
+            (x0 - out, -y - bar - over, -bar - 0.02), (x1, y + bar + over, -bar + 0.006), 0.006, axis=1
+        )
+    around = rng.random()
+    if around < 0.25:  # casing, level with the frame so that sashes can pass
+        wide = rng.uniform(0.04, 0.09)
+        solid += frame(
+            (x0, -y - bar - wide, -bar - wide), (x0 + 0.018, y + bar + wide, height + bar + wide), [wide + 0.001] * 4
+        )
+    elif around < 0.45:  # wall
+        wide = rng.uniform(0.1, 0.35)
+        solid += frame(
+            (x0 + 0.005, -y - bar - wide, -bar - wide),
+            (x1 - 0.004, y + bar + wide, height + bar + wide),
+            [wide + 0.002] * 4,
+        )
+    return solid
+
+
+def _sash(low: Array, high: Array, rail: float, glazing: tuple[int, int]) -> Solid:
+    columns = np.linspace(low[1] + rail, high[1] - rail, glazing[0] + 1)[1:-1]
+    rows = np.linspace(low[2] + rail, high[2] - rail, glazing[1] + 1)[1:-1]
+    return grid_panel(low, high, [rail] * 4, list(columns), list(rows), 0.022, PANE)
+
+
+def _hinged(
+    rng: np.random.Generator, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
+    rail: float, count: int, glazing: tuple[int, int],
+) -> None:  # fmt: skip
+    """Lights side by side between mullions; each hinged or fixed. Two may meet without a mullion between them."""
+    x0 = -depth / 2
+    mullion = rng.uniform(0.03, 0.06)
+    top = height
+    if rng.random() < 0.2 and height > 0.9:  # a fixed light above
+        top = height * rng.uniform(0.68, 0.78)
+        body += box((x0, -width / 2 - 0.001, top), (depth / 2, width / 2 + 0.001, top + mullion))
+        body += box((-PANE / 2, -width / 2 - 0.001, top), (PANE / 2, width / 2 + 0.001, height + 0.001))
+    meeting = count == 2 and rng.random() < 0.45
+    edges = np.linspace(-width / 2, width / 2, count + 1)
+    sideways = rng.random() < 0.65 or meeting
+    own = str(rng.choice(["left", "right"] if sideways else ["top", "top", "bottom"]))
+    limit = np.deg2rad(rng.choice([60.0, 85.0, 110.0, 160.0] if sideways else [25.0, 45.0, 70.0]))
+    fixed = int(rng.integers(count)) if count > 1 and not meeting and rng.random() < 0.35 else -1
+    leaves = []
+    for k in range(count):
+        first = edges[k] + (mullion / 2 if k > 0 and not meeting else 0.0)
+        last = edges[k + 1] - (mullion / 2 if k < count - 1 and not meeting else 0.0)
+        if k < count - 1 and not meeting:
+            body += box((x0, edges[k + 1] - mullion / 2, -0.001), (depth / 2, edges[k + 1] + mullion / 2, top + 0.001))
+        if k == fixed:
+            low, high = (
+                np.array([x0 + 0.01, first - 0.001, -0.001]),
+                np.array([x0 + 0.01 + sash, last + 0.001, top + 0.001]),
+            )
+            body += _sash(low, high, rail, glazing)
+            continue
+        hinge = {0: "right", count - 1: "left"}.get(k, own) if sideways and count > 1 else own
+        low, high = np.array([x0, first + GAP, GAP]), np.array([x0 + sash, last - GAP, top - GAP])
+        outer = (hinge == "left" and k == count - 1) or (hinge == "right" and k == 0)
+        leaves.append((hinge, low, high, outer))
+    window.add("frame", body, density=700.0)
+    for number, (hinge, low, high, outer) in enumerate(leaves):
+        name = "sash" if len(leaves) == 1 else f"sash_{number}"
+        _leaf(window, name, hinge, low, high, rail, glazing, limit, outer)
+
+
+def _leaf(
+    window: Assembly, name: str, hinge: str, low: Array, high: Array, rail: float, glazing: tuple[int, int],
+    limit: float, outer: bool,
+) -> None:  # fmt: skip
+    """A hinged sash and the handle that turns on it, on the edge that opens."""
+    across, end, axis = HINGES[hinge]
+    along = 3 - across
+    edge = high[across] if end > 0 else low[across]
+    foot = 0.5 * (low + high)
+    foot[0], foot[across] = low[0], edge - end * (high[across] - low[across] - rail / 2)
+    solid = _sash(low, high, rail, glazing)
+    half = np.array([0.005, min(0.011, 0.35 * rail), min(0.011, 0.35 * rail)])
+    half[along] = 0.03
+    solid += rounded_box(foot - half - (0.004, 0, 0), foot + half, 0.003, steps=2)
+    origin = foot.copy()
+    origin[0], origin[across] = low[0] - 0.001, edge
+    stay, most = swing_limits(abs(foot[across] - edge) - 0.12, 0.05)  # whichever way the lever points
+    angle = min(limit, most if outer else stay)
+    window.add(name, solid, revolute("frame", axis, tuple(origin), 0.0, angle), label="sash", density=900.0)
+
+    # The lever lies along the rail at rest and turns towards the glass.
+    reach = 0.042
+    tip = foot.copy()
+    tip[along] -= 0.11
+    lever = cylinder(foot - (0.010, 0, 0), foot - (reach, 0, 0), 0.008, sections=12)
+    corner_low, corner_high = np.minimum(foot, tip) - 0.007, np.maximum(foot, tip) + 0.007
+    corner_low[0], corner_high[0] = foot[0] - reach - 0.004, foot[0] - reach + 0.008
+    lever += rounded_box(corner_low, corner_high, 0.005, steps=2)
+    turn = float(end if along == 2 else -end)
+    joint = revolute(name, (turn, 0, 0), tuple(foot), 0.0, np.pi / 2)
+    window.add(name.replace("sash", "handle"), lever, joint, label="handle", density=2500.0)
+
+
+def _sliding(
+    rng: np.random.Generator, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
+    rail: float, count: int, glazing: tuple[int, int],
+) -> None:  # fmt: skip
+    """Sashes on as many tracks; each may slide over all others."""
+    window.add("frame", body, density=700.0)
+    pitch = width / count
+    order = rng.permutation(count)
+    for k in range(count):
+        x = -depth / 2 + 0.006 + order[k] * (sash + GAP)
+        overlap = rail / 2
+        first = -width / 2 + k * pitch - (overlap if k > 0 else -GAP)
+        last = -width / 2 + (k + 1) * pitch + (overlap if k < count - 1 else -GAP)
+        low, high = np.array([x, first, GAP]), np.array([x + sash, last, height - GAP])
+        solid = _sash(low, high, rail, glazing)
+        y = first + rail / 2 if k == 0 else last - rail / 2
+        solid += box((x - 0.0018, y - 0.3 * rail, 0.4 * height), (x + 0.002, y + 0.3 * rail, 0.4 * height + 0.14))
+        left = last - width / 2 + GAP  # travel to both sides, towards +Y and -Y
+        joint = prismatic(
+            "frame", (0, 1, 0), min(0.0, -(first + width / 2 - GAP)), max(0.0, -left), tuple(0.5 * (low + high))
+        )
+        window.add(f"sash_{k}", solid, joint, density=900.0)
+
+
+def _hung(
+    rng: np.random.Generator, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
+    rail: float, glazing: tuple[int, int],
+) -> None:  # fmt: skip
+    """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
+    both = rng.random() < 0.6
+    meet = height * rng.uniform(0.45, 0.55)
+    solids = []
+    for track, (first, last) in enumerate(((GAP, meet + rail / 2), (meet - rail / 2, height - GAP))):
+        x = -depth / 2 + 0.006 + track * (sash + GAP)
+        low, high = np.array([x, -width / 2 + GAP, first]), np.array([x + sash, width / 2 - GAP, last])
+        solid = _sash(low, high, rail, glazing)
+        if track == 0:  # two lifts on the lower rail
+            z = first + rail / 2
+            for y in (-0.25 * width, 0.25 * width):
+                solid += bar_handle((x, y - 0.04, z), (x, y + 0.04, z), (-1, 0, 0), 0.022, 0.005)
+        solids.append((solid, tuple(0.5 * (low + high))))
+    if not both:
+        body += solids[1][0] + box(
+            (-depth / 2 + 0.006 + sash + 2 * GAP, -width / 2 - 0.001, meet),
+            (depth / 2 - 0.002, -width / 2 + 0.01, height + 0.001),
+        )
+    window.add("frame", body, density=700.0)
+    window.add(
+        "sash_0" if both else "sash",
+        solids[0][0],
+        prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1]),
+        density=900.0,
+    )
+    if both:
+        window.add(
+            "sash_1",
+            solids[1][0],
+            prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1]),
+            density=900.0,
+        )
