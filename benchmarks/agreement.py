@@ -1,6 +1,6 @@
 """Agreement of the renderers: ``python -m benchmarks.agreement``.
 
-Real objects of 1 m diagonal, in random states and views at 640x480, drawn by the ray caster and by PyBullet's
+Real and procedural objects of 1 m diagonal, in random states and views at 640x480, drawn by the ray caster and by the
 rasterisers. Every pixel on which they differ is counted under the reason for it. The last line is one JSON object.
 """
 
@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from tqdm import tqdm
 
-from artsim import load, make_renderer
+from artsim import make_renderer
 from artsim.camera import Camera
+from artsim.families import FAMILIES
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.renderers.raycast import pose, render_posed
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
-from artsim.sources import find_sources
+from artsim.sources import Source, family_sources, find_sources
 
 _EDGE = 2  # pixels
 _JUMP = 2e-3  # metres between neighbouring pixels, beyond the local slope: a silhouette
@@ -40,9 +41,12 @@ class Options:
     partnet: Path = Path(os.environ.get("ARTSIM_PARTNET_DIR", "partnet_mobility"))
     """Folder of real objects."""
     objects: int = 40
+    """Real objects, spread over their categories."""
+    procedural: int = 30
+    """Procedural objects, likewise."""
     states: int = 5
     views: int = 2
-    renderers: tuple[str, ...] = ("pybullet-egl", "pybullet")
+    renderers: tuple[str, ...] = ("sapien", "pybullet-egl", "pybullet")
 
 
 @dataclass
@@ -133,24 +137,34 @@ def draw_scenes(
     return scenes
 
 
-def choose(partnet: Path, count: int) -> list[Path]:
-    """Objects spread over all categories: the first of each, then the second, and so on."""
-    by_category: dict[str, list[Path]] = {}
-    for source in find_sources([partnet]):
-        by_category.setdefault(source.name.split("/")[1], []).append(source.path)
-    turns = max(map(len, by_category.values()))
-    return [files[i] for i in range(turns) for files in by_category.values() if i < len(files)][:count]
+def choose(partnet: Path, count: int) -> list[Source]:
+    """Real objects spread over all categories: the first of each, then the second, and so on."""
+    by_category: dict[str, list[Source]] = {}
+    for source in find_sources([partnet]) if count else ():
+        by_category.setdefault(source.name.split("/")[1], []).append(source)
+    return _in_turn(list(by_category.values()), count)
+
+
+def choose_procedural(count: int) -> list[Source]:
+    """Procedural objects spread over all categories, in the same way."""
+    each = -(-count // len(FAMILIES))
+    return _in_turn([[*family_sources([category], each)] for category in FAMILIES] if count else [], count)
+
+
+def _in_turn(lists: list[list[Source]], count: int) -> list[Source]:
+    turns = max(map(len, lists), default=0)
+    return [sources[i] for i in range(turns) for sources in lists if i < len(sources)][:count]
 
 
 def main(options: Options) -> None:
     """Compare and print."""
-    files = choose(options.partnet, options.objects)
+    sources = choose(options.partnet, options.objects) + choose_procedural(options.procedural)
     result = {}
     for name in options.renderers:
         renderer = make_renderer(name)
         total, rows = Agreement(), []
-        for number, file in enumerate(tqdm(files, desc=name)):
-            obj = load(file)
+        for number, source in enumerate(tqdm(sources, desc=name)):
+            obj = source.load()
             one = compare(draw_scenes(obj, options.states, options.views, seed=number), renderer)
             rows.append((one.summary(), f"{obj.category} {obj.object_id}", one.reasons))
             total.depth_mm += one.depth_mm
@@ -160,7 +174,8 @@ def main(options: Options) -> None:
         renderer.close()
         summary = total.summary()
         result[name] = {**summary, "object_pixels": total.object_pixels, "pixels": dict(total.reasons)}
-        print(f"\n{name} against raycast: {len(files)} objects x {options.states} states x {options.views} views")
+        print(f"\n{name} against raycast: {options.objects} real and {options.procedural} procedural objects", end="")
+        print(f" x {options.states} states x {options.views} views")
         print("  " + ", ".join(f"{key} {value:.6g}" for key, value in summary.items()))
         print(f"  of {total.object_pixels} object pixels: " + ", ".join(f"{n} {r}" for r, n in total.reasons.items()))
         print("  least agreement:")

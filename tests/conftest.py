@@ -10,8 +10,10 @@ import pytest
 import trimesh
 from hypothesis import settings
 
+from artsim.errors import RenderError
 from artsim.kinematics import Joint, KinematicTree
 from artsim.objects import ArticulatedObject, Part
+from artsim.renderers import Renderer, make_renderer
 
 ASSETS = Path(__file__).resolve().parent.parent / "urdf_assets"
 DEMO = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
@@ -27,6 +29,16 @@ def partnet_dir() -> Path:
             pytest.fail(message)
         pytest.skip(message)
     return Path(folder)
+
+
+def backend(name: str) -> Renderer:
+    """A renderer that a machine may lack; its absence is loud, and in CI a failure."""
+    try:
+        return make_renderer(name)
+    except RenderError as error:
+        if os.environ.get("CI"):
+            pytest.fail(str(error))
+        pytest.skip(str(error))
 
 
 def solid(name: str, mesh: trimesh.Trimesh) -> Part:

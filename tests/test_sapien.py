@@ -11,29 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 
 import artsim
 from artsim import Camera, make_renderer, observe
-from artsim.errors import RenderError
-from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.renderers.sapien import flat_shaded
 from artsim.sources import find_sources
 from artsim.verify import sample_problems
 from benchmarks.agreement import compare, draw_scenes
-from tests.conftest import ASSETS, DEMO, rigid, solid
+from tests.conftest import ASSETS, DEMO, backend, rigid, solid
 
 
 @pytest.fixture(scope="module")
 def sapien() -> Iterator[Renderer]:
-    """The renderer; its absence is loud, and in CI a failure."""
-    try:
-        renderer = make_renderer("sapien")
-    except RenderError as error:
-        if os.environ.get("CI"):
-            pytest.fail(str(error))
-        pytest.skip(str(error))
+    renderer = backend("sapien")
     yield renderer
     renderer.close()
 
@@ -112,7 +105,7 @@ def test_more_objects_than_are_kept_and_cameras_of_two_sizes_give_the_same_pictu
     objects = [rigid(trimesh.creation.box((0.2 + 0.01 * i, 0.3, 0.4))) for i in range(20)]
     cameras = [Camera.look_at((-1, 0.5, 0.5), (0, 0, 0), *size) for size in ((64, 48), (40, 40))]
 
-    def pictures() -> list[Array]:
+    def pictures() -> list[NDArray[np.float32]]:
         return [sapien.render(obj, [0.0], camera).depth for obj in objects for camera in cameras]
 
     first, again = pictures(), pictures()

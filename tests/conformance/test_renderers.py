@@ -11,19 +11,19 @@ import trimesh
 import artsim
 from artsim import Camera, make_renderer, observe
 from benchmarks.agreement import choose, compare, draw_scenes
-from tests.conftest import ASSETS, DEMO, rigid
+from tests.conftest import ASSETS, DEMO, backend, rigid
 
-LIMITS = {"pybullet-egl": (0.05, 1.0, 0.998), "pybullet": (1.5, 1.0, 0.99)}
+LIMITS = {"sapien": (0.005, 0.1, 0.999), "pybullet-egl": (0.05, 1.0, 0.998), "pybullet": (1.5, 1.0, 0.99)}
 """Median and 99.9th percentile of depth differences in mm, share of equal part ids."""
 
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_renderers_agree_on_real_objects(name: str, partnet_dir: Path) -> None:
-    renderer = make_renderer(name)
+    renderer = backend(name)
     scenes = [
         scene
-        for seed, path in enumerate(choose(partnet_dir, 23)[::3])
-        for scene in draw_scenes(artsim.load(path), states=2, views=1, seed=seed)
+        for seed, source in enumerate(choose(partnet_dir, 23)[::3])
+        for scene in draw_scenes(source.load(), states=2, views=1, seed=seed)
     ]
     agreement = compare(scenes, renderer)
     renderer.close()
@@ -34,9 +34,9 @@ def test_renderers_agree_on_real_objects(name: str, partnet_dir: Path) -> None:
     assert summary["part_ids_equal"] > ids
 
 
-@pytest.mark.parametrize("name", ["raycast", "pybullet", "pybullet-egl"])
+@pytest.mark.parametrize("name", ["raycast", "sapien", "pybullet", "pybullet-egl"])
 def test_depth_is_along_the_optical_axis_in_metres(name: str) -> None:
-    renderer = make_renderer(name)
+    renderer = backend(name)
     box = rigid(trimesh.creation.box((1, 1, 1)))
     for scale, distance in ((1.0, 3.0), (0.01, 0.05), (50.0, 120.0)):
         frame = renderer.render(box.scaled(scale), [0.0], Camera.look_at([-distance, 0, 0], [0, 0, 0]))
@@ -47,7 +47,7 @@ def test_depth_is_along_the_optical_axis_in_metres(name: str) -> None:
     renderer.close()
 
 
-@pytest.mark.parametrize("name", ["pybullet", "pybullet-egl"])
+@pytest.mark.parametrize("name", ["sapien", "pybullet", "pybullet-egl"])
 def test_principal_point_and_placement_are_honoured(name: str) -> None:
     obj = artsim.load(ASSETS / "cabinet")
     K = np.array([[500.0, 0, 280], [0, 520, 270], [0, 0, 1]])
@@ -56,7 +56,7 @@ def test_principal_point_and_placement_are_honoured(name: str) -> None:
     T_world_object[:3, :3] = trimesh.transformations.rotation_matrix(0.4, [0, 0, 1])[:3, :3]
     T_world_object[:3, 3] = [0.1, -0.05, 0.02]
     q = obj.tree.rest + [0, 0.1, 0.2, 0.05]
-    renderer = make_renderer(name)
+    renderer = backend(name)
     rays = make_renderer("raycast").render(obj, q, camera, T_world_object)
     frame = renderer.render(obj, q, camera, T_world_object)
     renderer.close()
@@ -65,17 +65,19 @@ def test_principal_point_and_placement_are_honoured(name: str) -> None:
     assert np.median(np.abs(rays.depth - frame.depth)[same]) < 5e-5
 
 
-def test_colour_comes_with_pybullet() -> None:
+@pytest.mark.parametrize("name", ["sapien", "pybullet"])
+def test_colour_comes_with_rasterisers(name: str) -> None:
     obj = artsim.load(ASSETS / "laptop")
     camera = Camera.look_at([-0.5, 0.2, 0.4], [0, 0, 0])
-    sample = observe(obj, obj.tree.rest + [0.0, 1.5], camera, renderer="pybullet", images=("rgb", "depth"))
+    sample = observe(obj, obj.tree.rest + [0.0, 1.5], camera, renderer=backend(name), images=("rgb", "depth"))
     assert sample.rgb is not None
     assert sample.rgb.shape == (480, 640, 3)
-    assert sample.renderer == "pybullet"
+    assert sample.renderer == name
 
 
-def test_many_objects_in_turn_keep_their_own_pictures() -> None:
-    renderer = make_renderer("pybullet")
+@pytest.mark.parametrize("name", ["sapien", "pybullet"])
+def test_many_objects_in_turn_keep_their_own_pictures(name: str) -> None:
+    renderer = backend(name)
     objects = [artsim.load(path) for path in DEMO]
     camera = Camera.look_at([-1.2, 0.3, 0.6], [0, 0, 0], 160, 120)
     first = [renderer.render(obj, obj.tree.rest, camera) for obj in objects]
