@@ -17,6 +17,7 @@ from artsim.errors import ConfigError
 from artsim.families import (
     box,
     bucket,
+    coffee_machine,
     cutter,
     dishwasher,
     door,
@@ -52,6 +53,7 @@ Family = Callable[[np.random.Generator], Assembly]
 FAMILIES: dict[str, Family] = {
     "box": box.build,
     "bucket": bucket.build,
+    "coffee_machine": coffee_machine.build,
     "cutter": cutter.build,
     "dishwasher": dishwasher.build,
     "door": door.build,
