@@ -53,7 +53,7 @@ class Shape:
 
 def build(rng: np.random.Generator) -> Assembly:
     """A dishwasher, closed at rest."""
-    compact, half_door = rng.random(2) < (0.12, 0.12)
+    compact, half_door = rng.random(2) < (0.08, 0.12)
     width = rng.uniform(0.42, 0.48) if rng.random() < 0.2 and not compact else rng.uniform(0.54, 0.64)
     height = width * rng.uniform(0.75, 0.95) if compact else rng.uniform(0.70, 0.9)
     wall, thick = rng.uniform(0.012, 0.04), rng.uniform(0.03, 0.075)
@@ -80,14 +80,20 @@ def build(rng: np.random.Generator) -> Assembly:
         hinge_z=plinth + (0.0 if flush else rng.uniform(0.0, 0.012)),
         liner=rng.uniform(0.005, 0.025) if rng.random() < 0.75 else 0.0,
     )
+    racks = str(rng.choice(["none", "fixed", "sliding"], p=[0.4, 0.4, 0.2]))
     machine = Assembly()
-    machine.add("body", _body(rng, shape, strip, flush, flanked, compact), density=300.0)
+    body = _body(rng, shape, strip, flush, flanked, compact)
+    if racks == "fixed":
+        for low in _rack_heights(shape):
+            half = shape.half - shape.wall + 0.002
+            body += _rack(rng, shape.liner + shape.front + 0.01, shape.depth - shape.wall + 0.002, half, low)
+    machine.add("body", body, density=300.0)
     opening = 0.5 * np.pi if rng.random() < 0.7 else np.deg2rad(rng.uniform(75.0, 90.0))
     hinge = (shape.hinge_x, 0.0, shape.hinge_z)
     machine.add("door", _door(rng, shape, strip > 0.05), revolute("body", (0, -1, 0), hinge, 0.0, opening))
     if strip > 0.05 and rng.random() < 0.6:
         _controls(rng, machine, shape)
-    if rng.random() < 0.2:
+    if racks == "sliding":
         _sliding_racks(rng, machine, shape)
     return machine
 
@@ -117,9 +123,6 @@ def _body(rng: np.random.Generator, s: Shape, strip: float, flush: bool, flanked
         lip = rng.uniform(0.0, 0.02)
         solid += rounded_box((-s.thick * rng.uniform(0.0, 1.4), -half - lip, s.height - 0.001),
                              (back + lip, half + lip, s.height + rng.uniform(0.012, 0.04)), 0.004)  # fmt: skip
-    if rng.random() < 0.45:  # racks that stay where they are
-        for low in _rack_heights(s):
-            solid += _rack(rng, s.liner + front + 0.01, back - s.wall + 0.002, half - s.wall + 0.002, low)
     return solid
 
 

@@ -99,14 +99,15 @@ def build(rng: np.random.Generator) -> Assembly:
         else [(low[1] + s * (high[1] - low[1]), 0.5 * (low[2] + high[2])) for s in (0.66, 0.33)]
     )
     (lock_y, lock_z), (grip_y, grip_z) = spots
+    apart = float(np.hypot(lock_y - grip_y, lock_z - grip_z))
     if combination:
-        radius = min(0.13 * size, 0.055)
+        radius = min(0.13 * size, 0.055, 0.3 * apart)
         foot_at = (face, sign * lock_y, lock_z)
         solid = _combination(rng, face, lock_y, lock_z, radius)
         safe.add("dial", placed(solid), continuous("door", (-1, 0, 0), foot_at), density=3000.0)
     if opener != "pull":
         foot_at = (face, sign * grip_y, grip_z)
-        radius = min(rng.uniform(0.13, 0.22) * size, 0.11)
+        radius = min(rng.uniform(0.13, 0.22) * size, 0.11, 0.5 * apart)
         if opener == "wheel":
             solid = _wheel(rng, face, grip_y, grip_z, radius)
             joint = continuous("door", (-1, 0, 0), foot_at)
@@ -145,10 +146,11 @@ def _body(rng: np.random.Generator, s: Shape) -> Solid:
 
 def _knuckles(s: Shape, of_door: bool) -> list[tuple[float, float]]:
     """Lowest and highest point of the barrels: two pairs, the door's standing on the body's."""
-    length = 0.05 * (s.high - s.low) + 0.01
+    low, high = s.door[0][2], s.door[1][2]
+    length = 0.05 * (high - low) + 0.01
     spans = []
-    for share in (0.2, 0.75):
-        z = s.low + share * (s.high - s.low)
+    for share in (0.15, 0.75):
+        z = low + share * (high - low)
         spans.append((z + GAP, z + length) if of_door else (z - length, z))
     return spans
 
