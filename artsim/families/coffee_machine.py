@@ -1,0 +1,250 @@
+"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever.
+
+Drip trays slide out; portafilters, levers, lids and steam wands turn; knobs turn freely; buttons travel; carafes and
+water tanks come out. Sizes, round or square bodies, and which of these there are vary.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.families.details import dial
+from artsim.solids import Solid, box, cylinder, hull, ring, rounded_box, rounded_rectangle, tray, tube, union, vessel
+
+GAP = 0.0015
+OUT = (-1.0, 0.0, 0.0)
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """An espresso, a drip or a pod machine."""
+    return (_espresso, _drip, _pod)[int(rng.choice(3, p=[0.4, 0.4, 0.2]))](rng)
+
+
+def _drip_tray(
+    rng: np.random.Generator, machine: Assembly, x0: float, depth: float, y: float, low: float, high: float
+) -> None:
+    """A tray with a slotted cover, in an opening of the base between two heights."""
+    solid = tray((x0, -y, low), (x0 + depth, y, high), 0.003)
+    count = int(rng.integers(3, 7))
+    for edge in np.linspace(-y, y, count + 1)[1:-1]:
+        solid += box(
+            (x0 + 0.001, edge - 0.25 * y / count * 2, high - 0.004),
+            (x0 + depth - 0.001, edge + 0.25 * y / count * 2, high - 0.0005),
+        )
+    solid += rounded_box((x0 - 0.006, -y, low), (x0 + 0.002, y, high), 0.003)
+    machine.add("drip_tray", solid, prismatic("body", OUT, 0.0, 0.8 * depth, (x0, 0, low)), density=900.0)
+
+
+def _base(x: float, y: float, height: float, radius: float, tray_y: float, front: float) -> Solid:
+    """Base plate with a niche for the drip tray in front, ``front`` deep."""
+    solid = rounded_box((-x + front, -y, 0), (x, y, height), radius, axis=2)
+    solid += box((-x, -y, 0), (-x + front + radius, y, 0.008))
+    return solid + union(
+        box((-x, min(s * y, s * (tray_y + GAP)), 0.001), (-x + front + radius, max(s * y, s * (tray_y + GAP)), height))
+        for s in (-1, 1)
+    )
+
+
+def _espresso(rng: np.random.Generator) -> Assembly:
+    x, y = rng.uniform(0.12, 0.18), rng.uniform(0.09, 0.19)
+    height = rng.uniform(0.28, 0.4)
+    base, head = rng.uniform(0.045, 0.075), rng.uniform(0.1, 0.15)
+    front = rng.uniform(0.12, 0.15)  # how far head and base stand out before the column
+    radius = rng.uniform(0.005, 0.03)
+    tray_y = y - 0.012
+    body = _base(x, y, base, radius, tray_y, front)
+    body += rounded_box((-x + front, -y, base - 0.002), (x, y, height - 0.002), radius, axis=2)
+    head_low = height - head
+    body += rounded_box((-x, -y, head_low), (x, y, height), radius, axis=1 if rng.random() < 0.4 else 2)
+    with_lid = rng.random() < 0.5
+    if rng.random() < 0.6:  # rail for cups, before the lid
+        post, behind = 0.02, 0.1 * x if with_lid else x - 0.03
+        corners = [(a, b * (y - 0.02)) for a, b in ((0.03 - x, -1), (0.03 - x, 1), (behind, 1), (behind, -1))]
+        body += tube([(a, b, height + post) for a, b in corners], 0.0035, 8, closed=True)
+        body += union(cylinder((a, b, height - 0.003), (a, b, height + post), 0.003, sections=8) for a, b in corners)
+
+    wand_side = float(rng.choice([-1.0, 1.0])) if rng.random() < 0.7 and y > 0.11 else 0.0
+    group = np.array([-x + 0.5 * front, -0.25 * wand_side * y, head_low])
+    body += cylinder(group + (0, 0, 0.002), group - (0, 0, 0.014), 0.036, sections=24)
+    machine = Assembly()
+    machine.add("body", body, density=900.0)
+    _drip_tray(rng, machine, -x - 0.001, front - 0.003, tray_y, 0.01, base)
+
+    # The portafilter turns away from the wand.
+    top = group[2] - 0.014 - GAP
+    basket = cylinder((group[0], group[1], top - 0.03), (group[0], group[1], top), 0.029, 0.034)
+    reach = rng.uniform(0.09, 0.13)
+    neck = (group[0] - 0.03, group[1], top - 0.014)
+    grip = (group[0] - 0.035 - reach, group[1], top - 0.022)
+    basket += tube(
+        [(group[0], group[1], top - 0.012), neck, (neck[0] - 0.03, group[1], top - 0.016), grip],
+        [0.007, 0.007, 0.011, 0.013],
+    )
+    if top - 0.03 - base > 0.05:
+        basket += union(
+            cylinder((group[0], group[1] + s * 0.012, top - 0.045), (group[0], group[1], top - 0.028), 0.005, 0.007, 10)
+            for s in (-1, 1)
+        )
+    away = -wand_side if wand_side else float(rng.choice([-1.0, 1.0]))
+    limit = np.deg2rad(rng.uniform(35.0, 55.0))
+    machine.add("portafilter", basket, revolute("body", (0, 0, -away), tuple(group), 0.0, limit), density=3000.0)
+
+    if wand_side:
+        foot = np.array([-x + 0.03, wand_side * (y - 0.022), head_low - GAP])
+        drop = min(0.13, head_low - base - 0.04)
+        path = [
+            foot,
+            foot - (0, 0, 0.02),
+            foot + (-0.025, 0.01 * wand_side, -0.6 * drop),
+            foot + (-0.03, 0.014 * wand_side, -drop),
+        ]
+        wand = tube(np.array(path), 0.0045, 10) + cylinder(foot, foot - (0, 0, 0.014), 0.009, sections=14)
+        turn = revolute("body", (0, 0, -wand_side), tuple(foot), 0.0, np.deg2rad(rng.uniform(60.0, 120.0)))
+        machine.add("steam_wand", wand, turn, density=3000.0)
+    _controls(rng, machine, -x, y, head_low, height)
+    if with_lid:
+        _back_lid(rng, machine, x, y, height)
+    return machine
+
+
+def _controls(rng: np.random.Generator, machine: Assembly, face: float, y: float, low: float, high: float) -> None:
+    """Knobs and buttons in a row on the front of the head."""
+    z = 0.5 * (low + high)
+    room = 0.36 * (high - low)
+    for number, share in enumerate(np.linspace(-1.0, 1.0, int(rng.integers(1, 4)) + 2)[1:-1]):
+        center = (face, share * 0.9 * y, z)
+        if rng.random() < 0.5:
+            size = min(rng.uniform(0.012, 0.024), room, 0.25 * y)
+            machine.add(
+                f"knob_{number}", dial(center, OUT, 0.018, size), continuous("body", OUT, center), density=900.0
+            )
+        else:
+            size = min(rng.uniform(0.008, 0.012), room)
+            key = cylinder((face - GAP, center[1], z), (face - 0.007, center[1], z), size, 0.92 * size, 16)
+            machine.add(f"button_{number}", key, prismatic("body", (1, 0, 0), 0.0, 0.001, center), density=900.0)
+
+
+def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, height: float) -> None:
+    """Lid of the water tank on top."""
+    seam, thick = height + GAP, 0.008
+    low, high = (0.25 * x, -0.7 * y, seam), (0.97 * x, 0.7 * y, seam + thick)
+    lid = rounded_box(low, high, 0.01, axis=2)
+    lid += rounded_box((0.27 * x, -0.012, seam + 0.5 * thick), (0.27 * x + 0.012, 0.012, seam + thick + 0.004), 0.002)
+    limit = np.deg2rad(rng.uniform(70.0, 100.0))
+    machine.add("lid", lid, revolute("body", (0, 1, 0), (0.97 * x, 0, seam), 0.0, limit), density=900.0)
+
+
+def _drip(rng: np.random.Generator) -> Assembly:
+    y = rng.uniform(0.085, 0.11)
+    pot = y - rng.uniform(0.01, 0.02)  # radius of the carafe
+    x = pot + rng.uniform(0.05, 0.07)
+    height = rng.uniform(0.29, 0.38)
+    base, head = rng.uniform(0.025, 0.04), rng.uniform(0.07, 0.1)
+    radius = rng.uniform(0.01, 0.5 * y)
+    center = -x + pot + 0.012
+    back = center + pot + 0.006
+    head_low = height - head
+    body = rounded_box((-x, -y, 0), (x, y, base), radius, axis=2)
+    body += rounded_box((back, -y, 0), (x + 0.02, y, height), min(radius, 0.02), axis=2)
+    shrink = rng.choice([0.0, rng.uniform(0.0, 0.15)]) * y  # the head may narrow upward
+    reach = center - 0.5 * pot if rng.random() < 0.3 else -x  # or end above the middle of the carafe
+    body += _tapered((reach, -y), (x + 0.018, y), (head_low, height), radius, shrink)
+    body += cylinder((center, 0, base - 0.002), (center, 0, base + 0.003), 0.8 * pot)
+    if rng.random() < 0.5:  # gauge of the water tank
+        body += box((x - 0.01, -y - 0.002, base + 0.03), (x + 0.004, -y + 0.002, head_low - 0.02))
+    machine = Assembly()
+    machine.add("body", body, density=700.0)
+    _carafe(rng, machine, center, pot, base + 0.003 + GAP, head_low - GAP)
+
+    seam, thick = height + GAP, rng.uniform(0.012, 0.025)
+    hinge = x + 0.018
+    low, high = (reach, shrink - y), (hinge, y - shrink)
+    lid = _tapered(low, high, (seam, seam + thick), radius, rng.choice([0.0, 0.5, 1.0]) * thick)
+    machine.add(
+        "lid",
+        lid,
+        revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, np.deg2rad(rng.uniform(60.0, 95.0))),
+        density=700.0,
+    )
+    z = 0.5 * (height + head_low)
+    if rng.random() < 0.5:
+        _controls(rng, machine, reach, 0.7 * (y - shrink), head_low, height)
+    else:
+        key = rounded_box((reach - 0.006, -0.012, z - 0.008), (reach - GAP, 0.012, z + 0.008), 0.002)
+        machine.add("button", key, prismatic("body", (1, 0, 0), 0.0, 0.001, (reach, 0, z)), density=900.0)
+    return machine
+
+
+def _tapered(
+    low: tuple[float, float], high: tuple[float, float], heights: tuple[float, float], radius: float, shrink: float
+) -> Solid:
+    """Block with round upright edges whose two sides lean inward."""
+    outlines = [
+        np.column_stack([rounded_rectangle((low[0], low[1] + s), (high[0], high[1] - s), radius, 4), np.full(20, z)])
+        for s, z in zip((0.0, shrink), heights, strict=True)
+    ]
+    return hull(np.concatenate(outlines))
+
+
+def _carafe(rng: np.random.Generator, machine: Assembly, center: float, pot: float, low: float, high: float) -> None:
+    """Glass jug with a handle in front, drawn out from below the head."""
+    rise = (high - low) * rng.uniform(0.8, 0.97)
+    lid = 0.014
+    shares = np.array([0.0, 0.12, 0.45, 0.85, 1.0])
+    neck = rng.uniform(0.55, 0.8)
+    radii = pot * np.array([0.85, 0.97, 1.0, neck, neck + 0.03])
+    profile = np.column_stack([radii, shares * (rise - lid)])
+    solid = vessel(profile, 0.003, (center, 0, low), sections=24)
+    top = low + rise - lid
+    solid += cylinder((center, 0, top - 0.002), (center, 0, top + lid - 0.001), radii[-1] - 0.001, 0.8 * radii[-1])
+    solid += ring((center, 0, top - 0.02), (0, 0, 1), 0.95 * radii[3] - 0.004, radii[3] + 0.004, 0.014)
+    grip = [(center - radii[3] + 0.002, 0, top - 0.016), (center - radii[3] - 0.04, 0, top - 0.012),
+            (center - radii[3] - 0.055, 0, top - 0.03), (center - pot - 0.02, 0, low + 0.35 * rise),
+            (center - 0.97 * pot, 0, low + 0.3 * rise)]  # fmt: skip
+    solid += tube(np.array(grip), 0.007, 10)
+    machine.add("carafe", solid, prismatic("body", OUT, 0.0, 2.2 * pot, (center, 0, low)), density=1500.0)
+
+
+def _pod(rng: np.random.Generator) -> Assembly:
+    y, x = rng.uniform(0.055, 0.085), rng.uniform(0.13, 0.18)
+    height = rng.uniform(0.22, 0.3)
+    base, head = rng.uniform(0.03, 0.045), rng.uniform(0.08, 0.11)
+    front = rng.uniform(0.1, 0.13)
+    radius = rng.uniform(0.01, 0.03)
+    tank_x = x - rng.uniform(0.05, 0.07)
+    body = _base(x, y, base, radius, y - 0.01, front)
+    body += rounded_box((-x + front, -y, base - 0.002), (tank_x, y, height - 0.002), radius, axis=2)
+    body += rounded_box((-x + 0.01, -y, height - head), (tank_x - 0.001, y, height), 1.5 * radius, axis=1)
+    body += cylinder(
+        (-x + 0.5 * front, 0, height - head - 0.018), (-x + 0.5 * front, 0, height - head + 0.002), 0.012, 0.02, 16
+    )
+    machine = Assembly()
+    machine.add("body", body, density=700.0)
+    _drip_tray(rng, machine, -x - 0.001, front - 0.003, y - 0.01, 0.01, base)
+    # The lever lies on the head and turns up about an axis above its back.
+    pivot = (tank_x - 0.04, 0.0, height + 0.012)
+    wide, thick = 0.7 * y, 0.010
+    length = rng.uniform(0.6, 0.95) * (pivot[0] + x - 0.01)
+    lever = rounded_box(
+        (pivot[0] - length, -wide, height + GAP), (pivot[0] - length + 0.03, wide, height + GAP + thick), 0.004
+    )
+    for s in (-1.0, 1.0):
+        arm = sorted((s * wide, s * (wide - 0.01)))
+        lever += rounded_box(
+            (pivot[0] - length, arm[0], height + GAP), (pivot[0] + 0.006, arm[1], height + GAP + thick), 0.004
+        )
+    lever += cylinder((pivot[0], -wide, height + 0.0075), (pivot[0], wide, height + 0.0075), 0.005, sections=12)
+    machine.add(
+        "lever",
+        lever,
+        revolute("body", (0, 1, 0), (pivot[0], 0, height + 0.0075), 0.0, np.deg2rad(rng.uniform(60.0, 105.0))),
+        density=900.0,
+    )
+    top = height * rng.uniform(0.8, 0.98)
+    tank = rounded_box((tank_x + GAP, -0.9 * y, base + GAP), (x, 0.9 * y, top), 0.015, axis=2)
+    tank += rounded_box(
+        (tank_x + GAP + 0.001, -0.85 * y, top - 0.001), (x - 0.001, 0.85 * y, top + 0.006), 0.012, axis=2
+    )
+    machine.add("water_tank", tank, prismatic("body", (0, 0, 1), 0.0, 0.8 * (top - base), (x, 0, base)), density=900.0)
+    return machine
