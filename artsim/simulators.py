@@ -1,6 +1,7 @@
 """One URDF file in three simulators: PyBullet, MuJoCo and SAPIEN must load it and agree with artsim's kinematics.
 
-Each simulator is imported when first used (``pip install 'artsim[sim]'``) and told to change nothing about the file:
+Each simulator is imported when first used (``pip install 'artsim[pybullet,sim,sapien]'``) and told to change nothing
+about the file:
 
 - PyBullet: ``useFixedBase=True`` and ``URDF_USE_INERTIA_FROM_FILE``.
 - MuJoCo: ``fusestatic=False``, or links that no joint moves become part of their parents, the root of the world; and
@@ -209,7 +210,7 @@ def _compare(
         with silent():
             loaded = SIMULATORS[name](file)
     except ImportError as error:
-        raise ConfigError(f"{name} is not installed", mend="pip install 'artsim[sim,pybullet]'") from error
+        raise ConfigError(f"{name} is not installed", mend="pip install 'artsim[pybullet,sim,sapien]'") from error
     except ArtsimError:
         raise
     except Exception as error:  # a simulator may refuse a file in any way it likes

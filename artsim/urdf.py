@@ -1,20 +1,27 @@
 """``artsim.load``: a URDF file or a PartNet-Mobility folder becomes an :class:`ArticulatedObject`.
 
-Three separate steps: the document is checked and parsed (``urdf_xml``), its meshes are read (``meshes``), and
-here links are merged into rigid parts, joints are rewritten in the rest frame, and the rest state is chosen.
+Separate steps: the document is checked and parsed (``urdf_xml``), links are merged into rigid bodies (``bodies``),
+their meshes are read (``meshes``), and here joints are rewritten in the rest frame, and the rest state is chosen.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from artsim.bodies import (
+    RigidBody,
+    axis_in_base,
+    in_order,
+    join_screws,
+    merge_fixed_links,
+    stretch,
+    without_empty_leaves,
+)
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
@@ -71,10 +78,10 @@ def load(
 
     repairs += side.repairs
     category = canonical_category(category or side.category or "unknown")
-    bodies = _merge_fixed_links(robot, file, repairs)
+    bodies = merge_fixed_links(robot, file, repairs)
     _read_geometry(bodies, robot, reader, file, repairs)
-    bodies = _join_screws(_without_empty_leaves(bodies, repairs), side.helpers, repairs)
-    bodies, exported = _in_order(bodies, side.parts, repairs)
+    bodies = join_screws(without_empty_leaves(bodies, repairs), side.helpers, repairs)
+    bodies, exported = in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
     parts = [body.part(side.labels) for body in bodies]
     if side.num_movable is not None and len(tree) - 1 != side.num_movable:
@@ -129,113 +136,8 @@ def _object_id(file: Path, annotated: str | None) -> str:
     return folder if folder.isdigit() or annotated is None else annotated
 
 
-# --- links become rigid bodies ---------------------------------------------------------------------------------
-
-
-@dataclass(eq=False)
-class _Body:
-    """Links that never move against each other, in the base link's frame at the file's zero state."""
-
-    links: list[str]
-    joint: yourdfpy.Joint | None  # the moving joint that carries the body; None for the root
-    parent: _Body | None
-    T_base_joint: Array
-    T_base_link: dict[str, Array]
-    vertices: Array
-    faces: NDArray[np.int32]
-    slide: yourdfpy.Joint | None = None  # screws: the prismatic joint merged into this one
-    slide_rate: float = 0.0  # screws: value of the slide joint for each radian
-    pitch: float = 0.0  # screws: metres along the turning axis for each radian
-
-    def part(self, labels: Mapping[str, str]) -> Part:
-        label = next((labels[link] for link in self.links if link in labels), None)
-        solid = self.links[0] if label is None else next(link for link in self.links if link in labels)
-        return Part(solid, label or solid, self.vertices, self.faces)
-
-
-def _merge_fixed_links(robot: yourdfpy.Robot, file: Path, repairs: list[Repair]) -> list[_Body]:
-    """Bodies of the tree, root first, parents before children, siblings in the file's order."""
-    children: dict[str, list[yourdfpy.Joint]] = defaultdict(list)
-    for joint in robot.joints:
-        children[joint.parent].append(joint)
-    root = _root_link(robot, children, file, repairs)
-
-    def new_body(link: str, joint: yourdfpy.Joint | None, parent: _Body | None, T: Array) -> _Body:
-        return _Body([link], joint, parent, T, {link: T}, np.zeros((0, 3)), np.zeros((0, 3), np.int32))
-
-    bodies = [new_body(root, None, None, np.eye(4))]
-    body_of = {root: bodies[0]}
-    stack = [root]
-    while stack:
-        link = stack.pop()
-        body = body_of[link]
-        if body.links[0] == link and body is not bodies[0]:
-            bodies.append(body)
-        for joint in children[link]:
-            T = body.T_base_link[link] @ (np.eye(4) if joint.origin is None else joint.origin)
-            if joint.type == "fixed" or _places_root(joint, link, root, children, repairs):
-                body.links.append(joint.child)
-                body.T_base_link[joint.child] = T
-                body_of[joint.child] = body
-            elif joint.type == "floating":
-                raise AssetError(
-                    "a floating joint inside the object is not supported",
-                    f"{file}: joint {joint.name!r}",
-                    "split the file into one object per floating part",
-                )
-            else:
-                body_of[joint.child] = new_body(joint.child, joint, body, T)
-        stack += [joint.child for joint in reversed(children[link])]
-    lost = [link.name for link in robot.links if link.name not in body_of]
-    if lost:
-        raise AssetError(f"links {', '.join(lost[:5])} form a cycle that hangs on nothing", file, "remove one joint")
-    merged_links = [link for body in bodies for link in body.links[1:]]
-    if merged_links:
-        repairs.append(Repair("fixed joints", f"merged into their parent: {', '.join(merged_links)}"))
-    return bodies
-
-
-def _root_link(
-    robot: yourdfpy.Robot, children: Mapping[str, list[yourdfpy.Joint]], file: Path, repairs: list[Repair]
-) -> str:
-    carried_by: dict[str, str] = {}
-    for joint in robot.joints:
-        if joint.child in carried_by:
-            raise AssetError(
-                f"link {joint.child!r} is carried by two joints, {carried_by[joint.child]!r} and {joint.name!r}",
-                file,
-                "closed chains are not trees: remove one of the joints",
-            )
-        carried_by[joint.child] = joint.name
-    roots = [link for link in robot.links if link.name not in carried_by]
-    if not roots:
-        raise AssetError("every link has a parent: the joints form a cycle", file, "remove the joint that closes it")
-    used = [r for r in roots if r.visuals or r.collisions or children.get(r.name)] or roots[:1]
-    if len(used) > 1:
-        names = ", ".join(r.name for r in used[:5])
-        raise AssetError(f"{len(used)} links have no parent: {names}", file, "join them with a fixed joint")
-    for stray in roots:
-        if stray is not used[0]:
-            repairs.append(Repair(f"link {stray.name!r}", "left out: no joint reaches it and it has no geometry"))
-    return str(used[0].name)
-
-
-def _places_root(
-    joint: yourdfpy.Joint,
-    link: str,
-    root: str,
-    children: Mapping[str, list[yourdfpy.Joint]],
-    repairs: list[Repair],
-) -> bool:
-    """Whether a floating joint only places the whole object in its world: the object's own pose covers that."""
-    if joint.type != "floating" or link != root or len(children[root]) != 1:
-        return False
-    repairs.append(Repair(f"joint {joint.name!r}", "floats the whole object: left to the object's pose"))
-    return True
-
-
 def _read_geometry(
-    bodies: list[_Body], robot: yourdfpy.Robot, reader: MeshReader, file: Path, repairs: list[Repair]
+    bodies: list[RigidBody], robot: yourdfpy.Robot, reader: MeshReader, file: Path, repairs: list[Repair]
 ) -> None:
     """Fill in every body's surface from its links' visuals (or collisions, when the file has no visual at all)."""
     links = {link.name: link for link in robot.links}
@@ -269,92 +171,7 @@ def _read_geometry(
         raise AssetError("no link has any geometry", file, "add <visual> elements")
 
 
-def _without_empty_leaves(bodies: list[_Body], repairs: list[Repair]) -> list[_Body]:
-    """Bodies without those that show nothing, carry nothing and drive nothing (tool frames, sensor frames)."""
-    drivers = {body.joint.mimic.joint for body in bodies if body.joint is not None and body.joint.mimic is not None}
-    kept = list(bodies)
-    for body in reversed(bodies):  # children before parents
-        if body.joint is None or len(body.faces) or body.joint.name in drivers:
-            continue
-        if not any(other.parent is body for other in kept):
-            kept.remove(body)
-            repairs.append(Repair(f"link {body.links[0]!r}", "left out: it moves, but shows and carries nothing"))
-    return kept
-
-
-def _join_screws(bodies: list[_Body], known: Collection[str], repairs: list[Repair]) -> list[_Body]:
-    """One screw part in place of a helper link between a prismatic and a continuous joint on one axis.
-
-    Helpers that the file's annotation knows of need no mention.
-    """
-    kept = list(bodies)
-    for helper in bodies:
-        carried = [b for b in bodies if b.parent is helper]
-        if helper.joint is None or len(helper.faces) or len(carried) != 1:
-            continue
-        body = carried[0]
-        by_type = {b.joint.type: b for b in (helper, body) if b.joint is not None}
-        if set(by_type) != {"prismatic", "continuous"} or body.joint is None:
-            continue
-        turn, slide = by_type["continuous"], by_type["prismatic"]
-        along = float(_axis(slide) @ _axis(turn))
-        rate = _slide_rate(turn, slide)
-        if abs(abs(along) - 1.0) > 1e-6 or rate == 0.0:
-            continue
-        others = [b.joint.mimic.joint for b in bodies if b not in (helper, body) and b.joint and b.joint.mimic]
-        if slide.joint is None or turn.joint is None or slide.joint.name in others:
-            continue
-        pitch = rate * _stretch(slide.joint) * float(np.sign(along))
-        body.links = body.links + helper.links
-        if helper.links[0] not in known:
-            repairs.append(
-                Repair(
-                    f"link {helper.links[0]!r}",
-                    f"helper of a screw: joints {helper.joint.name!r} and {body.joint.name!r} joined into one of "
-                    f"{pitch:.6g} m/rad",
-                )
-            )
-        body.slide, body.slide_rate, body.pitch = slide.joint, rate, pitch
-        body.T_base_joint, body.joint, body.parent = turn.T_base_joint, turn.joint, helper.parent
-        kept.remove(helper)
-    return kept
-
-
-def _in_order(bodies: list[_Body], order: Sequence[str], repairs: list[Repair]) -> tuple[list[_Body], bool]:
-    """Bodies in the order of a list of their links, and whether there was one that fits."""
-    by_name = {body.links[0]: body for body in bodies}
-    ordered = [by_name[name] for name in order if name in by_name]
-    position = {body: i for i, body in enumerate(ordered)}
-    fits = len(order) == len(position) == len(bodies) and all(
-        (body.parent is None) == (i == 0) and (body.parent is None or position[body.parent] < i)
-        for i, body in enumerate(ordered)
-    )
-    if order and not fits:
-        repairs.append(Repair("meta.json", "its list of parts is not that of the file: ignored"))
-    return (ordered, True) if fits else (bodies, False)
-
-
-def _axis(body: _Body) -> Array:
-    """Unit axis of a body's joint in the base link's frame."""
-    axis = np.asarray(body.joint.axis, dtype=np.float64)  # type: ignore[union-attr]
-    direction: Array = body.T_base_joint[:3, :3] @ (axis / np.linalg.norm(axis))
-    return direction / np.linalg.norm(direction)
-
-
-def _slide_rate(turn: _Body, slide: _Body) -> float:
-    """Slide for each radian of turn: what a mimic relation says, else one turn for the whole slide."""
-    assert turn.joint is not None
-    assert slide.joint is not None
-    if slide.joint.mimic is not None and slide.joint.mimic.joint == turn.joint.name:
-        mimic = slide.joint.mimic
-        return 0.0 if mimic.offset else float(1.0 if mimic.multiplier is None else mimic.multiplier)
-    return float(slide.joint.limit.upper - slide.joint.limit.lower) / (2.0 * np.pi)
-
-
-# --- bodies become a tree ---------------------------------------------------------------------------------------
-
-
-def _tree(bodies: list[_Body], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
+def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
     """Tree in the base link's frame with rest state 0, and where each of the file's joints went."""
     index = {body.joint.name: k for k, body in enumerate(bodies) if body.joint is not None}
     position = {id(body): k for k, body in enumerate(bodies)}
@@ -375,14 +192,14 @@ def _tree(bodies: list[_Body], file: Path) -> tuple[KinematicTree, dict[str, tup
             )
             source_joints[body.slide.name] = (k, body.slide_rate)
         # Simulators move a prismatic joint by its value times its axis, whatever the axis's length.
-        lower, upper = lower * _stretch(joint), upper * _stretch(joint)
-        source_joints[joint.name] = (k, 1.0 / _stretch(joint))
+        lower, upper = lower * stretch(joint), upper * stretch(joint)
+        source_joints[joint.name] = (k, 1.0 / stretch(joint))
         joints.append(
             Joint(
                 name=joint.name,
                 type=kind,
                 parent=position[id(body.parent)],
-                axis=_triple(_axis(body)),
+                axis=_triple(axis_in_base(body)),
                 origin=_triple(body.T_base_joint[:3, 3]),
                 lower=lower,
                 upper=upper,
@@ -398,12 +215,7 @@ def _triple(vector: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _stretch(joint: yourdfpy.Joint) -> float:
-    """Metres of travel for each unit of a prismatic joint's value; 1 for joints that turn."""
-    return float(np.linalg.norm(joint.axis)) if joint.type == "prismatic" else 1.0
-
-
-def _mimic(joint: yourdfpy.Joint, bodies: list[_Body], index: Mapping[str, int], file: Path) -> Mimic | None:
+def _mimic(joint: yourdfpy.Joint, bodies: list[RigidBody], index: Mapping[str, int], file: Path) -> Mimic | None:
     if joint.mimic is None:
         return None
     source = index.get(joint.mimic.joint)
@@ -415,8 +227,8 @@ def _mimic(joint: yourdfpy.Joint, bodies: list[_Body], index: Mapping[str, int],
         )
     multiplier = 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
     offset = 0.0 if joint.mimic.offset is None else float(joint.mimic.offset)
-    unit = _stretch(joint)
-    return Mimic(source, multiplier * unit / _stretch(bodies[source].joint), offset * unit)
+    unit = stretch(joint)
+    return Mimic(source, multiplier * unit / stretch(bodies[source].joint), offset * unit)
 
 
 def _to_rest_frame(tree: KinematicTree, parts: list[Part], rest: Array) -> tuple[KinematicTree, list[Part], Array]:
