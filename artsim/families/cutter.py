@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic
-from artsim.solids import Solid, box, cylinder, prism, ring, rounded_box, rounded_rectangle, union
+from artsim.solids import Solid, box, cylinder, prism, rounded_box, rounded_rectangle, union
 
 GAP = 0.0005
 
@@ -53,7 +53,7 @@ def build(rng: np.random.Generator) -> Assembly:
         cutter.add("cap", plug, prismatic("body", (1, 0, 0), 0.0, pull, (end, 0, 0.5 * height)), density=1000.0)
     if rng.random() < 0.25:
         at, radius = button_end - 0.5 * button, min(0.35 * button, 0.9 * half)
-        wheel = ring((at, 0, top + 0.0006 + 0.0015), (0, 0, 1), 0.0, radius, 0.003, 16)
+        wheel = cylinder((at, 0, top + 0.001), (at, 0, top + 0.004), radius, sections=20)
         wheel += union(
             cylinder((at + x, y, top + 0.001), (at + x, y, top + 0.0034), 0.14 * radius, sections=6)
             for x, y in ((radius * np.cos(a), radius * np.sin(a)) for a in np.arange(12) * np.pi / 6)

@@ -103,7 +103,7 @@ def _outline(rng: np.random.Generator) -> Array:
     a = 0.5 * rng.uniform(*wide) * MM
     b = a * rng.uniform(*tall.get(kind, (0.72, 0.95)))
     n = rng.uniform(*power)
-    angles = np.linspace(0.0, 2.0 * np.pi, 30, endpoint=False)
+    angles = np.linspace(0.0, 2.0 * np.pi, 26, endpoint=False)
     c, s = np.cos(angles), np.sin(angles)
     y, z = np.sign(c) * np.abs(c) ** (2 / n), np.sign(s) * np.abs(s) ** (2 / n)
     nasal = {"aviator": (0.25, 0.45), "round": (0.0, 0.05)}.get(kind, (0.05, 0.25))
@@ -133,8 +133,9 @@ def _front(rng: np.random.Generator, style: str, outline: Array, rim: float, siz
 
 def _chains(outline: Array, y: Array) -> tuple[Array, Array]:
     """Lower and upper z of the outline over y."""
-    half = len(outline) // 2
-    upper, lower = outline[: half + 1], np.concatenate([outline[half:], outline[:1]])
+    turned = np.roll(outline, -int(np.argmax(outline[:, 0])), axis=0)
+    half = int(np.argmin(turned[:, 0]))
+    upper, lower = turned[: half + 1], np.concatenate([turned[half:], turned[:1]])
     chains = [chain[np.argsort(chain[:, 0])] for chain in (lower, upper)]
     low, high = (np.interp(y, chain[:, 0], chain[:, 1]) for chain in chains)
     return low, high
@@ -150,7 +151,7 @@ def _sheet(front: Front, y: Array, low: Array, high: Array, thickness: float) ->
 def _glass(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float, depth: float) -> Solid:
     """Lenses and rims."""
     inner, outer = outline[:, 0].min(), outline[:, 0].max()
-    y = 0.5 * (inner + outer) - 0.5 * (outer - inner) * np.cos(np.linspace(0.06, np.pi - 0.06, 11))
+    y = 0.5 * (inner + outer) - 0.5 * (outer - inner) * np.cos(np.linspace(0.08, np.pi - 0.08, 10))
     low, high = _chains(outline, y)
     lens = _sheet(front, y, low, high, 1.8 * MM)
     if style in ("wire", "thick"):
@@ -204,7 +205,7 @@ def _bridge(rng: np.random.Generator, style: str, outline: Array, front: Front, 
     def bar(level: float, arch: float) -> Solid:
         z = low + level * (high - low)
         left = inner[inner[:, 0] < np.median(inner[:, 0])]
-        y = float(np.interp(z, *left[np.argsort(left[:, 1])].T[::-1])) + 0.3 * MM
+        y = float(np.interp(z, *left[np.argsort(left[:, 1])].T[::-1])) + (3.0 if style == "rimless" else 0.3) * MM
         share = np.linspace(-1.0, 1.0, 7)
         bow = arch * (1 - share**2)
         return tube(np.column_stack([front.x(share * y) - 0.4 * bow, share * y, z + bow]), radius, 8)
@@ -271,7 +272,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
     length = 2 * front.half * rng.uniform(0.92, 1.06)
-    x = np.concatenate([np.linspace(GAP, 0.6 * length, 6), np.linspace(0.68, 1.0, 9) * length])
+    x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
     z = -bend * (share / share[-1]) ** rng.uniform(1.2, 1.8)
     y = front.barrel + 0.5 * front.thickness - rng.uniform(0.0, 3.0) * MM * (x / length) ** 2

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.assembly import Assembly, revolute
 from artsim.kinematics import Array
-from artsim.solids import Solid, cylinder, hull_of, loft, prism, tube, union
+from artsim.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
 
 GAP = 0.0005
 
@@ -28,11 +28,14 @@ class Ring:
         Of its middle line, along and across.
     turn : float
         Angle of its long axis from X.
+    egg : float
+        By how much it is wider at the back than at the front.
     """
 
     center: Array
     radii: Array
     turn: float
+    egg: float
 
 
 def build(rng: np.random.Generator) -> Assembly:
@@ -42,18 +45,17 @@ def build(rng: np.random.Generator) -> Assembly:
     width = min(max(blade * rng.uniform(0.09, 0.19), 0.006), 0.024)
     sheet = max(length * rng.uniform(0.008, 0.013), 0.0016)
     plastic = rng.random() < 0.6
-    bar = length * (rng.uniform(0.022, 0.036) if plastic else rng.uniform(0.014, 0.022))
+    bar = length * (rng.uniform(0.026, 0.046) if plastic else rng.uniform(0.014, 0.024))
     height = bar * rng.uniform(0.8, 1.3) if plastic else max(bar, 2.6 * sheet)
     reach = length - blade
     kind = str(rng.choice(["same", "long", "offset"], p=[0.4, 0.4, 0.2]))
-    rings = [_ring(rng, reach, bar, kind, k) for k in range(2)]
+    rings = [_ring(rng, reach, bar, kind, k, plastic) for k in range(2)]
     if kind == "same":
         rings[1] = rings[0]
     point = _blade(rng, blade, width)
     rest = rng.uniform(0.15, 0.3) * reach if not plastic and rng.random() < 0.3 else 0.0
     pivot = width * rng.uniform(0.22, 0.38)
     button = sheet * rng.uniform(0.4, 1.0)
-    tang = rng.uniform(0.35, 0.5) * width
 
     scissors = Assembly()
     middle = sheet + GAP / 2
@@ -62,7 +64,7 @@ def build(rng: np.random.Generator) -> Assembly:
         low = k * (sheet + GAP)
         side = 1.0 if k == 0 else -1.0
         solid = union(prism(piece * (1.0, side), low, low + sheet) for piece in point)
-        solid += _handle(rings[k], side, low, sheet, tang, bar, height, middle, plastic)
+        solid += _handle(rings[k], side, low, sheet, width, bar, height, plastic)
         if k == 0 and rest > 0:
             solid += _finger_rest(rings[k], rest, bar, middle)
         outward = 1 if k else -1
@@ -83,7 +85,7 @@ def _blade(rng: np.random.Generator, length: float, width: float) -> tuple[Array
     kind = str(rng.choice(["straight", "bellied", "blunt", "narrow"]))
     tip = {"blunt": 0.55, "narrow": 0.05}.get(kind, 0.14) * width
     turn = rng.uniform(0.3, 0.6) if kind != "blunt" else rng.uniform(0.75, 0.9)
-    sag = {"bellied": 0.25, "straight": 0.0, "narrow": -0.08}.get(kind, 0.15)
+    sag = {"bellied": 0.7, "straight": 0.2, "narrow": 0.0}.get(kind, 0.5)
     x = np.linspace(0.0, 1.0, 9)
     falling = np.clip((x - turn) / (1 - turn), 0, 1)
     backs = back + (edge - tip - back) * ((1 - sag) * falling + sag * falling**2)
@@ -97,68 +99,66 @@ def _blade(rng: np.random.Generator, length: float, width: float) -> tuple[Array
     return tuple(np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(8))
 
 
-def _ring(rng: np.random.Generator, reach: float, bar: float, kind: str, k: int) -> Ring:
+def _ring(rng: np.random.Generator, reach: float, bar: float, kind: str, k: int, plastic: bool) -> Ring:
     """Ring at the +Y side, clear of the middle by its bar."""
     long = kind != "same" and k == 1
-    along = reach * (rng.uniform(0.26, 0.33) if long else rng.uniform(0.17, 0.25))
-    across = min(along, reach * rng.uniform(0.13, 0.19)) if long or rng.random() < 0.5 else along * 0.95
-    turn = rng.uniform(0.0, 0.3)
-    half = np.hypot(along * np.sin(turn), across * np.cos(turn)) + 0.5 * bar
-    y = half + GAP + reach * rng.uniform(0.0, 0.08)
+    along = reach * (rng.uniform(0.27, 0.35) if long else rng.uniform(0.17, 0.27)) * (1.1 if plastic else 1.0)
+    across = min(along, reach * rng.uniform(0.13, 0.2)) if long or rng.random() < 0.5 else along * 0.95
+    turn, egg = rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.35)
+    half = np.hypot(along * np.sin(turn), (1 + egg) * across * np.cos(turn)) + 0.6 * bar
+    y = half + GAP + reach * rng.uniform(0.0, 0.05)
     shift = reach * rng.uniform(0.05, 0.12) if kind == "offset" and k == 0 else 0.0
-    return Ring(np.array([reach - along - bar - shift, y]), np.array([along, across]), turn)
+    return Ring(np.array([reach - along - bar - shift, y]), np.array([along, across]), turn, egg)
 
 
 def _loop(ring: Ring, count: int = 22) -> Array:
     """(count, 2) points of the ring's middle line."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    u = np.column_stack([ring.radii[0] * np.cos(angles), ring.radii[1] * np.sin(angles)])
+    wide = ring.radii[1] * (1 + ring.egg * np.cos(angles))
+    u = np.column_stack([ring.radii[0] * np.cos(angles), wide * np.sin(angles)])
     c, s = np.cos(ring.turn), np.sin(ring.turn)
     return ring.center + u @ np.array([[c, s], [-s, c]])
 
 
 def _handle(
-    ring: Ring,
-    side: float,
-    low: float,
-    sheet: float,
-    tang: float,
-    bar: float,
-    height: float,
-    middle: float,
-    plastic: bool,
+    ring: Ring, side: float, low: float, sheet: float, width: float, bar: float, height: float, plastic: bool
 ) -> Solid:
     """Ring and the shank that joins it to the pivot; half as thick as both blades near the pivot."""
+    middle, tang = sheet + GAP / 2, 0.42 * width
     loop = _loop(ring)
     path = np.column_stack([loop[:, 0], side * loop[:, 1], np.full(len(loop), middle)])
-    solid = _flat_tube(path, bar, height)
+    sections = _sections(path, bar, height)
+    solid = loft(sections, closed=True)
     # The shank meets the ring where it comes nearest to the pivot.
-    near = path[np.argmin(np.linalg.norm(loop, axis=1))]
-    top = low + sheet
-    start = cylinder((0, 0, low), (0, 0, top), tang, sections=20)
+    k = int(np.argmin(np.linalg.norm(loop, axis=1)))
+    near, top = path[k], low + sheet
+    rear = np.array([(x, side * y) for x in (-0.3, -0.2) for y in (-0.78, 0.2)]) * width
     end = cylinder((near[0], near[1], low), (near[0], near[1], top), 0.5 * bar, sections=16)
-    solid += hull_of(start, end)
+    solid += hull_of(cylinder((0, 0, low), (0, 0, top), tang, sections=20), prism(rear, low, top), end)
     if plastic:
-        # A thick sleeve around the shank, from where it is clear of the middle.
-        share = 0.62
+        # A moulded body around the shank, from where it is clear of the other blade.
+        share = min(max(0.35, 2.4 * width / near[0]), 0.8)
         neck = near * (share, share, 1.0)
-        neck[1] = side * max(abs(neck[1]), 0.42 * bar + GAP)
-        solid += tube([neck, near], [0.4 * bar, 0.5 * bar], 10)
+        neck[1] = side * max(abs(neck[1]), 0.5 * bar + GAP)
+        start = ellipsoid(neck, (0.5 * bar, 0.5 * bar, 0.5 * height), 12)
+        for first, second in ((k - 2, k - 1), (k - 1, k), (k, k + 1), (k + 1, k + 2)):
+            ends = np.concatenate([sections[i % len(sections)] for i in (first, second)])
+            solid += hull_of(start, hull(ends))
     return solid
 
 
-def _flat_tube(path: Array, width: float, height: float) -> Solid:
-    """Closed bar of elliptic section along a level loop."""
+def _sections(path: Array, width: float, height: float) -> list[Array]:
+    """Elliptic cross-sections of a level closed bar."""
     center = path.mean(axis=0)
     angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + np.pi / 8
-    rings = []
     ahead = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
+    sections = []
     for point, along in zip(path, ahead, strict=True):
         out = np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
         out *= np.sign(out @ (point - center))
         radial = 0.54 * width * np.cos(angles)
-        rings.append(point + radial[:, None] * out + (0.54 * height * np.sin(angles))[:, None] * (0, 0, 1))
-    return loft(rings, closed=True)
+        sections.append(point + radial[:, None] * out + (0.54 * height * np.sin(angles))[:, None] * (0, 0, 1))
+    return sections
 
 
 def _finger_rest(ring: Ring, length: float, bar: float, middle: float) -> Solid:
