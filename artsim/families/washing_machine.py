@@ -62,7 +62,7 @@ def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
     drawer = bool(rng.random() < 0.75)
 
     body = tray((0.5 * plate, -s.half, s.low), (s.depth, s.half, s.high), 0.012, axis=0, side=-1) + _feet(s)
-    body += holed_plate((0, -s.half, s.low), (plate, s.half, strip + 0.001), (0.0, z), hole, 0)
+    body += holed_plate((0, -s.half, s.low), (plate, s.half, strip + 0.001), (0.0, z), hole, 0, 20)
     slot = np.array([box_side * (s.half - box_half - 0.03), 0.5 * (strip + s.high)])
     room = 0.5 * (s.high - strip) - 0.016
     proud = rng.choice([0.0, rng.uniform(0.005, 0.02)])  # of the strip
@@ -112,9 +112,9 @@ def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
 def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: float) -> Solid:
     """Drum behind the porthole with three paddles; ``gap`` behind the front plate."""
     front, back = plate + gap + 0.008, s.depth - 0.05
-    solid = ring((0.5 * (front + back), 0, z), (1, 0, 0), radius - 0.008, radius, back - front, 18)
-    solid += cylinder((back - 0.004, 0, z), (back + 0.01, 0, z), radius, sections=18)
-    solid += ring((front + 0.004, 0, z), (1, 0, 0), hole + 0.012, radius - 0.004, 0.008, 18)
+    solid = ring((0.5 * (front + back), 0, z), (1, 0, 0), radius - 0.008, radius, back - front, 16)
+    solid += cylinder((back - 0.004, 0, z), (back + 0.01, 0, z), radius, sections=16)
+    solid += ring((front + 0.004, 0, z), (1, 0, 0), hole + 0.012, radius - 0.004, 0.008, 16)
     for k in range(3):
         a = 2.0 * np.pi * k / 3 + 0.4
         out, across = np.array([0.0, np.cos(a), np.sin(a)]), np.array([0.0, -np.sin(a), np.cos(a)])
@@ -134,10 +134,10 @@ def _porthole(rng: np.random.Generator, z: float, hole: float, outer: float, thi
     glass = hole * rng.uniform(0.72, 0.9)
     closed = rng.random() < 0.15
     if rng.random() < 0.75:
-        solid = ring((0.5 * (x0 + x1), 0, z), (1, 0, 0), 0.97 * glass, outer, thick)
-        solid += ring((x0, 0, z), (1, 0, 0), glass + 0.012, outer - 0.012, 0.012, 20) if rng.random() < 0.5 else Solid()
+        solid = ring((0.5 * (x0 + x1), 0, z), (1, 0, 0), 0.97 * glass, outer, thick, 22)
+        solid += ring((x0, 0, z), (1, 0, 0), glass + 0.012, outer - 0.012, 0.012, 16) if rng.random() < 0.5 else Solid()
     else:
-        solid = holed_plate((x0, -outer, z - outer), (x1, outer, z + outer), (0.0, z), 0.97 * glass, 0)
+        solid = holed_plate((x0, -outer, z - outer), (x1, outer, z + outer), (0.0, z), 0.97 * glass, 0, 20)
     if closed:
         solid += cylinder((x0 - 0.004, 0, z), (x1, 0, z), glass, sections=28)
     else:
@@ -165,7 +165,7 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
     radius = min(0.5 * back - 0.05, s.half - 0.05)
     center = np.array([0.5 * back, 0.0])
     body = tray((0, -s.half, s.low), (s.depth, s.half, s.high - 0.5 * deck), 0.012) + _feet(s)
-    body += holed_plate((0, -s.half, s.high - deck), (s.depth, s.half, s.high), center, radius, 2)
+    body += holed_plate((0, -s.half, s.high - deck), (s.depth, s.half, s.high), center, radius, 2, 20)
     slope = rng.uniform(0.0, 0.5) * console
     face = [
         (back + 0.004, s.high - 0.002),
@@ -210,7 +210,7 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
 def _agitator(rng: np.random.Generator, center: Array, radius: float, s: Shape) -> Solid:
     """Drum with a column and its vanes, or with a low impeller."""
     low, high, r = s.low + 0.05, s.high - 0.08, radius - 0.01
-    solid = vessel([(r, low), (r, high)], 0.006, (*center, 0.0), 18)
+    solid = vessel([(r, low), (r, high)], 0.006, (*center, 0.0), 16)
     x, y = center
     top = low + (rng.uniform(0.6, 0.85) * (high - low) if rng.random() < 0.5 else 0.05)
     solid += cylinder((x, y, low + 0.001), (x, y, top), 0.3 * r, 0.15 * r, 16)
