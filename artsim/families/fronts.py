@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from artsim.assembly import JointSpec, prismatic, revolute
-from artsim.families.details import bar_handle, bow_handle, knob, panel
+from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, hull_of, rounded_box, tray
 
@@ -76,6 +76,12 @@ class Style:
     """Radius of the handles' bars."""
     travel: float
     """Of drawers, as a share of their depth."""
+    lap: float
+    """How far overlaid fronts reach over the boards; they meet over a board that is narrower."""
+    place: float
+    """Where the handles of doors are, as a share of the doors' height."""
+    level: bool
+    """Handles of doors lie level rather than upright."""
 
 
 def drawer(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
@@ -148,6 +154,16 @@ def shelves(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, 
     return _shelves(rng, cell, style.face + rng.uniform(0.0, 0.02), style), []
 
 
+def fixed(cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+    """A front that does not move, as before a sink."""
+    low, high = _front_box(cell, style)
+    margin = np.array([0.0, 0.002, 0.002])
+    joint = box(low + margin + (0.5 * style.thickness, 0, 0), high - margin + (2 * GAP, 0, 0))
+    if not style.overlay:
+        joint = box(low - 2 * margin + (0.4 * style.thickness, 0, 0), high + 2 * margin)
+    return _face(low, high, style) + joint, []
+
+
 def _interior(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Behind a door: shelves, or trays that stay inside even when they are pulled out behind a closed door."""
     front = style.face + style.thickness + 0.02
@@ -197,8 +213,10 @@ def _front_box(cell: Cell, style: Style) -> tuple[Array, Array]:
             np.array([style.face, cell.low[0] + margin, cell.low[1] + margin]),
             np.array([style.face + style.thickness, cell.high[0] - margin, cell.high[1] - margin]),
         )
-    grow_low = [style.board - 0.001 if outer else style.board / 2 - GAP for outer in cell.outer_low]
-    grow_high = [style.board - 0.001 if outer else style.board / 2 - GAP for outer in cell.outer_high]
+    grow_low, grow_high = (
+        [min(style.lap, style.board - 0.001 if outer else style.board / 2 - GAP) for outer in edges]
+        for edges in (cell.outer_low, cell.outer_high)
+    )
     x = style.face - GAP
     return (
         np.array([x - style.thickness, cell.low[0] - grow_low[0], cell.low[1] - grow_low[1]]),
@@ -229,26 +247,21 @@ def _leaf(rng: np.random.Generator, cell: Cell, style: Style, hinge: str, low: A
     width, length = high[across] - low[across], high[along] - low[along]
     solid = _face(low, high, style)
 
+    run = across if style.level and across == 1 else along  # the axis along which the handle lies
+    half = 0.5 * min(style.handle_length, 0.6 * (width if run == across else length))
     grip = np.array([low[0], 0.0, 0.0])
-    grip[across] = edge + inward * (width - max(style.rail / 2, 0.02))
-    half = 0.5 * min(style.handle_length, 0.6 * length)
-    place = rng.choice([0.5, 0.2, 0.8]) if across == 1 else 0.5
-    grip[along] = np.clip(low[along] + place * length, low[along] + half + 0.03, high[along] - half - 0.03)
-    handle = _handle(style, tuple(grip), along, half, low, high)
-    limit = np.deg2rad(88.0)
+    aside = max(style.rail / 2, 0.02) + (half if run == across else 0.0)
+    grip[across] = edge + inward * (width - aside)
+    margin = 0.03 + (half if run == along else 0.0)
+    place = style.place if across == 1 else 0.5
+    grip[along] = np.clip(low[along] + place * length, low[along] + margin, high[along] - margin)
+    handle = _handle(style, grip, run, half, low, high)
     outer = (cell.outer_high if at_high else cell.outer_low)[across - 1] and across == 1
-    if handle.pieces:
-        bounds = handle.bounds()
-        reach = low[0] - bounds[0, 0]
-        near = (edge - bounds[1, across]) if at_high else (bounds[0, across] - edge)
-        folded = np.arctan2(near, reach)
-        limit = min(limit, folded - 0.01)
-        if outer:
-            limit = np.pi - max(np.arctan2(reach, near), 0.03) - 0.05
-    elif outer:
-        limit = np.pi - 0.08
+    bounds = handle.bounds() if handle.pieces else np.array([grip, grip])
+    near = edge - bounds[1, across] if at_high else bounds[0, across] - edge
+    limit, most = swing_limits(near, low[0] - bounds[0, 0])
     if outer:
-        limit = min(limit, np.deg2rad(rng.choice([95.0, 110.0, 135.0, 170.0])))
+        limit = min(most, np.deg2rad(rng.choice([95.0, 110.0, 135.0, 170.0])))
     origin = 0.5 * (low + high)
     origin[across], origin[0] = edge, low[0] - 0.0005
     return "door", solid + handle, revolute("body", axis, tuple(origin), 0.0, float(limit))

@@ -15,7 +15,7 @@ from artsim.assembly import Assembly
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, union
+from artsim.solids import Solid, box, cylinder, frame, hull, union
 
 # Of each kind: the ranges of width, depth and height of the body and of the height of what it stands on, in metres;
 # how likely a low cell is a drawer; how common the kind is.
@@ -36,14 +36,16 @@ def build(rng: np.random.Generator) -> Assembly:
     ranges, drawers, _ = KINDS[kind]
     width, depth, height, stand = (rng.uniform(*span) for span in ranges)
     stand = 0.0 if stand < 0.02 else stand
-    style = _style(rng, depth)
+    style = _style(rng, kind, depth)
     edge = style.board
     whole = Cell((-width / 2 + edge, stand + edge), (width / 2 - edge, stand + height - edge))
 
     cells, body = _divide(rng, whole, style, 0)
     moving: list[Moving] = []
-    for cell, recipe in sorted(cells, key=lambda item: -np.prod(item[0].sides)):
-        inside, parts = _fill(np.random.default_rng(recipe), cell, style, drawers, must_move=not moving)
+    cells.sort(key=lambda item: -item[0].sides[0] * item[0].sides[1])
+    for cell, recipe in cells:  # the largest, and those like it, are not left open
+        must_move = recipe == cells[0][1]
+        inside, parts = _fill(np.random.default_rng(recipe), cell, style, drawers, must_move)
         if len(moving) + len(parts) > MOST_MOVING:
             inside, parts = fronts.shelves(rng, cell, style)
         body += inside
@@ -59,11 +61,16 @@ def build(rng: np.random.Generator) -> Assembly:
     return furniture
 
 
-def _style(rng: np.random.Generator, depth: float) -> Style:
+def _style(rng: np.random.Generator, kind: str, depth: float) -> Style:
+    framed = rng.random() < 0.25  # wide boards around the fronts
+    place = {"base": 0.85, "wall": 0.15}.get(kind, 0.5)
     return Style(
         face=-depth / 2,
         back=depth / 2 - rng.uniform(0.006, 0.015),
-        board=rng.uniform(0.015, 0.026),
+        board=rng.uniform(0.03, 0.045) if framed else rng.uniform(0.015, 0.026),
+        lap=rng.uniform(0.006, 0.012) if framed else 1.0,
+        place=place if rng.random() < 0.6 else float(rng.choice([0.15, 0.5, 0.85])),
+        level=rng.random() < 0.2,
         thickness=rng.uniform(0.016, 0.024),
         overlay=rng.random() < 0.7,
         panel=str(rng.choice(["slab", "shaker", "raised", "planks", "glass"], p=[0.45, 0.2, 0.22, 0.05, 0.08])),
@@ -126,6 +133,7 @@ def _fill(
         "flap": 0.3 * (width > 1.15 * height and 0.18 < height < 0.6),
         "sliding": 0.2 * (width > 0.7 and height > 0.3),
         "open": 0.0 if must_move else 0.1,
+        "fixed": 0.04 * (not must_move and low_and_wide),
     }
     chances["drawer"] += sum(chances.values()) <= 0.0
     weights = np.array(list(chances.values()))
@@ -138,6 +146,8 @@ def _fill(
         return fronts.sliding_doors(rng, cell, style)
     if what == "open":
         return fronts.shelves(rng, cell, style)
+    if what == "fixed":
+        return fronts.fixed(cell, style)
     if what == "flap":
         return fronts.door(rng, cell, style, "top" if rng.random() < 0.7 else "bottom")
     outside = [name for name, outer in (("left", cell.outer_high[0]), ("right", cell.outer_low[0])) if outer]
@@ -164,6 +174,11 @@ def _carcass(
     else:
         solid += box((x0, -y + 0.001, top - board), (x1, y - 0.001, top))
         solid += _top(rng, kind, x0, x1, y, top)
+    if kind not in ("base", "wall") and rng.random() < 0.15:  # posts at the corners, down to the floor
+        post = rng.uniform(0.02, 0.045)
+        to_floor = False
+        solid += union(box((near, min(s * y, s * (y + post)), 0), (near + post, max(s * y, s * (y + post)), top))
+                       for near in (x0 - fronts.GAP, x1 - post) for s in (-1, 1))  # fmt: skip
     if to_floor:
         setback = x0 + rng.uniform(0.02, 0.07)
         return solid + box((setback, -y + 0.001, 0), (setback + board, y - 0.001, stand + 0.001))
@@ -195,6 +210,14 @@ def _stand(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, 
             (x1, y - 0.5 * abs(setback) + 0.01, height + 0.001),
         )
         return frame(low, high, [board] * 4, 0, 1)
+    if height < 0.2 and rng.random() < 0.25:  # brackets: an angle at each corner
+        arm, thick = rng.uniform(0.06, 0.12), rng.uniform(0.018, 0.03)
+        ends = [(a, b, sx, sy) for sx, a in ((1, x0), (-1, x1)) for sy, b in ((1, -y), (-1, y))]
+        return union(
+            hull([(a + sx * u * p, b + sy * v * p, z) for p, z in ((1.0, height + 0.001), (0.6, 0.0))
+                  for u in (0.0, du) for v in (0.0, dv)])
+            for a, b, sx, sy in ends for du, dv in ((arm, thick), (thick, arm))
+        )  # fmt: skip
     radius = rng.uniform(0.012, 0.03)
     taper = rng.uniform(0.45, 1.0)
     splay = rng.choice([0.0, rng.uniform(0.0, 0.25)]) * height
