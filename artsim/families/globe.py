@@ -34,14 +34,14 @@ def build(rng: np.random.Generator) -> Assembly:
 
     globe = Assembly()
     arc = _arc(rng, arc_radius, thick, lean * tilt)
-    foot = -arc_radius - thick * 0.5
+    foot = -arc_radius - 2.3 * thick
     turning = rng.random() < 0.3
     horizon = not turning and rng.random() < 0.2
-    stand = _stand(rng, radius, foot - (GAP if turning else -0.3 * thick), thick)
+    stand = _stand(rng, radius, foot - (GAP if turning else -1.5 * thick), thick)
     if horizon:
         stand += _horizon(rng, arc_radius + 1.6 * thick, foot, thick, radius)
     if turning:
-        stub = cylinder((0, 0, foot), (0, 0, foot + thick), 0.9 * thick, sections=16)
+        stub = cylinder((0, 0, foot), (0, 0, foot + 2.3 * thick), 0.9 * thick, sections=16)
         globe.add("stand", stand, density=900.0)
         if rng.random() < 0.5:
             joint = continuous("stand", UP, (0, 0, foot))

@@ -1,0 +1,229 @@
+"""Fans: table, standing and ceiling fans, and box fans in a square frame.
+
+What varies: the kind, 3 to 6 blades and their shape, the cage, a telescopic column, whether the head turns from side to
+side, tilts, or both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, rounded_box, tube, union
+
+GAP = 0.002
+UP = np.array([0.0, 0.0, 1.0])
+FRONT = np.array([-1.0, 0.0, 0.0])
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A fan that blows towards -X (a ceiling fan: downward)."""
+    kind = rng.choice(["head", "ceiling", "box"], p=[0.7, 0.17, 0.13])
+    if kind == "ceiling":
+        return _ceiling_fan(rng)
+    return _box_fan(rng) if kind == "box" else _head_fan(rng)
+
+
+def _head_fan(rng: np.random.Generator) -> Assembly:
+    """A head with a cage on a neck, on a table stand or a tall column."""
+    standing = rng.random() < 0.5
+    cage = rng.uniform(0.17, 0.25) if standing else rng.uniform(0.13, 0.2)
+    column = cage * rng.uniform(0.08, 0.12)
+    height = rng.uniform(0.7, 1.1) if standing else cage * rng.uniform(1.15, 1.5)
+    sliding, swings, tilts = standing and rng.random() < 0.6, rng.random() < 0.75, rng.random() < 0.75
+    motor = cage * rng.uniform(0.26, 0.36)
+    level = height + 1.3 * motor + 0.02
+    base = _foot(rng, cage, standing)
+    stages: list[tuple[str, Solid, JointSpec | None]] = [("base", base, None)]
+    if sliding:
+        sleeve = height * rng.uniform(0.5, 0.65)
+        wide = 1.45 * column
+        base += cylinder((0, 0, 0.005), (0, 0, 0.04), wide, sections=20)
+        base += ring((0, 0, 0.5 * (0.02 + sleeve)), UP, column + GAP, wide, sleeve - 0.02, 16)
+        base += ring((0, 0, sleeve - 0.02), UP, column + GAP, 1.25 * wide, 0.05, 16)
+        deep = rng.uniform(0.4, 0.8) * (sleeve - 0.06)
+        pole = cylinder((0, 0, sleeve - deep), (0, 0, height), column, sections=18)
+        stages = [("base", base, None), ("pole", pole, prismatic("", UP, 0.0, 0.75 * deep, (0, 0, sleeve)))]
+    else:
+        base += cylinder((0, 0, 0.005), (0, 0, height), column * (1.0 if standing else 1.5), column, 20)
+        stages = [("base", base, None)]
+    swing = np.deg2rad(rng.uniform(30, 75))
+    turn = revolute("", UP, (0, 0, height), -swing, swing) if swings else None
+    stages.append(("neck", _neck(column, motor, height + (GAP if swings else -0.002), level, 0.85 * motor), turn))
+    pins = 0.85 * motor + (-GAP if tilts else 0.002)
+    head, middle = _head(rng, cage, motor, level, pins)
+    down = _steepest(cage, -0.55 * motor, middle, 1.9 * column + 0.008)
+    nod = revolute("", (0, 1, 0), (0, 0, level), -down, np.deg2rad(rng.uniform(15, 35))) if tilts else None
+    stages.append(("head", head, nod))
+    blades = _blades(rng, cage, 2.0 * abs(middle + 0.55 * motor)).moved((middle, 0, level))
+    blades += cylinder((middle, 0, level), (-0.55 * motor - GAP, 0, level), 0.03 * cage, sections=10)
+    stages.append(("blades", blades, continuous("", FRONT, (middle, 0, level))))
+    return _stacked(stages)
+
+
+def _stacked(stages: list[tuple[str, Solid, JointSpec | None]]) -> Assembly:
+    """Every stage hangs on the one before; one without a joint is part of it."""
+    merged: list[tuple[str, Solid, JointSpec | None]] = []
+    for name, solid, joint in stages:
+        if joint is None and merged:
+            merged[-1] = (merged[-1][0], merged[-1][1] + solid, merged[-1][2])
+        else:
+            merged.append((name, solid, joint if joint is None else replace(joint, parent=merged[-1][0])))
+    fan = Assembly()
+    for name, solid, joint in merged:
+        fan.add(name, solid, joint, density=1200.0)
+    return fan
+
+
+def _steepest(cage: float, back: float, middle: float, column: float) -> float:
+    """Radians by which a head can look down before its cage meets the column."""
+    angles = np.linspace(0.0, np.deg2rad(30), 31)
+    profile = np.array([(back, 0.3 * cage), (middle, 1.04 * cage)])
+    x = profile[:, :1] * np.cos(angles) + profile[:, 1:] * np.sin(angles)
+    clear = angles[(x < -column).all(axis=0)]
+    return float(clear.max()) if len(clear) else 0.01
+
+
+def _neck(column: float, motor: float, z: float, level: float, side: float) -> Solid:
+    """A knuckle with two cheeks that carry the motor."""
+    cheek = 0.01
+    solid = cylinder((0, 0, z), (0, 0, z + 0.014), 1.4 * column, sections=18)
+    solid += box((-column, -side - cheek, z + 0.004), (column, side + cheek, z + 0.014))
+    for s in (-1, 1):
+        y0, y1 = sorted((s * side, s * (side + cheek)))
+        solid += box((-0.9 * column, y0, z + 0.005), (0.9 * column, y1, level))
+        solid += cylinder((0, y0, level), (0, y1, level), 1.1 * column, sections=18)
+    return solid
+
+
+def _head(rng: np.random.Generator, cage: float, motor: float, level: float, pins: float) -> tuple[Solid, float]:
+    """Motor with the cage before it; and the x of the middle of the cage."""
+    back = -0.55 * motor
+    half = cage * rng.uniform(0.17, 0.26)
+    middle = back - half
+    wide = 0.75 * motor
+    solid = cylinder((back, 0, 0), (0.6 * motor, 0, 0), wide)
+    solid += cylinder((0.59 * motor, 0, 0), (0.85 * motor, 0, 0), wide, 0.6 * wide)
+    solid += cylinder((0, -pins, 0), (0, pins, 0), 0.35 * motor, sections=16)
+    solid += _cage(rng, cage, half, wide, int(rng.integers(10, 17))).moved((middle, 0, 0))
+    return solid.moved((0, 0, level)), middle
+
+
+def _cage(rng: np.random.Generator, cage: float, half: float, motor: float, wires: int) -> Solid:
+    """Wires before and behind the blades, about the X axis; the front badge at -X, the motor at +X."""
+    wire = max(0.009 * cage, 0.0016)
+    solid = tube(circle((0, 0, 0), FRONT, cage, 24), 2.2 * wire, 8, closed=True)
+    badge = cage * rng.uniform(0.14, 0.26)
+    solid += cylinder((-half - 1.5 * wire, 0, 0), (-half + wire, 0, 0), 0.85 * badge, badge)
+    for sign, hub in ((-1.0, 0.85 * badge), (1.0, 0.8 * motor)):
+        shares = rng.uniform(0.82, 0.9)
+        for spot in circle((0, 0, 0), FRONT, 1.0, wires):
+            path = np.array([(hub, sign * half), (shares * cage, sign * half), (cage, 0.0)])
+            solid += tube(path[:, :1] * spot + path[:, 1:] * np.array([1.0, 0.0, 0.0]), wire, 5)
+    inner = 0.55 * cage
+    return solid + tube(circle((-half, 0, 0), FRONT, inner, 16), 1.1 * wire, 5, closed=True)
+
+
+def _blades(rng: np.random.Generator, cage: float, depth: float) -> Solid:
+    """A propeller about the X axis, within a cage of the given radius and depth."""
+    count = int(rng.integers(3, 7))
+    hub, tip = cage * rng.uniform(0.13, 0.2), cage * rng.uniform(0.78, 0.86)
+    reach = 0.2 * depth
+    solid = cylinder((-reach, 0, 0), (reach, 0, 0), 0.85 * hub, hub)
+    broad = rng.uniform(0.45, 0.75) * 2.0 * np.pi / count
+    sweep = rng.uniform(-0.5, 0.5)
+    shares = np.array([0.0, 0.35, 0.75, 1.0])
+    widths = np.array([0.75, 1.0, 1.0, rng.uniform(0.4, 0.8)])
+    sections = []
+    for share, width in zip(shares, widths, strict=True):
+        radius = 0.8 * hub + share * (tip - 0.8 * hub)
+        chord = min(broad * width * radius + 0.25 * hub, 0.55 * cage)
+        rise = min(0.35 * chord, reach)
+        center = np.array([0.0, -np.sin(sweep * share), np.cos(sweep * share)]) * radius
+        across = np.array([2.0 * rise, -chord * np.cos(sweep * share), -chord * np.sin(sweep * share)]) * 0.5
+        thick = np.array([0.0012, 0.0, 0.0])
+        sections.append([center + a * across + b * thick for a in (-1, 1) for b in (-1, 1)])
+    blade = loft(sections)
+    # The corners of a broad blade reach further out than its middle.
+    bounds = max(float(np.linalg.norm(np.array(s)[:, 1:], axis=1).max()) for s in sections)
+    if bounds > 0.88 * cage:
+        blade = blade.scaled((1.0, 0.88 * cage / bounds, 0.88 * cage / bounds))
+    return solid + union(blade.turned(FRONT, 2.0 * np.pi * k / count) for k in range(count))
+
+
+def _box_fan(rng: np.random.Generator) -> Assembly:
+    """Blades in a square frame, with a knob by chance."""
+    cage = rng.uniform(0.14, 0.26)
+    half = cage * rng.uniform(0.22, 0.32)
+    wall, outer = 0.014, 1.06 * cage + 0.014
+    base = frame((-half, -outer, -outer), (half, outer, outer), [wall] * 4)
+    for y in (-0.7 * outer, 0.7 * outer):
+        base += rounded_box((-1.3 * half, y - 0.015, -outer - 0.02), (1.3 * half, y + 0.015, -outer + 0.004), 0.004)
+    if rng.random() < 0.5:
+        spots = [(-0.3, -0.004), (-0.25, 0.03), (0.25, 0.03), (0.3, -0.004)]
+        base += tube([(0, y * outer, outer + z) for y, z in spots], 0.006, 10)
+    bars = int(rng.integers(7, 14))
+    bar = 0.0022
+    for x in (-half + 2 * bar, half - 2 * bar):
+        for y in np.linspace(-1.0, 1.0, bars + 2)[1:-1] * cage:
+            base += box((x - bar, y - bar, -outer + 0.5 * wall), (x + bar, y + bar, outer - 0.5 * wall))
+        for z in (-0.5 * cage, 0.0, 0.5 * cage):
+            base += box((x - 0.8 * bar, -outer + 0.5 * wall, z - bar), (x + 0.8 * bar, outer - 0.5 * wall, z + bar))
+    motor = 0.25 * cage
+    back = half - 0.35 * half
+    base += cylinder((back, 0, 0), (half - bar, 0, 0), motor)
+    base += cylinder((-half + bar, 0, 0), (-half - 0.002, 0, 0), 0.16 * cage)
+    corner = np.array([-half, outer - 0.035, outer - 0.035])
+    with_knob = rng.random() < 0.5
+    if with_knob:
+        base += rounded_box(corner - (0, 0.03, 0.03), corner + (half, 0.03, 0.03), 0.006, axis=0)
+    fan = Assembly()
+    fan.add("base", base, density=500.0)
+    blades = _blades(rng, cage, 1.5 * half) + cylinder((0, 0, 0), (back - GAP, 0, 0), 0.03 * cage, sections=10)
+    fan.add("blades", blades, continuous("base", FRONT, (0, 0, 0)), density=1200.0)
+    if with_knob:
+        at = corner + GAP * FRONT
+        knob = cylinder(at, at + 0.014 * FRONT, 0.02, 0.017, 20)
+        knob += box(at + (-0.02, -0.003, -0.016), at + (-0.01, 0.003, 0.016))
+        fan.add("knob", knob, revolute("base", FRONT, at, 0.0, 4.2), density=1200.0)
+    return fan
+
+
+def _ceiling_fan(rng: np.random.Generator) -> Assembly:
+    """Long paddles under a ceiling at z = 0, by chance with a lamp below."""
+    reach, drop = rng.uniform(0.45, 0.75), rng.uniform(0.12, 0.4)
+    count, body = int(rng.integers(3, 7)), rng.uniform(0.08, 0.13)
+    mount = cylinder((0, 0, -0.05), (0, 0, 0), 0.045, 0.07) + cylinder((0, 0, -drop), (0, 0, -0.02), 0.013, sections=14)
+    low = -drop - GAP
+    tall = body * rng.uniform(0.7, 1.2)
+    rotor = cylinder((0, 0, low - 0.25 * tall), (0, 0, low), body, 0.5 * body, 28)
+    rotor += cylinder((0, 0, low - tall), (0, 0, low - 0.24 * tall), 0.9 * body, body, 28)
+    if rng.random() < 0.6:
+        rotor += ellipsoid((0, 0, low - tall), (0.75 * body, 0.75 * body, body * rng.uniform(0.4, 0.8)), 20)
+    half, z = rng.uniform(0.05, 0.08), low - 0.6 * tall
+    pitch = np.deg2rad(rng.uniform(8, 15))
+    root = body + rng.uniform(0.03, 0.08)
+    paddle = rounded_box((-reach, -half, -0.004), (-root, half, 0.004), rng.uniform(0.2, 1.0) * half, axis=2, steps=4)
+    arm = box((-root - 0.06, -0.02, -0.0055), (-0.8 * body, 0.02, 0.0055))
+    blade = (paddle + arm).turned(FRONT, pitch).moved((0, 0, z))
+    rotor += union(blade.turned(UP, 2.0 * np.pi * k / count) for k in range(count))
+    fan = Assembly()
+    fan.add("base", mount, density=1500.0)
+    fan.add("blades", rotor, continuous("base", UP, (0, 0, -drop)), density=900.0)
+    return fan
+
+
+def _foot(rng: np.random.Generator, cage: float, standing: bool) -> Solid:
+    """Disc, or a cross of bars."""
+    wide = cage * rng.uniform(0.85, 1.05)
+    if standing and rng.random() < 0.4:
+        half = 0.022
+        return box((-wide, -half, 0), (wide, half, 0.025)) + box((-half, -wide, 0), (half, wide, 0.025))
+    if rng.random() < 0.25:
+        return rounded_box((-0.8 * wide, -0.8 * wide, 0), (0.8 * wide, 0.8 * wide, 0.03), 0.25 * wide, axis=2)
+    tall = rng.uniform(0.015, 0.03)
+    return cylinder((0, 0, 0), (0, 0, tall), wide, 0.9 * wide, 32) + cylinder(
+        (0, 0, tall - 0.001), (0, 0, 2 * tall), 0.85 * wide, 0.3 * wide, 28
+    )
