@@ -4,8 +4,12 @@ The reference's points stand for small discs of its surface. An observed point i
 
     e^2 = n^2 + (glide * max(t - zone, 0))^2
 
-from a disc with offset ``n`` along the disc's normal and ``t`` across it, where ``zone`` is the spacing of the
-reference's points: the distance from the surface that the discs sample, rather than from the samples themselves.
+from a disc with offset ``n`` along the disc's normal and ``t`` across it, where ``zone`` is the radius of the disc: the
+distance from the surface that the discs sample, rather than from the samples themselves.
+
+What is seen of an object lies on its surface, but an object that is too large fits that as well. So the other way
+round, every point of the reference, hidden or not, must lie within the outline of what is seen: points that would
+appear next to it are at a distance, too.
 """
 
 from __future__ import annotations
@@ -23,90 +27,160 @@ GLIDE = 0.4
 """Weight of offsets across a surface against those from it: with none, flat parts would slide along themselves."""
 _ZONE = 0.7
 """Radius of the disc that a point stands for, over the spacing of points."""
+_GAP = 2.0
+"""Gap within an outline over the mean distance of neighbouring rays: for random rays, few points have a wider one."""
+_OUTLINE_POINTS = 64
+"""Points of each part that must lie within the outline; the first ones are spread as evenly as all."""
 _HIDDEN = 10.0
 """Squared distance, in diagonals, added for a disc that faces away from the camera: it could not be seen."""
 
 
 @dataclass(frozen=True, eq=False)
+class Target(Batch):
+    """An observed cloud, prepared for matching.
+
+    Attributes
+    ----------
+    observed : Observed
+    share : (B, N) float
+        Weights of the points; they add up to 1.
+    middle : (B, 1, 3) float
+        Mean of the points.
+    unit : (B,) float
+        Diagonal of the object, metres, in which distances are counted.
+    rays : (B, N, 2) float
+        Points on the image plane at depth 1; those without weight are far off.
+    gap : (B,) float
+        Distance on that plane that may lie between a point within the outline and the nearest ray.
+    """
+
+    observed: Observed
+    share: Tensor
+    middle: Tensor
+    unit: Tensor
+    rays: Tensor
+    gap: Tensor
+
+    @staticmethod
+    def of(observed: Observed, unit: Tensor) -> Target:
+        """Prepare clouds whose objects have diagonals ``unit (B,)``."""
+        share = observed.weight / observed.weight.sum(1, keepdim=True).clamp(min=1e-12)
+        middle = (share[..., None] * observed.points).sum(1, keepdim=True)
+        rays = observed.points[..., :2] / observed.points[..., 2:].clamp(min=1e-6)
+        rays = torch.where(observed.weight[..., None] > 0, rays, 1e3)
+        apart = torch.cdist(rays, rays)
+        apart.diagonal(dim1=1, dim2=2).fill_(torch.inf)
+        gap = _GAP * (share * apart.amin(-1)).sum(1)
+        return Target(observed, share, middle, unit, rays, gap)
+
+
+@dataclass(frozen=True, eq=False)
 class Matches(Batch):
-    """Discs that belong to observed points, and the offsets of the points from them. Camera frame.
+    """Distances between a cloud and a posed reference. Camera frame; R rows: observed points, then outline points.
 
     Attributes
     ----------
     theta : Theta
         State in which the reference was posed.
-    local : (B, N, 3) float
-        Centres of the discs, in the reference's rest frame.
-    normal, across : (B, N, 3) float
-        Unit directions: the disc's normal, and from its centre towards the point along the disc.
-    offset : (B, N) float
-        Along the normal, in diagonals.
-    excess : (B, N) float
-        Along the disc beyond its radius, in diagonals; 0 for points above it.
+    posed : Posed
+    point : (B, R, 3) float
+        Where a distance is measured.
+    part : (B, R) int64
+        Part of the reference that it depends on.
+    local : (B, R, 3) float
+        The reference's own point, in its rest frame.
+    normal, across : (B, R, 3) float
+        Unit directions in which the point is off.
+    offset, excess : (B, R) float
+        By how much, in diagonals; the second counts :data:`GLIDE` times.
+    weight : (B, R) float
     """
 
     theta: Theta
+    posed: Posed
+    point: Tensor
+    part: Tensor
     local: Tensor
     normal: Tensor
     across: Tensor
     offset: Tensor
     excess: Tensor
+    weight: Tensor
 
     @property
     def square(self) -> Tensor:
-        """(B, N) squared distances e^2, in diagonals."""
+        """(B, R) squared distances e^2, in diagonals."""
         return self.offset**2 + (GLIDE * self.excess) ** 2
 
 
-def match(shapes: Shapes, observed: Observed, theta: Theta, unit: Tensor) -> tuple[Matches, Posed]:
-    """The nearest visible disc of its own part, for every observed point.
+def match(shapes: Shapes, target: Target, theta: Theta, outline_weight: float) -> Matches:
+    """Distances of a cloud from the reference in state ``theta``, and of the reference from the cloud's outline.
 
-    Parameters
-    ----------
-    shapes : Shapes
-    observed : Observed
-    theta : Theta
-    unit : (B,) float
-        Diagonal of the observed object, metres, in which distances are counted.
-
-    Returns
-    -------
-    Matches
-    Posed
-        Where ``theta`` puts the reference's parts.
+    Every observed point goes with the nearest disc of its own part that faces the camera.
     """
     posed = pose_parts(shapes.trees, theta, shapes.box_center)
     points = posed.points(shapes.points, shapes.box_center)
+    rows = [_surface(shapes, target, posed, points)]
+    if outline_weight > 0:
+        rows.append(_outline(shapes, target, points[:, :, :_OUTLINE_POINTS], outline_weight))
+    return Matches(theta, posed, *(torch.cat(column, dim=1) for column in zip(*rows, strict=True)))
+
+
+def _surface(shapes: Shapes, target: Target, posed: Posed, points: Tensor) -> tuple[Tensor, ...]:
+    """Rows of :class:`Matches` for the observed points."""
+    observed = target.observed
     normals = posed.normals(shapes.normals)
-    nearest = _nearest_disc(shapes, observed, points, normals, unit)
+    nearest = _nearest_disc(target, points, normals)
     B, P, M, _ = points.shape
     flat = observed.part * M + nearest.gather(1, observed.part[:, None])[:, 0]
 
     def at(values: Tensor) -> Tensor:
         return values.reshape(B, P * M, 3).gather(1, flat[..., None].expand(-1, -1, 3))
 
-    normal, scale = at(normals), unit[:, None]
+    normal, unit = at(normals), target.unit[:, None]
     apart = observed.points - at(points)
     offset = (apart * normal).sum(-1)
     sideways = apart - offset[..., None] * normal
     length = torch.linalg.vector_norm(sideways, dim=-1)
-    growth = posed.scale.mean(-1)
-    radius = (_ZONE * growth * shapes.spacing).gather(1, observed.part)
-    excess = torch.where(torch.isfinite(radius), (length - radius).clamp(min=0.0), 0.0)
+    radius = (_ZONE * posed.scale.mean(-1) * shapes.spacing).gather(1, observed.part)
+    excess = (length - radius).clamp(min=0.0) / unit
     across = sideways / length.clamp(min=1e-12)[..., None]
-    return Matches(theta, at(shapes.points), normal, across, offset / scale, excess / scale), posed
+    # Points labelled as a part that has no surface say nothing.
+    weight = target.share * torch.isfinite(radius)
+    return observed.points, observed.part, at(shapes.points), normal, across, offset / unit, excess, weight
 
 
-def _nearest_disc(shapes: Shapes, observed: Observed, points: Tensor, normals: Tensor, unit: Tensor) -> Tensor:
+def _outline(shapes: Shapes, target: Target, points: Tensor, outline_weight: float) -> tuple[Tensor, ...]:
+    """Rows of :class:`Matches` for points of the reference (B, P, M, 3), which must appear within the outline."""
+    B, P, M, _ = points.shape
+    point = points.flatten(1, 2)
+    depth = point[..., 2:].clamp(min=1e-6)
+    rays = point[..., :2] / depth
+    cost = (target.rays**2).sum(-1)[:, None] - 2.0 * rays @ target.rays.transpose(1, 2)
+    nearest = target.rays.gather(1, cost.argmin(-1)[..., None].expand(-1, -1, 2))
+    outwards = rays - nearest
+    length = torch.linalg.vector_norm(outwards, dim=-1)
+    outwards = outwards / length.clamp(min=1e-12)[..., None]
+    # depth * length grows by outwards . (dx - rays * dz) when the point moves: pushed against that, it comes back.
+    push = -torch.cat([outwards, -(outwards * rays).sum(-1, keepdim=True)], dim=-1)
+    offset = depth[..., 0] * (length - target.gap[:, None]).clamp(min=0.0) / target.unit[:, None]
+    solid = shapes.has_surface.to(point.dtype)
+    weight = outline_weight * solid / (M * solid.sum(1, keepdim=True).clamp(min=1.0))
+    part = torch.arange(P, device=point.device).repeat_interleave(M).expand(B, -1)
+    own = shapes.points[:, :, :M].flatten(1, 2)
+    zero = torch.zeros_like(point)
+    return point, part, own, push * (offset > 0)[..., None], zero, offset, zero[..., 0], weight.repeat_interleave(M, 1)
+
+
+def _nearest_disc(target: Target, points: Tensor, normals: Tensor) -> Tensor:
     """(B, P, N) index of the disc of each part that each point is nearest to.
 
     ``(n . (x - y))^2 + w |x - y|^2`` is linear in ten products of the point's coordinates, so that all pairs take one
     matrix product.
     """
-    middle = observed.points.mean(dim=1, keepdim=True)  # small numbers, for single precision
-    scale = unit[:, None, None]
-    x = ((observed.points - middle) / scale).float()
-    y = ((points - middle[:, None]) / scale[..., None]).float()
+    unit = target.unit[:, None, None]  # small numbers, for single precision
+    x = ((target.observed.points - target.middle) / unit).float()
+    y = ((points - target.middle[:, None]) / unit[..., None]).float()
     n = normals.float()
     facing = (points * normals).sum(-1) < 0.0  # the camera is at the origin
     weight = GLIDE**2

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from artperl.batch import Batch
-from artperl.matching import GLIDE, Matches, match
+from artperl.matching import GLIDE, Matches, Target, match
 from artperl.pose import Posed, Theta, Trees, clamp_state, complete_state, joint_axes, parent_pose
 from artperl.rotations import rotate, rotation_from_vector
 from artperl.shapes import Observed, Shapes
@@ -42,6 +42,8 @@ class RefineOptions:
     """Logarithm of a part's own scale against that of the whole."""
     sigma_shift: float = 0.04
     """Position of a joint's anchor."""
+    outline_weight: float = 0.3
+    """Weight of the reference's points outside the cloud's outline against that of the cloud's points."""
     prior_weight: float = 2e-5
     """Squared distance that a deviation of one sigma costs."""
     tolerance: float = 1e-4
@@ -93,8 +95,9 @@ def refine(shapes: Shapes, observed: Observed, start: Theta, options: RefineOpti
     unit = shapes.diagonal * start.log_scale.mean(-1).exp()
     prior = _Prior.of(shapes, unit, options)
     start = replace(start, state=clamp_state(shapes.trees, start.state))
-    current, posed = match(shapes, observed, start, unit)
-    first = _energy(observed, current, prior, options.robust_end)
+    target = Target.of(observed, unit)
+    current = match(shapes, target, start, options.outline_weight)
+    first = _energy(current, prior, options.robust_end)
     best, best_energy = start, first
     damping = torch.full_like(unit, 1e-2)
     steps = torch.zeros_like(unit, dtype=torch.int64)
@@ -102,13 +105,15 @@ def refine(shapes: Shapes, observed: Observed, start: Theta, options: RefineOpti
     width = options.robust_start
     for i in range(options.iterations):
         rigid = i < options.rigid_iterations
-        before = _energy(observed, current, prior, width)
-        step = _step(shapes, observed, current, posed, prior, width, damping, rigid)
-        candidate, candidate_posed = match(shapes, observed, _moved(shapes.trees, current.theta, step, observed), unit)
-        after = _energy(observed, candidate, prior, width)
+        before = _energy(current, prior, width)
+        step = _step(shapes, target, current, prior, width, damping, rigid)
+        candidate = match(
+            shapes, target, _moved(shapes.trees, current.theta, step, target.middle), options.outline_weight
+        )
+        after = _energy(candidate, prior, width)
         better = after < before
-        current, posed = candidate.where(better, current), candidate_posed.where(better, posed)
-        final = _energy(observed, current, prior, options.robust_end)
+        current = candidate.where(better, current)
+        final = _energy(current, prior, options.robust_end)
         improved = final < best_energy
         best, best_energy = current.theta.where(improved, best), torch.where(improved, final, best_energy)
         steps += better
@@ -163,7 +168,7 @@ class _Prior(Batch):
         return torch.cat([pose, theta.log_scale, theta.stretch.flatten(1), theta.shift.flatten(1)], dim=1)
 
 
-def _energy(observed: Observed, matches: Matches, prior: _Prior, width: float) -> Tensor:
+def _energy(matches: Matches, prior: _Prior, width: float) -> Tensor:
     """(B,) mean robust squared distance in diagonals, plus what the prior costs.
 
     Geman-McClure's ``w^2 e^2 / (w^2 + e^2)``: it falls when the width w shrinks, so that narrowing it on the way never
@@ -171,26 +176,17 @@ def _energy(observed: Observed, matches: Matches, prior: _Prior, width: float) -
     """
     square = matches.square
     robust = width**2 * square / (width**2 + square)
-    total = observed.weight.sum(1).clamp(min=1e-12)
-    return (observed.weight * robust).sum(1) / total + prior.cost(matches.theta)
+    return (matches.weight * robust).sum(1) + prior.cost(matches.theta)
 
 
 def _step(
-    shapes: Shapes,
-    observed: Observed,
-    matches: Matches,
-    posed: Posed,
-    prior: _Prior,
-    width: float,
-    damping: Tensor,
-    rigid: bool,
+    shapes: Shapes, target: Target, matches: Matches, prior: _Prior, width: float, damping: Tensor, rigid: bool
 ) -> Tensor:
     """(B, D) damped Gauss-Newton step of the reweighted least squares; shape parameters stay when ``rigid``."""
-    robust = (width**2 / (width**2 + matches.square)) ** 2
-    weight = observed.weight * robust / observed.weight.sum(1, keepdim=True).clamp(min=1e-12)
+    weight = matches.weight * (width**2 / (width**2 + matches.square)) ** 2
     directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
     residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
-    rows = _columns(shapes, observed, matches, posed, directions.flatten(1, 2), rigid) / prior.unit[:, None, None]
+    rows = _columns(shapes, target.middle, matches, directions, rigid).flatten(1, 2) / prior.unit[:, None, None]
     D = rows.shape[-1]
     active = prior.active[:, :D]
     rows = rows * active[:, None]
@@ -215,49 +211,50 @@ def _step(
     return torch.nn.functional.pad(step, (0, prior.active.shape[1] - D))
 
 
-def _columns(
-    shapes: Shapes, observed: Observed, matches: Matches, posed: Posed, directions: Tensor, rigid: bool
-) -> Tensor:
+def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tensor, rigid: bool) -> Tensor:
     """Derivatives of the points' offsets from the reference along given directions.
 
     Parameters
     ----------
-    directions : (B, 2 N, 3) float
-        Two for each point, in the camera frame; they turn with the part.
+    middle : (B, 1, 3) float
+        What the object turns about.
+    directions : (B, R, 2, 3) float
+        In the camera frame; they turn with the part.
 
     Returns
     -------
-    (B, 2 N, D) float
-        Columns: turn about the middle of the cloud (3), motion (3), states (P), and unless ``rigid`` log_scale (3),
-        stretch (3 P), shift (3 P).
+    (B, R, 2, D) float
+        Columns: turn about the middle (3), motion (3), states (P), and unless ``rigid`` log_scale (3), stretch (3 P),
+        shift (3 P).
     """
-    trees = shapes.trees
-    B, R, _ = directions.shape
+    trees, posed = shapes.trees, matches.posed
     P = trees.num_rows
-    part = observed.part.repeat_interleave(2, dim=1)
-    moment = torch.linalg.cross(
-        (observed.points - middle(observed)).repeat_interleave(2, dim=1), directions
-    )  # the turning effect of a push along each direction
+    moment = torch.linalg.cross((matches.point - middle)[:, :, None].expand_as(directions), directions)
     axis, origin = joint_axes(trees, posed)
-    moment_axis = torch.linalg.cross(axis, origin - middle(observed))
-    pitch = (trees.slide * posed.reach)[..., None]
-    turning = moment @ (trees.turn[..., None] * axis).transpose(1, 2)
-    sliding = directions @ (pitch * axis - trees.turn[..., None] * moment_axis).transpose(1, 2)
-    carried = trees.carries.to(moment.dtype).gather(2, part[:, None].expand(-1, P, -1)).transpose(1, 2)
-    states = carried * (turning + sliding)
+    turn = trees.turn[..., None]
+    # The moment about a joint's axis is that about the middle less the direction's own about the axis (Pluecker).
+    lines = torch.cat(
+        [turn * axis, (trees.slide * posed.reach)[..., None] * axis - turn * torch.linalg.cross(axis, origin - middle)],
+        dim=-1,
+    )
+    effect = (torch.cat([moment, directions], dim=-1).flatten(1, 2) @ lines.transpose(1, 2)).unflatten(
+        1, directions.shape[1:3]
+    )  # type: ignore[no-untyped-call]
+    carried = _rows(trees.carries.transpose(1, 2).to(moment.dtype), matches.part)[:, :, None]
     follow = trees.multiplier[..., None] * torch.nn.functional.one_hot(trees.source, P)
-    blocks = [moment, directions, states @ follow]
+    blocks = [moment, directions, (carried * effect) @ follow[:, None]]
     if not rigid:
-        rotation = _rows(posed.rotation.flatten(2), part).reshape(B, R, 3, 3)
-        local = (directions[..., None, :] @ rotation)[..., 0, :]
+        local = directions @ _rows(posed.rotation.flatten(2), matches.part).reshape(*matches.part.shape, 3, 3)
         above, _ = parent_pose(trees, posed)
-        offset = matches.local.repeat_interleave(2, dim=1) - _rows(shapes.box_center, part)
-        own = local * _rows(posed.scale, part) * offset
-        lever = _scale_lever(shapes, matches.theta, posed, above)
-        whole = own + (directions[..., None, :] @ _rows(lever.flatten(2), part).reshape(B, R, 3, 3))[..., 0, :]
-        stretch = torch.nn.functional.one_hot(part, P)[..., None] * own[..., None, :]
-        shift = carried[..., None] * torch.einsum("bri,bpij->brpj", directions, above)
-        blocks += [whole, stretch.flatten(2), shift.flatten(2)]
+        own = (
+            local
+            * (_rows(posed.scale, matches.part) * (matches.local - _rows(shapes.box_center, matches.part)))[:, :, None]
+        )
+        lever = _rows(_scale_lever(shapes, matches.theta, posed, above).flatten(2), matches.part)
+        whole = own + directions @ lever.reshape(*matches.part.shape, 3, 3)
+        stretch = torch.nn.functional.one_hot(matches.part, P)[:, :, None, :, None] * own[..., None, :]
+        shift = carried[..., None] * torch.einsum("brdi,bpij->brdpj", directions, above)
+        blocks += [whole, stretch.flatten(3), shift.flatten(3)]
     return -torch.cat(blocks, dim=-1)
 
 
@@ -275,11 +272,11 @@ def _scale_lever(shapes: Shapes, theta: Theta, posed: Posed, above: Tensor) -> T
     return center + torch.einsum("bjk,bjxi->bkxi", trees.carries.to(center.dtype), anchor + along)
 
 
-def _moved(trees: Trees, theta: Theta, step: Tensor, observed: Observed) -> Theta:
+def _moved(trees: Trees, theta: Theta, step: Tensor, middle: Tensor) -> Theta:
     """Theta after a step of the parameters that :func:`_columns` lists; states stay within their limits."""
     P = trees.num_rows
     turn = rotation_from_vector(step[:, :3])
-    pivot = middle(observed)[:, 0]
+    pivot = middle[:, 0]
     parts = step[:, 9 + P :].reshape(len(step), 2, P, 3)
     return Theta(
         turn @ theta.rotation,
@@ -289,11 +286,6 @@ def _moved(trees: Trees, theta: Theta, step: Tensor, observed: Observed) -> Thet
         theta.shift + parts[:, 1],
         theta.stretch + parts[:, 0],
     )
-
-
-def middle(observed: Observed) -> Tensor:
-    """(B, 1, 3) mean of the points."""
-    return observed.points.mean(dim=1, keepdim=True)
 
 
 def _rows(values: Tensor, part: Tensor) -> Tensor:
