@@ -42,6 +42,8 @@ class Layout:
         From the middle to a cheek beside the hinge.
     run : float
         By how far the cheeks reach forward.
+    back : float
+        Rear end of the base.
     """
 
     length: float
@@ -52,6 +54,7 @@ class Layout:
     magazine: float
     inside: float
     run: float
+    back: float
 
 
 def build(rng: np.random.Generator) -> Assembly:
@@ -70,13 +73,16 @@ def build(rng: np.random.Generator) -> Assembly:
         magazine=hinge + rng.uniform(0.3, 0.6) * tail,
         inside=0.5 * width + SKIRT + 2 * GAP,
         run=rng.uniform(1.2, 2.5) * tail,
+        back=tail * (rng.uniform(0.5, 0.8) if rng.random() < 0.5 else rng.uniform(1.0, 2.2)),
     )
     arm_width = max(width * rng.uniform(1.25, 1.9), 2 * lay.inside)
+    if rng.random() < 0.15:  # short and wide, like those for a schoolbag
+        arm_width *= rng.uniform(1.4, 2.1)
     stapler = Assembly()
     stapler.add("base", _base(rng, lay, arm_width), density=2500.0)
     magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
     widest = _opening(arm, lay)
-    wide = min(np.deg2rad(rng.uniform(60, 110) if rng.random() < 0.6 else rng.uniform(110, 165)), widest)
+    wide = min(np.deg2rad(rng.uniform(80, 125) if rng.random() < 0.6 else rng.uniform(125, 170)), widest)
     axis, origin = (0, 1, 0), (0, 0, hinge)
     if rng.random() < 0.55:
         lift = min(np.deg2rad(rng.uniform(12, 50)), 0.5 * wide)
@@ -89,11 +95,12 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _opening(solid: Solid, lay: Layout) -> float:
-    """Angle up to which what turns stays above the base's top."""
+    """Angle up to which what turns stays above the base, or behind it."""
     points = np.concatenate([vertices for vertices, _ in solid.piece_meshes()])
     angles = np.deg2rad(np.arange(0.0, 171.0, 2.0))
     heights = lay.hinge + (points[:, 2] - lay.hinge) * np.cos(angles)[:, None] - points[:, 0] * np.sin(angles)[:, None]
-    low = heights.min(axis=1) < lay.base + 2 * GAP
+    forward = points[:, 0] * np.cos(angles)[:, None] + (points[:, 2] - lay.hinge) * np.sin(angles)[:, None]
+    low = ((heights < lay.base + 2 * GAP) & (forward < lay.back + 2 * GAP)).any(axis=1)
     low[angles < 0.5] = False  # near rest only the front is low, and it rises
     return float(angles[np.argmax(low) - 1]) if low.any() else float(angles[-1])
 
@@ -101,7 +108,7 @@ def _opening(solid: Solid, lay: Layout) -> float:
 def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
     """Plate with an anvil at the front and cheeks beside the hinge."""
     front = -lay.length - rng.uniform(0.0, 0.012)
-    back = lay.tail + rng.uniform(0.0, 0.012)
+    back = lay.back
     cheek = rng.uniform(0.0015, 0.003)
     inside, run = lay.inside, lay.run
     half = max(0.5 * arm_width * rng.uniform(0.95, 1.35), inside + cheek + 0.001)
@@ -128,8 +135,8 @@ def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
     rise = lay.hinge + rng.uniform(0.3, 0.6) * lay.tail
     for side in (-1, 1):
         y = sorted((side * inside, side * (inside + cheek)))
-        foot = [(-run, lay.base - 0.002), (0.95 * lay.tail, lay.base - 0.002)]
-        crown = [(-0.5 * lay.tail, rise), (0.4 * lay.tail, rise), (0.9 * lay.tail, lay.hinge)]
+        foot = [(-run, lay.base - 0.002), (min(0.95 * lay.tail, 0.98 * back), lay.base - 0.002)]
+        crown = [(-0.5 * lay.tail, rise), (0.4 * lay.tail, rise), (min(0.9 * lay.tail, 0.98 * back), lay.hinge)]
         solid += prism(foot + crown, y[0], y[1], axis=1)
         head = side * (inside + cheek)
         solid += cylinder((0, head - side * 0.001, lay.hinge), (0, head + side * 0.0008, lay.hinge), 0.3 * lay.tail)
@@ -157,7 +164,9 @@ def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
     narrow = lay.inside - GAP
     front = -lay.length - rng.uniform(0.0, 0.006)
     neck = -lay.run - 0.001
-    x = np.array([front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, 0.8 * lay.tail])
+    x = np.array(
+        [front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, rng.uniform(0.3, 0.6) * lay.tail]
+    )
     kind = str(rng.choice(["straight", "arched", "nosed", "wedge"]))
     heights: Array = {
         "straight": np.array([0.85, 0.95, 1.0, 1.0, 0.9, 0.8, 0.5]),
@@ -184,6 +193,6 @@ def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
         skirt = [(0.92 * front, low + 0.001), (0.88 * front, low - hem), (neck, low - hem), (neck, low + 0.001)]
         solid += prism(skirt, y[0], y[1], axis=1)
         eye = cylinder((0, y[0], lay.hinge), (0, y[1], lay.hinge), 0.7 * lay.tail, sections=16)
-        ends = box((neck, y[0], low), (0.5 * lay.tail, y[1], low + 0.002))
+        ends = box((neck, y[0], low), (0.3 * lay.tail, y[1], low + 0.002))
         solid += hull_of(eye, ends)
     return solid
