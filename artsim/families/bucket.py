@@ -12,6 +12,9 @@ from artsim.assembly import Assembly, revolute
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, ring, tube, vessel
 
+SIDES = 20
+"""Segments of the vessel's circle."""
+
 
 def build(rng: np.random.Generator) -> Assembly:
     """A bucket whose bail swings to both sides."""
@@ -19,7 +22,7 @@ def build(rng: np.random.Generator) -> Assembly:
     height = top * rng.uniform(1.2, 2.4)
     wall = rng.uniform(0.0018, 0.004)
     profile = _profile(rng, top, height)
-    body = vessel(profile, wall, sections=28) + _rim(rng, top, height, wall, profile)
+    body = vessel(profile, wall, sections=SIDES) + _rim(rng, top, height, wall, profile)
     oval = rng.uniform(0.7, 0.95) if rng.random() < 0.15 else 1.0  # narrower from front to back
     body = body.scaled((oval, 1.0, 1.0))
     rim_z = height + 0.004
@@ -56,7 +59,7 @@ def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
             [(bottom, 0.0), (0.97 * middle, bend * height), (middle, (bend + 0.03) * height), (top, height)]
         )
     if kind == "belly":
-        shares = np.linspace(0.0, 1.0, 5)
+        shares = np.linspace(0.0, 1.0, 4)
         bulge = np.sin(np.pi * shares) * top * rng.uniform(0.02, 0.06)
         return np.column_stack([bottom + (top - bottom) * shares + bulge * (shares < 1), shares * height])
     if kind == "foot":
@@ -66,16 +69,16 @@ def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
 
 def _rim(rng: np.random.Generator, top: float, height: float, wall: float, profile: Array) -> Solid:
     """Rolled rim, hoops around the side, and a spout."""
-    solid = ring((0, 0, height), (0, 0, 1), top - wall - 0.001, top + rng.uniform(0.002, 0.006), 0.006, 28)
-    for share in rng.uniform(0.2, 0.8, int(rng.choice([0, 1, 2], p=[0.5, 0.3, 0.2]))):
+    solid = ring((0, 0, height), (0, 0, 1), top - wall - 0.001, top + rng.uniform(0.002, 0.006), 0.006, SIDES)
+    for share in rng.uniform(0.2, 0.8, int(rng.choice([0, 1, 2], p=[0.5, 0.35, 0.15]))):
         radius = float(np.interp(share * height, profile[:, 1], profile[:, 0]))
         slack = np.abs(np.diff(profile[:, 0])).max() * 0.06
         solid += ring(
-            (0, 0, share * height), (0, 0, 1), radius - wall, radius + slack + 0.002, rng.uniform(0.006, 0.02), 28
+            (0, 0, share * height), (0, 0, 1), radius - wall, radius + slack + 0.002, rng.uniform(0.006, 0.02), SIDES
         )
     if rng.random() < 0.3:
         foot = profile[0, 0]
-        solid += ring((0, 0, -0.003), (0, 0, 1), foot - 0.012, foot - 0.001, 0.012, 28)
+        solid += ring((0, 0, -0.003), (0, 0, 1), foot - 0.012, foot - 0.001, 0.012, SIDES)
     return solid
 
 
@@ -95,10 +98,10 @@ def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin
     curved = rng.random() < 0.85
     height = reach * rng.uniform(1.0, 1.35)
     if curved:  # from a half circle to a rounded rectangle
-        angles = np.linspace(0.0, np.pi, 21)
+        angles = np.linspace(0.0, np.pi, 17)
         cosine, sine, power = np.cos(angles), np.sin(angles), rng.choice([0.95, rng.uniform(0.5, 0.95)])
         path = np.column_stack(
-            [np.zeros(21), half * np.sign(cosine) * np.abs(cosine) ** power, pivot + height * sine**power]
+            [np.zeros(17), half * np.sign(cosine) * np.abs(cosine) ** power, pivot + height * sine**power]
         )
     else:
         straight, flat = 0.55 * height, rng.uniform(0.4, 0.8)
@@ -109,7 +112,7 @@ def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin
     path[-1] += (path[-2] - path[-1]) * lift
     solid = tube(path, wire, 8)
     for side_y in (-half, half):
-        solid += ring((0, side_y, pivot), (0, 1, 0), 1.1 * pin, 2.0 * pin + wire, 0.004, 16)
+        solid += ring((0, side_y, pivot), (0, 1, 0), 1.1 * pin, 2.0 * pin + wire, 0.004, 10)
     if rng.random() < 0.6:
         z = path[:, 2].max()
         radius, length = rng.uniform(0.007, 0.013), 0.35 * half
