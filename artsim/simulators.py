@@ -9,7 +9,8 @@ about the file:
   themselves.
 - SAPIEN: ``fix_root_link=True``. Its physics needs no graphics; visual shapes are left out here.
 
-``mimic`` is a wish that no simulator grants to states that are set from outside: values are given to every joint.
+Simulators that keep joints which follow others together (``mimic``) do so by forces: a state that is set from outside
+must name every joint, and here it does.
 """
 
 from __future__ import annotations

@@ -126,9 +126,9 @@ class Robot:
     def states(self, q: Array) -> dict[str, float]:
         """Value of each joint for a (K,) state of the object, metres and radians."""
         q = self.obj.tree.complete_state(q)
-        values = {joint.name: float(q[self.links[joint.child].part]) for joint in self.joints}
+        values = {joint.name: float(q[k]) for k, joint in enumerate(self.obj.tree.joints) if k > 0}
         for joint in self.joints:
-            if self.links[joint.child].part < 0 and joint.mimic is not None:
+            if joint.name not in values and joint.mimic is not None:  # the sliding joint of a screw
                 source, multiplier, offset = joint.mimic
                 values[joint.name] = multiplier * values[source] + offset
         return values
@@ -137,7 +137,8 @@ class Robot:
 def as_robot(obj: ArticulatedObject) -> Robot:
     """Write an object as links and joints.
 
-    A screw becomes a prismatic joint, a helper link and a continuous joint; the first follows the second.
+    A screw becomes a prismatic joint, a helper link and a continuous joint, which the first follows. In the other order
+    SAPIEN would couple the two, by a tendon whose force on the thread is that of a metre for each radian.
 
     Raises
     ------
@@ -166,12 +167,12 @@ def as_robot(obj: ArticulatedObject) -> Robot:
         if k > 0:
             parent = index[joint.parent]
             if joint.type == "screw":
-                links.append(
-                    Link(_unused(f"{obj.parts[k].name}_thread", used), -1, origin, inertia.share(HELPER_SHARE))
-                )
+                slide = _unused(f"{obj.parts[k].name}_slide", used)
+                joints.append(_slide(slide, joint, parent, len(links), carried[k]))
+                parent = len(links)
+                helper = _unused(f"{obj.parts[k].name}_thread", used)
+                links.append(Link(helper, -1, origin, inertia.share(HELPER_SHARE)))
                 inertia = inertia.share(1.0 - HELPER_SHARE)
-                joints.append(_slide(obj, k, joint, parent, len(links) - 1, carried[k], used))
-                parent = len(links) - 1
             joints.append(_joint(obj, joint, parent, len(links), carried[k]))
         index.append(len(links))
         links.append(_link(obj, k, origin, inertia))
@@ -224,14 +225,11 @@ def _joint(obj: ArticulatedObject, joint: Joint, parent: int, child: int, carrie
     return _driven(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
 
 
-def _slide(
-    obj: ArticulatedObject, k: int, joint: Joint, parent: int, child: int, carried: Inertia, used: set[str]
-) -> LinkJoint:
+def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:
     """The prismatic joint of a screw."""
-    name = _unused(f"{obj.parts[k].name}_slide", used)
     lower, upper = sorted((joint.lower * joint.pitch, joint.upper * joint.pitch))
     if not (np.isfinite(lower) and np.isfinite(upper)):
-        raise AssetError("a screw without limits cannot be written", f"joint of {obj.parts[k].name!r}", "limit it")
+        raise AssetError("a screw without limits cannot be written", f"joint {joint.name!r}", "limit it")
     return _driven(name, "prismatic", parent, child, joint, lower, upper, carried, (joint.name, joint.pitch, 0.0))
 
 
