@@ -1,4 +1,4 @@
-"""The program ``artsim``: generate, generate-objects, view, inspect, verify."""
+"""The program ``artsim``: generate, generate-objects, view, inspect, verify, doctor."""
 
 from __future__ import annotations
 
@@ -229,6 +229,19 @@ class Verify:
         print(f"{self.path}: sound")
 
 
+@dataclass(frozen=True)
+class Doctor:
+    """Try every backend: does it work, on which device, how fast, and what to do if not."""
+
+    backends: tyro.conf.Positional[tuple[str, ...]] = ()
+    """raycast, pybullet, pybullet-egl, sapien, maniskill, torch; by default all of them."""
+
+    def run(self) -> None:
+        from artsim.doctor import BACKENDS, examine, table
+
+        print(table([examine(backend) for backend in self.backends or BACKENDS]))
+
+
 def _categories(named: tuple[str, ...]) -> tuple[str, ...]:
     """Categories by name; 'all' stands for every one."""
     from artsim.families import FAMILIES
@@ -243,6 +256,7 @@ Verb = (
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
+    | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
 
 

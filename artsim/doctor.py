@@ -1,0 +1,216 @@
+"""Which backends work on this machine, on which device, how fast, and how to mend those that do not.
+
+Each backend is tried in a process of its own: some drivers crash the process that asks for a device in vain.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+from artsim.errors import ArtsimError, ConfigError, RenderError
+
+SIZE = 128
+"""Width and height of the pictures that rates are measured with, pixels."""
+
+_MEASURE = 1.0  # seconds
+_TIMEOUT = 300.0  # seconds; drivers compile their shaders first
+_START_EGL = """
+import importlib.util, pybullet
+pybullet.connect(pybullet.DIRECT)
+pybullet.loadPlugin(importlib.util.find_spec("eglRenderer").origin, "_eglRendererPlugin")
+"""  # the only way to learn the device is from what PyBullet prints
+_MENDS = {
+    "raycast": "pip install --force-reinstall embreex",
+    "pybullet": "pip install 'artsim[pybullet]'",
+    "pybullet-egl": "pip install 'artsim[pybullet]', then scripts/install-system.sh as root",
+    "sapien": "pip install 'artsim[sapien]', then scripts/install-vulkan.sh as root",
+    "maniskill": "pip install mani-skill, then scripts/install-vulkan.sh as root",
+    "torch": "pip install 'artsim[train]'",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found out about one backend.
+
+    Attributes
+    ----------
+    backend : str
+    works : bool
+    device : str
+        What it runs on; empty if it does not.
+    fps : float or None
+        Pictures of a laptop (depth and part ids) per second; None where the backend makes none.
+    problem, mend : str
+        What is wrong and what to do about it; empty if nothing is.
+    """
+
+    backend: str
+    works: bool
+    device: str = ""
+    fps: float | None = None
+    problem: str = ""
+    mend: str = ""
+
+
+def examine(backend: str) -> Finding:
+    """Try one of ``BACKENDS`` in a process of its own.
+
+    Parameters
+    ----------
+    backend : str
+
+    Raises
+    ------
+    ConfigError
+        When there is no such backend.
+    """
+    if backend not in BACKENDS:
+        raise ConfigError(f"there is no backend {backend!r}", "backend", f"use one of {', '.join(BACKENDS)}")
+    try:
+        child = subprocess.run(
+            [sys.executable, "-m", "artsim.doctor", backend], capture_output=True, text=True, timeout=_TIMEOUT
+        )
+    except subprocess.TimeoutExpired:
+        return _broken(backend, f"gave no answer within {_TIMEOUT:.0f} s")
+    # A process that has answered may still crash at its exit.
+    for line in reversed(child.stdout.splitlines()):
+        if line.startswith('{"backend":'):
+            return Finding(**json.loads(line))
+    if child.returncode < 0:
+        return _broken(backend, f"crashes its process ({signal.Signals(-child.returncode).name})")
+    last = (child.stderr.strip().splitlines() or [f"ended with {child.returncode}"])[-1]
+    return _broken(backend, last)
+
+
+def _broken(backend: str, problem: str, mend: str = "") -> Finding:
+    return Finding(backend, works=False, problem=problem, mend=mend or _MENDS[backend])
+
+
+def table(findings: list[Finding]) -> str:
+    """Findings as text: a line for each backend, and one more for what to do about those that do not work."""
+    width = max(len("device"), *(len(finding.device) for finding in findings))
+    lines = [f"{'backend':<14}{'works':<7}{'device':<{width + 2}}frames/s at {SIZE}x{SIZE}"]
+    for finding in findings:
+        rate = "" if finding.fps is None else f"{finding.fps:.0f}"
+        lines.append(f"{finding.backend:<14}{'yes' if finding.works else 'no':<7}{finding.device:<{width + 2}}{rate}")
+        if not finding.works:
+            lines.append(f"{'':<14}{finding.problem}\n{'':<14}mend: {finding.mend}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _rate(draw: Callable[[], object]) -> float:
+    """Calls per second, after a first one."""
+    draw()
+    count, start = 0, time.perf_counter()
+    while (elapsed := time.perf_counter() - start) < _MEASURE or count == 0:
+        draw()
+        count += 1
+    return count / elapsed
+
+
+def _renderer_fps(name: str) -> float:
+    from artsim.camera import Camera
+    from artsim.families import make
+    from artsim.renderers import make_renderer
+
+    obj, renderer = make("laptop", seed=0), make_renderer(name)
+    reach = 1.5 * obj.diagonal
+    camera = Camera.look_at((-reach, 0.4 * reach, 0.6 * reach), (0.0, 0.0, 0.0), SIZE, SIZE)
+    if not (renderer.render(obj, obj.tree.rest, camera).depth > 0).any():
+        raise RenderError("draws an empty picture", name)
+    return _rate(lambda: renderer.render(obj, obj.tree.rest, camera))
+
+
+def _processor() -> str:
+    """Name of the processor, where the system tells."""
+    try:
+        with open("/proc/cpuinfo") as file:  # noqa: PTH123
+            names = re.findall(r"^model name\s*: *(.*)$", file.read(), flags=re.MULTILINE)
+    except OSError:
+        names = []
+    return f"CPU ({names[0]}, {len(names)} threads)" if names else "CPU"
+
+
+def _raycast() -> tuple[str, float | None]:
+    return _processor(), _renderer_fps("raycast")
+
+
+def _pybullet() -> tuple[str, float | None]:
+    return _processor(), _renderer_fps("pybullet")
+
+
+def _pybullet_egl() -> tuple[str, float | None]:
+    fps = _renderer_fps("pybullet-egl")
+    said = subprocess.run([sys.executable, "-c", _START_EGL], capture_output=True, text=True, timeout=_TIMEOUT).stdout
+    found = re.search(r"^GL_RENDERER=(.*)$", said, flags=re.MULTILINE)
+    return found[1] if found else "", fps
+
+
+def _sapien() -> tuple[str, float | None]:
+    from artsim.renderers.sapien import import_sapien
+
+    return str(import_sapien().render.RenderSystem().device.name), _renderer_fps("sapien")
+
+
+def _maniskill() -> tuple[str, float | None]:
+    """ManiSkill's own simplest scene with a camera, a step each time."""
+    from artsim.renderers.sapien import import_sapien
+
+    device = str(import_sapien().render.RenderSystem().device.name)
+    import gymnasium
+    import mani_skill.envs  # noqa: F401 - registers its environments
+
+    backend = "gpu" if _torch_device() != "cpu" else "cpu"
+    env = gymnasium.make("PickCube-v1", obs_mode="depth+segmentation", render_backend=backend, sim_backend="cpu")
+    env.reset(seed=0)
+    return device, _rate(lambda: env.step(None))
+
+
+def _torch_device() -> str:
+    import torch
+
+    return "cuda" if torch.cuda.is_available() else "cpu"
+
+
+def _torch() -> tuple[str, float | None]:
+    import torch
+
+    device = torch.cuda.get_device_name() if _torch_device() == "cuda" else _processor()
+    torch.ones(2, device=_torch_device()).sum().item()
+    return device, None
+
+
+BACKENDS: dict[str, Callable[[], tuple[str, float | None]]] = {
+    "raycast": _raycast,
+    "pybullet": _pybullet,
+    "pybullet-egl": _pybullet_egl,
+    "sapien": _sapien,
+    "maniskill": _maniskill,
+    "torch": _torch,
+}
+"""What tries each backend: its device and frames per second."""
+
+
+def _answer(backend: str) -> Finding:
+    """Try a backend in this process."""
+    try:
+        device, fps = BACKENDS[backend]()
+    except ArtsimError as error:
+        return _broken(backend, error.what, error.mend or "")
+    except ImportError as error:
+        return _broken(backend, f"cannot be imported ({error})")
+    except Exception as error:  # backends fail in many ways
+        return _broken(backend, f"{type(error).__name__}: {error}")
+    return Finding(backend, works=True, device=device, fps=fps)
+
+
+if __name__ == "__main__":
+    print(json.dumps(asdict(_answer(sys.argv[1]))), flush=True)
