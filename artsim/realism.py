@@ -45,7 +45,7 @@ _VIEWS = ViewOptions(preset="sphere", width=320, height=320)
 _NUM_VIEWS = 12
 _POINTS_PER_VIEW = 2000
 _CELL = 0.01  # points are thinned to one in each cube of this side, which evens out their density
-_WHOLE, _PART = 1024, 256  # points of an object and of a part whose distance from another's whole cloud is averaged
+_WHOLE, _PART = 512, 128  # points of an object and of a part whose distance from another's whole cloud is averaged
 _LEVER = 0.5  # diagonals: where angles are turned into lengths
 _ODD_JOINT = 1.0  # placement and range of joints that move differently, or of one without a partner
 
@@ -240,8 +240,10 @@ def _visible_surface(obj: ArticulatedObject, rng: np.random.Generator) -> tuple[
             ids.append(np.full(len(seen), k))
     points, part = np.concatenate(clouds), np.concatenate(ids)
     order = rng.permutation(len(points))
-    cells = np.column_stack([np.floor(points[order] / _CELL).astype(np.int64), part[order]])
-    kept = order[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
+    cells = np.floor(points[order] / _CELL).astype(np.int64)
+    cells -= cells.min(axis=0)
+    number = np.ravel_multi_index((*cells.T, part[order]), (*(cells.max(axis=0) + 1), len(obj)))
+    kept = order[np.unique(number, return_index=True)[1]]
     return points[kept], part[kept]
 
 
