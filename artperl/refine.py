@@ -239,7 +239,7 @@ def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tenso
     )
     effect = (torch.cat([moment, directions], dim=-1).flatten(1, 2) @ lines.transpose(1, 2)).unflatten(
         1, directions.shape[1:3]
-    )  # type: ignore[no-untyped-call]
+    )
     carried = _rows(trees.carries.transpose(1, 2).to(moment.dtype), matches.part)[:, :, None]
     follow = trees.multiplier[..., None] * torch.nn.functional.one_hot(trees.source, P)
     blocks = [moment, directions, (carried * effect) @ follow[:, None]]
