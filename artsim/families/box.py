@@ -50,7 +50,10 @@ def _rigid(rng: np.random.Generator) -> Assembly:
             lid = box((-x, min(sign * y, sign * GAP), seam), (x, max(sign * y, sign * GAP), seam + thick))
             lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)
             chest.add(
-                f"lid_{number}", lid, revolute("body", axis, (0, sign * (y + 0.001), seam), 0.0, limit), density=700.0
+                f"lid_{number}",
+                lid,
+                revolute("body", axis, (0, sign * (y + band + 0.001), seam), 0.0, limit),
+                density=700.0,
             )
         return chest
     lid, top, domed = _lid(rng, x, y, seam, height, wall, radius, band == 0.0)

@@ -121,8 +121,8 @@ def _controls(rng: np.random.Generator, machine: Assembly, face: float, y: float
             )
         else:
             size = min(rng.uniform(0.008, 0.012), room)
-            key = cylinder((face - GAP, center[1], z), (face - 0.007, center[1], z), size, 0.92 * size, 16)
-            machine.add(f"button_{number}", key, prismatic("body", (1, 0, 0), 0.0, 0.001, center), density=900.0)
+            key = cylinder((face - 0.0032, center[1], z), (face - 0.011, center[1], z), size, 0.92 * size, 16)
+            machine.add(f"button_{number}", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, center), density=900.0)
 
 
 def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, height: float) -> None:
@@ -171,8 +171,8 @@ def _drip(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.5:
         _controls(rng, machine, reach, 0.7 * (y - shrink), head_low, height)
     else:
-        key = rounded_box((reach - 0.006, -0.012, z - 0.008), (reach - GAP, 0.012, z + 0.008), 0.002)
-        machine.add("button", key, prismatic("body", (1, 0, 0), 0.0, 0.001, (reach, 0, z)), density=900.0)
+        key = rounded_box((reach - 0.010, -0.012, z - 0.008), (reach - 0.0032, 0.012, z + 0.008), 0.002)
+        machine.add("button", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, (reach, 0, z)), density=900.0)
     return machine
 
 

@@ -218,8 +218,8 @@ def _bail(
 
 def _bag(rng: np.random.Generator) -> Assembly:
     """Bag with a closed body and one or two bails."""
-    y, z = rng.uniform(0.13, 0.26), rng.uniform(0.18, 0.34)
-    x = rng.uniform(0.06, 0.12)
+    y = rng.uniform(0.13, 0.26)
+    z, x = y * rng.uniform(1.1, 1.6), y * rng.uniform(0.4, 0.6)
     kind = int(rng.integers(3))
     top = rng.uniform(0.25, 0.7) if kind == 0 else 1.0
     flare = rng.uniform(0.75, 1.0)
