@@ -75,7 +75,7 @@ def build(rng: np.random.Generator) -> Assembly:
 
     fridge = Assembly()
     fridge.add("body", _body(rng, half, depth, foot, top, style, fronts, small), density=120.0)
-    opening = np.deg2rad(rng.uniform(90.0, 170.0))
+    opening = np.deg2rad(rng.uniform(90.0, 179.0))
     doors = drawers = 0
     dispenser = layout in ("beside", "french") and rng.random() < 0.5
     for side, right, left, low, high in fronts:
@@ -100,7 +100,7 @@ def build(rng: np.random.Generator) -> Assembly:
                 (-style.thick - 0.014, y - 0.05, z + 0.08), (-0.5 * style.thick, y + 0.05, z + 0.13), 0.004
             )
         name = f"door_{doors}" if layout != "single" else "door"
-        edge = corner_high[1] if side > 0 else corner_low[1]
+        edge = left if side > 0 else right
         fridge.add(name, solid, side_hinge(0.0, edge, opening, side > 0), density=200.0)
     return fridge
 

@@ -81,7 +81,7 @@ def build(rng: np.random.Generator) -> Assembly:
     safe = Assembly()
     safe.add("body", placed(_body(rng, shape)), density=2500.0)
     x, y = shape.hinge
-    upper = np.deg2rad(rng.uniform(95.0, 165.0))
+    upper = np.deg2rad(rng.uniform(100.0, 176.0))
     face = shape.door[0][0]
     opener = str(rng.choice(["lever", "wheel", "pull"], p=[0.45, 0.3, 0.25]))
     combination = bool(rng.random() < 0.6)

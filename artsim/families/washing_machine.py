@@ -1,8 +1,8 @@
 """Washing machines: front loaders with a porthole, top loaders with a lid.
 
 What varies: round or square door, hinged left or right, with a glass bowl or closed; drawer for the detergent; dials,
-keys and display; console of a top loader, its lid with or without a window; a drum or agitator that turns; feet,
-plinth, worktop.
+keys and display; console of a top loader, its lid hinged at the back or at a side; a drum or agitator that turns;
+feet, plinth, worktop.
 """
 
 from __future__ import annotations
@@ -196,9 +196,15 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
         lid += box(low + (edge - 0.002, edge - 0.002, 0.3 * thick), high - (edge - 0.002, edge - 0.002, 0.3 * thick))
     else:
         lid = rounded_box(low, high, 0.008)
-    lid += rounded_box((low[0] - 0.012, -0.07, low[2] + 0.004), (low[0] + 0.01, 0.07, high[2] - 0.003), 0.004)
-    upper = np.deg2rad(rng.uniform(75.0, 89.0))
-    machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
+    if rng.random() < 0.65:  # hinged at the back
+        upper = np.deg2rad(rng.uniform(75.0, 89.0))
+        lid += rounded_box((low[0] - 0.012, -0.07, low[2] + 0.004), (low[0] + 0.01, 0.07, high[2] - 0.003), 0.004)
+        machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
+    else:
+        upper, side = np.deg2rad(rng.uniform(85.0, 120.0)), int(rng.choice([-1, 1]))
+        x, free = 0.5 * (low[0] + high[0]), -side * high[1]
+        lid += rounded_box((x - 0.06, free - 0.01, low[2] + 0.004), (x + 0.06, free + 0.01, high[2] - 0.003), 0.004)
+        machine.add("lid", lid, revolute("body", (-side, 0, 0), (x, side * high[1], high[2]), 0.0, upper))
     machine.add(
         "drum", _agitator(rng, center, radius, s), continuous("body", (0, 0, 1), (*center, s.low)), density=900.0
     )
