@@ -13,7 +13,7 @@ from artsim.solids import Solid, Vector, cylinder
 
 Index = NDArray[np.int64]
 
-_STATES = 192
+_STATES = 256
 _DESCENTS = 4
 _ROUNDS = 30
 
@@ -54,10 +54,10 @@ class Link:
         self.capsules.append(np.array([*(start + inset), *(end - inset), 1.17 * radius]))
 
 
-def narrow_limits(links: list[Link], margin: float) -> None:
+def narrow_limits(links: list[Link], margin: float) -> bool:
     """Narrow the limits of a chain's joints until links that no joint connects keep clear of one another.
 
-    Tested in fixed random states, every other one with most joints close to a limit, and in states around the
+    Tested in fixed random states, every other one with most joints close to a limit or at it, and in states around the
     closest of those, again and again. Two links that are close at rest may be closer than ``margin``: half their
     distance at rest.
 
@@ -67,27 +67,34 @@ def narrow_limits(links: list[Link], margin: float) -> None:
         The first is the root, each of the others hangs on the one before it. Their joints are replaced.
     margin : float
         Metres between the capsules.
+
+    Returns
+    -------
+    bool
+        False when that cannot be: capsules touch at rest.
     """
     pairs = _Pairs(links)
     if not pairs.first.size:
-        return
+        return True
     wanted = np.minimum(margin, 0.5 * pairs.gaps(np.zeros((1, len(links)))))
     if wanted.min() <= 0:
-        raise ValueError("two links of the chain touch at rest")
+        return False
     rng = np.random.default_rng(0)
     unit = rng.random((_STATES, len(links)))
     unit[::2] = 0.5 - 0.5 * np.cos(np.pi * unit[::2])
+    unit[::4] = np.round(unit[::4])
     for _ in range(_ROUNDS):
         bounds = np.array([_interval(link.joint) for link in links])
         tight = _tight_pairs(pairs, wanted, bounds, unit, rng)
         if not tight.any():
-            return
+            return True
         for k in pairs.joints_between(tight):
             joint = links[k].joint
             assert joint is not None
             if np.isfinite(joint.lower):
                 share = links[k].narrowing
                 links[k].joint = replace(joint, lower=share * joint.lower, upper=share * joint.upper)
+    return False
 
 
 def _tight_pairs(

@@ -127,14 +127,16 @@ class _Chain:
 
 def build(rng: np.random.Generator) -> Assembly:
     """A robot arm, stretched out or bent at rest."""
-    reach = rng.uniform(0.4, 1.6)
-    chain = _Chain(rng, reach * rng.uniform(0.055, 0.085))
-    if rng.random() < 0.17:
-        _scara(chain, reach, str(rng.choice(SCARAS)))
-    else:
-        _arm(chain, reach, str(rng.choice(ARMS)))
-    spread = _tool(chain)
-    narrow_limits(chain.links, 0.025 * reach)
+    while True:
+        reach = rng.uniform(0.4, 1.6)
+        chain = _Chain(rng, reach * rng.uniform(0.055, 0.085))
+        if rng.random() < 0.17:
+            _scara(chain, reach, str(rng.choice(SCARAS)))
+        else:
+            _arm(chain, reach, str(rng.choice(ARMS)))
+        spread = _tool(chain)
+        if narrow_limits(chain.links, 0.025 * reach):
+            break
 
     arm = Assembly()
     for link in chain.links:
