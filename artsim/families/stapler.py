@@ -77,7 +77,7 @@ def build(rng: np.random.Generator) -> Assembly:
     )
     arm_width = max(width * rng.uniform(1.25, 1.9), 2 * lay.inside)
     if rng.random() < 0.15:  # short and wide, like those for a schoolbag
-        arm_width *= rng.uniform(1.4, 2.1)
+        arm_width = min(arm_width * rng.uniform(1.4, 2.1), 0.5 * length)
     stapler = Assembly()
     stapler.add("base", _base(rng, lay, arm_width), density=2500.0)
     magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
@@ -96,7 +96,9 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _opening(solid: Solid, lay: Layout) -> float:
     """Angle up to which what turns stays above the base, or behind it."""
-    points = np.concatenate([vertices for vertices, _ in solid.piece_meshes()])
+    corners = np.concatenate([vertices[faces] for vertices, faces in solid.piece_meshes()])
+    points = np.concatenate([corners + t * (np.roll(corners, 1, axis=1) - corners) for t in (0.0, 0.25, 0.5, 0.75)])
+    points = points.reshape(-1, 3)
     angles = np.deg2rad(np.arange(0.0, 171.0, 2.0))
     heights = lay.hinge + (points[:, 2] - lay.hinge) * np.cos(angles)[:, None] - points[:, 0] * np.sin(angles)[:, None]
     forward = points[:, 0] * np.cos(angles)[:, None] + (points[:, 2] - lay.hinge) * np.sin(angles)[:, None]
@@ -114,7 +116,7 @@ def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
     half = max(0.5 * arm_width * rng.uniform(0.95, 1.35), inside + cheek + 0.001)
     kind = str(rng.choice(["plain", "boat", "round"], p=[0.5, 0.3, 0.2]))
     if kind == "round":
-        half *= rng.uniform(1.3, 1.9)
+        half = max(half, min(half * rng.uniform(1.3, 1.9), 0.3 * (back - front)))
         ends = [cylinder((x, 0, 0), (x, 0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
         solid = hull_of(*ends) + rounded_box(
             (front + 0.4 * half, -0.5 * arm_width, 0.001), (back, 0.5 * arm_width, lay.base), 0.003, axis=2
