@@ -20,6 +20,7 @@ lint: $(VENV)/.ready-dev
 bench: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.kinematics
 	$(PY) -m benchmarks.agreement
+	$(PY) -m benchmarks.renderers
 	$(PY) -m benchmarks.generation
 	$(PY) -m benchmarks.resume
 	$(PY) -m benchmarks.objects

@@ -29,6 +29,9 @@ from artsim.renderers.raycast import pose, render_posed
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.sources import Source, family_sources, find_sources
 
+Scene = tuple[ArticulatedObject, Array, Camera]
+"""A sized object, its joint states and the camera that looks at it."""
+
 _EDGE = 2  # pixels
 _JUMP = 2e-3  # metres between neighbouring pixels, beyond the local slope: a silhouette
 _COINCIDENT = 1e-4  # metres between the surfaces of two parts
@@ -58,7 +61,7 @@ class Agreement:
     object_pixels: int = 0
     reasons: Counter[str] = field(default_factory=Counter)
 
-    def add(self, posed_obj: tuple[ArticulatedObject, Array, Camera], rays: Frame, other: Frame) -> None:
+    def add(self, scene: Scene, rays: Frame, other: Frame) -> None:
         """Take in one image."""
         shown = (rays.part_ids != BACKGROUND) | (other.part_ids != BACKGROUND)
         same = (rays.part_ids == other.part_ids) & (rays.part_ids != BACKGROUND)
@@ -69,7 +72,7 @@ class Agreement:
         self.object_pixels += int(shown.sum())
         differ = shown & ~same
         if differ.any():
-            coincident = differ & coincident_parts(*posed_obj, rays, other)
+            coincident = differ & coincident_parts(*scene, rays, other)
             self.reasons["two parts' surfaces coincide"] += int(coincident.sum())
             self.reasons["within 2 px of an edge"] += int((differ & ~coincident & edge).sum())
             self.reasons["not explained"] += int((differ & ~coincident & ~edge).sum())
@@ -116,7 +119,7 @@ def coincident_parts(obj: ArticulatedObject, q: Array, camera: Camera, rays: Fra
     return apart < _COINCIDENT
 
 
-def compare(scenes: Sequence[tuple[ArticulatedObject, Array, Camera]], renderer: Renderer) -> Agreement:
+def compare(scenes: Sequence[Scene], renderer: Renderer) -> Agreement:
     """Agreement of a renderer with the ray caster over some scenes."""
     rays = make_renderer("raycast")
     agreement = Agreement()
@@ -125,9 +128,7 @@ def compare(scenes: Sequence[tuple[ArticulatedObject, Array, Camera]], renderer:
     return agreement
 
 
-def draw_scenes(
-    obj: ArticulatedObject, states: int, views: int, seed: int
-) -> list[tuple[ArticulatedObject, Array, Camera]]:
+def draw_scenes(obj: ArticulatedObject, states: int, views: int, seed: int) -> list[Scene]:
     """Random states and views of an object made 1 m large."""
     rng, obj = np.random.default_rng(seed), obj.with_diagonal(1.0)
     scenes = []
