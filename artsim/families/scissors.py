@@ -57,6 +57,7 @@ def build(rng: np.random.Generator) -> Assembly:
     pivot = width * rng.uniform(0.22, 0.38)
     button = sheet * rng.uniform(0.4, 1.0)
 
+    opening = np.deg2rad(rng.uniform(45.0, 100.0))
     scissors = Assembly()
     middle = sheet + GAP / 2
     for k, name in enumerate(("blade_1", "blade_2")):
@@ -64,7 +65,9 @@ def build(rng: np.random.Generator) -> Assembly:
         low = k * (sheet + GAP)
         side = 1.0 if k == 0 else -1.0
         solid = union(prism(piece * (1.0, side), low, low + sheet) for piece in point)
-        solid += _handle(rings[k], side, low, sheet, width, bar, height, plastic)
+        handle = _handle(rings[k], side, low, sheet, width, bar, height, plastic)
+        opening = min(opening, _clear_opening(handle, low, low + sheet, width))
+        solid += handle
         if k == 0 and rest > 0:
             solid += _finger_rest(rings[k], rest, bar, middle)
         outward = 1 if k else -1
@@ -72,9 +75,7 @@ def build(rng: np.random.Generator) -> Assembly:
         solid += cylinder(
             (0, 0, face - 0.5 * outward * sheet), (0, 0, face + outward * button), pivot, 0.85 * pivot, 20
         )
-        joint = (
-            None if k == 0 else revolute("blade_1", (0, 0, -1), (0, 0, middle), 0.0, np.deg2rad(rng.uniform(45, 100)))
-        )
+        joint = None if k == 0 else revolute("blade_1", (0, 0, -1), (0, 0, middle), 0.0, opening)
         scissors.add(name, solid, joint, label="blade", density=4500.0)
     return scissors
 
@@ -145,6 +146,15 @@ def _handle(
             ends = np.concatenate([sections[i % len(sections)] for i in (first, second)])
             solid += hull_of(start, hull(ends))
     return solid
+
+
+def _clear_opening(handle: Solid, low: float, high: float, width: float) -> float:
+    """Angle up to which what is thicker than a blade's layer stays clear of the other blade's back."""
+    points = np.concatenate([vertices for vertices, _ in handle.piece_meshes()])
+    thick = points[(points[:, 2] < low - 1e-6) | (points[:, 2] > high + 1e-6)]
+    away = np.hypot(thick[:, 0], thick[:, 1])
+    turned = np.abs(np.arctan2(thick[:, 1], thick[:, 0])) + np.arcsin(np.minimum(1.0, 0.9 * width / away))
+    return float(np.pi - turned.max() - 0.05)
 
 
 def _sections(path: Array, width: float, height: float) -> list[Array]:
