@@ -131,7 +131,7 @@ def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, dept
     solid = rounded_box(start - side + front, end + side + back, 0.25 * min(thickness, depth))
     for share in (0.06, 0.94):
         foot = start + share * (end - start)
-        solid += box(foot - half + 0.8 * front, foot + half + (0.002, 0.0, 0.0))
+        solid += box(foot - half + 0.5 * (front + back), foot + half + (0.002, 0.0, 0.0))
     return solid
 
 
