@@ -37,12 +37,15 @@ class _Chain:
         self.square = rng.random() < 0.35
         self.side = float(rng.choice([-1.0, 1.0]))
         self.same_side = rng.random() < 0.5
+        self.widest = radius
+        """Half the width of the link so far: the next one steps past that."""
 
     @property
     def link(self) -> Link:
         return self.links[-1]
 
-    def _next(self, joint: JointSpec) -> None:
+    def begin(self, joint: JointSpec) -> None:
+        """Start the next link, on a joint to this one."""
         self.links.append(Link(f"link_{len(self.links)}", joint))
 
     @property
@@ -54,7 +57,7 @@ class _Chain:
         end = self.at + length * self.along
         r = self.radius
         if plate:
-            half = 0.7 * self._half(end_radius) * self.lateral
+            half = 0.7 * end_radius * self.lateral
             discs = [cylinder(p - half, p + half, q) for p, q in ((self.at, r), (end, end_radius))]
             self.link.solid += hull_of(*discs)
             self.link.guard(self.at - r * self.along, end + end_radius * self.along, r)
@@ -73,10 +76,6 @@ class _Chain:
         self.link.solid += hull(np.concatenate([start + half * outline, end + end_half * outline]))
         self.link.guard(start, end, 1.2 * max(half, end_half))
 
-    def _half(self, radius: float) -> float:
-        """Half width of a bend's housing: no part of the link is wider."""
-        return 1.0 * radius
-
     def roll(self, spin: bool = False) -> None:
         """Joint about the link's direction, between two round flanges."""
         r = self.radius
@@ -86,15 +85,16 @@ class _Chain:
         joint = (
             continuous(self.name, self.along, face) if spin else revolute(self.name, self.along, face, -limit, limit)
         )
-        self._next(joint)
+        self.begin(joint)
         self.link.narrowing = 0.97
+        self.widest = r
         self.at = face + GAP * self.along
         self.link.rod(self.at, self.at + 0.5 * r * self.along, r)
         self.at = self.at + 0.45 * r * self.along
 
     def bend(self, angle: float, radius: float, reach: tuple[float, float]) -> None:
         """Joint about the lateral axis: the next link lies beside this one and turns freely past it."""
-        r, half = self.radius, self._half(self.radius)
+        r, half = self.radius, max(self.radius, self.widest)
         if not self.same_side:
             self.side = -self.side
         step = self.side * self.lateral
@@ -102,9 +102,9 @@ class _Chain:
         self.link.rod(self.at - (half - cap) * step, self.at + half * step, r)
         self.link.solid += cylinder(self.at - half * step, self.at, 0.75 * r, sections=20)
         center = self.at + (half + GAP) * step
-        self._next(revolute(self.name, self.lateral, center, *reach))
+        self.begin(revolute(self.name, self.lateral, center, *reach))
         self.radius = radius
-        half = self._half(radius)
+        half = self.widest = radius
         self.link.rod(center, center + (2 * half - cap) * step, r)
         self.link.solid += cylinder(center + half * step, center + 2 * half * step, 0.75 * r, sections=20)
         self.at = center + half * step
@@ -118,7 +118,7 @@ class _Chain:
         self.link.solid += cylinder(self.at - 0.3 * r * d, self.at + 0.2 * r * d, r, sections=20)
         self.link.guard(self.at, self.at + depth * d, r)
         mouth = self.at + depth * d
-        self._next(prismatic(self.name, d, 0.0, travel, mouth))
+        self.begin(prismatic(self.name, d, 0.0, travel, mouth))
         inner = bore - GAP
         self.link.rod(mouth - min(depth - 0.3 * r, travel + 0.2 * depth) * d, mouth + 0.6 * r * d, inner)
         self.at, self.radius = mouth + 0.3 * r * d, 0.9 * r
@@ -191,10 +191,9 @@ def _rest_angles(rng: np.random.Generator, bends: int) -> Array:
 def _base(chain: _Chain, reach: float) -> None:
     """Plate and column, on a rail by chance."""
     rng, r = chain.rng, chain.radius
-    link = chain.link
     if rng.random() < 0.15:
         _rail(chain, reach)
-        link = chain.link
+    link = chain.link
     floor = chain.at.copy()
     height = r * rng.uniform(1.0, 3.5)
     wide = r * rng.uniform(1.15, 1.7)
@@ -219,7 +218,6 @@ def _rail(chain: _Chain, reach: float) -> None:
     low[axis], high[axis] = -half, half + travel
     low[other], high[other] = -1.1 * r, 1.1 * r
     high[2] = r
-    shift = np.zeros(3)
     chain.link.solid += rounded_box(low, high, 0.15 * r)
     for side in (-0.7, 0.7):
         a, b = low.copy(), high.copy()
@@ -230,11 +228,11 @@ def _rail(chain: _Chain, reach: float) -> None:
     ends[:, other], ends[:, 2] = 0.0, 0.5 * r
     chain.link.guard(ends[0], ends[1], 1.25 * r)
     direction = np.eye(3)[axis]
-    chain._next(prismatic(chain.name, direction, 0.0, travel, (0, 0, 1.15 * r)))
+    chain.begin(prismatic(chain.name, direction, 0.0, travel, (0, 0, 1.15 * r)))
     bottom = 1.15 * r + GAP
     chain.link.solid += rounded_box((-half, -half, bottom), (half, half, bottom + 0.5 * r), 0.1 * r)
     chain.link.guard((0, 0, bottom), (0, 0, bottom + 0.5 * r), 1.8 * r)
-    chain.at = np.array([0.0, 0.0, bottom + 0.49 * r]) + shift
+    chain.at = np.array([0.0, 0.0, bottom + 0.49 * r])
 
 
 def _scara(chain: _Chain, reach: float, kinds: str) -> None:
@@ -271,7 +269,7 @@ def _quill(chain: _Chain, height: float) -> None:
     chain.link.solid += ring(middle, down, bore, r, top - bottom, 20)
     chain.link.guard(center + (0, 0, bottom), center + (0, 0, top), r)
     mouth = center + (0, 0, bottom)
-    chain._next(prismatic(chain.name, down, 0.0, travel, mouth))
+    chain.begin(prismatic(chain.name, down, 0.0, travel, mouth))
     chain.link.rod(center + (0, 0, top + travel), mouth + 1.9 * r * down, bore - GAP)
     chain.along, chain.lateral, chain.radius = down, np.array([0.0, 1.0, 0.0]), 0.8 * r
     chain.at = mouth + 1.8 * r * down
