@@ -115,7 +115,7 @@ def _controls(rng: np.random.Generator, machine: Assembly, face: float, y: float
     for number, share in enumerate(np.linspace(-1.0, 1.0, int(rng.integers(1, 4)) + 2)[1:-1]):
         center = (face, share * 0.9 * y, z)
         if rng.random() < 0.5:
-            size = min(rng.uniform(0.012, 0.024), room, 0.25 * y)
+            size = min(rng.uniform(0.012, 0.024), room, 0.2 * y)
             machine.add(
                 f"knob_{number}", dial(center, OUT, 0.018, size), continuous("body", OUT, center), density=900.0
             )

@@ -214,7 +214,7 @@ def _front_box(cell: Cell, style: Style) -> tuple[Array, Array]:
             np.array([style.face + style.thickness, cell.high[0] - margin, cell.high[1] - margin]),
         )
     grow_low, grow_high = (
-        [min(style.lap, style.board - 0.001 if outer else style.board / 2 - GAP) for outer in edges]
+        [min(style.lap, style.board - 0.0025 if outer else style.board / 2 - GAP) for outer in edges]
         for edges in (cell.outer_low, cell.outer_high)
     )
     x = style.face - GAP

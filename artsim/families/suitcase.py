@@ -85,8 +85,8 @@ def _trolley(rng: np.random.Generator) -> Assembly:
         places = []
         for s in (-1.0, 1.0):  # feet in front, wheel arches behind
             back += rounded_box(
-                (seam + 0.012, s * (y - 0.05) - 0.012, 0.0),
-                (seam + 0.027, s * (y - 0.05) + 0.012, lift + 0.01),
+                (seam + 0.004, s * (y - 0.05) - 0.012, 0.0),
+                (seam + 0.017, s * (y - 0.05) + 0.012, lift + 0.01),
                 0.003,
             )
             for cheek in (-0.022, 0.022):
