@@ -17,7 +17,8 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
 fi
 missing=()
 for package in "${libraries[@]}"; do
-    [ -n "$(version "$package")" ] || missing+=("$package")
+    # Since 2024 some names end with t64.
+    [ -n "$(version "$package")" ] || [ -n "$(version "${package}t64")" ] || missing+=("$package")
 done
 if is_new "$(version mesa-vulkan-drivers)" && [ ${#missing[@]} -eq 0 ]; then
     exit 0
@@ -40,7 +41,7 @@ if ! is_new "$(candidate)"; then
             'Created-By: Packages' | awk -v s="$suite" '$1 == s && $2 == "main" {print $3, $4; exit}') || true
         if [ -z "${uri:-}" ]; then
             echo "no apt source of $suite main found: add $backports to the apt sources, then run $0 again" >&2
-            exit 1
+            exit 0
         fi
         entry=/etc/apt/sources.list.d/artsim-backports.sources
         printf 'Types: deb\nURIs: %s\nSuites: %s\nComponents: main\n' "$uri" "$backports" >"$entry"
@@ -51,8 +52,11 @@ if ! is_new "$(candidate)"; then
     if ! is_new "$(backported "$backports")"; then
         rm -f /etc/apt/sources.list.d/artsim-backports.sources
         echo "$backports has no mesa-vulkan-drivers >= $needed: install a newer Mesa by hand, or use a GPU's driver" >&2
-        exit 1
+        exit 0
     fi
     install+=(-t "$backports")
 fi
-"${install[@]}" mesa-vulkan-drivers "${missing[@]}" >/dev/null
+if ! said="$("${install[@]}" mesa-vulkan-drivers "${missing[@]}" 2>&1)"; then
+    echo "$said" >&2
+    echo "SAPIEN's Vulkan driver is not installed; mend what apt says, then run: $0" >&2
+fi
