@@ -10,18 +10,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
-import multiprocessing
-import os
-import signal
-import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from tqdm import tqdm
 
@@ -37,7 +32,8 @@ from artsim.plan import (
     unique_keys,
 )
 from artsim.sources import Source
-from artsim.worker import CompiledSource, compile_source, make_shard, start_worker
+from artsim.team import Team, locked
+from artsim.worker import CompiledSource, compile_source, make_shard
 
 CONVENTIONS = (
     "Metres, radians. Camera frame OpenCV (x right, y down, z forward); depth is z-depth, 0 = no return; pixel centres "
@@ -45,9 +41,6 @@ CONVENTIONS = (
     "towards -X, origin at the centre of the object's box in its rest state."
 )
 _VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
-
-P = ParamSpec("P")
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -116,10 +109,10 @@ def generate(
     options = {**json.loads(json.dumps(asked.to_dict())), "artsim_version": version("artsim")}
     del options["objects"]
     _check_options(num_samples, seed, shard_size, workers, splits, sources)
-    with _locked(folder):
+    with locked(folder):
         _remove_leftovers(folder)
         begun = _begun_plan(folder, options, sources)
-        with _Team(folder, workers) as team:
+        with Team(folder, workers) as team:
             if begun is None:
                 begun = _new_plan(folder, options, sources, team, skip_broken, progress)
             plan = Plan.from_dict(begun)
@@ -129,41 +122,6 @@ def generate(
         _complete(folder, plan, begun, finished)
     left_out = tuple(entry["why"] for entry in begun["left_out"])
     return GenerateResult(folder, plan.num_samples, plan.num_samples - before, time.perf_counter() - start, left_out)
-
-
-class _Team:
-    """The worker processes of a run: started when first given work, stopped at the end however it comes."""
-
-    def __init__(self, folder: Path, workers: int):
-        # Inherited by the processes: with one of them for each core, NumPy's own threads only get in the way.
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        context = multiprocessing.get_context("spawn")
-        self.folder, self.workers = folder, workers
-        self.made, self.stop = context.Value("q", 0), context.Event()
-        self.pool = ProcessPoolExecutor(workers, context, start_worker, (folder, self.made, self.stop))
-
-    def submit(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Give work to the processes; those that it starts never hear a Ctrl-C, which is the parent's to answer."""
-        if sys.platform == "win32":
-            return self.pool.submit(work, *args, **kwargs)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            return self.pool.submit(work, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-    def __enter__(self) -> _Team:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        self.stop.set()
-        self.pool.shutdown(wait=True, cancel_futures=True)
-        if isinstance(error, BrokenProcessPool | MemoryError):
-            raise DatasetError(
-                "a worker process died (out of memory? a script without `if __name__ == '__main__'`?)",
-                self.folder,
-                "use fewer --workers; the same command resumes",
-            ) from error
 
 
 def _check_options(
@@ -182,27 +140,6 @@ def _check_options(
     check_shares(splits)
     if not sources:
         raise AssetError("no objects to show", mend="name categories to make, or URDF files or folders that hold some")
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Keep a second run out of the folder; the lock goes with the process, however it ends."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / ".lock").open("w")
-    except OSError as error:
-        raise write_error(error, folder) from error
-    with lock:
-        if sys.platform != "win32":
-            import fcntl
-
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise DatasetError("another run is writing here", folder, "wait for it or stop it") from error
-            except OSError as error:
-                raise DatasetError(f"cannot lock ({error.strerror})", folder, "use a folder on a local disk") from error
-        yield
 
 
 def _remove_leftovers(folder: Path) -> None:
@@ -264,7 +201,7 @@ def _new_plan(
     folder: Path,
     options: Mapping[str, Any],
     sources: Sequence[Source],
-    team: _Team,
+    team: Team,
     skip_broken: bool,
     progress: bool,
 ) -> dict[str, Any]:
@@ -346,7 +283,7 @@ def _finished_shards(folder: Path, plan: Plan) -> dict[str, ShardRecord]:
 
 
 def _make_missing(
-    folder: Path, plan: Plan, finished: Mapping[str, ShardRecord], team: _Team, progress: bool
+    folder: Path, plan: Plan, finished: Mapping[str, ShardRecord], team: Team, progress: bool
 ) -> dict[str, ShardRecord]:
     """Make the shards that are not finished, writing down each as it is."""
     missing = [shard for shard in plan.shards() if shard.name not in finished]

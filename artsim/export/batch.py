@@ -26,7 +26,7 @@ from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
 from artsim.files import write_atomic, write_error
-from artsim.pipeline import _locked, _Team
+from artsim.team import Team, locked
 
 INDEX = "index.csv"
 _COLUMNS = ("folder", "category", "object_id", "parts", "joints", "free_joints", "mass_kg", "size_m", "sha256")
@@ -86,13 +86,13 @@ def generate_objects(
     check_formats(formats)
     folder = Path(out)
     wanted = [(category, number) for category in dict.fromkeys(categories) for number in range(seed, seed + count)]
-    with _locked(folder):
+    with locked(folder):
         _remove_leftovers(folder)
         found = {key: meta for key in wanted if (meta := _whole(_folder(folder, *key), formats)) is not None}
         missing = [key for key in wanted if key not in found]
         with (
             tqdm(total=len(wanted), initial=len(found), desc="objects", unit="object", disable=not progress) as bar,
-            _Team(folder, workers) as team,
+            Team(folder, workers) as team,
         ):
             waiting = iter(missing)
             pending: dict[Future[dict[str, Any]], tuple[str, int]] = {}
