@@ -53,12 +53,13 @@ def _head_fan(rng: np.random.Generator) -> Assembly:
     turn = revolute("", UP, (0, 0, height), -swing, swing) if swings else None
     stages.append(("neck", _neck(column, motor, height + (GAP if swings else -0.002), level, 0.85 * motor), turn))
     pins = 0.85 * motor + (-GAP if tilts else 0.002)
-    head, middle = _head(rng, cage, motor, level, pins)
-    down = _steepest(cage, -0.55 * motor, middle, 1.9 * column + 0.008)
+    back = -max(0.55 * motor, 1.7 * column + 0.008)  # where the cage starts, before the neck
+    head, middle = _head(rng, cage, motor, level, pins, back)
+    down = _steepest(cage, back, middle, 1.9 * column + 0.008)
     nod = revolute("", (0, 1, 0), (0, 0, level), -down, np.deg2rad(rng.uniform(15, 35))) if tilts else None
     stages.append(("head", head, nod))
-    blades = _blades(rng, cage, 2.0 * abs(middle + 0.55 * motor)).moved((middle, 0, level))
-    blades += cylinder((middle, 0, level), (-0.55 * motor - GAP, 0, level), 0.03 * cage, sections=10)
+    blades = _blades(rng, cage, 2.0 * abs(middle - back)).moved((middle, 0, level))
+    blades += cylinder((middle, 0, level), (back - GAP, 0, level), 0.03 * cage, sections=10)
     stages.append(("blades", blades, continuous("", FRONT, (middle, 0, level))))
     return _stacked(stages)
 
@@ -98,9 +99,10 @@ def _neck(column: float, motor: float, z: float, level: float, side: float) -> S
     return solid
 
 
-def _head(rng: np.random.Generator, cage: float, motor: float, level: float, pins: float) -> tuple[Solid, float]:
+def _head(
+    rng: np.random.Generator, cage: float, motor: float, level: float, pins: float, back: float
+) -> tuple[Solid, float]:
     """Motor with the cage before it; and the x of the middle of the cage."""
-    back = -0.55 * motor
     half = cage * rng.uniform(0.17, 0.26)
     middle = back - half
     wide = 0.75 * motor
