@@ -32,13 +32,18 @@ def part_energy(shapes: Shapes, observed: Observed, posed: Posed, two_sided: boo
     (B,) float
     """
     points = posed.points(shapes.points, shapes.box_center)
-    _, P, M, _ = points.shape
+    B, P, M, _ = points.shape
     of_part = torch.nn.functional.one_hot(observed.part, P).transpose(1, 2) * observed.weight[:, None]  # (B, P, N)
-    apart = torch.cdist(points.flatten(1, 2), observed.points).square().unflatten(1, (P, M))
+    with torch.no_grad():  # gradients flow through the distances of the nearest pairs alone
+        apart = torch.cdist(points.flatten(1, 2), observed.points).unflatten(1, (P, M))
+        to_reference = apart.argmin(2)
+        to_cloud = apart.masked_fill(of_part[:, :, None] <= 0, torch.inf).argmin(-1)
+    near = points.gather(2, to_reference[..., None].expand(-1, -1, -1, 3))
     seen = of_part.sum(-1)
-    total = (of_part * apart.amin(2)).sum(-1) / seen.clamp(min=1e-12)
+    total = (of_part * (observed.points[:, None] - near).square().sum(-1)).sum(-1) / seen.clamp(min=1e-12)
     if two_sided:
-        total = total + apart.masked_fill(of_part[:, :, None] <= 0, torch.inf).amin(-1).mean(-1)
+        cloud = observed.points.gather(1, to_cloud.flatten(1)[..., None].expand(-1, -1, 3)).reshape(B, P, M, 3)
+        total = total + (cloud - points).square().sum(-1).mean(-1)
     counted = (seen > 0) & shapes.has_surface
     return torch.where(counted, total, 0.0).sum(1) / shapes.diagonal**2
 

@@ -26,25 +26,27 @@ class RefineOptions:
     A sigma says how far a property of the object may differ from the reference's; 0 keeps the reference's.
     """
 
-    iterations: int = 25
+    iterations: int = 20
     """At most; fewer when nothing improves any more."""
-    rigid_iterations: int = 8
+    rigid_iterations: int = 4
     """Of these, the first that leave the reference's shape as it is."""
     robust_start: float = 0.2
     robust_end: float = 0.03
-    narrowing: float = 0.7
+    narrowing: float = 0.6
     """Distance at which a point loses its say (Geman-McClure): at first, at last, and its share kept per iteration."""
-    sigma_scale: float = 0.2
+    sigma_scale: float = 0.3
     """Logarithm of the overall scale."""
-    sigma_aspect: float = 0.15
+    sigma_aspect: float = 0.2
     """Logarithm of the scale along each axis against the overall scale."""
     sigma_stretch: float = 0.1
     """Logarithm of a part's own scale against that of the whole."""
-    sigma_shift: float = 0.04
+    sigma_shift: float = 0.1
     """Position of a joint's anchor."""
+    sigma_size: float = 0.1
+    """Logarithm of a part's size against the size that is expected, where one is."""
     outline_weight: float = 0.3
     """Weight of the reference's points outside the cloud's outline against that of the cloud's points."""
-    prior_weight: float = 2e-5
+    prior_weight: float = 5e-6
     """Squared distance that a deviation of one sigma costs."""
     tolerance: float = 1e-4
     """Relative decrease of the energy below which an object counts as done."""
@@ -73,7 +75,13 @@ class Refined(Batch):
     iterations: Tensor
 
 
-def refine(shapes: Shapes, observed: Observed, start: Theta, options: RefineOptions | None = None) -> Refined:
+def refine(
+    shapes: Shapes,
+    observed: Observed,
+    start: Theta,
+    options: RefineOptions | None = None,
+    expected_size: Tensor | None = None,
+) -> Refined:
     """Fit references to observed clouds by Levenberg-Marquardt on Theta.
 
     Every iteration matches the points anew, and a step is taken only if the robust energy, matched anew, falls; for an
@@ -86,6 +94,8 @@ def refine(shapes: Shapes, observed: Observed, start: Theta, options: RefineOpti
     start : Theta
         For several starts of one object, repeat the rows of shapes and clouds.
     options : RefineOptions, optional
+    expected_size : (B, P, 3) float, optional
+        Sizes of the parts' boxes, metres, that something else predicts; NaN where nothing does.
 
     Returns
     -------
@@ -93,74 +103,87 @@ def refine(shapes: Shapes, observed: Observed, start: Theta, options: RefineOpti
     """
     options = options or RefineOptions()
     unit = shapes.diagonal * start.log_scale.mean(-1).exp()
-    prior = _Prior.of(shapes, unit, options)
+    prior = _Prior.of(shapes, unit, options, expected_size)
     start = replace(start, state=clamp_state(shapes.trees, start.state))
     target = Target.of(observed, unit)
     current = match(shapes, target, start, options.outline_weight)
-    first = _energy(current, prior, options.robust_end)
-    best, best_energy = start, first
+    current_cost = prior.cost(start)
+    first = _robust(current, options.robust_end) + current_cost
     damping = torch.full_like(unit, 1e-2)
     steps = torch.zeros_like(unit, dtype=torch.int64)
     settled = torch.zeros_like(unit, dtype=torch.bool)
     width = options.robust_start
     for i in range(options.iterations):
         rigid = i < options.rigid_iterations
-        before = _energy(current, prior, width)
         step = _step(shapes, target, current, prior, width, damping, rigid)
-        candidate = match(
-            shapes, target, _moved(shapes.trees, current.theta, step, target.middle), options.outline_weight
-        )
-        after = _energy(candidate, prior, width)
+        theta = _moved(shapes.trees, current.theta, step, target.middle)
+        candidate, cost = match(shapes, target, theta, options.outline_weight), prior.cost(theta)
+        before, after = _robust(current, width) + current_cost, _robust(candidate, width) + cost
         better = after < before
-        current = candidate.where(better, current)
-        final = _energy(current, prior, options.robust_end)
-        improved = final < best_energy
-        best, best_energy = current.theta.where(improved, best), torch.where(improved, final, best_energy)
+        current, current_cost = candidate.where(better, current), torch.where(better, cost, current_cost)
         steps += better
         if width == options.robust_end and not rigid:
             settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 10.0)
-            if bool(settled.all()):
-                break
         damping = torch.where(better, 0.3 * damping, 8.0 * damping).clamp(1e-6, 1e8)
         width = max(options.robust_end, options.narrowing * width)
-    return Refined(best, best_energy, first, steps)
+        if bool(settled.all()):
+            break
+    final = _robust(current, options.robust_end) + current_cost
+    # Steps that paid at a larger width need not have paid at the last one.
+    improved = final < first
+    return Refined(current.theta.where(improved, start), torch.where(improved, final, first), first, steps)
 
 
 @dataclass(frozen=True, eq=False)
 class _Prior(Batch):
-    """Which parameters move, and how freely. Parameters are ordered as :func:`_columns` says."""
+    """Which parameters p move, and what they cost: ``p . precision p - 2 pull . p + constant``.
+
+    Parameters are ordered as :func:`_columns` says.
+    """
 
     active: Tensor
     precision: Tensor
-    unit: Tensor
+    pull: Tensor
+    constant: Tensor
 
     @staticmethod
-    def of(shapes: Shapes, unit: Tensor, options: RefineOptions) -> _Prior:
-        """``active (B, D)`` and ``precision (B, D, D)``, the quadratic form that deviations cost."""
+    def of(shapes: Shapes, unit: Tensor, options: RefineOptions, expected_size: Tensor | None) -> _Prior:
+        """The prior of references whose objects have diagonals ``unit (B,)``."""
         trees = shapes.trees
         B, P = trees.valid.shape
-        jointed = trees.valid & (trees.depth > 0)
         eye, mean = torch.eye(3, device=unit.device), torch.full((3, 3), 1.0 / 3.0, device=unit.device)
         always = torch.ones(B, 6, dtype=torch.bool, device=unit.device)
         scaled = torch.full((B, 3), options.sigma_scale > 0 or options.sigma_aspect > 0, device=unit.device)
         stretched = (trees.valid & shapes.has_surface & (options.sigma_stretch > 0)).repeat_interleave(3, dim=1)
-        shifted = (jointed & (options.sigma_shift > 0)).repeat_interleave(3, dim=1)
+        shifted = (trees.valid & (trees.depth > 0) & (options.sigma_shift > 0)).repeat_interleave(3, dim=1)
         active = torch.cat([always, trees.free, scaled, stretched, shifted], dim=1)
         tight = 1e-4  # a sigma of 0 for one of two that share the same parameters
+        whole, own = slice(6 + P, 9 + P), slice(9 + P, 9 + 4 * P)
         precision = unit.new_zeros(B, active.shape[1], active.shape[1])
-        first = 6 + P
-        precision[:, first : first + 3, first : first + 3] = (
+        precision[:, whole, whole] = (
             mean / 3.0 / max(options.sigma_scale, tight) ** 2 + (eye - mean) / max(options.sigma_aspect, tight) ** 2
         )
         diagonal = precision.diagonal(dim1=1, dim2=2)
-        diagonal[:, first + 3 : first + 3 + 3 * P] = max(options.sigma_stretch, tight) ** -2
-        diagonal[:, first + 3 + 3 * P :] = (unit[:, None] * max(options.sigma_shift, tight)) ** -2
-        return _Prior(active, options.prior_weight * precision * active[:, None] * active[:, :, None], unit)
+        diagonal[:, own] = max(options.sigma_stretch, tight) ** -2
+        diagonal[:, own.stop :] = (unit[:, None] * max(options.sigma_shift, tight)) ** -2
+        pull, constant = unit.new_zeros(B, active.shape[1]), torch.zeros_like(unit)
+        if expected_size is not None:
+            known = torch.isfinite(expected_size) & (expected_size > 0) & (shapes.box_size > 0)
+            missing = torch.where(known, (expected_size / shapes.box_size).log(), 0.0) / options.sigma_size
+            adds = unit.new_zeros(B, P, 3, active.shape[1])  # log_scale and stretch add up to a part's own scale
+            adds[..., whole] = eye
+            adds[..., own] = torch.eye(3 * P, device=unit.device).reshape(P, 3, 3 * P)
+            adds = (adds * known[..., None] / options.sigma_size).flatten(1, 2)
+            precision = precision + adds.transpose(1, 2) @ adds
+            pull, constant = (adds * missing.flatten(1)[..., None]).sum(1), missing.square().sum((1, 2))
+        precision = precision * active[:, None] * active[:, :, None]
+        weight = options.prior_weight
+        return _Prior(active, weight * precision, weight * pull * active, weight * constant)
 
     def cost(self, theta: Theta) -> Tensor:
         """(B,)"""
         values = self.values(theta)
-        return (values * (self.precision @ values[..., None])[..., 0]).sum(-1)
+        return (values * ((self.precision @ values[..., None])[..., 0] - 2.0 * self.pull)).sum(-1) + self.constant
 
     def values(self, theta: Theta) -> Tensor:
         """(B, D) deviations of the reference's shape; the other parameters count as 0."""
@@ -168,15 +191,14 @@ class _Prior(Batch):
         return torch.cat([pose, theta.log_scale, theta.stretch.flatten(1), theta.shift.flatten(1)], dim=1)
 
 
-def _energy(matches: Matches, prior: _Prior, width: float) -> Tensor:
-    """(B,) mean robust squared distance in diagonals, plus what the prior costs.
+def _robust(matches: Matches, width: float) -> Tensor:
+    """(B,) mean robust squared distance in diagonals.
 
     Geman-McClure's ``w^2 e^2 / (w^2 + e^2)``: it falls when the width w shrinks, so that narrowing it on the way never
     raises the energy either.
     """
     square = matches.square
-    robust = width**2 * square / (width**2 + square)
-    return (matches.weight * robust).sum(1) + prior.cost(matches.theta)
+    return (matches.weight * (width**2 * square / (width**2 + square))).sum(1)
 
 
 def _step(
@@ -186,7 +208,7 @@ def _step(
     weight = matches.weight * (width**2 / (width**2 + matches.square)) ** 2
     directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
     residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
-    rows = _columns(shapes, target.middle, matches, directions, rigid).flatten(1, 2) / prior.unit[:, None, None]
+    rows = _columns(shapes, target.middle, matches, directions, rigid).flatten(1, 2) / target.unit[:, None, None]
     D = rows.shape[-1]
     active = prior.active[:, :D]
     rows = rows * active[:, None]
@@ -194,7 +216,7 @@ def _step(
     precision = prior.precision[:, :D, :D]
     curvature = (weighted.transpose(1, 2) @ rows + precision).double()
     slope = (weighted.transpose(1, 2) @ residual[..., None])[..., 0]
-    slope = (slope + (precision @ prior.values(matches.theta)[:, :D, None])[..., 0]).double()
+    slope = (slope + (precision @ prior.values(matches.theta)[:, :D, None])[..., 0] - prior.pull[:, :D]).double()
     # A state at its limit stays there while the energy falls beyond it.
     D_states = slice(6, 6 + shapes.trees.num_rows)
     state = matches.theta.state

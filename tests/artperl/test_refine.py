@@ -130,6 +130,24 @@ def test_another_laptop_takes_on_the_shape_of_the_one_seen() -> None:
     assert np.median(translation) < np.median(errors(others, fixed.theta, truth)[1])
 
 
+def test_expected_sizes_are_met_where_the_view_leaves_them_open() -> None:
+    objects, samples = views("laptop", 12, first_seed=50)
+    others = Shapes.from_objects([artsim.make("laptop", 200 + i).with_diagonal(1.0) for i in range(12)])
+    observed, truth = observe(samples), true_theta(others, samples)
+    start = perturbed(others, truth, 15.0, 0.08)
+    sizes = torch.from_numpy(np.stack([obj.box_size for obj in objects])).float()
+    unsure = sizes.clone()
+    unsure[:, 1] = torch.nan
+
+    def wrong(expected: torch.Tensor | None) -> torch.Tensor:
+        theta = refine(others, observed, start, RefineOptions(sigma_size=0.02), expected).theta
+        scale = pose_parts(others.trees, theta, others.box_center).scale
+        return (scale * others.box_size / sizes).log().abs().mean((0, 2))
+
+    assert (wrong(sizes) < 0.5 * wrong(None)).all()
+    assert wrong(unsure)[0] < 0.5 * wrong(None)[0]
+
+
 def test_energy_never_rises_from_any_start(laptops: tuple[Shapes, Observed, Theta]) -> None:
     shapes, observed, truth = laptops
     for seed, degrees, length in ((0, 0.0, 0.0), (1, 5.0, 0.02), (2, 60.0, 0.3), (3, 170.0, 0.5)):
