@@ -148,9 +148,9 @@ class _Pairs:
     def gaps(self, states: Array) -> Array:
         """(S, P) distances in S states, in metres; negative where two capsules overlap."""
         T = self.tree.forward_kinematics(states)[:, self.owner]
-        start, end = (
-            np.einsum("sncd,nd->snc", T[..., :3, :3], self.capsules[:, i : i + 3]) + T[..., :3, 3] for i in (0, 3)
-        )
+        ends = np.stack([self.capsules[:, :3], self.capsules[:, 3:6]], axis=-1)
+        points = T[..., :3, :3] @ ends + T[..., :3, 3:]
+        start, end = points[..., 0], points[..., 1]
         radius = self.capsules[:, 6]
         middle = _segment_distance(start, end - start, self.first, self.second)
         gaps: Array = middle - radius[self.first] - radius[self.second]
