@@ -162,7 +162,9 @@ def _lid(
         profile = [(0.0, bevel), (0.3 * bevel / rise, 0.3 * bevel), (bevel / rise, 0.0), (1.0, 0.0)]
         shape = profile if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
         return (
-            rounded_tray((-x, -y, seam), (x, y, seam + rise), wall, radius, shape, side=-1, floor=wall + bevel),
+            rounded_tray(
+                (-x, -y, seam), (x, y, seam + rise), wall, radius, shape, side=-1, floor=min(wall + bevel, 0.7 * rise)
+            ),
             seam + rise,
             False,
         )
