@@ -157,7 +157,7 @@ def _lid(
     if kind == "hollow":
         rise = height * rng.uniform(0.15, 0.9)
         if radius == 0.0:
-            return tray((-x, -y, seam), (x, y, seam + rise), wall, side=-1), seam + rise, False
+            return tray((-x, -y, seam), (x, y, seam + rise), wall, min(wall, 0.7 * rise), side=-1), seam + rise, False
         bevel = min(rng.choice([0.0, 0.6 * radius]), 0.5 * rise)
         profile = [(0.0, bevel), (0.3 * bevel / rise, 0.3 * bevel), (bevel / rise, 0.0), (1.0, 0.0)]
         shape = profile if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
