@@ -1,4 +1,4 @@
-"""Dishwashers: a tub with a door that drops down about a hinge at its bottom.
+"""Dishwashers: a tub with a door that drops down about a hinge at its bottom, or one or two that slide out as drawers.
 
 What varies: built-in, free-standing (with a worktop) or for the countertop; a door over the whole front, below a fixed
 strip of controls, or only over the upper half; between side panels or over them; where the hinge lies; handle, strips,
@@ -53,6 +53,8 @@ class Shape:
 
 def build(rng: np.random.Generator) -> Assembly:
     """A dishwasher, closed at rest."""
+    if rng.random() < 0.12:
+        return _drawers(rng)
     compact, half_door = rng.random(2) < (0.08, 0.12)
     width = rng.uniform(0.42, 0.48) if rng.random() < 0.2 and not compact else rng.uniform(0.54, 0.64)
     height = width * rng.uniform(0.75, 0.95) if compact else rng.uniform(0.70, 0.9)
@@ -95,6 +97,44 @@ def build(rng: np.random.Generator) -> Assembly:
         _controls(rng, machine, shape)
     if racks == "sliding":
         _sliding_racks(rng, machine, shape)
+    return machine
+
+
+def _drawers(rng: np.random.Generator) -> Assembly:
+    """Tubs that slide out behind a full front, one above the other."""
+    count = int(rng.choice([1, 2], p=[0.65, 0.35]))
+    half, depth, wall = 0.5 * rng.uniform(0.5, 0.64), rng.uniform(0.42, 0.62), rng.uniform(0.012, 0.03)
+    plinth = rng.uniform(0.015, 0.1)
+    tall = rng.uniform(0.4, 0.75) if count == 1 else rng.uniform(0.34, 0.42)
+    shape = Shape(
+        half=half,
+        depth=depth,
+        height=plinth + count * tall,
+        wall=wall,
+        thick=rng.uniform(0.02, 0.05),
+        half_door=half + rng.uniform(-0.002, 0.025),
+        bottom=plinth - (rng.uniform(0.0, 0.012) if count == 1 else 0.0),
+        top=plinth + tall + (rng.uniform(-0.003, 0.012) if count == 1 else -0.004),
+        hinge_x=0.0,
+        hinge_z=plinth,
+        liner=0.0,
+    )
+    body = tray((shape.front, -half, plinth), (depth, half, shape.height), wall, axis=0, side=-1)
+    body += box((shape.front + rng.uniform(0.0, 0.06), -half + 0.005, 0.0), (depth, half - 0.005, plinth + 0.003))
+    if count == 2:
+        z = plinth + tall
+        body += box((shape.front, -half + 0.002, z - 0.5 * wall), (depth, half - 0.002, z + 0.5 * wall))
+    low, inside, back = plinth + wall + 0.004, half - wall - 0.005, depth - wall - rng.uniform(0.01, 0.08)
+    drawer = _door(rng, shape, True)
+    drawer += tray((-0.004, -inside, low), (back, inside, low + rng.uniform(0.6, 0.85) * (tall - 2 * wall)), 0.008)
+    if rng.random() < 0.6:
+        drawer += _rack(rng, 0.02, back - 0.03, inside - 0.02, low + 0.006)
+    machine = Assembly()
+    machine.add("body", body, density=300.0)
+    travel = rng.uniform(0.6, 0.9) * back
+    for number in range(count):
+        name = "drawer" if count == 1 else f"drawer_{number + 1}"
+        machine.add(name, drawer.moved((0, 0, number * tall)), prismatic("body", (-1, 0, 0), 0.0, travel))
     return machine
 
 

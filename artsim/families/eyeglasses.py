@@ -118,11 +118,11 @@ def _outline(rng: np.random.Generator) -> Array:
 
 def _front(rng: np.random.Generator, style: str, outline: Array, rim: float, size: float, flat: bool) -> Front:
     height = rng.uniform(5.0, 13.0 if style == "shield" else 10.0) if flat else rng.uniform(2.2, 4.0)
-    wrap = size * (rng.uniform(10.0, 20.0) if style == "shield" else rng.uniform(2.0, 9.0)) * MM
+    wrap = size * (rng.uniform(1.0, 20.0) if style == "shield" else rng.uniform(0.5, 9.0)) * MM
     low, high = outline[:, 1].min(), outline[:, 1].max()
     return Front(
         half=float(outline[:, 0].max()) + rim + rng.uniform(0.5, 4.0) * MM,
-        ahead=wrap + rng.uniform(6.0, 11.0) * MM,
+        ahead=wrap + rng.uniform(4.5, 11.0) * MM,
         wrap=wrap,
         hinge_z=float(high - rng.uniform(0.08, 0.42) * (high - low)) - 0.2 * height * MM,
         height=height * MM,
@@ -271,7 +271,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 
 def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
-    length = 2 * front.half * rng.uniform(0.92, 1.06)
+    length = 2 * front.half * (rng.uniform(0.92, 1.06) if rng.random() < 0.75 else rng.uniform(0.62, 0.92))
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
     z = -bend * (share / share[-1]) ** rng.uniform(1.2, 1.8)

@@ -56,7 +56,7 @@ def _shape(rng: np.random.Generator) -> _Shape:
     # The lid turns about a barrel between the two shells, in notches behind both.
     radius = rng.uniform(0.3, 0.45) * min(height, lid, 0.009)
     hinge_x = depth / 2 + radius * rng.uniform(-0.4, 0.9)
-    back = min(depth / 2, hinge_x - radius - 0.0012)
+    back = min(depth / 2, hinge_x - radius - 0.0008)
     front = base_front = -depth / 2
     tilt, odd = 0.0, rng.random()
     if odd < 0.07:  # a flat keyboard dock, propped up by a thick bar at the back
