@@ -11,17 +11,20 @@ from pathlib import Path
 
 import numpy as np
 from lxml import etree
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from artsim.errors import ArtsimError
 from artsim.files import read_bounded
 from artsim.kinematics import Array
-from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError
+from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
 from artsim.objects import ArticulatedObject
 from artsim.urdf import find_urdf
 from artsim.urdf_xml import MOVING_TYPES, SHAPES, safe_xml
 
 TOLERANCE = 1e-6
-"""By which an axis's length may differ from 1, and a mimic joint may leave its limits."""
+"""By which an axis's length may differ from 1, a mimic joint may leave its limits, and a piece fall short of its hull
+(as a share of the volume)."""
 
 
 def strict_urdf(path: str | Path) -> list[str]:
@@ -43,8 +46,7 @@ def strict_urdf(path: str | Path) -> list[str]:
         Each names an element and what is wrong with it.
     """
     try:
-        file = find_urdf(Path(path))
-        root = safe_xml(read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file"), file)
+        file, root = _read(path)
     except ArtsimError as error:
         return [str(error)]
     if root.tag != "robot" or not root.get("name"):
@@ -59,6 +61,61 @@ def strict_urdf(path: str | Path) -> list[str]:
     for joint in joints:
         problems += [f"joint {joint.get('name')!r}: {p}" for p in _joint_problems(joint, names)]
     return problems
+
+
+def strict_inertia(path: str | Path) -> list[str]:
+    """Problems of a URDF file's inertias: every link needs a mass, and the inertia of a possible body."""
+    try:
+        _, root = _read(path)
+    except ArtsimError as error:
+        return [str(error)]
+    return [f"link {link.get('name')!r}: {p}" for link in root.findall("link") for p in _inertial_problems(link)]
+
+
+def convex_collision_geometry(path: str | Path) -> list[str]:
+    """Problems of a URDF file's collision geometry: every link needs some, of primitives and convex meshes."""
+    try:
+        file, root = _read(path)
+    except ArtsimError as error:
+        return [str(error)]
+    helpers = _screw_helpers(root.findall("joint"))
+    reader = MeshReader(file.parent, {}, LoadLimits())
+    problems = []
+    for link in root.findall("link"):
+        shapes = link.findall("collision")
+        found = [] if shapes or link.get("name") in helpers else ["has no <collision>"]
+        found += [p for shape in shapes for p in _shape_problems(shape, reader) or _convexity_problems(shape, reader)]
+        problems += [f"link {link.get('name')!r}: {p}" for p in found]
+    return problems
+
+
+def _convexity_problems(collision: etree._Element, reader: MeshReader) -> list[str]:
+    mesh = collision.find("geometry/mesh")
+    if mesh is None:
+        return []
+    try:
+        path = reader.resolve(mesh.get("filename") or "")
+        content = read_bounded(path, reader.limits.max_mesh_bytes, "mesh")
+        vertices, faces, _ = triangles(content, path.suffix.lower(), path)
+    except (UnusableMeshError, ArtsimError) as problem:
+        return [str(problem)]
+    return [] if len(faces) and is_convex(vertices, faces) else [f"mesh {path.name!r} is not convex"]
+
+
+def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
+    """Whether a mesh encloses its whole convex hull."""
+    corners = (vertices - vertices[0])[faces]
+    volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    try:
+        whole = ConvexHull(vertices - vertices[0]).volume
+    except QhullError:  # flat
+        return False
+    return bool(volume >= (1.0 - TOLERANCE) * whole)
+
+
+def _read(path: str | Path) -> tuple[Path, etree._Element]:
+    file = find_urdf(Path(path))
+    return file, safe_xml(read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file"), file)
 
 
 def _tree_problems(links: list[etree._Element], joints: list[etree._Element]) -> list[str]:

@@ -10,19 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from artsim.collision import Collision, Sweep
 from artsim.errors import ArtsimError
 from artsim.inertia import part_inertia
-from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
-from artsim.strict import strict_kinematics, strict_urdf
-
-CONVEX = 1e-6
-"""Share of its hull's volume by which a collision piece may fall short of it."""
-
+from artsim.strict import convex_collision_geometry, is_convex, strict_inertia, strict_kinematics, strict_urdf
 
 _SHOWN = 5
 
@@ -53,25 +46,38 @@ class Gate:
 
 
 def check(obj: ArticulatedObject) -> list[Gate]:
-    """All gates that need nothing but the object.
+    """All gates of a procedural object that need no file: the physics is that of its parts' bodies."""
+    physics = {"convex collision geometry": lambda: _collision_geometry(obj), "inertia": lambda: _inertia(obj)}
+    return _run({**_geometry(obj), **physics})
 
-    :func:`check_file` adds those of its URDF file; :mod:`artsim.simulators` loads it into simulators.
+
+def check_file(obj: ArticulatedObject, path: str | Path) -> list[Gate]:
+    """All gates of an object and the URDF file that it was loaded from, or exported to: the physics is the file's.
+
+    :mod:`artsim.simulators` adds a look by three simulators.
     """
+    return _run(
+        {
+            "strict URDF": lambda: strict_urdf(path),
+            **_geometry(obj),
+            "convex collision geometry": lambda: convex_collision_geometry(path),
+            "inertia": lambda: strict_inertia(path),
+        }
+    )
+
+
+def _geometry(obj: ArticulatedObject) -> dict[str, Callable[[], list[str]]]:
     sweep = Sweep(obj)
-    gates: dict[str, Callable[[], list[str]]] = {
+    return {
         "kinematics": lambda: strict_kinematics(obj),
         "collision free": lambda: [_say(obj, c) for c in sweep.collisions()],
         "joined parts apart": lambda: [_say(obj, c) for c in sweep.joined_overlaps()],
         "watertight": lambda: [f"{obj.parts[k].name} is not closed" for k in np.flatnonzero(~sweep.watertight)],
-        "convex collision geometry": lambda: _collision_geometry(obj),
-        "inertia": lambda: _inertia(obj),
     }
+
+
+def _run(gates: dict[str, Callable[[], list[str]]]) -> list[Gate]:
     return [Gate(name, tuple(_closed(gate))) for name, gate in gates.items()]
-
-
-def check_file(obj: ArticulatedObject, path: str | Path) -> list[Gate]:
-    """All gates of a loaded object: those of its URDF file, then its own."""
-    return [Gate("strict URDF", tuple(strict_urdf(path))), *check(obj)]
 
 
 def _closed(gate: Callable[[], list[str]]) -> list[str]:
@@ -95,19 +101,9 @@ def _collision_geometry(obj: ArticulatedObject) -> list[str]:
     for part in obj.parts:
         if part.body is None or not part.body.pieces:
             problems.append(f"{part.name} has none")
-        elif not all(_is_convex(vertices, faces) for vertices, faces in part.body.pieces):
+        elif not all(is_convex(vertices, faces) for vertices, faces in part.body.pieces):
             problems.append(f"{part.name} has pieces that are not convex")
     return problems
-
-
-def _is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
-    corners = (vertices - vertices[0])[faces]
-    volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    try:
-        whole = ConvexHull(vertices - vertices[0]).volume
-    except QhullError:  # flat
-        return False
-    return bool(volume >= (1.0 - CONVEX) * whole)
 
 
 def _inertia(obj: ArticulatedObject) -> list[str]:
