@@ -9,85 +9,54 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
+from importlib import import_module
 
 import numpy as np
 
 from artsim.assembly import Assembly
 from artsim.errors import ConfigError
-from artsim.families import (
-    box,
-    bucket,
-    coffee_machine,
-    cutter,
-    desk_lamp,
-    dishwasher,
-    door,
-    drawer,
-    eyeglasses,
-    fan,
-    faucet,
-    folding_knife,
-    globe,
-    kitchen_pot,
-    laptop,
-    microwave,
-    oven,
-    pliers,
-    random_tree,
-    refrigerator,
-    robot_arm,
-    safe,
-    scissors,
-    stapler,
-    storage_furniture,
-    suitcase,
-    switch,
-    swivel_chair,
-    toaster,
-    trash_can,
-    valve,
-    washing_machine,
-    window,
-)
 from artsim.objects import ArticulatedObject
 
 Family = Callable[[np.random.Generator], Assembly]
 
-FAMILIES: dict[str, Family] = {
-    "box": box.build,
-    "bucket": bucket.build,
-    "coffee_machine": coffee_machine.build,
-    "cutter": cutter.build,
-    "desk_lamp": desk_lamp.build,
-    "dishwasher": dishwasher.build,
-    "door": door.build,
-    "drawer": drawer.build,
-    "eyeglasses": eyeglasses.build,
-    "fan": fan.build,
-    "faucet": faucet.build,
-    "folding_knife": folding_knife.build,
-    "globe": globe.build,
-    "kitchen_pot": kitchen_pot.build,
-    "laptop": laptop.build,
-    "microwave": microwave.build,
-    "oven": oven.build,
-    "pliers": pliers.build,
-    "random_tree": random_tree.build,
-    "refrigerator": refrigerator.build,
-    "robot_arm": robot_arm.build,
-    "safe": safe.build,
-    "scissors": scissors.build,
-    "stapler": stapler.build,
-    "storage_furniture": storage_furniture.build,
-    "suitcase": suitcase.build,
-    "switch": switch.build,
-    "swivel_chair": swivel_chair.build,
-    "toaster": toaster.build,
-    "trash_can": trash_can.build,
-    "valve": valve.build,
-    "washing_machine": washing_machine.build,
-    "window": window.build,
-}
+CATEGORIES = (
+    "box",
+    "bucket",
+    "coffee_machine",
+    "cutter",
+    "desk_lamp",
+    "dishwasher",
+    "door",
+    "drawer",
+    "eyeglasses",
+    "fan",
+    "faucet",
+    "folding_knife",
+    "globe",
+    "kitchen_pot",
+    "laptop",
+    "microwave",
+    "oven",
+    "pliers",
+    "random_tree",
+    "refrigerator",
+    "robot_arm",
+    "safe",
+    "scissors",
+    "stapler",
+    "storage_furniture",
+    "suitcase",
+    "switch",
+    "swivel_chair",
+    "toaster",
+    "trash_can",
+    "valve",
+    "washing_machine",
+    "window",
+)
+"""The registry: each category's name is that of its module."""
+
+FAMILIES: dict[str, Family] = {name: import_module(f"artsim.families.{name}").build for name in CATEGORIES}
 """Every category that :func:`make` knows."""
 
 
