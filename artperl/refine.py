@@ -48,7 +48,7 @@ class RefineOptions:
     """Weight of the reference's points outside the cloud's outline against that of the cloud's points."""
     prior_weight: float = 5e-6
     """Squared distance that a deviation of one sigma costs."""
-    tolerance: float = 1e-4
+    tolerance: float = 1e-3
     """Relative decrease of the energy below which an object counts as done."""
 
     def __post_init__(self) -> None:
@@ -120,7 +120,8 @@ def refine(
         candidate, cost = match(shapes, target, theta, options.outline_weight), prior.cost(theta)
         before, after = _robust(current, width) + current_cost, _robust(candidate, width) + cost
         better = after < before
-        current, current_cost = candidate.where(better, current), torch.where(better, cost, current_cost)
+        current_cost = torch.where(better, cost, current_cost)
+        current = candidate if bool(better.all()) else candidate.where(better, current)
         steps += better
         if width == options.robust_end and not rigid:
             settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 10.0)
