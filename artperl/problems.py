@@ -11,9 +11,12 @@ from torch import Tensor
 
 from artperl.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.batch import Batch
+from artperl.data import Clouds
+from artperl.networks.perception import Perception
 from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
 from artperl.shapes import Observed, Shapes
+from artperl.start import sized
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.stream import FamilyStream
@@ -64,6 +67,9 @@ class Problems:
         View preset, noise and the like.
     choices : int
         Among how many of the nearest references to draw.
+    perception : Perception, optional
+        Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
+        it.
     """
 
     def __init__(
@@ -76,11 +82,12 @@ class Problems:
         start: StartOptions | None = None,
         sample: SampleOptions | None = None,
         choices: int = 4,
+        perception: Perception | None = None,
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
         self.stream = FamilyStream(categories, options, seed, views_per_object=2)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
-        self.start = start or StartOptions()
+        self.start, self.perception = start or StartOptions(), perception
 
     def __getitem__(self, n: int) -> Problem:
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + n)
@@ -90,14 +97,19 @@ class Problems:
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
         nearest = self.base.nearest(valid, box_center, box_size, self.choices)
         pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
-        shapes = self.base.shapes[nearest.gather(1, pick)[:, 0]]
+        shapes = sized(self.base.shapes[nearest.gather(1, pick)[:, 0]], torch.tensor([s.diagonal for s in samples]))
         goal = theta_from_parts(shapes.trees, shapes.box_center, shapes.box_size, rotation, center, size)
         goal = Theta(**{**vars(goal), "state": clamp_state(shapes.trees, goal.state)})
         points = torch.from_numpy(np.stack([s.points for s in samples]))
         part = torch.from_numpy(np.stack([s.part for s in samples]).astype(np.int64))
-        observed = Observed.of(points, part)
+        observed = Observed.of(points, part if self.perception is None else self._labels(points))
         radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
         return Problem(shapes, observed, perturbed(shapes, goal, radius, self.start, generator), goal)
+
+    @torch.inference_mode()
+    def _labels(self, points: Tensor) -> Tensor:
+        assert self.perception is not None
+        return self.perception.eval()(Clouds.of(points).points).part.clone()
 
 
 def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:

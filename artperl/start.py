@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
 from torch import Tensor
 
 from artperl.data import Clouds
 from artperl.networks.perception import Perceived
-from artperl.pose import Theta, theta_from_parts
+from artperl.pose import Theta, clamp_state, pose_parts, reach, theta_from_parts
 from artperl.rotations import rotate
 from artperl.shapes import Shapes
 
@@ -49,13 +51,65 @@ def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Te
     return rotation, center * metres + clouds.center[:, None], perceived.box_size * unit * metres
 
 
-def start(clouds: Clouds, perceived: Perceived, shapes: Shapes) -> Theta:
-    """The state that brings each reference nearest to :func:`part_poses`."""
-    rotation, center, size = part_poses(clouds, perceived)
-    rows = shapes.trees.num_rows
-    return theta_from_parts(
-        shapes.trees, shapes.box_center, shapes.box_size, rotation[:, :rows], center[:, :rows], size[:, :rows]
-    )
+def start(clouds: Clouds, perceived: Perceived, references: Shapes, count: int) -> tuple[Shapes, Theta]:
+    """References adapted to what is perceived, and the states that bring them nearest to :func:`part_poses`.
+
+    Parameters
+    ----------
+    clouds : Clouds
+    perceived : Perceived
+        Both of B objects.
+    references : Shapes
+        ``count`` for each object, neighbours together.
+    count : int
+
+    Returns
+    -------
+    Shapes, Theta
+        B * count rows. The shapes have the perceived size, so that the states carry no scale.
+    """
+    rows = references.trees.num_rows
+    rotation, center, size = (pose[:, :rows].repeat_interleave(count, dim=0) for pose in part_poses(clouds, perceived))
+    fitted = theta_from_parts(references.trees, references.box_center, references.box_size, rotation, center, size)
+    plain = torch.zeros_like(fitted.stretch)
+    shapes = adapted(references, replace(fitted, shift=plain))
+    theta = replace(fitted, log_scale=plain[:, 0], stretch=plain, shift=plain)
+    return shapes, replace(theta, state=clamp_state(shapes.trees, _rescaled(references, fitted)))
+
+
+def adapted(shapes: Shapes, theta: Theta) -> Shapes:
+    """References that have the shape which ``theta`` gives them, so that a state without scale poses them alike."""
+    trees = shapes.trees
+    posed = pose_parts(trees, theta, shapes.box_center)
+    unit = torch.where((trees.slide != 0) & (trees.turn == 0), posed.reach, 1.0)
+    mean_scale = posed.scale.mean(-1)
+    return Shapes(
+        trees=replace(
+            trees, origin=posed.origin_rest, lower=trees.lower * unit, upper=trees.upper * unit,
+            rest=trees.rest * unit, slide=torch.where(trees.turn == 0, trees.slide, trees.slide * posed.reach),
+            offset=trees.offset * unit,
+        ),
+        box_center=posed.center_rest,
+        box_size=shapes.box_size * posed.scale,
+        points=posed.center_rest[:, :, None]
+        + posed.scale[:, :, None] * (shapes.points - shapes.box_center[:, :, None]),
+        normals=torch.nn.functional.normalize(shapes.normals / posed.scale[:, :, None], dim=-1),
+        spacing=shapes.spacing * mean_scale,
+        diagonal=shapes.diagonal * theta.log_scale.mean(-1).exp(),
+    )  # fmt: skip
+
+
+def sized(shapes: Shapes, diagonal: Tensor) -> Shapes:
+    """References with the diagonals (B,) asked for."""
+    plain = Theta.at_rest(shapes.trees)
+    log_scale = (diagonal.to(plain.state.dtype) / shapes.diagonal).log()[:, None].expand(-1, 3)
+    return adapted(shapes, replace(plain, log_scale=log_scale))
+
+
+def _rescaled(shapes: Shapes, theta: Theta) -> Tensor:
+    """States in the units of the adapted references."""
+    slides = (shapes.trees.slide != 0) & (shapes.trees.turn == 0)
+    return torch.where(slides, theta.state * reach(shapes.trees, theta.log_scale), theta.state)
 
 
 def procrustes(source: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:

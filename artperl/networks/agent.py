@@ -31,6 +31,7 @@ class Agent(nn.Module):
 
     def __init__(self, width: int = 64):
         super().__init__()
+        self.width = width
         features = 2 * width
         self.observed = _encoder(6, width, features)
         self.reference = _encoder(6, width, features)

@@ -67,7 +67,7 @@ class Perception(nn.Module):
 
     def __init__(self, num_rows: int, width: int = 48):
         super().__init__()
-        self.num_rows = num_rows
+        self.num_rows, self.width = num_rows, width
         self.backbone = PointNet2(width)
         channels, whole = self.backbone.point_channels, self.backbone.cloud_channels
         self.point_head = nn.Sequential(nn.Linear(channels, 128), nn.ReLU(), nn.Linear(128, num_rows + 4))

@@ -1,0 +1,155 @@
+"""Trained estimators on disk: a folder with weights (safetensors), settings (JSON) and the base of references (npz).
+
+Nothing in it is executed when it is read.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor, nn
+
+from artperl.estimator import Calibration, Estimator, EstimatorOptions
+from artperl.networks.agent import Agent
+from artperl.networks.perception import Perception
+from artperl.pose import Trees
+from artperl.refine import RefineOptions
+from artperl.retrieval import ShapeBase
+from artperl.shapes import Shapes
+from artsim.errors import DatasetError
+
+WEIGHTS = Path(__file__).parent / "weights"
+"""Folder of the estimators that come with the package."""
+
+_FORMAT = 1
+_SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
+
+
+def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any]) -> None:
+    """Write an estimator.
+
+    Parameters
+    ----------
+    estimator : Estimator
+    folder : Path
+        Made if missing; files in it are replaced one by one.
+    about : mapping
+        Anything else worth knowing, in JSON's terms: what it was trained on, and how well it does.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    networks: dict[str, nn.Module] = {"perception": estimator.perception}
+    if estimator.agent is not None:
+        networks["agent"] = estimator.agent
+    tensors = {f"{name}.{key}": t for name, net in networks.items() for key, t in net.state_dict().items()}
+    save_tensors(tensors, folder / _TENSORS)
+    save_base(estimator.base, folder / _BASE)
+    settings = {
+        "format": _FORMAT,
+        "perception": {"num_rows": estimator.perception.num_rows, "width": estimator.perception.width},
+        "agent": None if estimator.agent is None else {"width": estimator.agent.width},
+        "options": asdict(estimator.options),
+        "calibration": asdict(estimator.calibration),
+        "about": dict(about),
+    }
+    replace_file(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
+
+
+def load_estimator(name: str | Path) -> Estimator:
+    """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
+
+    Raises
+    ------
+    DatasetError
+        When there is none, or its files are damaged.
+    """
+    folder = Path(name) if Path(name).is_dir() else WEIGHTS / name
+    settings = read_settings(folder)
+    try:
+        tensors = load_file(folder / _TENSORS)
+        perception = Perception(**settings["perception"])
+        perception.load_state_dict(_under(tensors, "perception."))
+        agent = None if settings["agent"] is None else Agent(**settings["agent"])
+        if agent is not None:
+            agent.load_state_dict(_under(tensors, "agent."))
+        options = {**settings["options"], "refine": RefineOptions(**settings["options"]["refine"])}
+        return Estimator(
+            perception, load_base(folder / _BASE), agent, EstimatorOptions(**options),
+            Calibration(**settings["calibration"]),
+        )  # fmt: skip
+    except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
+        raise DatasetError(f"the estimator does not load: {error}", folder, "train it again") from error
+
+
+def read_settings(folder: Path) -> dict[str, Any]:
+    """Settings of the estimator in a folder.
+
+    Raises
+    ------
+    DatasetError
+        When there is none, or it was written by another version.
+    """
+    try:
+        settings: dict[str, Any] = json.loads((folder / _SETTINGS).read_text())
+    except (OSError, ValueError) as error:
+        shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{_SETTINGS}"))) or "none"
+        raise DatasetError(
+            "there is no estimator", folder, f"train one, or use one that comes with the package: {shipped}"
+        ) from error
+    if settings.get("format") != _FORMAT:
+        raise DatasetError(f"format {settings.get('format')} is not {_FORMAT}", folder, "train it again")
+    return settings
+
+
+def save_base(base: ShapeBase, path: Path) -> None:
+    """Write a base of references as arrays; no pickle."""
+    arrays = {name: tensor.numpy() for name, tensor in _flat(base.shapes).items()}
+    part = path.with_name(f".{path.name}")
+    with part.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, names=np.array(base.names), **arrays)
+    part.replace(path)
+
+
+def load_base(path: Path) -> ShapeBase:
+    """Inverse of :func:`save_base`."""
+    with np.load(path, allow_pickle=False) as arrays:
+        tensors = {name: torch.from_numpy(arrays[name]) for name in arrays.files if name != "names"}
+        names = tuple(str(name) for name in arrays["names"])
+    trees = Trees(**_under(tensors, "trees."))
+    own = {f.name: tensors[f.name] for f in fields(Shapes) if f.name != "trees"}
+    return ShapeBase(Shapes(trees=trees, **own), names)
+
+
+def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
+    """Write tensors so that a stop halfway leaves the old file."""
+    part = path.with_name(f".{path.name}")
+    save_file({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, part)
+    part.replace(path)
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file so that a stop halfway leaves the old one."""
+    part = path.with_name(f".{path.name}")
+    part.write_bytes(content)
+    part.replace(path)
+
+
+def _flat(record: Any, prefix: str = "") -> dict[str, Tensor]:
+    """Tensors of a record and of the records in it, by dotted names."""
+    flat: dict[str, Tensor] = {}
+    for f in fields(record):
+        value = getattr(record, f.name)
+        flat |= _flat(value, f"{prefix}{f.name}.") if is_dataclass(value) else {f"{prefix}{f.name}": value}
+    return flat
+
+
+def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """Tensors whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

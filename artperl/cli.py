@@ -1,0 +1,191 @@
+"""The program ``artperl``: train, evaluate, estimate."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tyro
+
+from artsim.errors import ArtsimError, ConfigError
+from artsim.plan import SampleOptions
+from artsim.sampling import ViewOptions
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train an estimator on fresh procedural objects, and test it on unseen ones as it learns.
+
+    Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
+    the same command goes on where it stopped, with the same result. Curves: tensorboard --logdir OUT.
+
+    Examples:
+    python train.py --category laptop --preset quick
+    python train.py --category eyeglasses --preset full --out out/eyeglasses
+    """
+
+    category: tuple[str, ...] = ("laptop",)
+    """Procedural categories, or 'all'; several share one estimator."""
+    preset: Literal["quick", "full"] = "quick"
+    """quick: under five minutes on two cores, to see it learn; full: within the hour."""
+    out: Path | None = None
+    """Folder of the run; by default out/train/CATEGORY-PRESET."""
+    seed: int = 0
+    perception_steps: int | None = None
+    """Batches that perception learns from; by default the preset's."""
+    agent_rollouts: int | None = None
+    """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
+    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
+    """Depth sensor of the clouds."""
+    workers: int = 1
+    """Processes that make clouds while the network learns; the result does not depend on it."""
+    threads: int | None = None
+    """Processor threads of the network; by default torch's choice."""
+
+    def run(self) -> None:
+        import torch
+
+        from artperl.training import PRESETS, Training
+        from artsim.families import FAMILIES
+
+        if self.threads is not None:
+            torch.set_num_threads(self.threads)
+        categories = tuple(FAMILIES) if self.category == ("all",) else self.category
+        preset = PRESETS[self.preset]
+        steps, rollouts = self.perception_steps, self.agent_rollouts
+        options = replace(
+            preset, categories=categories, seed=self.seed, sample=SampleOptions(noise=self.noise),
+            perception_steps=preset.perception_steps if steps is None else steps,
+            agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
+        )  # fmt: skip
+        out = self.out or Path("out/train") / f"{'-'.join(self.category)}-{self.preset}"
+        training = Training(options, out, self.workers, progress=sys.stderr.isatty())
+        try:
+            training.run()
+        except KeyboardInterrupt:
+            print(f"stopped; the same command goes on from {out}", file=sys.stderr)
+            sys.exit(130)
+        print((out / "table.txt").read_text(), end="")
+        print(f"estimator: {out / 'best'}")
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Test an estimator on unseen procedural objects and print the table of its errors."""
+
+    estimator: tyro.conf.Positional[Path]
+    """Folder of the estimator, or the name of one that comes with the package."""
+    category: tuple[str, ...] = ()
+    """Procedural categories; by default those that it was trained on."""
+    objects: int = 40
+    """Unseen objects of each category."""
+    views: int = 4
+    """Views of each object."""
+    preset: Literal["artimage", "sphere"] = "artimage"
+    """From where objects are seen."""
+    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
+    """Depth sensor of the clouds."""
+    json: Path | None = None
+    """Write the figures to this file."""
+
+    def run(self) -> None:
+        from artperl.checkpoint import WEIGHTS, load_estimator, read_settings, replace_file
+        from artperl.evaluation import evaluate, frozen_samples, summary, table
+
+        estimator = load_estimator(self.estimator)
+        folder = self.estimator if self.estimator.is_dir() else WEIGHTS / self.estimator
+        categories = self.category or tuple(read_settings(folder)["about"]["options"]["categories"])
+        options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
+        samples = frozen_samples(categories, self.objects, self.views, options)
+        figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
+        print(table(figures))
+        if self.json is not None:
+            replace_file(self.json, _json(figures))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimate the poses of the parts of the object that a cloud shows, and print them as JSON."""
+
+    cloud: tyro.conf.Positional[Path]
+    """PLY or other mesh file with vertices, .npy with (N, 3), or .npz with an array 'points': camera frame, metres."""
+    category: str = "laptop"
+    """Folder of an estimator, or the name of one that comes with the package."""
+    out: Path | None = None
+    """Write here, as .json or as .npz with the part of every point; by default print."""
+
+    def run(self) -> None:
+        from artperl.checkpoint import load_estimator, replace_file
+
+        estimate = load_estimator(self.category)(read_cloud(self.cloud))
+        record = {name: _plain(value) for name, value in vars(estimate).items() if name != "part"}
+        if self.out is None:
+            print(json.dumps(record, indent=1))
+        elif self.out.suffix == ".npz":
+            arrays = {name: np.asarray(v) for name, v in vars(estimate).items() if name != "milliseconds"}
+            np.savez(self.out, allow_pickle=False, **arrays)
+        else:
+            replace_file(self.out, _json(record))
+
+
+def read_cloud(path: Path) -> np.ndarray:
+    """(N, 3) points of a file.
+
+    Raises
+    ------
+    ConfigError
+        When it holds no cloud.
+    """
+    mend = "give (N, 3) points as .npy, .npz with 'points', or .ply"
+    try:
+        if path.suffix == ".npy":
+            return np.asarray(np.load(path, allow_pickle=False))
+        if path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as arrays:
+                return np.asarray(arrays["points"])
+        import trimesh
+
+        return np.asarray(trimesh.load(path).vertices)
+    except (ValueError, KeyError, AttributeError, EOFError) as error:
+        raise ConfigError(f"no cloud can be read: {error}", path, mend) from error
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _json(record: Any) -> bytes:
+    return (json.dumps(record, indent=1) + "\n").encode()
+
+
+Verb = (
+    Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Estimate, tyro.conf.subcommand("estimate")]
+)
+
+
+def main() -> None:
+    """Entry point of ``artperl``."""
+    _run(Verb, "artperl")
+
+
+def train_main() -> None:
+    """Entry point of ``train.py``."""
+    _run(Train, "train.py")
+
+
+def _run(verb: Any, program: str) -> None:
+    try:
+        tyro.cli(verb, prog=program, description=None if verb is Train else __doc__).run()
+    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
+        sys.stderr.close()
+    except (ArtsimError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,307 @@
+"""Training and testing in one loop.
+
+Stage 1 teaches perception by what is true of fresh procedural objects; stage 2 teaches the agent by behaviour cloning
+and PPO (Algorithm 1) on fitting problems whose points carry the labels that perception gives them. At intervals the
+whole estimator is tested on a frozen set of unseen objects, and the best is kept.
+
+A run depends on its options alone. Batches, rollouts and learning rates are functions of their number, so that a
+stopped run goes on exactly as if it had not been stopped: only weights, the optimiser's moments and the number of
+steps taken have to be kept.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field, replace
+from math import cos, pi
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors.torch import load_file
+from torch import Tensor, nn
+from torch.utils.tensorboard import SummaryWriter
+from tqdm import tqdm
+
+from artperl.checkpoint import load_estimator, replace_file, save_estimator, save_tensors
+from artperl.data import batches
+from artperl.estimator import Estimator, EstimatorOptions
+from artperl.evaluation import calibrate, evaluate, frozen_samples, headline, summary, table
+from artperl.fitting import Fitting, FittingOptions
+from artperl.networks.agent import Agent
+from artperl.networks.perception import Perception, perception_losses
+from artperl.ppo import PPOOptions, collect, update
+from artperl.problems import Problems, StartOptions
+from artperl.retrieval import ShapeBase
+from artsim.errors import DatasetError
+from artsim.plan import SampleOptions
+from artsim.sample import Sample
+from artsim.sources import family_sources
+
+BASE_SEEDS = 2_000_000
+"""Seed of the first object of a base: neither in streams nor in test sets."""
+_STATE = "state"
+_WARM_UP = 0.1
+_LAST_RATE = 0.01
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """What a run depends on."""
+
+    categories: tuple[str, ...] = ("laptop",)
+    """Procedural categories; several share one estimator."""
+    seed: int = 0
+    base_objects: int = 64
+    """Reference objects of each category."""
+    num_rows: int = 0
+    """Most parts that an object may have; 0 for as many as any reference has."""
+    width: int = 48
+    """Channels of perception's finest level."""
+    perception_steps: int = 6000
+    """Batches of stage 1."""
+    perception_rate: float = 2e-3
+    batch_size: int = 32
+    num_points: int = 1024
+    """Points of a cloud."""
+    agent_rollouts: int = 200
+    """Batches of episodes of stage 2; 0 goes without an agent."""
+    agent_rate: float = 1e-3
+    episodes: int = 64
+    """Episodes of a rollout."""
+    fit_points: int = 512
+    """Points of a cloud that the agent sees."""
+    evaluate_every: int = 1000
+    """Steps of stage 1 between tests."""
+    evaluate_rollouts: int = 50
+    """Rollouts of stage 2 between tests."""
+    test_objects: int = 40
+    """Unseen objects of each category."""
+    test_views: int = 2
+    """Views of each; the last test of a run takes twice as many."""
+    sample: SampleOptions = field(default_factory=SampleOptions)
+    ppo: PPOOptions = field(default_factory=PPOOptions)
+    fitting: FittingOptions = field(default_factory=FittingOptions)
+    start: StartOptions = field(default_factory=StartOptions)
+
+
+PRESETS = {
+    "quick": TrainOptions(
+        base_objects=32, width=32, perception_steps=350, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
+        fit_points=256, evaluate_every=175, evaluate_rollouts=12, test_objects=20, test_views=2,
+    ),
+    "full": TrainOptions(),
+}  # fmt: skip
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour."""
+
+
+class Training:
+    """A run that may be stopped and gone on with.
+
+    Parameters
+    ----------
+    options : TrainOptions
+    out : Path
+        Folder of the run: ``best`` and ``last`` hold estimators, ``state.*`` what is needed to go on, ``events`` curves
+        for TensorBoard, ``table.txt`` and ``figures.json`` the last test.
+    workers : int
+        Processes that make training clouds; the result does not depend on it.
+    progress : bool
+        Show a bar, and tables as they come.
+
+    Raises
+    ------
+    DatasetError
+        When the folder holds a run with other options.
+    """
+
+    def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
+        self.options, self.out, self.workers, self.progress = options, out, workers, progress
+        objects = [source.load() for source in family_sources(options.categories, options.base_objects, BASE_SEEDS)]
+        self.base = ShapeBase.of(objects, options.num_rows or None)
+        torch.manual_seed(options.seed)
+        self.perception = Perception(self.base.shapes.trees.num_rows, options.width)
+        self.agent = Agent()
+        self.optimizers = {
+            "perception": torch.optim.AdamW(self.perception.parameters(), weight_decay=1e-2),
+            "agent": torch.optim.AdamW(self.agent.parameters(), weight_decay=1e-4),
+        }
+        self.done = {"perception": 0, "agent": 0}
+        self.best = float("inf")
+        self.history: list[dict[str, Any]] = []
+        self._tests: list[Sample] = []
+        if (out / f"{_STATE}.json").exists():
+            self._load()
+
+    def run(self) -> dict[str, Any]:
+        """Train to the end and return the figures of the best estimator; a stop by Ctrl-C keeps what was reached."""
+        self.out.mkdir(parents=True, exist_ok=True)
+        try:
+            with closing(SummaryWriter(str(self.out / "events"))) as board:
+                self._learn_to_perceive(board)
+                self._learn_to_fit(board)
+        except KeyboardInterrupt:
+            self._save()
+            raise
+        return self._finish()
+
+    def estimator(self) -> Estimator:
+        """The estimator as it stands."""
+        agent = self.agent if self.done["agent"] else None
+        return Estimator(self.perception, self.base, agent, EstimatorOptions(fit_points=self.options.fit_points))
+
+    def _learn_to_perceive(self, board: SummaryWriter) -> None:
+        options, optimizer = self.options, self.optimizers["perception"]
+        first, total = self.done["perception"], options.perception_steps
+        if first >= total:
+            return
+        data = batches(
+            options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
+            self.workers, options.sample,
+        )  # fmt: skip
+        bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
+        for step in range(first, total):
+            clouds, truth = next(data)
+            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
+            self.perception.train()
+            perceived = self.perception(clouds.points)
+            losses = perception_losses(perceived, truth)
+            loss = torch.stack(list(losses.values())).sum()
+            optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(self.perception.parameters(), 1.0)
+            optimizer.step()
+            self.done["perception"] = step + 1
+            figures = {name: value.item() for name, value in losses.items()}
+            figures["accuracy"] = (perceived.part == truth.part).float().mean().item()
+            figures["coordinates"] = (perceived.canonical - truth.canonical).norm(dim=-1).median().item()
+            _write(board, "perception", figures, step)
+            bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
+            bar.update()
+            if (step + 1) % options.evaluate_every == 0 or step + 1 == total:
+                self._test(board, step + 1)
+        bar.close()
+
+    def _learn_to_fit(self, board: SummaryWriter) -> None:
+        options, optimizer = self.options, self.optimizers["agent"]
+        first, total = self.done["agent"], options.agent_rollouts
+        if first >= total:
+            return
+        problems = Problems(
+            options.categories, self.base, options.episodes, options.fit_points, options.seed + 1, options.start,
+            options.sample, perception=self.perception,
+        )  # fmt: skip
+        bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
+        for n in range(first, total):
+            generator = torch.Generator().manual_seed((options.seed << 32) + n)
+            set_rate(optimizer, options.agent_rate * one_cycle(n, total))
+            problem = problems[n]
+            fitting = Fitting(problem.shapes, problem.observed, problem.start, options.fitting)
+            rollout = collect(self.agent, fitting, problem.goal, options.ppo, generator)
+            updates: list[dict[str, float]] = []
+            update(self.agent, optimizer, rollout, options.ppo, generator, updates.append)
+            self.done["agent"] = n + 1
+            figures = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]} | rollout.figures
+            _write(board, "agent", figures, n)
+            bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
+            bar.update()
+            if (n + 1) % options.evaluate_rollouts == 0 or n + 1 == total:
+                self._test(board, options.perception_steps + n + 1)
+        bar.close()
+
+    def _test(self, board: SummaryWriter, step: int) -> None:
+        """Test on the frozen set, keep the best, and write down where the run stands."""
+        figures, estimator = self._figures(self.estimator(), self._samples(self.options.test_views))
+        score = headline(figures)
+        self.history.append({"step": step, "score": score, "done": dict(self.done)})
+        _write(board, "test", _curves(figures) | {"score": score}, step)
+        if score < self.best:
+            self.best = score
+            save_estimator(estimator, self.out / "best", self._about(figures))
+        self._save()
+        if self.progress:
+            tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")
+
+    def _figures(self, estimator: Estimator, samples: Sequence[Sample]) -> tuple[dict[str, Any], Estimator]:
+        """Figures of an estimator, and the estimator with its confidence calibrated on the same samples."""
+        scored = evaluate(estimator, samples, self.progress)
+        return summary(scored), replace(estimator, calibration=calibrate(scored))
+
+    def _samples(self, views: int) -> list[Sample]:
+        if len(self._tests) != views * self.options.test_objects * len(self.options.categories):
+            sample = replace(self.options.sample, num_points=2048)
+            self._tests = frozen_samples(self.options.categories, self.options.test_objects, views, sample)
+        return self._tests
+
+    def _finish(self) -> dict[str, Any]:
+        """Figures and table of the best estimator on twice as many views."""
+        figures, _ = self._figures(load_estimator(self.out / "best"), self._samples(2 * self.options.test_views))
+        replace_file(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
+        replace_file(self.out / "table.txt", (table(figures) + "\n").encode())
+        return figures
+
+    def _about(self, figures: dict[str, Any]) -> dict[str, Any]:
+        return {"options": _plain(self.options), "done": dict(self.done), "test": figures}
+
+    def _save(self) -> None:
+        """Everything that going on needs. The tensors come first: the JSON names the steps that they belong to."""
+        tensors: dict[str, Tensor] = {"done": torch.tensor(list(self.done.values()))}
+        for name, network in (("perception", self.perception), ("agent", self.agent)):
+            tensors |= {f"{name}.{key}": value for key, value in network.state_dict().items()}
+            for number, moments in self.optimizers[name].state_dict()["state"].items():
+                tensors |= {f"{name}/{number}/{key}": value for key, value in moments.items()}
+        save_tensors(tensors, self.out / f"{_STATE}.safetensors")
+        state = {"options": _plain(self.options), "best": self.best, "history": self.history}
+        replace_file(self.out / f"{_STATE}.json", (json.dumps(state, indent=1) + "\n").encode())
+
+    def _load(self) -> None:
+        state = json.loads((self.out / f"{_STATE}.json").read_text())
+        if state["options"] != json.loads(json.dumps(_plain(self.options))):
+            raise DatasetError("a run with other options is here", self.out, "give the same options, or another folder")
+        self.best, self.history = state["best"], state["history"]
+        tensors = load_file(self.out / f"{_STATE}.safetensors")
+        self.done = dict(zip(self.done, tensors["done"].tolist(), strict=True))
+        for name, network in (("perception", self.perception), ("agent", self.agent)):
+            own = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
+            network.load_state_dict(own)
+            moments: dict[int, dict[str, Tensor]] = {}
+            for key, value in tensors.items():
+                if key.startswith(f"{name}/"):
+                    _, number, moment = key.split("/")
+                    moments.setdefault(int(number), {})[moment] = value
+            optimizer = self.optimizers[name]
+            optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+
+
+def one_cycle(step: int, total: int) -> float:
+    """Share of the highest learning rate: a linear rise, then half a cosine down to a hundredth (Smith 2018)."""
+    rise = max(1.0, _WARM_UP * total)
+    if step < rise:
+        return (step + 1) / rise if rise > step + 1 else 1.0
+    return _LAST_RATE + 0.5 * (1.0 - _LAST_RATE) * (1.0 + cos(pi * (step - rise) / max(1.0, total - rise)))
+
+
+def set_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
+    """Use a learning rate from now on."""
+    for group in optimizer.param_groups:
+        group["lr"] = rate
+
+
+def _write(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:
+    for name, value in figures.items():
+        board.add_scalar(f"{group}/{name}", value, step)
+
+
+def _curves(figures: dict[str, Any]) -> dict[str, float]:
+    return {
+        f"{category}/{k}/{name}": part[name]["median"]
+        for category, figure in figures.items()
+        for k, part in enumerate(figure["parts"])
+        for name in ("rotation_deg", "translation_percent_diagonal", "iou_exact")
+    }
+
+
+def _plain(options: TrainOptions) -> dict[str, Any]:
+    return asdict(options)
