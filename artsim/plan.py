@@ -55,7 +55,7 @@ class SampleOptions:
         if not isinstance(self.scale, str) and not 0.0 < self.scale[0] <= self.scale[1]:
             raise ConfigError(f"{self.scale} is not a range of diagonals", "scale", "write LOW HIGH in metres")
         if "rgb" in self.images and self.renderer == "raycast":
-            raise ConfigError("raycast makes no rgb", "images", "add --renderer pybullet")
+            raise ConfigError("raycast makes no rgb", "images", "add --renderer sapien or pybullet")
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> SampleOptions:
