@@ -124,8 +124,8 @@ def refine(
         current = candidate if bool(better.all()) else candidate.where(better, current)
         steps += better
         if width == options.robust_end and not rigid:
-            settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 10.0)
-        damping = torch.where(better, 0.3 * damping, 8.0 * damping).clamp(1e-6, 1e8)
+            settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 1.0)
+        damping = torch.where(better, 0.3 * damping, 10.0 * damping).clamp(1e-3, 1e8)
         width = max(options.robust_end, options.narrowing * width)
         if bool(settled.all()):
             break
