@@ -25,6 +25,8 @@ from artsim.urdf_xml import MOVING_TYPES, SHAPES, safe_xml
 TOLERANCE = 1e-6
 """By which an axis's length may differ from 1, a mimic joint may leave its limits, and a piece fall short of its hull
 (as a share of the volume)."""
+ROUNDING = 1e-8
+"""Metres by which a file may have rounded a vertex."""
 
 
 def strict_urdf(path: str | Path) -> list[str]:
@@ -107,10 +109,10 @@ def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
     corners = (vertices - vertices[0])[faces]
     volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
     try:
-        whole = ConvexHull(vertices - vertices[0]).volume
+        hull = ConvexHull(vertices - vertices[0])
     except QhullError:  # flat
         return False
-    return bool(volume >= (1.0 - TOLERANCE) * whole)
+    return bool(volume >= (1.0 - TOLERANCE) * hull.volume - ROUNDING * hull.area)
 
 
 def _read(path: str | Path) -> tuple[Path, etree._Element]:

@@ -16,9 +16,9 @@ GAP = 0.0005
 
 def build(rng: np.random.Generator) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
-    length = rng.uniform(0.12, 0.19)
-    half = 0.5 * length * rng.uniform(0.1, 0.19)
-    height = max(2 * half * rng.uniform(0.38, 0.7), 0.009)
+    length = rng.uniform(0.08, 0.27)
+    half = 0.5 * length * rng.uniform(0.09, 0.22)
+    height = max(2 * half * rng.uniform(0.35, 0.9), 0.009)
     wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
     blade_half = (half - wall - GAP) * rng.uniform(0.8, 1.0)
     slot = blade_half * rng.uniform(0.3, 0.5)

@@ -40,9 +40,9 @@ class Style:
 def build(rng: np.random.Generator) -> Assembly:
     """A door, closed at rest."""
     kind = str(rng.choice(["single", "double", "sliding"], p=[0.62, 0.23, 0.15]))
-    width = rng.uniform(0.65, 1.05) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
-    height = rng.uniform(1.9, 2.3)
-    depth, jamb = rng.uniform(0.07, 0.18), rng.uniform(0.03, 0.12)
+    width = rng.uniform(0.5, 1.25) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
+    height = rng.uniform(1.6, 3.0)
+    depth, jamb = rng.uniform(0.07, 0.3), rng.uniform(0.03, 0.2)
     style = _style(rng, kind)
     door = Assembly()
     if kind == "sliding":

@@ -56,7 +56,7 @@ class Front:
 def build(rng: np.random.Generator) -> Assembly:
     """Eyeglasses, open at rest; each temple turns inwards about its hinge."""
     style = str(rng.choice(["wire", "thick", "half", "rimless", "shield"], p=[0.27, 0.36, 0.15, 0.08, 0.14]))
-    size = rng.uniform(0.92, 1.08) if rng.random() < 0.85 else rng.uniform(0.75, 0.9)
+    size = rng.uniform(0.87, 1.13) if rng.random() < 0.85 else rng.uniform(0.75, 0.9)
     outline = size * _outline(rng)
     apart = size * rng.uniform(14.0, 24.0) * MM + float(np.ptp(outline[:, 0]))
     outline[:, 0] += apart / 2 - 0.5 * (outline[:, 0].min() + outline[:, 0].max())

@@ -19,8 +19,8 @@ RING = 16
 
 def build(rng: np.random.Generator) -> Assembly:
     """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
-    length = rng.uniform(0.075, 0.135)
-    half = 0.5 * length * rng.uniform(0.17, 0.27)
+    length = rng.uniform(0.06, 0.2)
+    half = 0.5 * length * rng.uniform(0.15, 0.29)
     many = rng.random() < 0.4
     layers = int(rng.integers(2, 5)) if many else 1
     sheet = rng.uniform(0.0018, 0.0028)

@@ -49,9 +49,9 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _shape(rng: np.random.Generator) -> _Shape:
-    width = rng.uniform(0.26, 0.42)
+    width = rng.uniform(0.2, 0.45)
     depth = width * rng.triangular(0.54, 0.67, 0.9)
-    height = max(width * rng.triangular(0.012, 0.03, 0.085), 0.006)
+    height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
     lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
     # The lid turns about a barrel between the two shells, in notches behind both.
     radius = rng.uniform(0.3, 0.45) * min(height, lid, 0.009)
