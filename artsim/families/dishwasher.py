@@ -56,6 +56,7 @@ def build(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.12:
         return _drawers(rng)
     compact, half_door = rng.random(2) < (0.08, 0.12)
+    half_door = half_door and not compact  # there is no room for it
     width = rng.uniform(0.42, 0.48) if rng.random() < 0.2 and not compact else rng.uniform(0.54, 0.64)
     height = width * rng.uniform(0.75, 0.95) if compact else rng.uniform(0.70, 0.9)
     wall, thick = rng.uniform(0.012, 0.04), rng.uniform(0.03, 0.075)
@@ -149,7 +150,7 @@ def _body(rng: np.random.Generator, s: Shape, strip: float, flush: bool, flanked
         y = half - (0.001 if flanked else 0.0)
         solid += rounded_box((-s.thick, -y, s.height - strip), (front + s.wall, y, s.height), 0.004)
     if flush:
-        foot = min(rng.uniform(0.0, 0.09), 0.5 * s.bottom)
+        foot = min(rng.uniform(0.0, 0.09), 0.5 * s.bottom, base - 0.002)
         solid += rounded_box((face, -half, foot), (front + 0.02, half, s.bottom - GAP), 0.003)
         solid += box((front + 0.01, -half, foot), (back, half, base + 0.002))
         solid += box((face + rng.uniform(0.02, 0.06), -half + 0.01, 0.0), (back - 0.02, half - 0.01, foot + 0.01))
