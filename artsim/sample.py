@@ -188,7 +188,9 @@ def observe(
             frame = replace(frame, depth=sensor.read_image(frame.depth, camera, key))
     wanted = {image: None if frame is None else getattr(frame, field) for image, field in _FRAME_FIELDS.items()}
     if "rgb" in images and wanted["rgb"] is None:
-        raise ConfigError(f"renderer {name!r} makes no rgb", "images", "use a renderer that does, such as sapien or pybullet")
+        raise ConfigError(
+            f"renderer {name!r} makes no rgb", "images", "use a renderer that does, such as sapien or pybullet"
+        )
     tree = obj.tree
     axis_camera, origin_camera = tree.posed_joints(posed.T_camera_part)
     return Sample(

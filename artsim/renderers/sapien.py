@@ -22,6 +22,7 @@ from artsim.renderers.raycast import pose
 
 _MAX_SCENES = 16  # as many objects as take turns in a plan
 _MAX_FACES = 1_500_000  # triangles kept loaded
+_PROBE_TIMEOUT = 120.0  # seconds
 _EXTRA_MEND = "pip install 'artsim[sapien]'"
 _DRIVER_MEND = (
     "run scripts/install-vulkan.sh as root (Mesa's lavapipe >= 24.3 renders on a CPU) or install the GPU's Vulkan "
@@ -180,9 +181,11 @@ def import_sapien() -> ModuleType:
         When it is not installed, lacks a system library, or finds no device to render on.
     """
     # Some drivers crash the process that asks for a device in vain, at once or at its exit.
-    probe = subprocess.run(
-        [sys.executable, "-c", "import sapien; sapien.render.RenderSystem()"], capture_output=True, text=True
-    )
+    command = [sys.executable, "-c", "import sapien; sapien.render.RenderSystem()"]
+    try:
+        probe = subprocess.run(command, capture_output=True, text=True, timeout=_PROBE_TIMEOUT)
+    except subprocess.TimeoutExpired as error:
+        raise RenderError("SAPIEN's driver gives no answer", "sapien", _DRIVER_MEND) from error
     if probe.returncode != 0:
         said = (probe.stderr.strip().splitlines() or [f"the probe ended with {probe.returncode}"])[-1]
         if "No module named 'sapien'" in said:
