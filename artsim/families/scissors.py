@@ -40,7 +40,7 @@ class Ring:
 
 def build(rng: np.random.Generator) -> Assembly:
     """Scissors, closed at rest. One blade turns about the vertical pivot."""
-    length = rng.uniform(0.11, 0.27)
+    length = rng.uniform(0.09, 0.3)
     blade = length * rng.uniform(0.36, 0.6)
     width = min(max(blade * rng.uniform(0.09, 0.19), 0.006), 0.024)
     sheet = max(length * rng.uniform(0.008, 0.013), 0.0016)

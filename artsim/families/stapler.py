@@ -59,7 +59,7 @@ class Layout:
 
 def build(rng: np.random.Generator) -> Assembly:
     """A stapler, closed at rest; what turns about the hinge opens upwards."""
-    length = rng.uniform(0.075, 0.17)
+    length = rng.uniform(0.065, 0.21)
     width = rng.uniform(0.011, 0.016)
     base = rng.uniform(0.005, 0.011)
     tail = rng.uniform(0.0065, 0.01)

@@ -30,8 +30,8 @@ def build(rng: np.random.Generator) -> Assembly:
     count = int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2]))
     if kind == "sliding":
         count = max(count, 2)
-    width = rng.uniform(0.45, 0.8) * (count if kind != "hung" else 1)
-    height = rng.uniform(0.7, 1.5) if kind != "hung" else width * rng.uniform(1.3, 2.0)
+    width = rng.uniform(0.35, 1.0) * (count if kind != "hung" else 1)
+    height = rng.uniform(0.5, 1.8) if kind != "hung" else width * rng.uniform(1.3, 2.0)
     bar = rng.uniform(0.035, 0.065)
     depth = rng.uniform(0.06, 0.12)
     sash = float(rng.uniform(0.03, 0.045))
