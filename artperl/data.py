@@ -16,6 +16,8 @@ from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.stream import FamilyStream
 
+_ATTEMPTS = 50
+
 
 @dataclass(frozen=True, eq=False)
 class Clouds(Batch):
@@ -67,17 +69,39 @@ class Truth(Batch):
     diagonal: Tensor
 
 
-def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
-    """One sample as arrays for :class:`Clouds` and :class:`Truth`.
+class Samples:
+    """Samples of fresh procedural objects by number, of objects with at most ``num_rows`` parts.
 
-    Raises
-    ------
-    ConfigError
-        When the sample has more parts than rows.
+    Parameters
+    ----------
+    categories : sequence of str
+    options : SampleOptions
+    seed : int
+    views_per_object : int
+    num_rows : int
     """
+
+    def __init__(
+        self, categories: Sequence[str], options: SampleOptions, seed: int, views_per_object: int, num_rows: int
+    ):
+        self.stream = FamilyStream(categories, options, seed, views_per_object)
+        self.num_rows = num_rows
+
+    def __getitem__(self, i: int) -> Sample:
+        # Another object of the same category takes the place of one that has too many parts.
+        elsewhere = len(self.stream.categories) * self.stream.views_per_object << 32
+        for attempt in range(_ATTEMPTS):
+            sample = self.stream[i + attempt * elsewhere]
+            if len(sample.joint_type) <= self.num_rows:
+                return sample
+        raise ConfigError(
+            f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts", sample.category, "allow more parts"
+        )
+
+
+def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
+    """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
     K = len(sample.joint_type)
-    if num_rows < K:
-        raise ConfigError(f"{sample.category} {sample.object_id} has {K} parts", mend=f"allow more than {num_rows}")
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
     size = np.linalg.norm(sample.box_size, axis=1)
     rest = (sample.npcs[:num_points] - 0.5) * size[part, None] + sample.box_center[part]
@@ -109,8 +133,8 @@ def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch."""
 
-    def __init__(self, stream: FamilyStream, num_points: int, num_rows: int, batch_size: int, first: int):
-        self.stream, self.num_points, self.num_rows = stream, num_points, num_rows
+    def __init__(self, samples: Samples, num_points: int, batch_size: int, first: int):
+        self.samples, self.num_points = samples, num_points
         self.batch_size, self.first = batch_size, first
 
     def __iter__(self) -> Iterator[dict[str, Array]]:
@@ -119,7 +143,7 @@ class _Rows(IterableDataset[dict[str, Array]]):
         batch = self.first // self.batch_size + worker
         while True:
             for i in range(batch * self.batch_size, (batch + 1) * self.batch_size):
-                yield training_rows(self.stream[i], self.num_points, self.num_rows)
+                yield training_rows(self.samples[i], self.num_points, self.samples.num_rows)
             batch += workers
 
 
@@ -152,7 +176,7 @@ def batches(
         View preset, noise and the like; ``num_points`` overrides its own.
     """
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-    stream = FamilyStream(categories, options, seed, views_per_object=batch_size // 4)
-    rows = _Rows(stream, num_points, num_rows, batch_size, first_batch * batch_size)
+    samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows)
+    rows = _Rows(samples, num_points, batch_size, first_batch * batch_size)
     loader = DataLoader(rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None)
     yield from map(to_batch, loader)

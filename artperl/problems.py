@@ -11,7 +11,7 @@ from torch import Tensor
 
 from artperl.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.batch import Batch
-from artperl.data import Clouds
+from artperl.data import Clouds, Samples
 from artperl.networks.perception import Perception
 from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
@@ -19,7 +19,6 @@ from artperl.shapes import Observed, Shapes
 from artperl.start import sized
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
-from artsim.stream import FamilyStream
 
 
 @dataclass(frozen=True)
@@ -85,13 +84,13 @@ class Problems:
         perception: Perception | None = None,
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-        self.stream = FamilyStream(categories, options, seed, views_per_object=2)
+        self.samples = Samples(categories, options, seed, 2, base.shapes.trees.num_rows)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
         self.start, self.perception = start or StartOptions(), perception
 
     def __getitem__(self, n: int) -> Problem:
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + n)
-        samples = [self.stream[i] for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
+        samples = [self.samples[i] for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
         rows = self.base.shapes.trees.num_rows
         truth = [part_truth(sample, rows) for sample in samples]
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))

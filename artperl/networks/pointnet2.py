@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 
 @dataclass(frozen=True)
@@ -27,20 +28,20 @@ class Neighbourhoods:
     points : list of (B, N_l, 3) float
     down : list of (B, N_l+1, k) int64
         For each centre of level l + 1, its nearest points of level l.
-    up, up_weight : list of (B, N_l, 3)
-        For each point of level l, its nearest centres of level l + 1, and weights that fall with distance.
+    up : list of (B, N_l, N_l+1) float
+        Weights of the centres of level l + 1 for each point of level l: they fall with distance, and only those of the
+        three nearest are not 0. Dense, since a matrix product with them is faster, above all backwards.
     """
 
     points: list[Tensor]
     down: list[Tensor]
     up: list[Tensor]
-    up_weight: list[Tensor]
 
     @staticmethod
     @torch.no_grad()
     def of(points: Tensor, sizes: Sequence[int], neighbours: int) -> Neighbourhoods:
         """Neighbourhoods of (B, N, 3) clouds in random order, with ``sizes`` points at the coarser levels."""
-        levels, down, up, weights = [points], [], [], []
+        levels, down, up = [points], [], []
         for size in sizes:
             fine = levels[-1]
             coarse = fine[:, :size]
@@ -50,17 +51,19 @@ class Neighbourhoods:
             down.append(squared.topk(min(neighbours, fine.shape[1]), dim=2, largest=False, sorted=False).indices)
             near, index = squared.topk(min(3, coarse.shape[1]), dim=1, largest=False, sorted=False)
             weight = 1.0 / (near + 1e-8)
-            up.append(index.transpose(1, 2))
-            weights.append((weight / weight.sum(1, keepdim=True)).transpose(1, 2))
+            weight = weight / weight.sum(1, keepdim=True)
+            up.append(torch.zeros_like(squared).scatter_(1, index, weight).transpose(1, 2))
             levels.append(coarse)
-        return Neighbourhoods(levels, down, up, weights)
+        return Neighbourhoods(levels, down, up)
 
 
-def gather(features: Tensor, index: Tensor) -> Tensor:
-    """Rows (B, M, k, C) of features (B, N, C) by indices (B, M, k)."""
+def strongest(features: Tensor, index: Tensor) -> Tensor:
+    """(B, M, C) maxima of the rows of features (B, N, C) that indices (B, M, k) name."""
     B, N, C = features.shape
     flat = index + torch.arange(B, device=index.device)[:, None, None] * N
-    return features.reshape(B * N, C)[flat.reshape(-1)].reshape(*index.shape, C)
+    # Gathers and maximises in one pass; gradients go back along the winning edges alone.
+    best = functional.embedding_bag(flat.flatten(0, 1), features.reshape(B * N, C), mode="max")
+    return best.reshape(B, -1, C)
 
 
 class SetAbstraction(nn.Module):
@@ -75,8 +78,7 @@ class SetAbstraction(nn.Module):
     def forward(self, features: Tensor, fine: Tensor, coarse: Tensor, index: Tensor, radius: float) -> Tensor:
         """(B, M, outputs); positions are taken over ``radius``, the typical reach of a neighbourhood."""
         point_term = self.features(features) + self.positions(fine / radius)
-        strongest = gather(point_term, index).amax(2) - self.positions(coarse / radius)
-        return self.dense(torch.relu(strongest))
+        return self.dense(torch.relu(strongest(point_term, index) - self.positions(coarse / radius)))
 
 
 class FeaturePropagation(nn.Module):
@@ -88,10 +90,9 @@ class FeaturePropagation(nn.Module):
         self.fine = nn.Linear(fine, outputs, bias=False)
         self.dense = nn.Sequential(nn.LayerNorm(outputs), nn.ReLU(), nn.Linear(outputs, outputs), nn.ReLU())
 
-    def forward(self, coarse: Tensor, fine: Tensor, index: Tensor, weight: Tensor) -> Tensor:
-        """(B, N, outputs)."""
-        spread = (gather(self.coarse(coarse), index) * weight[..., None]).sum(2)
-        return self.dense(spread + self.fine(fine))
+    def forward(self, coarse: Tensor, fine: Tensor, weight: Tensor) -> Tensor:
+        """(B, N, outputs) from coarse (B, M, C), fine (B, N, C') features and weights (B, N, M)."""
+        return self.dense(weight @ self.coarse(coarse) + self.fine(fine))
 
 
 class PointNet2(nn.Module):
@@ -140,5 +141,5 @@ class PointNet2(nn.Module):
         decoded = torch.cat([features[-1], cloud[:, None].expand(-1, features[-1].shape[1], -1)], dim=-1)
         for step, layer in enumerate(self.up):
             level = len(self.sizes) - 1 - step
-            decoded = layer(decoded, features[level], near.up[level], near.up_weight[level])
+            decoded = layer(decoded, features[level], near.up[level])
         return decoded, cloud
