@@ -33,7 +33,6 @@ audit: $(VENV)/.ready-dev
 
 assets: $(VENV)/.ready-dev
 	$(PY) urdf_assets/build.py
-	$(VENV)/bin/artsim generate-objects --category all --count 1 --out urdf_assets/procedural
 
 # System libraries that PyBullet's EGL renderer needs, and SAPIEN's Vulkan driver; everything else comes from pip.
 system:

@@ -2,7 +2,7 @@
 
 Objects are drawn in their rest frame (metres, Z up, front towards -X) and written as PartNet-Mobility folders: Y-up
 meshes, an empty ``base`` link, and joints without rotations of their own. The binary meshes of ``quirks/formats`` are
-written too; all other quirk cases are written by hand.
+written too; all other quirk cases are written by hand. ``procedural`` holds one exported object of each family.
 """
 
 from __future__ import annotations
@@ -18,6 +18,12 @@ import trimesh
 from numpy.typing import NDArray
 from shapely import LineString, Point, Polygon, unary_union  # type: ignore[import-untyped]
 from trimesh import Trimesh as Mesh
+
+from artsim import ArticulatedObject, make
+from artsim.export import export
+from artsim.families import FAMILIES
+
+SEEDS_TO_CHOOSE_FROM = 12
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
@@ -408,8 +414,21 @@ def write_formats(folder: Path) -> None:
         (folder / f"ramp.{kind}").write_bytes(ramp.export(file_type=kind))
 
 
+def write_procedural(folder: Path) -> None:
+    """One procedural object of each category, the smallest file of the first few seeds."""
+    for category in sorted(FAMILIES):
+        objects = [make(category, seed) for seed in range(SEEDS_TO_CHOOSE_FROM)]
+        export(min(objects, key=shape_size), folder / category)
+
+
+def shape_size(obj: ArticulatedObject) -> int:
+    """Triangles of the object's surfaces and collision geometry."""
+    return obj.num_faces + sum(len(faces) for part in obj.parts if part.body for _, faces in part.body.pieces)
+
+
 def main(folder: Path) -> None:
     """Write every object, and the meshes of ``quirks/formats``, below a folder."""
+    write_procedural(folder / "procedural")
     write_formats(folder / "quirks" / "formats" / "meshes")
     for name, build in MODELS.items():
         write(build(), folder / name)
