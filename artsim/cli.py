@@ -29,9 +29,9 @@ class Generate:
     the same command goes on where it stopped. The result depends on the options and the seed alone, never on the number
     of workers.
 
-    Examples:
-    python generate.py --categories laptop drawer --objects-per-category 200 --out out/first --num-samples 5000
-    python generate.py --objects path/to/partnet_mobility/Laptop --out out/real --num-samples 500
+    To make objects: python generate.py --categories laptop drawer --objects-per-category 200 --out out/first
+
+    To load objects: python generate.py --objects path/to/partnet_mobility/Laptop --out out/real --num-samples 500
     """
 
     out: Path

@@ -24,7 +24,15 @@ def generate(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_help_teaches() -> None:
     result = generate("--help")
     assert result.returncode == 0
-    for word in ("--objects", "--out", "--states.fraction-open", "--views.preset", "--renderer", "Examples:"):
+    for word in (
+        "--objects",
+        "--out",
+        "--states.fraction-open",
+        "--views.preset",
+        "--renderer",
+        "To make objects:",
+        "To load objects:",
+    ):
         assert word in result.stdout
     result = run(ARTSIM, "--help")
     for verb in ("generate", "view", "inspect", "verify"):
