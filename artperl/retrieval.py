@@ -1,75 +1,150 @@
-"""The base of reference shapes, and finding in it the ones most like an observed object (ArtPERL, section 4.2)."""
+"""The shape base: objects in canonical space that serve as references, and the nearest of them by an embedding."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from artperl.pose import Trees
 from artperl.shapes import Shapes
-from artsim.errors import ConfigError
+from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject
 
-_MISSING = 4.0
-"""Distance, in diagonals per part, between objects whose parts or joints do not correspond."""
+FORMAT = 1
+_CLOUDS = ("box_center", "box_size", "points", "normals", "spacing", "diagonal")
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeBase:
-    """Reference objects, scaled to a diagonal of 1, found by the boxes of their parts.
+    """Reference objects at diagonal 1 in their rest frames, with what is needed to find and to fit them.
 
     Attributes
     ----------
+    object_ids, categories : tuple of str, length B
+    trees : tuple of KinematicTree, length B
     shapes : Shapes
-        One row for each object.
-    names : tuple of str
-        Where each came from, such as "laptop:3".
+        B rows, padded to the most parts of any object.
+    embeddings : (B, E) float or None
+        One for each object, of whatever network searches the base.
     """
 
+    object_ids: tuple[str, ...]
+    categories: tuple[str, ...]
+    trees: tuple[KinematicTree, ...]
     shapes: Shapes
-    names: tuple[str, ...]
+    embeddings: Tensor | None = None
+
+    def __len__(self) -> int:
+        return len(self.object_ids)
 
     @staticmethod
-    def of(objects: Sequence[ArticulatedObject], num_rows: int | None = None, points_per_part: int = 192) -> ShapeBase:
-        """A base of some objects.
+    def of(objects: Sequence[ArticulatedObject], points_per_part: int = 512) -> ShapeBase:
+        """A base of any set of objects, each brought to diagonal 1."""
+        if not objects:
+            raise ConfigError("a shape base needs objects", mend="pass at least one")
+        units = [obj.with_diagonal(1.0) for obj in objects]
+        return ShapeBase(
+            tuple(obj.object_id for obj in units),
+            tuple(obj.category for obj in units),
+            tuple(obj.tree for obj in units),
+            Shapes.from_objects(units, points_per_part),
+        )
+
+    def with_embeddings(self, embeddings: Tensor) -> ShapeBase:
+        """The same objects, found by other embeddings (B, E)."""
+        if len(embeddings) != len(self):
+            raise ConfigError(f"{len(embeddings)} embeddings do not fit {len(self)} objects", "embeddings")
+        return replace(self, embeddings=embeddings.detach())
+
+    def of_category(self, category: str) -> Tensor:
+        """(B,) bool: objects of a category."""
+        return torch.tensor([name == category for name in self.categories])
+
+    def nearest(self, queries: Tensor, count: int = 1, allowed: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The objects whose embeddings are nearest (section 4.2: Euclidean distance), nearest first.
+
+        Parameters
+        ----------
+        queries : (Q, E) float
+        count : int
+            Objects for each query.
+        allowed : (B,) or (Q, B) bool, optional
+            Objects to choose among, for example those of a category; at least ``count`` for each query.
+
+        Returns
+        -------
+        rows : (Q, count) int64
+        distance : (Q, count) float
 
         Raises
         ------
         ConfigError
-            When there is none.
+            When the base has no embeddings, or too few objects.
         """
-        if not objects:
-            raise ConfigError("a base without objects has nothing to retrieve", mend="pass some objects")
-        unit = [obj.with_diagonal(1.0) for obj in objects]
-        shapes = Shapes.from_objects(unit, points_per_part, num_rows)
-        return ShapeBase(shapes, tuple(f"{obj.category}:{obj.object_id}" for obj in objects))
+        if self.embeddings is None:
+            raise ConfigError("the shape base has no embeddings", mend="give it some: with_embeddings")
+        apart = torch.cdist(queries, self.embeddings.to(queries))
+        if allowed is not None:
+            apart = apart.masked_fill(~allowed.to(apart.device), torch.inf)
+        if count > len(self) or not bool(torch.isfinite(apart).sum(1).ge(count).all()):
+            raise ConfigError(f"fewer than {count} objects to choose among", "count", "ask for fewer, or allow more")
+        distance, rows = apart.topk(count, largest=False)
+        return rows, distance
 
-    def __len__(self) -> int:
-        return len(self.names)
+    def references(self, rows: Tensor) -> Shapes:
+        """Shapes of the chosen objects, with no more rows for parts than they need."""
+        return self.shapes[rows].trimmed()
 
-    def distance(self, valid: Tensor, box_center: Tensor, box_size: Tensor) -> Tensor:
-        """(B, len) difference of part boxes, in diagonals, mean over parts.
+    def save(self, path: str | Path) -> None:
+        """Write everything into one ``.npz`` file, without pickle."""
+        description = {
+            "format": FORMAT,
+            "object_ids": self.object_ids,
+            "categories": self.categories,
+            "trees": [tree.to_dict() for tree in self.trees],
+        }
+        arrays = {name: getattr(self.shapes, name).cpu().numpy() for name in _CLOUDS}
+        arrays["normals"] = arrays["normals"].astype(np.float16)  # to 0.03 deg, at half the size
+        if self.embeddings is not None:
+            arrays["embeddings"] = self.embeddings.cpu().numpy()
+        text = np.frombuffer(json.dumps(description).encode(), dtype=np.uint8)
+        with Path(path).open("wb") as file:
+            np.savez_compressed(file, description=text, **arrays)
 
-        Parameters
-        ----------
-        valid : (B, P) bool
-            Parts of the observed objects.
-        box_center, box_size : (B, P, 3) float
-            In the rest frame, in diagonals of the object, as perceived.
+    @staticmethod
+    def load(path: str | Path) -> ShapeBase:
+        """Read a file that :meth:`save` wrote.
+
+        Raises
+        ------
+        DatasetError
+            When it is missing, damaged or of another format.
         """
-        P = valid.shape[1]
-        both = torch.cat([box_center, box_size], dim=-1)
-        base = torch.cat([self.shapes.box_center, self.shapes.box_size], dim=-1)[:, :P]
-        known = self.shapes.trees.valid[:, :P]
-        apart = (both[:, None] - base[None]).abs().sum(-1)
-        agree = valid[:, None] & known[None]
-        differ = valid[:, None] ^ known[None]
-        extra = self.shapes.trees.valid[:, P:].sum(1)
-        total = (apart * agree).sum(-1) + _MISSING * (differ.sum(-1) + extra)
-        return total / valid.sum(1, keepdim=True).clamp(min=1)
-
-    def nearest(self, valid: Tensor, box_center: Tensor, box_size: Tensor, count: int = 1) -> Tensor:
-        """(B, count) rows of the most similar objects, the best first."""
-        return self.distance(valid, box_center, box_size).topk(min(count, len(self)), largest=False).indices
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+            description = json.loads(arrays.pop("description").tobytes())
+            if description["format"] != FORMAT:
+                raise DatasetError(f"format {description['format']} is not {FORMAT}", path, "build the base again")
+            trees = tuple(KinematicTree.from_dict(tree) for tree in description["trees"])
+            embeddings = arrays.pop("embeddings", None)
+            tensors = {name: torch.from_numpy(arrays[name].astype(np.float32)) for name in _CLOUDS}
+            stacked = Trees.stack(trees, tensors["box_size"].shape[1], torch.float32)
+        except DatasetError:
+            raise
+        except (OSError, ValueError, KeyError, TypeError, ArtsimError) as error:
+            raise DatasetError(f"no shape base can be read ({error})", path, "build it again") from error
+        return ShapeBase(
+            tuple(description["object_ids"]),
+            tuple(description["categories"]),
+            trees,
+            Shapes(trees=stacked, **tensors),
+            None if embeddings is None else torch.from_numpy(embeddings),
+        )

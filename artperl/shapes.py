@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -50,7 +50,7 @@ class Shapes(Batch):
     @staticmethod
     def from_objects(
         objects: Sequence[ArticulatedObject],
-        points_per_part: int = 256,
+        points_per_part: int = 512,
         num_rows: int | None = None,
         dtype: torch.dtype = torch.float32,
         seed: int = 0,
@@ -82,6 +82,14 @@ class Shapes(Batch):
         tensors = {name: torch.from_numpy(array).to(dtype) for name, array in {**boxes, **arrays}.items()}
         diagonal = torch.tensor([obj.diagonal for obj in objects], dtype=dtype)
         return Shapes(trees=trees, **tensors, spacing=torch.from_numpy(spacing).to(dtype), diagonal=diagonal)
+
+    def trimmed(self) -> Shapes:
+        """Without rows for parts that no object of the batch has."""
+        count = max(1, int(self.trees.valid.sum(1).max()))
+        cut = {
+            name: getattr(self, name)[:, :count] for name in ("box_center", "box_size", "points", "normals", "spacing")
+        }
+        return replace(self, trees=self.trees.trimmed(count), **cut)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,81 @@
+"""The shape base keeps objects as they are, and finds the nearest."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import artsim
+from artperl.retrieval import ShapeBase
+from artsim.errors import ConfigError, DatasetError
+
+
+@pytest.fixture(scope="module")
+def base() -> ShapeBase:
+    objects = [artsim.make(category, seed) for category in ("laptop", "drawer") for seed in range(3)]
+    made = ShapeBase.of(objects, points_per_part=64)
+    return made.with_embeddings(torch.randn(len(made), 16, generator=torch.Generator().manual_seed(0)))
+
+
+def test_a_base_comes_back_from_its_file(base: ShapeBase, tmp_path: Path) -> None:
+    base.save(tmp_path / "base.npz")
+    back = ShapeBase.load(tmp_path / "base.npz")
+    assert (back.object_ids, back.categories, back.trees) == (base.object_ids, base.categories, base.trees)
+    assert base.embeddings is not None
+    assert back.embeddings is not None
+    torch.testing.assert_close(back.embeddings, base.embeddings)
+    torch.testing.assert_close(back.shapes.points, base.shapes.points)
+    torch.testing.assert_close(back.shapes.normals, base.shapes.normals, atol=1e-3, rtol=0.0)
+    for field in fields(base.shapes.trees):
+        torch.testing.assert_close(getattr(back.shapes.trees, field.name), getattr(base.shapes.trees, field.name))
+
+
+def test_clouds_lie_on_the_objects_they_stand_for(base: ShapeBase) -> None:
+    obj = artsim.make("drawer", 1).with_diagonal(1.0)
+    row = 4
+    for k in range(len(obj)):
+        _, distance, _ = obj.part_mesh(k).nearest.on_surface(base.shapes.points[row, k].numpy())
+        assert distance.max() < 1e-5
+    np.testing.assert_allclose(base.shapes.box_size[row, : len(obj)], obj.box_size, atol=1e-6)
+    assert base.shapes.diagonal.allclose(torch.ones(len(base)))
+
+
+def test_the_nearest_object_is_found_in_well_under_a_millisecond(base: ShapeBase) -> None:
+    assert base.embeddings is not None
+    rows, distance = base.nearest(base.embeddings + 1e-3)
+    assert rows[:, 0].tolist() == list(range(len(base)))
+    assert distance.max() < 0.01
+    laptops, _ = base.nearest(base.embeddings, 3, base.of_category("laptop"))
+    assert sorted(laptops[5].tolist()) == [0, 1, 2]
+    times = []
+    for _ in range(50):
+        start = time.perf_counter()
+        base.nearest(base.embeddings[:1])
+        times.append(time.perf_counter() - start)
+    assert min(times) < 1e-3
+
+
+def test_references_have_no_more_rows_than_they_need(base: ShapeBase) -> None:
+    laptops = base.references(torch.tensor([0, 2]))
+    assert laptops.trees.valid.shape == (2, 2)
+    assert laptops.trees.carries.shape == (2, 2, 2)
+    assert laptops.points.eq(base.shapes.points[[0, 2], :2]).all()
+
+
+def test_what_cannot_be_searched_or_read_is_refused(base: ShapeBase, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no embeddings"):
+        ShapeBase.of([artsim.make("laptop", 0)], 8).nearest(torch.zeros(1, 4))
+    assert base.embeddings is not None
+    with pytest.raises(ConfigError, match="fewer than 4"):
+        base.nearest(base.embeddings, 4, base.of_category("laptop"))
+    with pytest.raises(ConfigError, match="needs objects"):
+        ShapeBase.of([])
+    (tmp_path / "broken.npz").write_bytes(b"not a base")
+    for name in ("broken.npz", "missing.npz"):
+        with pytest.raises(DatasetError, match="shape base"):
+            ShapeBase.load(tmp_path / name)
