@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
@@ -20,10 +18,8 @@ from torch import Tensor, nn
 from artperl.estimator import Calibration, Estimator, EstimatorOptions
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception
-from artperl.pose import Trees
 from artperl.refine import RefineOptions
 from artperl.retrieval import ShapeBase
-from artperl.shapes import Shapes
 from artsim.errors import DatasetError
 
 WEIGHTS = Path(__file__).parent / "weights"
@@ -50,7 +46,9 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         networks["agent"] = estimator.agent
     tensors = {f"{name}.{key}": t for name, net in networks.items() for key, t in net.state_dict().items()}
     save_tensors(tensors, folder / _TENSORS)
-    save_base(estimator.base, folder / _BASE)
+    part = folder / f".{_BASE}"
+    estimator.base.save(part)
+    part.replace(folder / _BASE)
     settings = {
         "format": _FORMAT,
         "perception": {"num_rows": estimator.perception.num_rows, "width": estimator.perception.width},
@@ -81,7 +79,7 @@ def load_estimator(name: str | Path) -> Estimator:
             agent.load_state_dict(_under(tensors, "agent."))
         options = {**settings["options"], "refine": RefineOptions(**settings["options"]["refine"])}
         return Estimator(
-            perception, load_base(folder / _BASE), agent, EstimatorOptions(**options),
+            perception, ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**options),
             Calibration(**settings["calibration"]),
         )  # fmt: skip
     except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
@@ -108,25 +106,6 @@ def read_settings(folder: Path) -> dict[str, Any]:
     return settings
 
 
-def save_base(base: ShapeBase, path: Path) -> None:
-    """Write a base of references as arrays; no pickle."""
-    arrays = {name: tensor.numpy() for name, tensor in _flat(base.shapes).items()}
-    part = path.with_name(f".{path.name}")
-    with part.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, names=np.array(base.names), **arrays)
-    part.replace(path)
-
-
-def load_base(path: Path) -> ShapeBase:
-    """Inverse of :func:`save_base`."""
-    with np.load(path, allow_pickle=False) as arrays:
-        tensors = {name: torch.from_numpy(arrays[name]) for name in arrays.files if name != "names"}
-        names = tuple(str(name) for name in arrays["names"])
-    trees = Trees(**_under(tensors, "trees."))
-    own = {f.name: tensors[f.name] for f in fields(Shapes) if f.name != "trees"}
-    return ShapeBase(Shapes(trees=trees, **own), names)
-
-
 def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
     """Write tensors so that a stop halfway leaves the old file."""
     part = path.with_name(f".{path.name}")
@@ -139,15 +118,6 @@ def replace_file(path: Path, content: bytes) -> None:
     part = path.with_name(f".{path.name}")
     part.write_bytes(content)
     part.replace(path)
-
-
-def _flat(record: Any, prefix: str = "") -> dict[str, Tensor]:
-    """Tensors of a record and of the records in it, by dotted names."""
-    flat: dict[str, Tensor] = {}
-    for f in fields(record):
-        value = getattr(record, f.name)
-        flat |= _flat(value, f"{prefix}{f.name}.") if is_dataclass(value) else {f"{prefix}{f.name}": value}
-    return flat
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

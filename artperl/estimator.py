@@ -19,6 +19,7 @@ from torch import Tensor
 
 from artperl.batch import concatenate
 from artperl.data import Clouds
+from artperl.embedding import box_embedding
 from artperl.fitting import Fitting, FittingOptions
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perceived, Perception
@@ -185,8 +186,8 @@ class Estimator:
             clouds = Clouds.of(cloud)
             perceived = self.perception(clouds.points)
         with clock("start"):
-            has = perceived.valid_logits > 0
-            rows = self.base.nearest(has, perceived.box_center, perceived.box_size, options.references)[0]
+            query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
+            rows = self.base.nearest(query, min(options.references, len(self.base)))[0][0]
             shapes, theta = start(clouds, perceived, self.base.shapes[rows], len(rows))
             few = cloud[:, : options.fit_points]
             observed = Observed.of(few, perceived.part[:, : options.fit_points]).repeat(len(rows))
@@ -240,7 +241,7 @@ class Estimator:
             joint_axis=_numpy(axis)[:K],
             joint_origin=_numpy(origin)[:K],
             part=part,
-            reference=self.base.names[reference],
+            reference=f"{self.base.categories[reference]}:{self.base.object_ids[reference]}",
             residual=residual,
             disagreement=disagreement,
             visibility=visibility(shapes, observed, posed)[:K],

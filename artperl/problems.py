@@ -12,6 +12,7 @@ from torch import Tensor
 from artperl.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.batch import Batch
 from artperl.data import Clouds, Samples
+from artperl.embedding import box_embedding
 from artperl.networks.perception import Perception
 from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
@@ -94,7 +95,8 @@ class Problems:
         rows = self.base.shapes.trees.num_rows
         truth = [part_truth(sample, rows) for sample in samples]
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
-        nearest = self.base.nearest(valid, box_center, box_size, self.choices)
+        query = box_embedding(valid, box_center, box_size)
+        nearest, _ = self.base.nearest(query, min(self.choices, len(self.base)))
         pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
         shapes = sized(self.base.shapes[nearest.gather(1, pick)[:, 0]], torch.tensor([s.diagonal for s in samples]))
         goal = theta_from_parts(shapes.trees, shapes.box_center, shapes.box_size, rotation, center, size)

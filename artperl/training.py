@@ -27,6 +27,7 @@ from tqdm import tqdm
 
 from artperl.checkpoint import load_estimator, replace_file, save_estimator, save_tensors
 from artperl.data import batches
+from artperl.embedding import by_boxes
 from artperl.estimator import Estimator, EstimatorOptions
 from artperl.evaluation import calibrate, evaluate, frozen_samples, headline, summary, table
 from artperl.fitting import Fitting, FittingOptions
@@ -56,8 +57,8 @@ class TrainOptions:
     seed: int = 0
     base_objects: int = 64
     """Reference objects of each category."""
-    num_rows: int = 0
-    """Most parts that an object may have; 0 for as many as any reference has."""
+    reference_points: int = 192
+    """Points of each part of a reference."""
     width: int = 48
     """Channels of perception's finest level."""
     perception_steps: int = 6000
@@ -89,7 +90,7 @@ class TrainOptions:
 
 PRESETS = {
     "quick": TrainOptions(
-        base_objects=32, width=32, perception_steps=350, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
+        base_objects=32, width=32, perception_steps=400, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
         fit_points=256, evaluate_every=175, evaluate_rollouts=12, test_objects=20, test_views=2,
     ),
     "full": TrainOptions(),
@@ -120,7 +121,7 @@ class Training:
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
         objects = [source.load() for source in family_sources(options.categories, options.base_objects, BASE_SEEDS)]
-        self.base = ShapeBase.of(objects, options.num_rows or None)
+        self.base = by_boxes(ShapeBase.of(objects, options.reference_points))
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width)
         self.agent = Agent()

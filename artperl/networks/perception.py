@@ -48,10 +48,14 @@ class Perceived(Batch):
     log_diagonal: Tensor
 
     @property
+    def valid(self) -> Tensor:
+        """(B, P) bool: parts that the object has; the root always."""
+        return (self.valid_logits > 0).index_fill(1, torch.zeros(1, dtype=torch.int64), True)
+
+    @property
     def part(self) -> Tensor:
         """(B, N) most likely part of each point, among those that the object has."""
-        has = (self.valid_logits > 0).index_fill(1, torch.tensor([0]), True)
-        return self.part_logits.masked_fill(~has[:, None], -torch.inf).argmax(-1)
+        return self.part_logits.masked_fill(~self.valid[:, None], -torch.inf).argmax(-1)
 
 
 class Perception(nn.Module):
