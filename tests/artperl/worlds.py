@@ -1,0 +1,22 @@
+"""Small worlds that several tests share."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import artsim
+from artperl.embedding import by_boxes
+from artperl.problems import Problem, Problems
+from artperl.retrieval import ShapeBase
+
+
+@cache
+def small_base(*categories: str, objects: int = 6) -> ShapeBase:
+    """A base of some procedural objects of each category."""
+    return by_boxes(ShapeBase.of([artsim.make(c, 500 + i) for c in categories for i in range(objects)], 96))
+
+
+@cache
+def small_problem(*categories: str, batch: int = 6) -> Problem:
+    """A few fitting problems."""
+    return Problems(categories, small_base(*categories), batch, 128, seed=3)[0]
