@@ -33,7 +33,6 @@ _OUTLINE_POINTS = 32
 """Points of each part that must lie within the outline; the first ones are spread as evenly as all."""
 _BLOCK = 64
 """Points that are matched together."""
-_PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 _HIDDEN = 10.0
 """Squared distance, in diagonals, added for a disc that faces away from the camera: it could not be seen."""
 
@@ -84,8 +83,7 @@ class Target(Batch):
         apart.diagonal(dim1=1, dim2=2).fill_(torch.inf)
         gap = _GAP * (share * apart.amin(-1)).sum(1)
         x = ((observed.points - middle) / unit[:, None, None]).float()  # small numbers, for single precision
-        first, second = _PAIRS
-        monomials = torch.cat([x[..., first] * x[..., second], x, torch.ones_like(x[..., :1])], dim=-1)
+        monomials = torch.cat([x * x, x * x.roll(1, -1), x, torch.ones_like(x[..., :1])], dim=-1)
         slot, source, block_part = _blocks(observed.part)
         sorted_rows = monomials.gather(1, source[..., None].expand(-1, -1, 10)).reshape(len(x), -1, _BLOCK, 10)
         return Target(observed, share, middle, unit, rays, slot, block_part, sorted_rows, gap)
@@ -226,10 +224,8 @@ def _nearest_disc(target: Target, points: Tensor, normals: Tensor) -> Tensor:
     height = (n * y).sum(-1, keepdim=True)
     constant = height**2 + weight * (y * y).sum(-1, keepdim=True) + _HIDDEN * (~facing)[..., None]
     linear = -2.0 * (height * n + weight * y)
-    first, second = _PAIRS
-    # Products of different coordinates count twice.
-    squares, mixed = n * n, 2.0 * n[..., first[3:]] * n[..., second[3:]]
-    discs = torch.cat([squares, mixed, linear, constant], dim=-1)
+    # Products of different coordinates (zx, xy, yz) count twice.
+    discs = torch.cat([n * n, 2.0 * n * n.roll(1, -1), linear, constant], dim=-1)
     # weight |x|^2 is the same for all discs of a point and is left out.
     own = discs.flatten(2).gather(1, target.block_part[..., None].expand(-1, -1, discs[0, 0].numel()))
     own = own.reshape(*target.block_part.shape, -1, 10)
