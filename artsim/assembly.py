@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.errors import KinematicsError
+from artsim.errors import AssetError, KinematicsError
 from artsim.kinematics import Joint, KinematicTree, Mimic
 from artsim.objects import ArticulatedObject, Body, Part, content_sha256
 from artsim.solids import Solid, Vector
@@ -86,9 +86,18 @@ class Assembly:
         -------
         str
             The name.
+
+        Raises
+        ------
+        KinematicsError
+            When another part has this name.
+        AssetError
+            When a piece of the solid is empty.
         """
         if any(part.name == name for part in self._parts):
             raise KinematicsError(f"two parts are called {name!r}")
+        if not solid.pieces or any(piece.is_empty() for piece in solid.pieces):
+            raise AssetError("a piece of its solid encloses nothing", name, "look for swapped corners or flat outlines")
         stem, _, number = name.rpartition("_")
         vertices, faces = solid.union()
         body = Body(solid.piece_meshes(), density)
