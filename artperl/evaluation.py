@@ -25,7 +25,9 @@ from artsim.sources import family_sources
 Array = NDArray[np.float64]
 
 TEST_SEEDS = 1_000_000
-"""Seed of the first unseen procedural object; streams and bases have others."""
+"""Seed of the first procedural object of a test set; streams and bases have others."""
+VALIDATION_SEEDS = 1_500_000
+"""Seed of the first object by which the best estimator is chosen and its confidence calibrated."""
 _RIGHT = (10.0, 0.05)
 """An estimate is right when every part is within that many degrees and diagonals: what confidence speaks of."""
 

@@ -12,7 +12,6 @@ steps taken have to be kept.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from math import cos, pi
@@ -25,11 +24,20 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
-from artperl.checkpoint import load_estimator, replace_file, save_estimator, save_tensors
+from artperl.checkpoint import load_estimator, read_settings, replace_file, save_estimator, save_tensors
 from artperl.data import batches
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator, EstimatorOptions
-from artperl.evaluation import calibrate, evaluate, frozen_samples, headline, summary, table
+from artperl.evaluation import (
+    TEST_SEEDS,
+    VALIDATION_SEEDS,
+    calibrate,
+    evaluate,
+    frozen_samples,
+    headline,
+    summary,
+    table,
+)
 from artperl.fitting import Fitting, FittingOptions
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception, perception_losses
@@ -44,6 +52,7 @@ from artsim.sources import family_sources
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
+_TEST_POINTS = 2048
 _WARM_UP = 0.1
 _LAST_RATE = 0.01
 
@@ -74,14 +83,16 @@ class TrainOptions:
     """Episodes of a rollout."""
     fit_points: int = 512
     """Points of a cloud that the agent sees."""
-    evaluate_every: int = 1000
+    validate_every: int = 1000
     """Steps of stage 1 between tests."""
-    evaluate_rollouts: int = 50
+    validate_rollouts: int = 50
     """Rollouts of stage 2 between tests."""
     test_objects: int = 40
-    """Unseen objects of each category."""
-    test_views: int = 2
-    """Views of each; the last test of a run takes twice as many."""
+    """Unseen objects of each category, others for validation than for the test at the end."""
+    validation_views: int = 2
+    """Views of each object when the estimator is validated."""
+    test_views: int = 4
+    """Views of each object when the best estimator is tested."""
     sample: SampleOptions = field(default_factory=SampleOptions)
     ppo: PPOOptions = field(default_factory=PPOOptions)
     fitting: FittingOptions = field(default_factory=FittingOptions)
@@ -91,7 +102,7 @@ class TrainOptions:
 PRESETS = {
     "quick": TrainOptions(
         base_objects=32, width=32, perception_steps=400, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
-        fit_points=256, evaluate_every=175, evaluate_rollouts=12, test_objects=20, test_views=2,
+        fit_points=256, validate_every=175, validate_rollouts=12, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
 }  # fmt: skip
@@ -132,7 +143,7 @@ class Training:
         self.done = {"perception": 0, "agent": 0}
         self.best = float("inf")
         self.history: list[dict[str, Any]] = []
-        self._tests: list[Sample] = []
+        self._validation: list[Sample] = []
         if (out / f"{_STATE}.json").exists():
             self._load()
 
@@ -181,8 +192,8 @@ class Training:
             _write(board, "perception", figures, step)
             bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
             bar.update()
-            if (step + 1) % options.evaluate_every == 0 or step + 1 == total:
-                self._test(board, step + 1)
+            if (step + 1) % options.validate_every == 0 or step + 1 == total:
+                self._validate(board, step + 1)
         bar.close()
 
     def _learn_to_fit(self, board: SummaryWriter) -> None:
@@ -208,43 +219,42 @@ class Training:
             _write(board, "agent", figures, n)
             bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
             bar.update()
-            if (n + 1) % options.evaluate_rollouts == 0 or n + 1 == total:
-                self._test(board, options.perception_steps + n + 1)
+            if (n + 1) % options.validate_rollouts == 0 or n + 1 == total:
+                self._validate(board, options.perception_steps + n + 1)
         bar.close()
 
-    def _test(self, board: SummaryWriter, step: int) -> None:
-        """Test on the frozen set, keep the best, and write down where the run stands."""
-        figures, estimator = self._figures(self.estimator(), self._samples(self.options.test_views))
-        score = headline(figures)
+    def _validate(self, board: SummaryWriter, step: int) -> None:
+        """Score the estimator on a frozen set of unseen objects, keep the best, and write down where the run stands."""
+        if not self._validation:
+            self._validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
+        scored = evaluate(self.estimator(), self._validation, self.progress)
+        figures, score = summary(scored), headline(summary(scored))
         self.history.append({"step": step, "score": score, "done": dict(self.done)})
-        _write(board, "test", _curves(figures) | {"score": score}, step)
+        _write(board, "validation", _curves(figures) | {"score": score}, step)
         if score < self.best:
             self.best = score
-            save_estimator(estimator, self.out / "best", self._about(figures))
+            best = replace(self.estimator(), calibration=calibrate(scored))
+            save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()
         if self.progress:
             tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")
 
-    def _figures(self, estimator: Estimator, samples: Sequence[Sample]) -> tuple[dict[str, Any], Estimator]:
-        """Figures of an estimator, and the estimator with its confidence calibrated on the same samples."""
-        scored = evaluate(estimator, samples, self.progress)
-        return summary(scored), replace(estimator, calibration=calibrate(scored))
-
-    def _samples(self, views: int) -> list[Sample]:
-        if len(self._tests) != views * self.options.test_objects * len(self.options.categories):
-            sample = replace(self.options.sample, num_points=2048)
-            self._tests = frozen_samples(self.options.categories, self.options.test_objects, views, sample)
-        return self._tests
+    def _unseen(self, views: int, first_seed: int) -> list[Sample]:
+        sample = replace(self.options.sample, num_points=_TEST_POINTS)
+        return frozen_samples(self.options.categories, self.options.test_objects, views, sample, first_seed)
 
     def _finish(self) -> dict[str, Any]:
-        """Figures and table of the best estimator on twice as many views."""
-        figures, _ = self._figures(load_estimator(self.out / "best"), self._samples(2 * self.options.test_views))
+        """Test the best estimator on objects that had no say in which one that is."""
+        best = load_estimator(self.out / "best")
+        figures = summary(evaluate(best, self._unseen(self.options.test_views, TEST_SEEDS), self.progress))
+        about = read_settings(self.out / "best")["about"]
+        save_estimator(best, self.out / "best", {**about, "test": figures})
         replace_file(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
         replace_file(self.out / "table.txt", (table(figures) + "\n").encode())
         return figures
 
     def _about(self, figures: dict[str, Any]) -> dict[str, Any]:
-        return {"options": _plain(self.options), "done": dict(self.done), "test": figures}
+        return {"options": _plain(self.options), "done": dict(self.done), **figures}
 
     def _save(self) -> None:
         """Everything that going on needs. The tensors come first: the JSON names the steps that they belong to."""

@@ -1,0 +1,162 @@
+"""Algorithm 1's losses are those of the literature, and learning works."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from artperl.actions import MOVE, NUM_AXES, NUM_BINS, SCALE, action_mask
+from artperl.fitting import Fitting, FittingOptions
+from artperl.networks.agent import Agent
+from artperl.pose import KINDS
+from artperl.ppo import (
+    PPOOptions,
+    Rollout,
+    advantages,
+    cloning_loss,
+    collect,
+    log_probability,
+    ppo_losses,
+    update,
+)
+from tests.artperl.worlds import small_problem
+
+FITTING = FittingOptions(steps=3, observed_points=96, reference_points=32)
+
+
+def a_rollout(agent: Agent, options: PPOOptions, seed: int = 0, kinds: tuple[str, ...] = ("laptop",)) -> Rollout:
+    problem = small_problem(*kinds)
+    fitting = Fitting(problem.shapes, problem.observed, problem.start, FITTING)
+    return collect(agent, fitting, problem.goal, options, torch.Generator().manual_seed(seed))
+
+
+def an_agent(seed: int = 0, width: int = 16) -> Agent:
+    torch.manual_seed(seed)
+    return Agent(width)
+
+
+def test_advantages_are_discounted_sums_of_errors() -> None:
+    options = PPOOptions()
+    rng = np.random.default_rng(0)
+    rewards, values = rng.normal(size=(6, 4)), rng.normal(size=(7, 4))
+    delta = rewards + options.gamma * values[1:] - values[:-1]
+    direct = np.zeros_like(rewards)
+    for t in range(6):
+        for later in range(t, 6):
+            direct[t] += (options.gamma * options.gae_lambda) ** (later - t) * delta[later]
+    found = advantages(torch.from_numpy(rewards), torch.from_numpy(values), options)
+    np.testing.assert_allclose(found.numpy(), direct, atol=1e-12)
+
+
+def test_losses_are_those_of_stable_baselines() -> None:
+    """The formulas of Stable-Baselines3's PPO.train, on its own distribution over MultiDiscrete actions."""
+    distributions = pytest.importorskip("stable_baselines3.common.distributions")
+    options = PPOOptions()
+    rollout = a_rollout(an_agent(), options)
+    moved = an_agent(1)
+    logits, value = moved(rollout.view)
+    rows = torch.arange(len(rollout.log_prob))
+    advantage = rollout.advantage - rollout.advantage.mean()
+    ours = ppo_losses(logits, value, rollout, advantage, rows, options)
+    has = rollout.mask[0]
+    assert (rollout.mask == has).all()  # so that masked axes can be left out of the oracle's action space
+    theirs = distributions.MultiCategoricalDistribution([NUM_BINS] * int(has.sum()))
+    theirs = theirs.proba_distribution(logits[:, has].flatten(1))
+    log_prob = theirs.log_prob(rollout.action[:, has])
+    ratio = torch.exp(log_prob - rollout.log_prob)
+    clipped = advantage * torch.clamp(ratio, 1 - options.clip, 1 + options.clip)
+    wanted = {
+        "policy": -torch.min(advantage * ratio, clipped).mean(),
+        "value": torch.nn.functional.mse_loss(rollout.result, value),
+        "entropy": theirs.entropy().mean(),
+        "divergence": torch.mean((torch.exp(log_prob - rollout.log_prob) - 1) - (log_prob - rollout.log_prob)),
+    }
+    for name, value_wanted in wanted.items():
+        torch.testing.assert_close(ours[name], value_wanted, atol=1e-5, rtol=1e-5)
+
+
+def test_a_policy_has_not_yet_diverged_from_itself() -> None:
+    agent, options = an_agent(), PPOOptions()
+    rollout = a_rollout(agent, options)
+    rows = torch.arange(len(rollout.log_prob))
+    logits, value = agent(rollout.view)
+    losses = ppo_losses(logits, value, rollout, rollout.advantage, rows, options)
+    assert losses["divergence"].item() == pytest.approx(0.0, abs=1e-5)
+    assert losses["policy"].item() == pytest.approx(-rollout.advantage.mean().item(), abs=1e-5)
+
+
+def test_actions_are_drawn_as_likely_as_the_policy_says() -> None:
+    logits = torch.randn(1, 1, NUM_AXES, NUM_BINS)
+    mask = torch.ones(1, 1, NUM_AXES, dtype=torch.bool)
+    action = torch.randint(0, NUM_BINS, (1, 1, NUM_AXES))
+    chance = logits.softmax(-1)[0, 0].gather(-1, action[0, 0][:, None]).prod()
+    assert log_probability(logits, action, mask).exp().item() == pytest.approx(chance.item(), rel=1e-4)
+    mask[..., 3:] = False
+    part = logits.softmax(-1)[0, 0, :3].gather(-1, action[0, 0, :3, None]).prod()
+    assert log_probability(logits, action, mask).exp().item() == pytest.approx(part.item(), rel=1e-4)
+
+
+def test_cloning_weighs_rotation_translation_and_scale() -> None:
+    """Equation 4 on an even policy: every axis costs log 11, whatever its weight; and by hand on one axis each."""
+    options = PPOOptions()
+    mask = torch.zeros(1, 3, NUM_AXES, dtype=torch.bool)
+    mask[0, 0], mask[0, 1, 0], mask[0, 2, 0] = True, True, True
+    kind = torch.tensor([[KINDS.index("free"), KINDS.index("revolute"), KINDS.index("prismatic")]])
+    expert = torch.zeros(1, 3, NUM_AXES, dtype=torch.int64)
+    even = torch.zeros(1, 3, NUM_AXES, NUM_BINS)
+    assert cloning_loss(even, expert, mask, kind, options).item() == pytest.approx(np.log(NUM_BINS), rel=1e-5)
+    total = 3 * 0.3 + 3 * 0.6 + 3 * 0.1 + 0.3 + 0.6
+    cases: list[tuple[Any, float]] = [
+        ((0, 0, 0), 0.3), ((0, 0, MOVE.start), 0.6), ((0, 0, SCALE.start), 0.1), ((0, 1, 0), 0.3), ((0, 2, 0), 0.6)
+    ]  # fmt: skip
+    for where, weight in cases:
+        sure = even.clone()
+        sure[where][0] = 50.0
+        gained = np.log(NUM_BINS) * (1 - weight / total)
+        assert cloning_loss(sure, expert, mask, kind, options).item() == pytest.approx(gained, rel=1e-4)
+
+
+@pytest.mark.parametrize("reinforcement", [False, True])
+def test_the_agent_learns_what_the_expert_does(reinforcement: bool) -> None:
+    options = PPOOptions(reinforcement=reinforcement, epochs=25, minibatch=18)
+    agent = an_agent()
+    rollout = a_rollout(agent, options)
+    seen: list[dict[str, float]] = []
+    optimizer = torch.optim.Adam(agent.parameters(), 3e-3)
+    update(agent, optimizer, rollout, options, torch.Generator().manual_seed(0), seen.append)
+    assert seen[-1]["cloning"] < 0.8 * seen[0]["cloning"]
+    assert seen[-1]["accuracy"] > seen[0]["accuracy"] + 0.1
+
+
+def test_rewarded_actions_become_likelier() -> None:
+    options = PPOOptions(behaviour_cloning=False, epochs=3)
+    agent = an_agent()
+    rollout = a_rollout(agent, options)
+    with torch.no_grad():
+        rollout.advantage.copy_((torch.arange(len(rollout.advantage)) % 2).float())
+    optimizer = torch.optim.Adam(agent.parameters(), 1e-3)
+    update(agent, optimizer, rollout, options, torch.Generator().manual_seed(0))
+    logits, _ = agent(rollout.view)
+    gain = log_probability(logits, rollout.action, rollout.mask) - rollout.log_prob
+    assert gain[1::2].mean() > gain[0::2].mean()
+
+
+def test_the_policy_knows_parts_by_their_joints_not_by_their_rows() -> None:
+    """Points in another order, and parts beyond the last, change nothing."""
+    problem = small_problem("laptop", "eyeglasses")
+    agent = an_agent()
+    view = Fitting(problem.shapes, problem.observed, problem.start, FITTING).view()
+    logits, value = agent(view)
+    order = torch.randperm(view.observed.shape[1], generator=torch.Generator().manual_seed(0))
+    shuffled = type(view)(**{
+        **vars(view), "observed": view.observed[:, order], "part": view.part[:, order], "offset": view.offset[:, order]
+    })  # fmt: skip
+    again, value_again = agent(shuffled)
+    mask = action_mask(problem.shapes.trees)
+    torch.testing.assert_close(logits[mask], again[mask], atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(value, value_again, atol=1e-5, rtol=1e-4)
+    rows = torch.tensor([2, 0, 1])
+    torch.testing.assert_close(agent(view[rows])[0], logits[rows], atol=1e-5, rtol=1e-4)
