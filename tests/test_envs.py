@@ -14,7 +14,8 @@ from gymnasium.vector import AsyncVectorEnv
 
 import artsim.envs
 from artsim.camera import Camera
-from artsim.envs.articulated import ArticulatedEnv, openness
+from artsim.envs.articulated import ArticulatedEnv
+from artsim.episode import openness
 from artsim.errors import ArtsimError, ConfigError
 from artsim.families import make
 from artsim.kinematics import invert_transform
