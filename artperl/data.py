@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -147,6 +148,11 @@ class _Rows(IterableDataset[dict[str, Array]]):
             batch += workers
 
 
+def _carry_on(worker: int) -> None:
+    """A worker ends with the process that it works for, which hears Ctrl-C, too."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def batches(
     categories: Sequence[str],
     num_rows: int,
@@ -178,5 +184,7 @@ def batches(
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
     samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows)
     rows = _Rows(samples, num_points, batch_size, first_batch * batch_size)
-    loader = DataLoader(rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None)
+    loader = DataLoader(
+        rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on
+    )
     yield from map(to_batch, loader)

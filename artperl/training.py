@@ -12,6 +12,8 @@ steps taken have to be kept.
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from math import cos, pi
@@ -148,15 +150,17 @@ class Training:
             self._load()
 
     def run(self) -> dict[str, Any]:
-        """Train to the end and return the figures of the best estimator; a stop by Ctrl-C keeps what was reached."""
+        """Train to the end and return the figures of the best estimator.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            After Ctrl-C, once the step has come to its end and been written down. A second Ctrl-C does not wait.
+        """
         self.out.mkdir(parents=True, exist_ok=True)
-        try:
-            with closing(SummaryWriter(str(self.out / "events"))) as board:
-                self._learn_to_perceive(board)
-                self._learn_to_fit(board)
-        except KeyboardInterrupt:
-            self._save()
-            raise
+        with closing(SummaryWriter(str(self.out / "events"))) as board, _Stop() as stop:
+            self._learn_to_perceive(board, stop)
+            self._learn_to_fit(board, stop)
         return self._finish()
 
     def estimator(self) -> Estimator:
@@ -164,7 +168,7 @@ class Training:
         agent = self.agent if self.done["agent"] else None
         return Estimator(self.perception, self.base, agent, EstimatorOptions(fit_points=self.options.fit_points))
 
-    def _learn_to_perceive(self, board: SummaryWriter) -> None:
+    def _learn_to_perceive(self, board: SummaryWriter, stop: _Stop) -> None:
         options, optimizer = self.options, self.optimizers["perception"]
         first, total = self.done["perception"], options.perception_steps
         if first >= total:
@@ -194,9 +198,10 @@ class Training:
             bar.update()
             if (step + 1) % options.validate_every == 0 or step + 1 == total:
                 self._validate(board, step + 1)
+            self._stop_if(stop)
         bar.close()
 
-    def _learn_to_fit(self, board: SummaryWriter) -> None:
+    def _learn_to_fit(self, board: SummaryWriter, stop: _Stop) -> None:
         options, optimizer = self.options, self.optimizers["agent"]
         first, total = self.done["agent"], options.agent_rollouts
         if first >= total:
@@ -221,7 +226,13 @@ class Training:
             bar.update()
             if (n + 1) % options.validate_rollouts == 0 or n + 1 == total:
                 self._validate(board, options.perception_steps + n + 1)
+            self._stop_if(stop)
         bar.close()
+
+    def _stop_if(self, stop: _Stop) -> None:
+        if stop.asked:
+            self._save()
+            raise KeyboardInterrupt
 
     def _validate(self, board: SummaryWriter, step: int) -> None:
         """Score the estimator on a frozen set of unseen objects, keep the best, and write down where the run stands."""
@@ -284,6 +295,30 @@ class Training:
                     moments.setdefault(int(number), {})[moment] = value
             optimizer = self.optimizers[name]
             optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+
+
+class _Stop:
+    """Ctrl-C as a wish, so that no step is left half done."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __enter__(self) -> _Stop:
+        self._before = signal.signal(signal.SIGINT, self._ask) if self._in_charge() else None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._in_charge():
+            signal.signal(signal.SIGINT, self._before)
+
+    def _ask(self, *_: object) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+    def _in_charge(self) -> bool:
+        """Only the main thread hears signals."""
+        return threading.current_thread() is threading.main_thread()
 
 
 def one_cycle(step: int, total: int) -> float:

@@ -1,0 +1,249 @@
+"""One call, from a cloud to poses: any cloud, whatever its size, place and dirt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import artsim
+from artperl import metrics
+from artperl.checkpoint import load_estimator, save_estimator
+from artperl.data import Clouds, to_batch, training_rows
+from artperl.embedding import by_boxes
+from artperl.estimator import Calibration, Estimator, EstimatorOptions, clean, draw
+from artperl.evaluation import (
+    Scored,
+    calibrate,
+    compare,
+    evaluate,
+    frozen_samples,
+    headline,
+    summary,
+    table,
+    true_poses,
+)
+from artperl.networks.agent import Agent
+from artperl.networks.perception import Perceived, Perception
+from artperl.retrieval import ShapeBase
+from artsim.errors import ArtsimError, DatasetError
+from artsim.sample import Sample
+
+
+class Oracle(Perception):
+    """Knows every point of one sample, by the nearest of its true points."""
+
+    def __init__(self, sample: Sample, rows: int):
+        super().__init__(rows, width=16)
+        self.sample = sample
+
+    def forward(self, points: torch.Tensor) -> Perceived:
+        rows = training_rows(self.sample, 2048, self.num_rows)
+        clouds, truth = to_batch({k: torch.from_numpy(np.asarray(v)[None]) for k, v in rows.items()})
+        nearest = torch.cdist(points, clouds.points).argmin(-1)[0]
+        return Perceived(
+            20.0 * torch.nn.functional.one_hot(truth.part[:, nearest], self.num_rows).float(),
+            truth.canonical[:, nearest],
+            torch.full((1, points.shape[1]), -3.0),
+            2.0 * truth.part_valid.float() - 1.0,
+            truth.box_center,
+            truth.box_size,
+            truth.diagonal.log(),
+        )
+
+
+@pytest.fixture(scope="module")
+def sample() -> Sample:
+    (one,) = frozen_samples(["laptop"], 1, 1)
+    return one
+
+
+@pytest.fixture(scope="module")
+def base() -> ShapeBase:
+    return by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(8)], 128))
+
+
+@pytest.fixture(scope="module")
+def estimator(base: ShapeBase, sample: Sample) -> Estimator:
+    return Estimator(Oracle(sample, 2), base)
+
+
+def test_who_sees_well_estimates_well(estimator: Estimator, sample: Sample) -> None:
+    estimate = estimator(sample.points)
+    rotation, center = true_poses(sample)
+    assert metrics.rotation_error(estimate.rotation, rotation).max() < 3.0
+    assert metrics.translation_error(estimate.translation, center, sample.diagonal).max() < 0.04
+    assert (estimate.part == sample.part).mean() > 0.95
+    assert estimate.state.shape == (2,)
+    assert estimate.joint_type == ("free", "revolute")
+    assert estimate.joint_parent.tolist() == [-1, 0]
+    assert metrics.axis_error(estimate.joint_axis[1], sample.joint_axis_camera[1]) < 4.0
+    assert np.allclose(estimate.rotation, estimate.T_camera_part[:, :3, :3])
+    assert np.allclose(estimate.trajectory[-1], estimate.T_camera_part)
+    assert ((estimate.visibility >= 0) & (estimate.visibility <= 1)).all()
+    assert estimate.reference.startswith("laptop:")
+    assert set(estimate.milliseconds) >= {"clean", "perception", "refine"}
+
+
+def test_dirt_does_not_matter(estimator: Estimator, sample: Sample) -> None:
+    rng = np.random.default_rng(0)
+    dirty = np.concatenate([
+        sample.points, np.full((50, 3), np.nan), rng.normal(size=(40, 3)) * 20.0, np.array([[np.inf, 0.0, 1.0]])
+    ])  # fmt: skip
+    estimate = estimator(dirty)
+    rotation, _ = true_poses(sample)
+    assert metrics.rotation_error(estimate.rotation, rotation).max() < 3.0
+    assert (estimate.part[2048:2098] == -1).all()
+    assert (estimate.part[2098:] == -1).mean() > 0.9
+    assert (estimate.part[:2048] >= 0).mean() > 0.98
+
+
+@pytest.mark.parametrize("count", [12, 300, 10_000])
+def test_clouds_of_any_number_of_points(estimator: Estimator, sample: Sample, count: int) -> None:
+    chosen = np.random.default_rng(0).choice(2048, count)
+    noise = np.random.default_rng(1).normal(size=(count, 3)) * 1e-4
+    estimate = estimator(sample.points[chosen] + noise)
+    assert len(estimate.part) == count
+    assert np.isfinite(estimate.T_camera_part).all()
+
+
+@pytest.mark.parametrize(
+    "cloud", [np.zeros((0, 3)), np.full((100, 3), np.nan), np.zeros((100, 3)), np.zeros((5, 3)), np.zeros((10, 2))]
+)
+def test_clouds_of_nothing_are_refused(estimator: Estimator, cloud: np.ndarray) -> None:
+    with pytest.raises(ArtsimError, match="points"):
+        estimator(cloud)
+
+
+def test_the_same_cloud_gives_the_same_estimate(estimator: Estimator, sample: Sample) -> None:
+    assert np.array_equal(estimator(sample.points).T_camera_part, estimator(sample.points).T_camera_part)
+
+
+def test_an_agent_leaves_a_trajectory(base: ShapeBase, sample: Sample) -> None:
+    torch.manual_seed(0)
+    options = EstimatorOptions(references=2, agent_steps=3)
+    estimate = Estimator(Oracle(sample, 2), base, Agent(16), options)(sample.points)
+    assert estimate.trajectory.shape == (5, 2, 4, 4)
+    rotation, _ = true_poses(sample)
+    # An agent that knows nothing does no harm: its starts compete with the others.
+    assert metrics.rotation_error(estimate.rotation, rotation).max() < 3.0
+
+
+def test_outliers_are_left_out_and_the_object_is_not() -> None:
+    rng = np.random.default_rng(0)
+    cloud = rng.uniform(size=(3000, 3)) * [1.0, 1.0, 0.01]
+    kept = clean(np.concatenate([cloud, rng.uniform(5.0, 50.0, size=(30, 3))]))
+    assert (kept < 3000).all()
+    assert len(kept) > 2990
+
+
+def test_draws_take_every_point_before_any_twice() -> None:
+    rng = np.random.default_rng(0)
+    assert sorted(draw(10, 10, rng)) == list(range(10))
+    assert np.bincount(draw(10, 25, rng)).tolist().count(3) == 5
+    assert len(set(draw(100, 30, rng))) == 30
+
+
+def test_an_estimator_comes_back_from_its_folder(base: ShapeBase, sample: Sample, tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    options = EstimatorOptions(references=2, agent_steps=2)
+    made = Estimator(Perception(2, 16), base, Agent(16), options, Calibration(1.0, -2.0, -3.0))
+    save_estimator(made, tmp_path / "made", {"note": "untrained"})
+    back = load_estimator(tmp_path / "made")
+    assert (back.options, back.calibration) == (options, made.calibration)
+    np.testing.assert_allclose(back(sample.points).trajectory[0], made(sample.points).trajectory[0], atol=1e-3)
+
+
+@pytest.mark.parametrize("spoiled", ["estimator.json", "weights.safetensors", "base.npz"])
+def test_damaged_folders_are_refused(base: ShapeBase, tmp_path: Path, spoiled: str) -> None:
+    folder = tmp_path / "made"
+    save_estimator(Estimator(Perception(2, 16), base), folder, {})
+    (folder / spoiled).write_bytes(b"damaged")
+    with pytest.raises(DatasetError, match="mend"):
+        load_estimator(folder)
+
+
+def test_a_missing_estimator_says_which_there_are() -> None:
+    with pytest.raises(DatasetError, match="come"):
+        load_estimator("no-such-category")
+
+
+def test_a_perfect_estimate_has_no_error(estimator: Estimator, sample: Sample) -> None:
+    rotation, center = true_poses(sample)
+    perfect = replace(
+        estimator(sample.points), rotation=rotation, translation=center, size=sample.box_size,
+        T_camera_part=sample.T_camera_part, state=sample.joint_state, joint_axis=sample.joint_axis_camera,
+        part=sample.part.astype(np.int64),
+    )  # fmt: skip
+    scored = compare(perfect, sample, 1.0)
+    for name, value in {
+        "rotation": 0.0,
+        "translation": 0.0,
+        "iou_exact": 1.0,
+        "iou_rest_exact": 1.0,
+        "state": 0.0,
+    }.items():
+        np.testing.assert_allclose(getattr(scored, name), value, atol=1e-6)
+    assert scored.right
+    assert scored.segmentation == 1.0
+
+
+def test_failures_count_with_the_worst_values(sample: Sample) -> None:
+    class Blind(Estimator):
+        def __call__(self, points: object) -> None:  # type: ignore[override]
+            raise ArtsimError("nothing is seen")
+
+    blind = Blind.__new__(Blind)
+    (scored,) = evaluate(blind, [sample])
+    assert scored.failed
+    assert (scored.rotation == 180.0).all()
+    figures = summary([scored])
+    assert figures["laptop"]["failures"] == 1
+    assert "1 failures" in table(figures)
+    assert headline(figures) > 100.0
+
+
+def test_the_table_holds_medians_and_means(estimator: Estimator, sample: Sample) -> None:
+    one = evaluate(estimator, [sample])[0]
+    scored = [replace(one, rotation=np.array([r, 2.0 * r])) for r in (1.0, 2.0, 6.0)]
+    parts = summary(scored)["laptop"]["parts"]
+    assert parts[0]["rotation_deg"] == {"median": 2.0, "mean": 3.0}
+    assert parts[1]["rotation_deg"] == {"median": 4.0, "mean": 6.0}
+    translation = parts[0]["translation_percent_diagonal"]["median"]
+    assert parts[0]["translation_partnet"]["median"] == pytest.approx(0.02 * translation)
+    assert f"{'laptop 1':14s}     4.00   6.00" in table(summary(scored))
+
+
+def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:
+    """Where half of the estimates with a residual are right, confidence says so; and it never rises with it."""
+    one: Scored = evaluate(estimator, [sample])[0]
+    rng = np.random.default_rng(0)
+    residual = rng.uniform(0.0, 0.1, 2000)
+    chance = 1.0 / (1.0 + np.exp(80.0 * (residual - 0.05)))
+    right = rng.random(2000) < chance
+    scored = [
+        replace(one, residual=r, disagreement=0.02, rotation=np.full(2, 1.0 if ok else 90.0))
+        for r, ok in zip(residual, right, strict=True)
+    ]
+    fitted = calibrate(scored)
+    found = np.array([fitted(r, 0.02) for r in residual])
+    assert np.abs(found - chance).mean() < 0.05
+    assert fitted(0.3, 0.3) < 0.01
+    assert calibrate([]) == Calibration()
+
+
+def test_frozen_samples_are_always_the_same() -> None:
+    one, other = (frozen_samples(["laptop"], 2, 2) for _ in range(2))
+    assert all(np.array_equal(a.points, b.points) for a, b in zip(one, other, strict=True))
+    assert len({s.object_id for s in one}) == 2
+    assert len(one) == 4
+
+
+def test_clouds_know_where_they_were(sample: Sample) -> None:
+    points = torch.from_numpy(sample.points)[None]
+    clouds = Clouds.of(points)
+    back = clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]
+    torch.testing.assert_close(back, points)

@@ -1,0 +1,145 @@
+"""Perception reads clouds of any object in any order, and learns what is true of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from artperl.data import Clouds, Samples, Truth, batches
+from artperl.networks.perception import Perceived, Perception, perception_losses
+from artperl.networks.pointnet2 import Neighbourhoods, strongest
+from artsim.plan import SampleOptions
+
+
+@pytest.fixture(scope="module")
+def batch() -> tuple[Clouds, Truth]:
+    return next(batches(["laptop", "eyeglasses"], 4, 128, 4, workers=0))
+
+
+def network(rows: int = 4) -> Perception:
+    torch.manual_seed(0)
+    return Perception(rows, width=16).eval()
+
+
+def test_shapes_of_what_it_says(batch: tuple[Clouds, Truth]) -> None:
+    clouds, truth = batch
+    perceived = network()(clouds.points)
+    assert perceived.part_logits.shape == (4, 128, 4)
+    assert perceived.canonical.shape == (4, 128, 3)
+    assert perceived.box_size.shape == truth.box_size.shape == (4, 4, 3)
+    assert (perceived.box_size > 0).all()
+    assert perceived.valid[:, 0].all()
+    assert (perceived.part <= 3).all()
+
+
+def test_points_are_never_given_to_parts_that_the_object_lacks(batch: tuple[Clouds, Truth]) -> None:
+    perceived = network()(batch[0].points)
+    lacking = torch.full_like(perceived.valid_logits, -1.0)
+    lacking[:, 2] = 1.0
+    part = Perceived(**{**vars(perceived), "valid_logits": lacking}).part
+    assert set(part.flatten().tolist()) <= {0, 2}
+
+
+def test_objects_of_a_batch_do_not_depend_on_each_other(batch: tuple[Clouds, Truth]) -> None:
+    net, points = network(), batch[0].points
+    order = torch.tensor([2, 0, 3, 1])
+    together, permuted, alone = net(points), net(points[order]), net(points[1:2])
+    for name in ("part_logits", "canonical", "log_diagonal"):
+        torch.testing.assert_close(getattr(together, name)[order], getattr(permuted, name), atol=1e-5, rtol=1e-4)
+        torch.testing.assert_close(getattr(together, name)[1:2], getattr(alone, name), atol=1e-5, rtol=1e-4)
+
+
+def test_place_and_size_of_a_cloud_do_not_matter(batch: tuple[Clouds, Truth]) -> None:
+    points = batch[0].points
+    other = Clouds.of(3.0 * points + torch.tensor([1.0, -2.0, 5.0]))
+    torch.testing.assert_close(other.points, Clouds.of(points).points, atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(other.radius, 3.0 * Clouds.of(points).radius, atol=1e-4, rtol=1e-4)
+
+
+def test_truth_is_what_the_sample_says() -> None:
+    options = SampleOptions(num_points=64)
+    clouds, truth = next(batches(["laptop"], 3, 64, 4, seed=5, workers=0))
+    samples = Samples(["laptop"], options, 5, 1, 3)
+    for b in range(4):
+        sample = samples[b]
+        unit = float(clouds.radius[b])
+        assert float(truth.diagonal[b]) * unit == pytest.approx(sample.diagonal, rel=1e-5)
+        assert truth.part_valid[b].tolist() == [True, True, False]
+        rotation, translation = sample.T_camera_part[:, :3, :3], sample.T_camera_part[:, :3, 3]
+        canonical = truth.canonical[b].numpy().astype(float) * sample.diagonal
+        part = truth.part[b].numpy()
+        there = np.einsum("nij,nj->ni", rotation[part], canonical) + translation[part]
+        given = (clouds.points[b] * clouds.radius[b] + clouds.center[b]).numpy()
+        np.testing.assert_allclose(there, given, atol=2e-3 * sample.diagonal)
+
+
+def test_batch_n_is_always_the_same() -> None:
+    stream = batches(["laptop"], 2, 32, 4, workers=0)
+    batch_list = [next(stream) for _ in range(3)]
+    later = next(batches(["laptop"], 2, 32, 4, first_batch=2, workers=0))
+    worked = batches(["laptop"], 2, 32, 4, workers=2)
+    parallel = [next(worked) for _ in range(3)]
+    for i in range(3):
+        assert torch.equal(batch_list[i][0].points, parallel[i][0].points)
+    assert torch.equal(batch_list[2][1].canonical, later[1].canonical)
+    assert not torch.equal(batch_list[0][0].points, batch_list[1][0].points)
+
+
+def test_objects_with_too_many_parts_give_way_to_others() -> None:
+    samples = Samples(["drawer"], SampleOptions(num_points=16), 0, 1, 3)
+    sizes = [len(samples[i].joint_type) for i in range(6)]
+    assert max(sizes) <= 3
+    assert samples[2].object_id == samples[2].object_id
+
+
+def test_it_learns_a_batch_by_heart(batch: tuple[Clouds, Truth]) -> None:
+    clouds, truth = batch
+    net = network().train()
+    optimizer = torch.optim.Adam(net.parameters(), 3e-3)
+    seen: list[dict[str, Tensor]] = []
+    for _ in range(40):
+        seen.append(perception_losses(net(clouds.points), truth))
+        optimizer.zero_grad()
+        torch.stack(list(seen[-1].values())).sum().backward()  # type: ignore[no-untyped-call]
+        optimizer.step()
+    for name in ("part", "canonical", "boxes", "diagonal"):
+        assert seen[-1][name] < 0.5 * seen[0][name], name
+
+
+def test_losses_vanish_for_what_is_true(batch: tuple[Clouds, Truth]) -> None:
+    clouds, truth = batch
+    perceived = network()(clouds.points)
+    sure = 50.0 * (2.0 * truth.part_valid.float() - 1.0)
+    true = Perceived(
+        100.0 * torch.nn.functional.one_hot(truth.part, 4).float(), truth.canonical, perceived.spread, sure,
+        truth.box_center, truth.box_size, truth.diagonal.log(),
+    )  # fmt: skip
+    losses = perception_losses(true, truth)
+    for name in ("part", "canonical", "valid", "boxes", "diagonal"):
+        assert losses[name].item() == pytest.approx(0.0, abs=1e-6), name
+
+
+def test_neighbours_are_the_nearest() -> None:
+    points = torch.randn(2, 40, 3, generator=torch.Generator().manual_seed(0))
+    near = Neighbourhoods.of(points, (10, 4), 5)
+    apart = torch.cdist(points[:, :10], points)
+    for b in range(2):
+        for i in range(10):
+            assert set(near.down[0][b, i].tolist()) == set(apart[b, i].argsort()[:5].tolist())
+    torch.testing.assert_close(near.up[0].sum(-1), torch.ones(2, 40))
+    assert ((near.up[0] > 0).sum(-1) <= 3).all()
+    torch.testing.assert_close(near.up[0][:, :10].amax(-1), torch.ones(2, 10), atol=1e-3, rtol=0)
+
+
+def test_strongest_is_the_maximum_over_neighbours_with_its_gradient() -> None:
+    generator = torch.Generator().manual_seed(0)
+    features = torch.randn(2, 9, 4, generator=generator, requires_grad=True)
+    index = torch.randint(0, 9, (2, 5, 3), generator=generator)
+    direct = torch.stack([features[b][index[b]].amax(1) for b in range(2)])
+    found = strongest(features, index)
+    torch.testing.assert_close(found, direct)
+    (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
+    (other,) = torch.autograd.grad((direct**2).sum(), features)
+    torch.testing.assert_close(one, other)

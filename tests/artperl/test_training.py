@@ -1,0 +1,156 @@
+"""Training goes on exactly where it stopped, and its commands do what they say."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from artperl import cli
+from artperl.checkpoint import load_estimator
+from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
+from artperl.fitting import FittingOptions
+from artperl.ppo import PPOOptions
+from artperl.training import BASE_SEEDS, PRESETS, Training, TrainOptions, one_cycle
+from artsim.errors import DatasetError
+from artsim.stream import STREAM_SEEDS
+
+TINY = TrainOptions(
+    base_objects=3, reference_points=48, width=16, perception_steps=4, batch_size=4, num_points=96, agent_rollouts=3,
+    episodes=3, fit_points=48, validate_every=2, validate_rollouts=2, test_objects=2, validation_views=1, test_views=1,
+    ppo=PPOOptions(minibatch=4), fitting=FittingOptions(steps=2, observed_points=48, reference_points=16),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run from beginning to end."""
+    out = tmp_path_factory.mktemp("whole")
+    Training(TINY, out, workers=0, progress=False).run()
+    return out
+
+
+def test_a_run_leaves_an_estimator_a_table_and_curves(whole: Path) -> None:
+    figures = json.loads((whole / "figures.json").read_text())
+    assert figures["laptop"]["instances"] == 2
+    assert "laptop 1" in (whole / "table.txt").read_text()
+    assert list((whole / "events").glob("events.*"))
+    estimator = load_estimator(whole / "best")
+    points = np.random.default_rng(0).normal(size=(200, 3)) * 0.1 + [0.0, 0.0, 1.0]
+    assert np.isfinite(estimator(points).T_camera_part).all()
+    history = json.loads((whole / "state.json").read_text())["history"]
+    assert [h["done"] for h in history] == [
+        {"perception": 2, "agent": 0}, {"perception": 4, "agent": 0}, {"perception": 4, "agent": 2},
+        {"perception": 4, "agent": 3},
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("stop", [("perception", 3), ("agent", 1)], ids=str)
+def test_a_stopped_run_ends_as_if_it_had_not_been(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: tuple[str, int]
+) -> None:
+    stage, after = stop
+    monkeypatch.setattr("artperl.training._write", _interrupt(stage, after))
+    with pytest.raises(KeyboardInterrupt):
+        Training(TINY, tmp_path, workers=0, progress=False).run()
+    monkeypatch.undo()
+    again = Training(TINY, tmp_path, workers=0, progress=False)
+    assert again.done[stage] == after
+    again.run()
+    one, other = (load_file(folder / "state.safetensors") for folder in (whole, tmp_path))
+    assert one.keys() == other.keys()
+    for name, tensor in one.items():
+        assert torch.equal(tensor, other[name]), name
+    histories = [json.loads((folder / "state.json").read_text())["history"] for folder in (whole, tmp_path)]
+    assert histories[0] == histories[1]
+    timeless = [json.loads((folder / "figures.json").read_text()) for folder in (whole, tmp_path)]
+    for figures in timeless:
+        del figures["laptop"]["ms_per_instance"]
+    assert timeless[0] == timeless[1]
+
+
+def _interrupt(group: str, after: int) -> Callable[..., None]:
+    """Ctrl-C in the midst of a step."""
+
+    def write(board: object, written: str, figures: dict[str, float], step: int) -> None:
+        if written == group and step + 1 == after:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    return write
+
+
+def test_a_finished_run_stays_as_it_is(whole: Path) -> None:
+    before = (whole / "state.safetensors").read_bytes()
+    Training(TINY, whole, workers=0, progress=False).run()
+    assert (whole / "state.safetensors").read_bytes() == before
+
+
+def test_a_folder_with_another_run_is_refused(whole: Path) -> None:
+    with pytest.raises(DatasetError, match="other options"):
+        Training(replace(TINY, seed=1), whole, workers=0, progress=False)
+
+
+def test_no_object_is_both_learnt_from_and_tested_on() -> None:
+    for options in PRESETS.values():
+        test = range(TEST_SEEDS, TEST_SEEDS + options.test_objects)
+        validation = range(VALIDATION_SEEDS, VALIDATION_SEEDS + options.test_objects)
+        references = range(BASE_SEEDS, BASE_SEEDS + options.base_objects)
+        assert not set(test) & set(validation)
+        assert not (set(test) | set(validation)) & set(references)
+        assert max(references) < STREAM_SEEDS[0]
+
+
+def test_the_learning_rate_rises_once_and_falls() -> None:
+    rates = [one_cycle(step, 100) for step in range(100)]
+    assert max(rates) == pytest.approx(1.0)
+    assert rates.index(max(rates)) in (9, 10)
+    assert rates[0] == pytest.approx(0.1)
+    assert rates[-1] < 0.02
+    assert all(a >= b for a, b in pairwise(rates[10:]))
+
+
+def test_the_program_evaluates_and_estimates(
+    whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cli.Evaluate(whole / "best", objects=1, views=1, json=tmp_path / "figures.json").run()
+    assert "laptop 0" in capsys.readouterr().out
+    assert json.loads((tmp_path / "figures.json").read_text())["laptop"]["instances"] == 1
+    cloud = np.random.default_rng(0).normal(size=(100, 3)) * 0.1 + [0.0, 0.0, 1.0]
+    np.save(tmp_path / "cloud.npy", cloud)
+    np.savez(tmp_path / "cloud.npz", points=cloud)
+    (tmp_path / "cloud.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        + "\n".join(" ".join(map(str, p)) for p in cloud.tolist())
+    )
+    for name in ("cloud.npy", "cloud.npz", "cloud.ply"):
+        monkeypatch.setattr(
+            "sys.argv", ["artperl", "estimate", str(tmp_path / name), "--category", str(whole / "best")]
+        )
+        cli.main()
+        assert len(json.loads(capsys.readouterr().out)["rotation"]) == 2
+    cli.Estimate(tmp_path / "cloud.npy", str(whole / "best"), tmp_path / "out.npz").run()
+    with np.load(tmp_path / "out.npz") as arrays:
+        assert arrays["part"].shape == (100,)
+
+
+def test_the_program_says_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cloud.npy").write_bytes(b"nothing")
+    for argv in (["estimate", str(tmp_path / "cloud.npy"), "--category", "none"], ["train", "--category", "teapot"]):
+        monkeypatch.setattr(
+            "sys.argv", ["artperl", *argv, *(["--out", str(tmp_path / "t")] if "train" in argv else [])]
+        )
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        assert stopped.value.code == 2
+        assert "mend" in capsys.readouterr().err
