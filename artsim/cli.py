@@ -1,16 +1,17 @@
-"""The program ``artsim``: generate, generate-objects, view, inspect, verify, doctor."""
+"""The program ``artsim``: generate, generate-objects, record, view, inspect, verify, doctor."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
+from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
 from artsim.plan import SampleOptions
 
@@ -129,6 +130,34 @@ class GenerateObjects:
             return
         rate = result.made / result.seconds
         print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")
+
+
+@dataclass(frozen=True)
+class Record:
+    """Record motions for tracking: objects under physics, frame by frame, with full ground truth.
+
+    Every motion is a shard of samples of one object, a control step apart, whose joints a motor drives from one random
+    goal to the next; motions.json lists times, joint states and speeds. Parts keep their number from frame to frame.
+
+    Example: artsim record --categories laptop door --motions 20 --camera orbit --out out/motions
+    """
+
+    out: Path
+    """Folder to write to; made if missing."""
+    motions: int = 10
+    """Motions, each of an object of its own."""
+    frames: int = 60
+    """Frames of each: one for each control step."""
+    seed: int = 0
+    """Motion m depends on (seed, m) and the options alone."""
+    episode: Annotated[EpisodeOptions, tyro.conf.arg(name="")] = field(default_factory=EpisodeOptions)
+
+    def run(self) -> None:
+        from artsim.record import record
+
+        episode = replace(self.episode, categories=_categories(self.episode.categories))
+        folder = record(self.out, episode, self.motions, self.frames, self.seed)
+        print(f"{folder}: {self.motions} motions of {self.frames} frames; read them with artsim.record.open_motions")
 
 
 @dataclass(frozen=True)
@@ -253,6 +282,7 @@ Verb = (
     Annotated[Generate, tyro.conf.subcommand("generate")]
     | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
+    | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]

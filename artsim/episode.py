@@ -37,7 +37,7 @@ class EpisodeOptions:
     """What an episode shows."""
 
     categories: tuple[str, ...] = ("drawer",)
-    """Procedural categories: every episode has a new object of one of them, unless objects are named."""
+    """Procedural categories, such as drawer: every episode has a new object of one, unless objects are named."""
     objects: tuple[Path, ...] = ()
     """URDF files, object folders, or folders of them: every episode has one of these."""
     obj: Annotated[ArticulatedObject | None, tyro.conf.Suppress] = None
@@ -150,10 +150,10 @@ class Episode:
     @property
     def camera(self) -> Camera:
         """Where the camera is now."""
-        self.simulation  # noqa: B018  # says that no episode has begun
+        obj = self.obj
         if self.options.camera == "fixed":
             return self._camera
-        center, _ = bounding_sphere(self.obj, _widest(self.obj))
+        center, _ = bounding_sphere(obj, _widest(obj))
         angle = np.deg2rad(self.options.orbit_speed) * self.time
         T_world_turned = np.eye(4)
         T_world_turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]

@@ -10,6 +10,7 @@ import pytest
 
 import artsim
 from artsim.errors import ArtsimError
+from artsim.export import export
 from artsim.export.mjcf import mjcf_text
 from artsim.export.robot import as_robot
 from artsim.export.text import obj_text
@@ -136,7 +137,8 @@ MOVED = ["drawer", "door", "laptop", "valve", "globe", "window", "coffee_machine
 
 @pytest.mark.parametrize("category", MOVED)
 def test_damped_joints_move_as_in_mujoco(category: str) -> None:
-    mujoco = pytest.importorskip("mujoco")
+    import mujoco
+
     obj, q, push = released(category)
     robot = as_robot(obj)
     files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
@@ -160,8 +162,7 @@ def test_damped_joints_move_as_in_mujoco(category: str) -> None:
 
 @pytest.mark.parametrize("category", ["drawer", "door", "laptop", "globe", "window", "coffee_machine"])
 def test_damped_joints_move_as_in_sapien(category: str, tmp_path: Path) -> None:
-    sapien = pytest.importorskip("sapien")
-    from artsim.export import export
+    import sapien
 
     obj, q, push = released(category)
     export(obj, tmp_path, ("urdf",))
