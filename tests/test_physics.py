@@ -20,6 +20,7 @@ from artsim.kinematics import Array, KinematicTree
 from artsim.objects import ArticulatedObject
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.renderers.bullet import import_pybullet
+from artsim.sources import find_sources
 from tests.conftest import DEMO
 
 FREE = PhysicsOptions(damping=0.0, friction=0.0)
@@ -258,6 +259,16 @@ def test_loaded_objects_move_too(path: Path) -> None:
     assert np.all((simulation.state - obj.tree.rest)[free] * upwards > 0)
     assert np.all(simulation.state <= obj.tree.limits[:, 1] + 1e-3)
     assert np.all(simulation.state >= obj.tree.limits[:, 0] - 1e-3)
+
+
+def test_real_objects_stay_within_their_limits(partnet_dir: Path) -> None:
+    for source in find_sources([partnet_dir])[::12]:
+        obj = source.load()
+        simulation = Simulation(obj)
+        for push in (1.0, 1.0, -1.0, -1.0, 1.0):
+            simulation.step(push * simulation.effort_limit)
+            assert np.all(simulation.state >= obj.tree.limits[:, 0] - 1e-3)
+            assert np.all(simulation.state <= obj.tree.limits[:, 1] + 1e-3)
 
 
 @pytest.mark.parametrize("action", [[], [0.0, 0.0], [np.nan], 1.0])

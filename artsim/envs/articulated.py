@@ -28,6 +28,7 @@ from artsim.kinematics import Array
 from artsim.physics import Control, Simulation
 from artsim.renderers import render
 from artsim.sample import Sample
+from artsim.view import shaded
 
 Observation = dict[str, NDArray[Any]]
 
@@ -201,11 +202,11 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
         return observation, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """(H, W, 3) picture of the object, if the environment was made with ``render_mode="rgb_array"``."""
+        """(H, W, 3) picture, a colour for each part, if the environment was made with ``render_mode="rgb_array"``."""
         if self.render_mode is None:
             return None
-        episode = self.episode
-        return render(episode.obj, episode.simulation.state, episode.camera, renderer="pybullet").rgb
+        episode, camera = self.episode, self.episode.camera
+        return shaded(render(episode.obj, episode.simulation.state, camera), camera)
 
     def close(self) -> None:
         """Free the physics world."""
