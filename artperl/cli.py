@@ -75,14 +75,16 @@ class Train:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Test an estimator on unseen procedural objects and print the table of its errors."""
+    """Test an estimator on unseen objects, procedural ones or those of files, and print the table of its errors."""
 
     estimator: tyro.conf.Positional[Path]
     """Folder of the estimator, or the name of one that comes with the package."""
     category: tuple[str, ...] = ()
     """Procedural categories; by default those that it was trained on."""
     objects: int = 40
-    """Unseen objects of each category."""
+    """Unseen procedural objects of each category."""
+    files: tuple[Path, ...] = ()
+    """Instead of procedural objects: URDF files, object folders, or folders of them."""
     views: int = 4
     """Views of each object."""
     preset: Literal["artimage", "sphere"] = "artimage"
@@ -94,13 +96,17 @@ class Evaluate:
 
     def run(self) -> None:
         from artperl.checkpoint import WEIGHTS, load_estimator, read_settings, replace_file
-        from artperl.evaluation import evaluate, frozen_samples, summary, table
+        from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
+        from artsim.sources import find_sources
 
         estimator = load_estimator(self.estimator)
         folder = self.estimator if self.estimator.is_dir() else WEIGHTS / self.estimator
         categories = self.category or tuple(read_settings(folder)["about"]["options"]["categories"])
         options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
-        samples = frozen_samples(categories, self.objects, self.views, options)
+        if self.files:
+            samples = samples_of(find_sources(self.files), self.views, options)
+        else:
+            samples = frozen_samples(categories, self.objects, self.views, options)
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
         print(table(figures))
         if self.json is not None:

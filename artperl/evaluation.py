@@ -20,7 +20,7 @@ from artsim.errors import ArtsimError
 from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import make_renderer
 from artsim.sample import Sample
-from artsim.sources import family_sources
+from artsim.sources import Source, family_sources
 
 Array = NDArray[np.float64]
 
@@ -84,14 +84,25 @@ def frozen_samples(
     first_seed: int = TEST_SEEDS,
 ) -> list[Sample]:
     """Samples of unseen procedural objects: always the same ones for the same arguments."""
+    sources = family_sources(categories, objects, first_seed)
+    return [
+        sample
+        for k in range(0, len(sources), objects)
+        for sample in samples_of(sources[k : k + objects], views_per_object, options, first_seed)
+    ]
+
+
+def samples_of(
+    sources: Sequence[Source], views_per_object: int = 4, options: SampleOptions | None = None, seed: int = TEST_SEEDS
+) -> list[Sample]:
+    """The same number of views of every object; they depend on the seed and on the object's place in the list."""
     options = options or SampleOptions()
     renderer = make_renderer(options.renderer)
     samples = []
-    for source in family_sources(categories, objects, first_seed):
+    for n, source in enumerate(sources):
         obj = source.load()
-        for view in range(views_per_object):
-            index = (source.seed - first_seed) * views_per_object + view
-            samples.append(draw_sample(obj, options, first_seed, index, renderer))
+        for index in range(n * views_per_object, (n + 1) * views_per_object):
+            samples.append(draw_sample(obj, options, seed, index, renderer))
     return samples
 
 
