@@ -20,8 +20,8 @@ from artperl.shapes import Observed, Shapes
 FAR = 1e6
 """Coordinate of reference points that stand for nothing: parts without a surface."""
 
-_CACHED = 1 << 20
-"""Products of points that are held at once."""
+_CACHED = 1 << 18
+"""Products of points that are held at once, as far as one object lets."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,8 @@ class Fitting:
         own = torch.cat([-2.0 * self._local[:, None].expand(-1, rows, -1, -1), elsewhere[..., None]], dim=-1)
         self._sought_in = own.flatten(0, 1)  # (B P, N, 4): points of other parts are far away
         self._square = square[..., 0]
+        pairs = observed.points.shape[1] * rows * self.shapes.points.shape[2]
+        self._scratch = self._local.new_empty(max(_CACHED, pairs))
         self.steps_taken = 0
         self._look()
 
@@ -122,10 +124,10 @@ class Fitting:
         B, P, M, _ = local.shape
         squared = (self.reference**2).sum(-1, keepdim=True)
         placed = torch.cat([self.reference, squared], dim=-1).reshape(B, P * M, 4)
-        index, least = nearest(self._sought_from, placed, P)  # (B, N, P)
+        index, least = nearest(self._sought_from, placed, P, self._scratch)  # (B, N, P)
         self._nearest = index.gather(2, self.observed.part[..., None])[..., 0]
         asked = torch.cat([self.reference, torch.ones_like(squared)], dim=-1).flatten(0, 1)
-        self._back = nearest(asked, self._sought_in, 1)[0].reshape(B, P, M)
+        self._back = nearest(asked, self._sought_in, 1, self._scratch)[0].reshape(B, P, M)
         there = (least.amin(2) + self._square).clamp(min=0.0).sqrt().mean(1)
         self.distance = there if self.options.distance == "observed" else 0.5 * (there + self._unexplained(squared))
 
@@ -134,7 +136,7 @@ class Fitting:
         B, P, M, _ = squared.shape
         asked = torch.cat([self.reference, torch.ones_like(squared)], dim=-1).reshape(B, P * M, 4)
         every = torch.cat([-2.0 * self._local, self._square[..., None]], dim=-1)
-        least = nearest(asked, every, 1)[1].reshape(B, P, M) + squared[..., 0]
+        least = nearest(asked, every, 1, self._scratch)[1].reshape(B, P, M) + squared[..., 0]
         apart = least.clamp(0.0, 4.0).sqrt()
         seen = self.shapes.has_surface[..., None].to(apart.dtype)
         return (apart * seen).sum((1, 2)) / (seen.sum((1, 2)) * M)
@@ -187,7 +189,7 @@ class Fitting:
         return self.steps_taken >= self.options.steps
 
 
-def nearest(asked: Tensor, offered: Tensor, groups: int) -> tuple[Tensor, Tensor]:
+def nearest(asked: Tensor, offered: Tensor, groups: int, scratch: Tensor) -> tuple[Tensor, Tensor]:
     """Least scalar products, and where they are.
 
     Parameters
@@ -195,6 +197,8 @@ def nearest(asked: Tensor, offered: Tensor, groups: int) -> tuple[Tensor, Tensor
     asked : (B, N, C) float
     offered : (B, groups * M, C) float
     groups : int
+    scratch : (S,) float
+        Room for products, at least N * groups * M; more lets several objects be worked on at once.
 
     Returns
     -------
@@ -208,9 +212,10 @@ def nearest(asked: Tensor, offered: Tensor, groups: int) -> tuple[Tensor, Tensor
     if asked.is_cuda:
         least, index = (asked @ across).unflatten(2, (groups, M)).min(-1)
         return index, least
-    # A few products at a time stay in the cache; NumPy's argmin is ten times as fast as torch's on a CPU.
-    rows = max(1, _CACHED // (N * groups * M))
-    products = asked.new_empty(min(rows, B), N, groups, M)
+    # A few products at a time stay in the cache, in memory that is already there; NumPy's argmin is ten times as fast
+    # as torch's on a CPU.
+    rows = min(len(scratch) // (N * groups * M), B)
+    products = scratch[: rows * N * groups * M].view(rows, N, groups, M)
     index = torch.empty(B, N, groups, dtype=torch.int64)
     least = asked.new_empty(B, N, groups)
     for first in range(0, B, rows):

@@ -93,15 +93,14 @@ def test_what_the_agent_sees_does_not_depend_on_place_or_size(problem: Problem) 
         torch.testing.assert_close(getattr(here, name), getattr(there, name), atol=1e-3, rtol=1e-3)
 
 
-def test_nearest_agrees_with_all_pairs_whatever_the_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("room", [600, 1500, 1 << 15])
+def test_nearest_agrees_with_all_pairs_whatever_the_room(room: int) -> None:
     generator = torch.Generator().manual_seed(0)
     asked, offered = (torch.randn(7, n, 4, generator=generator) for n in (20, 30))
-    for cached in (1, 5000, 1 << 20):
-        monkeypatch.setattr("artperl.fitting._CACHED", cached)
-        index, least = nearest(asked, offered, 3)
-        least_of_all, where = (asked @ offered.transpose(1, 2)).unflatten(2, (3, 10)).min(-1)
-        assert (index == where).all()
-        torch.testing.assert_close(least, least_of_all)
+    index, least = nearest(asked, offered, 3, torch.empty(room))
+    least_of_all, where = (asked @ offered.transpose(1, 2)).unflatten(2, (3, 10)).min(-1)
+    assert (index == where).all()
+    torch.testing.assert_close(least, least_of_all)
 
 
 def test_parts_without_a_surface_are_near_nothing(problem: Problem) -> None:
