@@ -51,8 +51,10 @@ class EstimatorOptions:
 
     num_points: int = 1024
     """Points that perception sees."""
-    fit_points: int = 512
-    """Of these, points that the reference is fitted to."""
+    early_points: int = 256
+    """Of these, points by which the best start is found."""
+    fit_points: int = 1024
+    """Of these, points that the best one is fitted to."""
     references: int = 3
     """References that are tried, the nearest first."""
     agent_steps: int = 8
@@ -189,8 +191,8 @@ class Estimator:
             query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
             rows = self.base.nearest(query, min(options.references, len(self.base)))[0][0]
             shapes, theta = start(clouds, perceived, self.base.shapes[rows], len(rows))
-            few = cloud[:, : options.fit_points]
-            observed = Observed.of(few, perceived.part[:, : options.fit_points]).repeat(len(rows))
+            some = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
+            observed = some.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(rows))
             steps = [theta]
         with clock("agent"):
             if self.agent is not None and options.agent_steps:
@@ -203,9 +205,9 @@ class Estimator:
             )
             refined = refine(shapes, observed, theta, early)
             best = refined.energy.argmin()[None]
-            shapes, observed, theta = shapes[best], observed[best], refined.theta[best]
+            shapes, theta = shapes[best], refined.theta[best]
         with clock("relabel"):
-            observed = replace(observed, part=relabel(shapes, observed, theta, perceived.part_logits))
+            observed = replace(some, part=relabel(shapes, some, theta, perceived.part_logits))
         with clock("last"):
             refined = refine(shapes, observed, theta, replace(options.refine, rigid_iterations=2))
         with clock("report"):

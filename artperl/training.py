@@ -83,8 +83,6 @@ class TrainOptions:
     agent_rate: float = 1e-3
     episodes: int = 64
     """Episodes of a rollout."""
-    fit_points: int = 512
-    """Points of a cloud that the agent sees."""
     validate_every: int = 1000
     """Steps of stage 1 between tests."""
     validate_rollouts: int = 50
@@ -103,8 +101,8 @@ class TrainOptions:
 
 PRESETS = {
     "quick": TrainOptions(
-        base_objects=32, width=32, perception_steps=400, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
-        fit_points=256, validate_every=175, validate_rollouts=12, test_objects=20, validation_views=2,
+        base_objects=32, width=32, perception_steps=500, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
+        validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
 }  # fmt: skip
@@ -166,7 +164,7 @@ class Training:
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
         agent = self.agent if self.done["agent"] else None
-        return Estimator(self.perception, self.base, agent, EstimatorOptions(fit_points=self.options.fit_points))
+        return Estimator(self.perception, self.base, agent, EstimatorOptions(num_points=self.options.num_points))
 
     def _learn_to_perceive(self, board: SummaryWriter, stop: _Stop) -> None:
         options, optimizer = self.options, self.optimizers["perception"]
@@ -207,7 +205,7 @@ class Training:
         if first >= total:
             return
         problems = Problems(
-            options.categories, self.base, options.episodes, options.fit_points, options.seed + 1, options.start,
+            options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
             options.sample, perception=self.perception,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
