@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from artperl.batch import Batch
-from artsim.errors import ConfigError
+from artsim.errors import AssetError, ConfigError
 from artsim.kinematics import Array
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
@@ -89,14 +89,20 @@ class Samples:
         self.num_rows = num_rows
 
     def __getitem__(self, i: int) -> Sample:
-        # Another object of the same category takes the place of one that has too many parts.
+        # Another object of the same category takes the place of one that has too many parts, or cannot be made: a long
+        # run outlives the rare fault of a family, which artsim's audit reports.
         elsewhere = len(self.stream.categories) * self.stream.views_per_object << 32
         for attempt in range(_ATTEMPTS):
-            sample = self.stream[i + attempt * elsewhere]
+            try:
+                sample = self.stream[i + attempt * elsewhere]
+            except AssetError:
+                continue
             if len(sample.joint_type) <= self.num_rows:
                 return sample
         raise ConfigError(
-            f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts", sample.category, "allow more parts"
+            f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts, or cannot be made",
+            ", ".join(self.stream.categories),
+            "allow more parts, or mend the family",
         )
 
 

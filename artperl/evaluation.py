@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -109,6 +109,21 @@ def samples_of(
 def evaluate(estimator: Estimator, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
     """Score an estimator on samples, one at a time."""
     return [score(estimator, sample) for sample in tqdm(samples, "evaluating", disable=not progress, leave=False)]
+
+
+def mistake(estimator: Estimator, samples: Iterable[Sample]) -> list[Scored]:
+    """Scores of estimates for objects that are not of the estimator's categories: whatever it says is wrong."""
+    scored = []
+    for sample in samples:
+        estimate = estimator(sample.points)
+        wrong = _failed(sample, sum(estimate.milliseconds.values()))
+        scored.append(
+            replace(
+                wrong, failed=False, residual=estimate.residual, disagreement=estimate.disagreement,
+                confidence=estimate.confidence,
+            )
+        )  # fmt: skip
+    return scored
 
 
 def score(estimator: Estimator, sample: Sample) -> Scored:

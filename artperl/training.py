@@ -37,6 +37,7 @@ from artperl.evaluation import (
     evaluate,
     frozen_samples,
     headline,
+    mistake,
     summary,
     table,
 )
@@ -47,6 +48,7 @@ from artperl.ppo import PPOOptions, collect, update
 from artperl.problems import Problems, StartOptions
 from artperl.retrieval import ShapeBase
 from artsim.errors import DatasetError
+from artsim.families import FAMILIES
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.sources import family_sources
@@ -89,6 +91,8 @@ class TrainOptions:
     """Rollouts of stage 2 between tests."""
     test_objects: int = 40
     """Unseen objects of each category, others for validation than for the test at the end."""
+    foreign_categories: int = 12
+    """Other categories, of which two objects each show what confidence must be low for."""
     validation_views: int = 2
     """Views of each object when the estimator is validated."""
     test_views: int = 4
@@ -242,11 +246,17 @@ class Training:
         _write(board, "validation", _curves(figures) | {"score": score}, step)
         if score < self.best:
             self.best = score
-            best = replace(self.estimator(), calibration=calibrate(scored))
+            foreign = mistake(self.estimator(), self._foreign())
+            best = replace(self.estimator(), calibration=calibrate([*scored, *foreign]))
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()
         if self.progress:
             tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")
+
+    def _foreign(self) -> list[Sample]:
+        """Objects of other categories, for which confidence must be low."""
+        others = [category for category in FAMILIES if category not in self.options.categories]
+        return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS)
 
     def _unseen(self, views: int, first_seed: int) -> list[Sample]:
         sample = replace(self.options.sample, num_points=_TEST_POINTS)

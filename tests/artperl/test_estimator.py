@@ -22,6 +22,7 @@ from artperl.evaluation import (
     evaluate,
     frozen_samples,
     headline,
+    mistake,
     summary,
     table,
     true_poses,
@@ -233,6 +234,13 @@ def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:
     assert np.abs(found - chance).mean() < 0.05
     assert fitted(0.3, 0.3) < 0.01
     assert calibrate([]) == Calibration()
+
+
+def test_whatever_is_said_of_another_category_is_wrong(estimator: Estimator) -> None:
+    (scored,) = mistake(estimator, frozen_samples(["bucket"], 1, 1))
+    assert not scored.right
+    assert not scored.failed
+    assert np.isfinite([scored.residual, scored.disagreement]).all()
 
 
 def test_frozen_samples_are_always_the_same() -> None:

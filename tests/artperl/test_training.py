@@ -26,7 +26,8 @@ from artsim.stream import STREAM_SEEDS
 
 TINY = TrainOptions(
     base_objects=3, reference_points=48, width=16, perception_steps=4, batch_size=4, num_points=96, agent_rollouts=3,
-    episodes=3, validate_every=2, validate_rollouts=2, test_objects=2, validation_views=1, test_views=1,
+    episodes=3, validate_every=2, validate_rollouts=2, test_objects=2, foreign_categories=1,
+    validation_views=1, test_views=1,
     ppo=PPOOptions(minibatch=4), fitting=FittingOptions(steps=2, observed_points=48, reference_points=16),
 )  # fmt: skip
 
