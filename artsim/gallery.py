@@ -41,7 +41,7 @@ def gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_r
         for i, q in enumerate(opened_states(obj, states)):
             sheet.paste(Image.fromarray(portrait(obj, q)), (x + i * _TILE, y + _HEADER))
     buffer = io.BytesIO()
-    sheet.quantize(128).save(buffer, "PNG", optimize=True)  # a third of the size
+    sheet.quantize(256).save(buffer, "PNG", optimize=True)  # a third of the size
     return buffer.getvalue()
 
 

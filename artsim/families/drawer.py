@@ -224,6 +224,8 @@ def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
     leg = rng.uniform(0.035, 0.07)
     low = height * rng.uniform(0.1, 0.6) if on_legs else (0.0 if rng.random() < 0.5 else rng.uniform(0.03, 0.1))
     outer = y - leg + 0.002 if on_legs else y
+    if len(sides) == 2:
+        pedestal = min(pedestal, outer - 0.1)  # room for knees
     rows = int(rng.integers(1, 4 if len(sides) == 2 else 5))
     rows = min(rows, max(1, int((top - low) / 0.1)))
     contents = ["drawer"] * rows
