@@ -21,6 +21,7 @@ from artperl.networks.perception import Perception
 from artperl.refine import RefineOptions
 from artperl.retrieval import ShapeBase
 from artsim.errors import DatasetError
+from artsim.files import write_atomic
 
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
@@ -57,7 +58,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         "calibration": asdict(estimator.calibration),
         "about": dict(about),
     }
-    replace_file(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
+    write_atomic(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
 
 
 def load_estimator(name: str | Path) -> Estimator:
@@ -110,13 +111,6 @@ def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
     """Write tensors so that a stop halfway leaves the old file."""
     part = path.with_name(f".{path.name}")
     save_file({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, part)
-    part.replace(path)
-
-
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a file so that a stop halfway leaves the old one."""
-    part = path.with_name(f".{path.name}")
-    part.write_bytes(content)
     part.replace(path)
 
 

@@ -11,7 +11,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import tyro
 
-from artsim.errors import ArtsimError, ConfigError
+from artsim.cli import run_program
+from artsim.errors import ConfigError
+from artsim.files import write_atomic
 from artsim.plan import SampleOptions
 from artsim.sampling import ViewOptions
 
@@ -23,9 +25,9 @@ class Train:
     Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
     the same command goes on where it stopped, with the same result. Curves: tensorboard --logdir OUT.
 
-    Examples:
-    python train.py --category laptop --preset quick
-    python train.py --category eyeglasses --preset full --out out/eyeglasses
+    To see it learn: python train.py --category laptop --preset quick
+
+    To train well: python train.py --category eyeglasses --preset full --out out/eyeglasses
     """
 
     category: tuple[str, ...] = ("laptop",)
@@ -95,7 +97,7 @@ class Evaluate:
     """Write the figures to this file."""
 
     def run(self) -> None:
-        from artperl.checkpoint import WEIGHTS, load_estimator, read_settings, replace_file
+        from artperl.checkpoint import WEIGHTS, load_estimator, read_settings
         from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
         from artsim.sources import find_sources
 
@@ -110,7 +112,7 @@ class Evaluate:
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
         print(table(figures))
         if self.json is not None:
-            replace_file(self.json, _json(figures))
+            write_atomic(self.json, _json(figures))
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ class Estimate:
     """Write here, as .json or as .npz with the part of every point; by default print."""
 
     def run(self) -> None:
-        from artperl.checkpoint import load_estimator, replace_file
+        from artperl.checkpoint import load_estimator
 
         estimate = load_estimator(self.category)(read_cloud(self.cloud))
         record = {name: _plain(value) for name, value in vars(estimate).items() if name != "part"}
@@ -135,7 +137,7 @@ class Estimate:
             arrays = {name: np.asarray(v) for name, v in vars(estimate).items() if name != "milliseconds"}
             np.savez(self.out, allow_pickle=False, **arrays)
         else:
-            replace_file(self.out, _json(record))
+            write_atomic(self.out, _json(record))
 
 
 def read_cloud(path: Path) -> np.ndarray:
@@ -177,21 +179,9 @@ Verb = (
 
 def main() -> None:
     """Entry point of ``artperl``."""
-    _run(Verb, "artperl")
+    run_program(Verb, "artperl", __doc__)
 
 
 def train_main() -> None:
     """Entry point of ``train.py``."""
-    _run(Train, "train.py")
-
-
-def _run(verb: Any, program: str) -> None:
-    try:
-        tyro.cli(verb, prog=program, description=None if verb is Train else __doc__).run()
-    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
-        sys.stderr.close()
-    except (ArtsimError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        sys.exit(130)
+    run_program(Train, "train.py")

@@ -26,7 +26,7 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
-from artperl.checkpoint import load_estimator, read_settings, replace_file, save_estimator, save_tensors
+from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
 from artperl.data import batches
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator, EstimatorOptions
@@ -49,6 +49,7 @@ from artperl.problems import Problems, StartOptions
 from artperl.retrieval import ShapeBase
 from artsim.errors import DatasetError
 from artsim.families import FAMILIES
+from artsim.files import write_atomic
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.sources import family_sources
@@ -268,8 +269,8 @@ class Training:
         figures = summary(evaluate(best, self._unseen(self.options.test_views, TEST_SEEDS), self.progress))
         about = read_settings(self.out / "best")["about"]
         save_estimator(best, self.out / "best", {**about, "test": figures})
-        replace_file(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
-        replace_file(self.out / "table.txt", (table(figures) + "\n").encode())
+        write_atomic(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
+        write_atomic(self.out / "table.txt", (table(figures) + "\n").encode())
         return figures
 
     def _about(self, figures: dict[str, Any]) -> dict[str, Any]:
@@ -284,7 +285,7 @@ class Training:
                 tensors |= {f"{name}/{number}/{key}": value for key, value in moments.items()}
         save_tensors(tensors, self.out / f"{_STATE}.safetensors")
         state = {"options": _plain(self.options), "best": self.best, "history": self.history}
-        replace_file(self.out / f"{_STATE}.json", (json.dumps(state, indent=1) + "\n").encode())
+        write_atomic(self.out / f"{_STATE}.json", (json.dumps(state, indent=1) + "\n").encode())
 
     def _load(self) -> None:
         state = json.loads((self.out / f"{_STATE}.json").read_text())

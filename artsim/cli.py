@@ -292,17 +292,18 @@ Verb = (
 
 def main() -> None:
     """Entry point of the program ``artsim``."""
-    _run(Verb, "artsim")
+    run_program(Verb, "artsim", __doc__)
 
 
 def generate_main() -> None:
     """Entry point of ``generate.py``."""
-    _run(Generate, "generate.py")
+    run_program(Generate, "generate.py")
 
 
-def _run(verb: Any, program: str) -> None:
+def run_program(verb: Any, program: str, description: str | None = None) -> None:
+    """Read the command line as one of some verbs, and run it; errors are one line, and exit with 2."""
     try:
-        tyro.cli(verb, prog=program, description=None if verb is Generate else __doc__).run()
+        tyro.cli(verb, prog=program, description=description).run()
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()
     except (ArtsimError, OSError) as error:
