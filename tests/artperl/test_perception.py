@@ -99,7 +99,7 @@ def test_it_learns_a_batch_by_heart(batch: tuple[Clouds, Truth]) -> None:
     net = network().train()
     optimizer = torch.optim.Adam(net.parameters(), 3e-3)
     seen: list[dict[str, Tensor]] = []
-    for _ in range(40):
+    for _ in range(80):
         seen.append(perception_losses(net(clouds.points), truth))
         optimizer.zero_grad()
         torch.stack(list(seen[-1].values())).sum().backward()  # type: ignore[no-untyped-call]
