@@ -16,7 +16,7 @@ GAP = 0.0005
 
 def build(rng: np.random.Generator) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
-    length = rng.uniform(0.08, 0.27)
+    length = rng.uniform(0.07, 0.3)
     half = 0.5 * length * rng.uniform(0.09, 0.22)
     height = max(2 * half * rng.uniform(0.35, 0.9), 0.009)
     wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)

@@ -49,7 +49,7 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _shape(rng: np.random.Generator) -> _Shape:
-    width = rng.uniform(0.2, 0.45)
+    width = rng.uniform(0.18, 0.48)
     depth = width * rng.triangular(0.54, 0.67, 0.9)
     height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
     lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)

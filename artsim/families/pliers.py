@@ -17,7 +17,7 @@ GAP = 0.0006
 
 def build(rng: np.random.Generator) -> Assembly:
     """Pliers, closed at rest. One lever turns about the vertical rivet."""
-    length = rng.uniform(0.1, 0.32)
+    length = rng.uniform(0.09, 0.38)
     kind = str(rng.choice(["combination", "nose", "flat", "cutting", "hollow"]))
     jaw = length * {"nose": 0.34, "cutting": 0.13, "flat": 0.26}.get(kind, 0.22) * rng.uniform(0.85, 1.15)
     thick = length * rng.uniform(0.045, 0.07)
