@@ -528,6 +528,7 @@ def test_ctrl_c_keeps_whole_objects_and_leaves_nothing_else(tmp_path: Path) -> N
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores Ctrl-C
     )
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob("laptop/[0-9]*")) and time.monotonic() < deadline:
