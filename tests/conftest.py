@@ -1,44 +1,70 @@
-"""Objects that tests share: real ones where they are to be had, and small ones of our own."""
+"""What tests share: objects, real ones where they are to be had, and what to do where something is missing."""
 
 from __future__ import annotations
 
+import importlib
+import multiprocessing
+import operator
 import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from types import ModuleType
+from typing import NoReturn, TypeVar
 
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import settings
 
+from artsim.assembly import Assembly, continuous, prismatic, revolute, screw
 from artsim.errors import RenderError
 from artsim.kinematics import Joint, KinematicTree
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers import Renderer, make_renderer
+from artsim.solids import box, cylinder, ring
 
+T = TypeVar("T")
 ASSETS = Path(__file__).resolve().parent.parent / "urdf_assets"
 DEMO = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
 
 
+def absent(message: str) -> NoReturn:
+    """Something that a test needs is missing: a skip that says so on a developer's machine, a failure in CI."""
+    if os.environ.get("CI"):
+        pytest.fail(message)
+    pytest.skip(message)
+
+
+def installed(module: str) -> ModuleType:
+    """A module of an optional dependency."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        absent(f"{module} cannot be imported ({error}): what needs it is not tested")
+
+
 @pytest.fixture(scope="session")
 def partnet_dir() -> Path:
-    """Folder of real PartNet-Mobility objects; their absence is loud, and in CI a failure."""
+    """Folder of real PartNet-Mobility objects."""
     folder = os.environ.get("ARTSIM_PARTNET_DIR")
     if not folder:
-        message = "ARTSIM_PARTNET_DIR is not set: real PartNet-Mobility objects are not tested"
-        if os.environ.get("CI"):
-            pytest.fail(message)
-        pytest.skip(message)
+        absent("ARTSIM_PARTNET_DIR is not set: real PartNet-Mobility objects are not tested")
     return Path(folder)
 
 
 def backend(name: str) -> Renderer:
-    """A renderer that a machine may lack; its absence is loud, and in CI a failure."""
+    """A renderer that a machine may lack."""
     try:
         return make_renderer(name)
     except RenderError as error:
-        if os.environ.get("CI"):
-            pytest.fail(str(error))
-        pytest.skip(str(error))
+        absent(str(error))
+
+
+def in_another_process(source: Sequence[T], i: int) -> T:
+    """What a new process, which was sent the source as a DataLoader would send it, reads as its i-th item."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(operator.getitem, source, i).result(timeout=120)
 
 
 def solid(name: str, mesh: trimesh.Trimesh) -> Part:
@@ -50,6 +76,21 @@ def rigid(mesh: trimesh.Trimesh) -> ArticulatedObject:
     """An object of one part."""
     tree = KinematicTree([Joint("root", "free", -1)])
     return ArticulatedObject("solid", "solid", (solid("solid", mesh),), tree, sha256="0" * 64)
+
+
+def valve() -> ArticulatedObject:
+    """Every type of joint, a mimic relation, and parts in another order than a walk through the tree gives."""
+    assembly = Assembly()
+    assembly.add("pipe", box((-0.1, -0.1, 0), (0.1, 0.1, 0.2)), density=1000.0)
+    arm = revolute("pipe", (0, 0, 1), (0.15, 0, 0), -1, 2)
+    assembly.add("arm", box((0.15, -0.02, 0), (0.35, 0.02, 0.05)), arm)
+    cap = screw("pipe", (0, 0, 1), (0, 0, 0.2), 0, 20, 0.002)
+    assembly.add("cap", cylinder((0, 0, 0.21), (0, 0, 0.25), 0.05), cap)
+    knob = continuous("arm", (1, 2, 0), (0.4, 0, 0))
+    assembly.add("knob_2", ring((0.41, 0, 0.01), (1, 0, 0), 0.01, 0.02, 0.02), knob)
+    slide = prismatic("arm", (1, 0, 1), 0, 0.1, mimic=("cap", 0.005))
+    assembly.add("knob_1", box((0.4, 0.1, 0), (0.42, 0.12, 0.02)), slide)
+    return assembly.build("valve", "3")
 
 
 settings.register_profile("plain", max_examples=50, deadline=None)

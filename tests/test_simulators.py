@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,16 +12,14 @@ from artsim.export import export
 from artsim.families import FAMILIES, make
 from artsim.kinematics import KinematicTree
 from artsim.simulators import AGREEMENT, SIMULATORS, compare_simulators
-from tests.conftest import ASSETS
-from tests.test_export import valve
+from tests.conftest import ASSETS, installed, valve
 
 
 @pytest.fixture(scope="module", params=SIMULATORS)
 def simulator(request: pytest.FixtureRequest) -> str:
     """Each simulator that is installed."""
     name = str(request.param)
-    if importlib.util.find_spec(name) is None:
-        pytest.skip(f"{name} is not installed")
+    installed(name)
     return name
 
 
@@ -79,7 +76,7 @@ def test_a_file_that_does_not_load_is_a_finding(
 
 
 def test_mujoco_fuses_the_root_unless_told_not_to(tmp_path: Path) -> None:
-    mujoco = pytest.importorskip("mujoco")
+    mujoco = installed("mujoco")
     obj = make("laptop", 0)
     export(obj, tmp_path)
     file = tmp_path / "mobility.urdf"
@@ -91,7 +88,7 @@ def test_mujoco_fuses_the_root_unless_told_not_to(tmp_path: Path) -> None:
 @pytest.mark.parametrize("category", FAMILIES)
 def test_every_family_stands_apart_at_rest_and_moves_calmly(category: str, tmp_path: Path) -> None:
     """A second under gravity in MuJoCo: no part touches another at first, nothing blows up, limits hold."""
-    mujoco = pytest.importorskip("mujoco")
+    mujoco = installed("mujoco")
     export(make(category, 1), tmp_path, ["mjcf"])
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "mobility.xml"))
     data = mujoco.MjData(model)

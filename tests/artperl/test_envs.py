@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from artperl.envs import ENV_ID, PoseFittingEnv, nothing
 from artperl.fitting import Fitting, FittingOptions
+from tests.conftest import installed
 
 OPTIONS = FittingOptions(steps=4, observed_points=64, reference_points=32)
 
@@ -57,7 +58,7 @@ def test_a_step_needs_a_reset() -> None:
 
 
 def test_ppo_of_stable_baselines_runs_on_it_unchanged(env: PoseFittingEnv) -> None:
-    baselines = pytest.importorskip("stable_baselines3")
+    baselines = installed("stable_baselines3")
     model = baselines.PPO("MultiInputPolicy", env, n_steps=16, batch_size=8, n_epochs=1, device="cpu")
     before = [p.detach().clone() for p in model.policy.parameters()]
     model.learn(16)

@@ -23,6 +23,7 @@ from artperl.ppo import (
     update,
 )
 from tests.artperl.worlds import small_problem
+from tests.conftest import installed
 
 FITTING = FittingOptions(steps=3, observed_points=96, reference_points=32)
 
@@ -53,7 +54,7 @@ def test_advantages_are_discounted_sums_of_errors() -> None:
 
 def test_losses_are_those_of_stable_baselines() -> None:
     """The formulas of Stable-Baselines3's PPO.train, on its own distribution over MultiDiscrete actions."""
-    distributions = pytest.importorskip("stable_baselines3.common.distributions")
+    distributions = installed("stable_baselines3.common.distributions")
     options = PPOOptions()
     rollout = a_rollout(an_agent(), options)
     moved = an_agent(1)
