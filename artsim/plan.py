@@ -42,10 +42,10 @@ class SampleOptions:
     """Size of the object: native (as in its file), unit (diagonal of 1 m), or a range of diagonals in metres."""
     states: StateOptions = field(default_factory=StateOptions)
     views: ViewOptions = field(default_factory=ViewOptions)
-    renderer: Literal["raycast", "pybullet", "pybullet-egl", "sapien"] = "raycast"
-    """raycast needs nothing installed; the others need the extra 'pybullet' or 'sapien'."""
+    renderer: Literal["raycast", "pybullet", "pybullet-egl", "sapien", "warp"] = "raycast"
+    """raycast needs nothing installed; the others need the extra 'pybullet', 'sapien' or 'warp'."""
     images: tuple[Literal["depth", "part_mask", "rgb"], ...] = ()
-    """Images to keep beside the cloud; rgb needs a renderer other than raycast."""
+    """Images to keep beside the cloud; rgb needs sapien or pybullet."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
 
@@ -54,8 +54,8 @@ class SampleOptions:
             raise ConfigError(f"clouds of {self.num_points} points are not made", "num_points", "use 1 to 1000000")
         if not isinstance(self.scale, str) and not 0.0 < self.scale[0] <= self.scale[1]:
             raise ConfigError(f"{self.scale} is not a range of diagonals", "scale", "write LOW HIGH in metres")
-        if "rgb" in self.images and self.renderer == "raycast":
-            raise ConfigError("raycast makes no rgb", "images", "add --renderer sapien or pybullet")
+        if "rgb" in self.images and self.renderer in ("raycast", "warp"):
+            raise ConfigError(f"{self.renderer} makes no rgb", "images", "add --renderer sapien or pybullet")
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> SampleOptions:

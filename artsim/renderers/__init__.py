@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 from numpy.typing import ArrayLike
@@ -9,9 +10,9 @@ from numpy.typing import ArrayLike
 from artsim.camera import Camera
 from artsim.errors import ConfigError
 from artsim.objects import ArticulatedObject
-from artsim.renderers.base import BACKGROUND, Frame, Renderer
+from artsim.renderers.base import BACKGROUND, CameraBatch, Frame, Renderer
 
-RENDERERS = ("raycast", "pybullet", "pybullet-egl", "sapien")
+RENDERERS = ("raycast", "pybullet", "pybullet-egl", "sapien", "warp")
 
 
 def make_renderer(name: str) -> Renderer:
@@ -36,6 +37,10 @@ def make_renderer(name: str) -> Renderer:
         from artsim.renderers.sapien import SapienRenderer
 
         return SapienRenderer()
+    if name == "warp":
+        from artsim.renderers.warp import WarpRenderer
+
+        return WarpRenderer()
     raise ConfigError(f"there is no renderer {name!r}", "renderer", f"use one of {', '.join(RENDERERS)}")
 
 
@@ -72,4 +77,54 @@ def render(
     return shared_renderer(renderer).render(obj, q, camera, T_world_object)
 
 
-__all__ = ["BACKGROUND", "RENDERERS", "Frame", "Renderer", "make_renderer", "render", "shared_renderer"]
+def render_cameras(
+    obj: ArticulatedObject,
+    q: ArrayLike,
+    cameras: Sequence[Camera],
+    T_world_object: ArrayLike | None = None,
+    renderer: str | Renderer = "raycast",
+) -> list[Frame]:
+    """Render one posed object by several cameras: at once where the renderer can, else one after another.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    q : (K,) float
+        Joint states.
+    cameras : sequence of Camera
+        All of one image size.
+    T_world_object : (4, 4) float, optional
+        Pose of the rest frame in the world; identity by default.
+    renderer : str or Renderer
+        One of ``RENDERERS``, or one of your own.
+
+    Returns
+    -------
+    list of Frame
+        One for each camera.
+
+    Raises
+    ------
+    ConfigError
+        When the image sizes differ.
+    """
+    sizes = {(camera.width, camera.height) for camera in cameras}
+    if len(sizes) > 1:
+        raise ConfigError(f"a batch has one image size, not {len(sizes)}", "cameras", "draw each size by itself")
+    drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
+    if cameras and isinstance(drawer, CameraBatch):
+        return drawer.render_cameras(obj, q, cameras, T_world_object)
+    return [drawer.render(obj, q, camera, T_world_object) for camera in cameras]
+
+
+__all__ = [
+    "BACKGROUND",
+    "RENDERERS",
+    "CameraBatch",
+    "Frame",
+    "Renderer",
+    "make_renderer",
+    "render",
+    "render_cameras",
+    "shared_renderer",
+]

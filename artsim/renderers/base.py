@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,6 +66,24 @@ class Renderer(Protocol):
 
     def close(self) -> None:
         """Release what the renderer holds (contexts, scenes)."""
+        ...
+
+
+@runtime_checkable
+class CameraBatch(Protocol):
+    """What a renderer has besides, if it draws several views at once faster than one after another."""
+
+    def render_cameras(
+        self,
+        obj: ArticulatedObject,
+        q: ArrayLike,
+        cameras: Sequence[Camera],
+        T_world_object: ArrayLike | None = None,
+    ) -> list[Frame]:
+        """Render one posed object by at least one camera, all of one image size.
+
+        Users call :func:`artsim.renderers.render_cameras`, which any renderer will do for.
+        """
         ...
 
 
