@@ -32,6 +32,9 @@ class Train:
 
     category: tuple[str, ...] = ("laptop",)
     """Procedural categories, or 'all'; several share one estimator."""
+    parts: Literal["artimage", "any"] = "artimage"
+    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
+    objects of the families."""
     preset: Literal["quick", "full"] = "quick"
     """quick: under five minutes on two cores, to see it learn; full: within the hour."""
     out: Path | None = None
@@ -60,7 +63,7 @@ class Train:
         preset = PRESETS[self.preset]
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
-            preset, categories=categories, seed=self.seed, sample=SampleOptions(noise=self.noise),
+            preset, categories=categories, parts=self.parts, seed=self.seed, sample=SampleOptions(noise=self.noise),
             perception_steps=preset.perception_steps if steps is None else steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
         )  # fmt: skip
@@ -106,7 +109,7 @@ class Evaluate:
         categories = self.category or tuple(read_settings(folder)["about"]["options"]["categories"])
         options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
         if self.files:
-            samples = samples_of(find_sources(self.files), self.views, options)
+            samples = samples_of((source.load() for source in find_sources(self.files)), self.views, options)
         else:
             samples = frozen_samples(categories, self.objects, self.views, options)
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))

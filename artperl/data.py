@@ -5,19 +5,22 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from artperl.batch import Batch
+from artperl.categories import Parts, has_parts
 from artsim.errors import AssetError, ConfigError
 from artsim.kinematics import Array
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.stream import FamilyStream
 
-_ATTEMPTS = 50
+_ATTEMPTS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,11 @@ class Truth(Batch):
 
 
 class Samples:
-    """Samples of fresh procedural objects by number, of objects with at most ``num_rows`` parts.
+    """Samples of fresh procedural objects by number.
+
+    Another object of the same category takes the place of one that has other parts than are asked for, more than
+    ``num_rows`` of them, or that cannot be made: a long run outlives the rare fault of a family, which artsim's audit
+    reports.
 
     Parameters
     ----------
@@ -80,30 +87,49 @@ class Samples:
     seed : int
     views_per_object : int
     num_rows : int
+    parts : Parts
     """
 
     def __init__(
-        self, categories: Sequence[str], options: SampleOptions, seed: int, views_per_object: int, num_rows: int
+        self,
+        categories: Sequence[str],
+        options: SampleOptions,
+        seed: int,
+        views_per_object: int,
+        num_rows: int,
+        parts: Parts = "artimage",
     ):
         self.stream = FamilyStream(categories, options, seed, views_per_object)
-        self.num_rows = num_rows
+        self.num_rows, self.parts = num_rows, parts
+        self._right = lru_cache(maxsize=64)(self._find_right)
 
     def __getitem__(self, i: int) -> Sample:
-        # Another object of the same category takes the place of one that has too many parts, or cannot be made: a long
-        # run outlives the rare fault of a family, which artsim's audit reports.
-        elsewhere = len(self.stream.categories) * self.stream.views_per_object << 32
+        n, view = divmod(i, self.stream.views_per_object)
+        return self.stream[self._right(n) * self.stream.views_per_object + view]
+
+    def _find_right(self, n: int) -> int:
+        """Number of the object that stands for object ``n``."""
+        category = self.stream.categories[n % len(self.stream.categories)]
+        elsewhere = len(self.stream.categories) << 32  # of the same category, and no run gets there
         for attempt in range(_ATTEMPTS):
             try:
-                sample = self.stream[i + attempt * elsewhere]
+                joints = self.stream.object(n + attempt * elsewhere).tree.types
             except AssetError:
                 continue
-            if len(sample.joint_type) <= self.num_rows:
-                return sample
+            if len(joints) <= self.num_rows and has_parts(category, joints, self.parts):
+                return n + attempt * elsewhere
         raise ConfigError(
-            f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts, or cannot be made",
+            f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts, or other ones, or cannot be made",
             ", ".join(self.stream.categories),
             "allow more parts, or mend the family",
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_right"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._right = lru_cache(maxsize=64)(self._find_right)
 
 
 def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
@@ -168,6 +194,7 @@ def batches(
     seed: int = 0,
     workers: int = 1,
     sample: SampleOptions | None = None,
+    parts: Parts = "artimage",
 ) -> Iterator[tuple[Clouds, Truth]]:
     """Endless batches of fresh procedural objects.
 
@@ -186,9 +213,11 @@ def batches(
         Processes that make samples; 0 makes them in this one.
     sample : SampleOptions, optional
         View preset, noise and the like; ``num_points`` overrides its own.
+    parts : Parts
+        Of the objects.
     """
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-    samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows)
+    samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows, parts)
     rows = _Rows(samples, num_points, batch_size, first_batch * batch_size)
     loader = DataLoader(
         rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on

@@ -14,12 +14,12 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from artperl.actions import NOTHING, NUM_AXES, NUM_BINS
+from artperl.categories import objects_of
 from artperl.embedding import by_boxes
 from artperl.fitting import Fitting, FittingOptions
 from artperl.pose import KINDS
 from artperl.problems import Problem, Problems
 from artperl.retrieval import ShapeBase
-from artsim.sources import family_sources
 
 ENV_ID = "artperl/PoseFitting-v0"
 _FAR = np.float32(1e3)
@@ -45,8 +45,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
 
     def __init__(self, category: str = "laptop", references: int = 16, options: FittingOptions | None = None):
         self.options = options or FittingOptions()
-        objects = [source.load() for source in family_sources([category], references, _SEEDS)]
-        self.base = by_boxes(ShapeBase.of(objects, self.options.reference_points))
+        self.base = by_boxes(ShapeBase.of(objects_of([category], references, _SEEDS), self.options.reference_points))
         self.category = category
         P, N, M = self.base.shapes.trees.num_rows, self.options.observed_points, self.options.reference_points
         self._shape = (P, NUM_AXES)

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from artperl import metrics
+from artperl.categories import Parts, objects_of
 from artperl.estimator import Calibration, Estimate, Estimator
 from artsim.errors import ArtsimError
+from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import make_renderer
 from artsim.sample import Sample
-from artsim.sources import Source, family_sources
 
 Array = NDArray[np.float64]
 
@@ -82,28 +83,32 @@ def frozen_samples(
     views_per_object: int = 4,
     options: SampleOptions | None = None,
     first_seed: int = TEST_SEEDS,
+    parts: Parts = "artimage",
 ) -> list[Sample]:
     """Samples of unseen procedural objects: always the same ones for the same arguments."""
-    sources = family_sources(categories, objects, first_seed)
     return [
         sample
-        for k in range(0, len(sources), objects)
-        for sample in samples_of(sources[k : k + objects], views_per_object, options, first_seed)
+        for category in categories
+        for sample in samples_of(
+            objects_of([category], objects, first_seed, parts), views_per_object, options, first_seed
+        )
     ]
 
 
 def samples_of(
-    sources: Sequence[Source], views_per_object: int = 4, options: SampleOptions | None = None, seed: int = TEST_SEEDS
+    objects: Iterable[ArticulatedObject],
+    views_per_object: int = 4,
+    options: SampleOptions | None = None,
+    seed: int = TEST_SEEDS,
 ) -> list[Sample]:
     """The same number of views of every object; they depend on the seed and on the object's place in the list."""
     options = options or SampleOptions()
     renderer = make_renderer(options.renderer)
-    samples = []
-    for n, source in enumerate(sources):
-        obj = source.load()
-        for index in range(n * views_per_object, (n + 1) * views_per_object):
-            samples.append(draw_sample(obj, options, seed, index, renderer))
-    return samples
+    return [
+        draw_sample(obj, options, seed, index, renderer)
+        for n, obj in enumerate(objects)
+        for index in range(n * views_per_object, (n + 1) * views_per_object)
+    ]
 
 
 def evaluate(estimator: Estimator, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:

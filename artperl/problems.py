@@ -11,6 +11,7 @@ from torch import Tensor
 
 from artperl.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.batch import Batch
+from artperl.categories import Parts
 from artperl.data import Clouds, Samples
 from artperl.embedding import box_embedding
 from artperl.networks.perception import Perception
@@ -70,6 +71,8 @@ class Problems:
     perception : Perception, optional
         Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
         it.
+    parts : Parts
+        Of the objects.
     """
 
     def __init__(
@@ -83,9 +86,10 @@ class Problems:
         sample: SampleOptions | None = None,
         choices: int = 4,
         perception: Perception | None = None,
+        parts: Parts = "artimage",
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-        self.samples = Samples(categories, options, seed, 2, base.shapes.trees.num_rows)
+        self.samples = Samples(categories, options, seed, 2, base.shapes.trees.num_rows, parts)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
         self.start, self.perception = start or StartOptions(), perception
 

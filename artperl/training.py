@@ -26,6 +26,7 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
+from artperl.categories import Parts, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
 from artperl.data import batches
 from artperl.embedding import by_boxes
@@ -52,7 +53,6 @@ from artsim.families import FAMILIES
 from artsim.files import write_atomic
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
-from artsim.sources import family_sources
 
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
@@ -68,6 +68,9 @@ class TrainOptions:
 
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator."""
+    parts: Parts = "artimage"
+    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
+    objects of the families."""
     seed: int = 0
     base_objects: int = 64
     """Reference objects of each category."""
@@ -136,7 +139,7 @@ class Training:
 
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
-        objects = [source.load() for source in family_sources(options.categories, options.base_objects, BASE_SEEDS)]
+        objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts)
         self.base = by_boxes(ShapeBase.of(objects, options.reference_points))
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width)
@@ -178,7 +181,7 @@ class Training:
             return
         data = batches(
             options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
-            self.workers, options.sample,
+            self.workers, options.sample, options.parts,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
@@ -211,7 +214,7 @@ class Training:
             return
         problems = Problems(
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
-            options.sample, perception=self.perception,
+            options.sample, perception=self.perception, parts=options.parts,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
         for n in range(first, total):
@@ -257,11 +260,12 @@ class Training:
     def _foreign(self) -> list[Sample]:
         """Objects of other categories, for which confidence must be low."""
         others = [category for category in FAMILIES if category not in self.options.categories]
-        return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS)
+        return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")
 
     def _unseen(self, views: int, first_seed: int) -> list[Sample]:
         sample = replace(self.options.sample, num_points=_TEST_POINTS)
-        return frozen_samples(self.options.categories, self.options.test_objects, views, sample, first_seed)
+        options = self.options
+        return frozen_samples(options.categories, options.test_objects, views, sample, first_seed, options.parts)
 
     def _finish(self) -> dict[str, Any]:
         """Test the best estimator on objects that had no say in which one that is."""

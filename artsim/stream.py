@@ -67,8 +67,11 @@ class FamilyStream:
             raise IndexError(f"sample {i} of an endless stream")
         if self._renderer is None:
             self._renderer = make_renderer(self.options.renderer)
-        obj = self._object(i // self.views_per_object)
-        return draw_sample(obj, self.options, self.seed, i, self._renderer)
+        return draw_sample(self.object(i // self.views_per_object), self.options, self.seed, i, self._renderer)
+
+    def object(self, n: int) -> ArticulatedObject:
+        """Object number ``n``, which samples ``n * views_per_object`` and on show."""
+        return self._object(n)
 
     def __iter__(self) -> Iterator[Sample]:
         n = self.start

@@ -7,6 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from artperl.categories import ARTIMAGE, objects_of
 from artperl.data import Clouds, Samples, Truth, batches
 from artperl.networks.perception import Perceived, Perception, perception_losses
 from artperl.networks.pointnet2 import Neighbourhoods, strongest
@@ -88,10 +89,17 @@ def test_batch_n_is_always_the_same() -> None:
 
 
 def test_objects_with_too_many_parts_give_way_to_others() -> None:
-    samples = Samples(["drawer"], SampleOptions(num_points=16), 0, 1, 3)
+    samples = Samples(["drawer"], SampleOptions(num_points=16), 0, 1, 3, "any")
     sizes = [len(samples[i].joint_type) for i in range(6)]
     assert max(sizes) <= 3
     assert samples[2].object_id == samples[2].object_id
+
+
+@pytest.mark.parametrize("category", sorted(ARTIMAGE))
+def test_objects_have_the_parts_of_artimage(category: str) -> None:
+    samples = Samples([category], SampleOptions(num_points=16), 0, 2, 4)
+    assert {samples[i].joint_type[1:] for i in range(8)} == {ARTIMAGE[category]}
+    assert {obj.tree.types[1:] for obj in objects_of([category], 4, 1_000_000)} == {ARTIMAGE[category]}
 
 
 def test_it_learns_a_batch_by_heart(batch: tuple[Clouds, Truth]) -> None:

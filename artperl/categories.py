@@ -1,0 +1,62 @@
+"""Which objects of a category an estimator is for.
+
+Procedural families vary the parts, too: a `drawer` has one to seven drawers, a `dishwasher` may have racks and buttons.
+ArtImage, which the paper reports, has a fixed kinematic structure in each category (Xue et al. 2021).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import count, islice
+from typing import Literal
+
+from artsim.errors import AssetError, ConfigError
+from artsim.objects import ArticulatedObject
+from artsim.sources import FamilySource, family_sources
+
+ARTIMAGE: dict[str, tuple[str, ...]] = {
+    "laptop": ("revolute",),
+    "eyeglasses": ("revolute", "revolute"),
+    "dishwasher": ("revolute",),
+    "scissors": ("revolute",),
+    "drawer": ("prismatic", "prismatic", "prismatic"),
+}
+"""Joints of the moving parts of each category of ArtImage."""
+
+Parts = Literal["artimage", "any"]
+"""artimage: objects with the joints that their category has in ArtImage (any, for other categories); any: all."""
+
+_ATTEMPTS = 200
+
+
+def has_parts(category: str, joint_types: Sequence[str], parts: Parts = "artimage") -> bool:
+    """Whether an object with these joints, the root's among them, is one to learn from and to be tested on."""
+    return parts == "any" or category not in ARTIMAGE or tuple(joint_types[1:]) == ARTIMAGE[category]
+
+
+def objects_of(
+    categories: Sequence[str], number: int, first_seed: int, parts: Parts = "artimage"
+) -> list[ArticulatedObject]:
+    """Procedural objects with the parts asked for: for each category, those of the first seeds that have them.
+
+    Raises
+    ------
+    ConfigError
+        When a category is unknown, or hardly any object of it has these parts.
+    """
+    sources = family_sources(categories, 1, first_seed)
+    return [obj for source in sources for obj in islice(_objects(source, parts), number)]
+
+
+def _objects(first: FamilySource, parts: Parts) -> Iterator[ArticulatedObject]:
+    missed = 0
+    for seed in count(first.seed):
+        try:
+            obj = FamilySource(first.category, seed).load()
+        except AssetError:
+            continue  # a rare fault of the family, which artsim's audit reports
+        if has_parts(first.category, obj.tree.types, parts):
+            missed = 0
+            yield obj
+        elif (missed := missed + 1) > _ATTEMPTS:
+            raise ConfigError(f"no object has the parts of {parts}", first.category, "use parts 'any'")
