@@ -263,7 +263,7 @@ class Doctor:
     """Try every backend: does it work, on which device, how fast, and what to do if not."""
 
     backends: tyro.conf.Positional[tuple[str, ...]] = ()
-    """raycast, pybullet, pybullet-egl, sapien, maniskill, torch; by default all of them."""
+    """raycast, pybullet, pybullet-egl, sapien, maniskill, warp, ray, torch; by default all of them."""
 
     def run(self) -> None:
         from artsim.doctor import BACKENDS, examine, table

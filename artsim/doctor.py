@@ -32,6 +32,8 @@ _MENDS = {
     "pybullet-egl": "pip install 'artsim[pybullet]', then scripts/install-system.sh as root",
     "sapien": "pip install 'artsim[sapien]', then scripts/install-vulkan.sh as root",
     "maniskill": "pip install mani-skill, then scripts/install-vulkan.sh as root",
+    "warp": "pip install 'artsim[warp]'",
+    "ray": "none needed: artsim's own processes make its data; pip install ray to spread code of yours over machines",
     "torch": "pip install 'artsim[train]'",
 }
 
@@ -174,6 +176,19 @@ def _maniskill() -> tuple[str, float | None]:
     return device, _rate(lambda: env.step(None))
 
 
+def _warp() -> tuple[str, float | None]:
+    from artsim.renderers.warp import WarpRenderer, import_warp
+
+    device = import_warp().get_device(WarpRenderer().device)
+    return str(device.name) if device.is_cuda else _processor(), _renderer_fps("warp")
+
+
+def _ray() -> tuple[str, float | None]:
+    import ray
+
+    return f"Ray {ray.__version__} is installed; nothing in artsim needs it", None
+
+
 def _torch_device() -> str:
     import torch
 
@@ -194,6 +209,8 @@ BACKENDS: dict[str, Callable[[], tuple[str, float | None]]] = {
     "pybullet-egl": _pybullet_egl,
     "sapien": _sapien,
     "maniskill": _maniskill,
+    "warp": _warp,
+    "ray": _ray,
     "torch": _torch,
 }
 """What tries each backend: its device and frames per second."""

@@ -38,7 +38,8 @@ def pretend(monkeypatch: pytest.MonkeyPatch, folder: Path, module: str, source: 
 @pytest.mark.parametrize(
     ("module", "backend", "mend"),
     [("torch", "torch", "artsim[train]"), ("pybullet", "pybullet", "artsim[pybullet]"),
-     ("gymnasium", "maniskill", "mani-skill"), ("sapien", "sapien", "artsim[sapien]")],
+     ("gymnasium", "maniskill", "mani-skill"), ("sapien", "sapien", "artsim[sapien]"),
+     ("warp", "warp", "artsim[warp]"), ("ray", "ray", "none needed")],
 )  # fmt: skip
 def test_what_is_not_installed_is_named_with_its_mend(
     module: str, backend: str, mend: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -172,8 +172,8 @@ class WarpRenderer:
 
     @property
     def device(self) -> str:
-        """Name of the device that draws."""
-        return str(self._device.name)
+        """Warp's name of the device that draws: "cuda:0", "cpu", ..."""
+        return str(self._device.alias)
 
     def render(
         self, obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None
