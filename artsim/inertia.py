@@ -35,6 +35,12 @@ class Inertia:
         arm = np.cross(axis, self.center - point)
         return float(axis @ self.tensor @ axis + self.mass * arm @ arm)
 
+    def principal(self) -> tuple[Array, Array]:
+        """Moments (3,), ascending, about the principal axes, and these axes (3, 3): right-handed, one a column."""
+        moments, axes = np.linalg.eigh(self.tensor)
+        axes[:, 2] *= np.sign(np.linalg.det(axes))
+        return moments, axes
+
     def share(self, fraction: float) -> Inertia:
         """A fraction of the body's mass, spread in space as the whole is."""
         return Inertia(fraction * self.mass, self.center, fraction * self.tensor)

@@ -31,7 +31,6 @@ from scipy.spatial.transform import Rotation
 from artsim.embodied import embodied
 from artsim.errors import ConfigError
 from artsim.export.robot import GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
-from artsim.inertia import Inertia
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.renderers.bullet import import_pybullet, silent
@@ -300,7 +299,7 @@ def _gears(joints: Sequence[LinkJoint]) -> list[tuple[int, int, float, float]]:
 def _create_body(bullet: ModuleType, client: int, robot: Robot, mass_unit: float) -> int:
     """The object as a multibody whose base stands still; joints are free, and at rest at 0."""
     base, *links = robot.links
-    frames = [Rotation.from_matrix(_principal(link.inertia)).as_quat().tolist() for link in links]
+    frames = [Rotation.from_matrix(link.inertia.principal()[1]).as_quat().tolist() for link in links]
     return int(
         bullet.createMultiBody(
             baseMass=0.0,
@@ -320,13 +319,6 @@ def _create_body(bullet: ModuleType, client: int, robot: Robot, mass_unit: float
             physicsClientId=client,
         )
     )
-
-
-def _principal(inertia: Inertia) -> Array:
-    """(3, 3) right-handed axes along which the tensor is diagonal, moments in ascending order."""
-    axes: Array = np.linalg.eigh(inertia.tensor)[1]
-    axes[:, 2] *= np.sign(np.linalg.det(axes))
-    return axes
 
 
 def _collision_shape(bullet: ModuleType, client: int, link: Link) -> int:
