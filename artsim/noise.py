@@ -249,8 +249,8 @@ class AxialNoise:
 
 
 @dataclass(frozen=True)
-class EdgeDropout:
-    """Pixels lose their return beside a jump in depth; an empty background counts as one.
+class _AtEdges:
+    """What happens to pixels beside a jump in depth.
 
     Attributes
     ----------
@@ -263,9 +263,10 @@ class EdgeDropout:
     jump: float
     chance: float
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def happens(self, view: View, stream: int) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Where it does, and the nearest and farthest depth around each pixel."""
         near, far = _range(view.patch)
-        return np.where((far - near > self.jump) & (view.uniform(stream) < self.chance), 0.0, depth)
+        return (far - near > self.jump) & (view.uniform(stream) < self.chance), near, far
 
     def sigma(self, depth: Array, incidence: Array, focal: float) -> Array:
         """0: flat surfaces have no edges."""
@@ -273,33 +274,32 @@ class EdgeDropout:
 
 
 @dataclass(frozen=True)
-class FlyingPixels:
-    """Pixels beside a jump in depth mix the light of both sides: the reading lies anywhere between them.
+class EdgeDropout(_AtEdges):
+    """Pixels lose their return beside a jump in depth; an empty background counts as one."""
+
+    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+        lost, _, _ = self.happens(view, stream)
+        return np.where(lost, 0.0, depth)
+
+
+@dataclass(frozen=True)
+class FlyingPixels(_AtEdges):
+    """Pixels beside a jump in depth mix the light of both sides: the reading, if any, lies anywhere between them.
 
     Attributes
     ----------
-    jump : float
-        Range of the depths in the 3x3 pixels around, metres, from which it happens.
-    chance : float
-        Probability that it does, to pixels that have a return.
     reach : float
         Metres behind the nearer side that a reading lies at most.
     """
 
-    jump: float
-    chance: float
     reach: float
 
     def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
-        near, far = _range(view.patch)
-        flies = (far - near > self.jump) & (view.uniform(stream) < self.chance) & (depth > 0)
+        flies, near, far = self.happens(view, stream)
+        flies = flies & (depth > 0)
         near = np.where(flies, near, 0.0)
         mixed = near + view.uniform(stream + 1) * np.minimum(np.where(flies, far, 0.0) - near, self.reach)
         return np.where(flies, mixed, depth)
-
-    def sigma(self, depth: Array, incidence: Array, focal: float) -> Array:
-        """0: flat surfaces have no edges."""
-        return np.zeros_like(depth)
 
 
 def _range(patch: Array) -> tuple[Array, Array]:

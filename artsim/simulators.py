@@ -194,7 +194,7 @@ def compare_simulators(
     root = etree.parse(str(file)).getroot()
     links = len(root.findall("link"))
     joints = sum(joint.get("type") != "fixed" for joint in root.findall("joint"))
-    at_rest = _poses_in_file(file)(obj.source_state(obj.tree.rest))
+    at_rest = poses_in_file(file)(obj.source_state(obj.tree.rest))
     return [_compare(name, file, obj, drawn, at_rest, links, joints) for name in simulators]
 
 
@@ -225,8 +225,8 @@ def _compare(
     return Agreement(name, loaded.links, loaded.joints, metres, problem)
 
 
-def _poses_in_file(file: Path) -> LinkPoses:
-    """Where the file itself puts its links: in double precision, which simulators do not all keep."""
+def poses_in_file(file: Path) -> LinkPoses:
+    """Where the file itself puts its links, by yourdfpy: in double precision, which simulators do not all keep."""
     import yourdfpy
 
     robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)

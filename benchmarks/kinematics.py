@@ -11,14 +11,13 @@ import importlib.util
 import json
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import tyro
-import yourdfpy
 from lxml import etree
 from tqdm import tqdm
 
@@ -27,10 +26,8 @@ from artsim.kinematics import Array, invert_transform
 from artsim.objects import ArticulatedObject
 from artsim.renderers.bullet import import_pybullet, silent
 from artsim.sampling import StateOptions, sample_state
+from artsim.simulators import LinkPoses, poses_in_file
 from artsim.sources import find_sources
-
-LinkPoses = Callable[[dict[str, float]], dict[str, Array]]
-"""Poses of all links in the base link's frame, for joint values by name."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ def bullet_robots() -> list[Path]:
 
 def compare(files: Sequence[Path], states: int) -> tuple[dict[str, Comparison], list[str]]:
     """Largest differences over objects, parts and states; and the files that artsim itself does not load."""
-    oracles = {"pybullet": pybullet_poses, "yourdfpy": yourdfpy_poses}
+    oracles = {"pybullet": pybullet_poses, "yourdfpy": poses_in_file}
     result = {name: Comparison() for name in oracles}
     failed = []
     for file in tqdm(files, desc="objects"):
@@ -127,18 +124,6 @@ def differences(obj: ArticulatedObject, states: Sequence[Array], poses: LinkPose
             # Frobenius distance: exact for small angles, where the arc cosine of a trace is not.
             radians = max(radians, float(np.linalg.norm(error[:3, :3] - np.eye(3)) / np.sqrt(2)))
     return metres, radians
-
-
-def yourdfpy_poses(file: Path) -> LinkPoses:
-    """yourdfpy's own forward kinematics of a file."""
-    robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)
-    names = [link.name for link in robot.robot.links]
-
-    def poses(state: dict[str, float]) -> dict[str, Array]:
-        robot.update_cfg({name: state.get(name, 0.0) for name in robot.actuated_joint_names})
-        return {name: robot.get_transform(name, robot.base_link) for name in names}
-
-    return poses
 
 
 @cache

@@ -69,7 +69,7 @@ def test_a_file_that_does_not_load_is_a_finding(
     file = tmp_path / "mobility.urdf"
     file.write_text(file.read_text().replace('<child link="lid"/>', '<child link="nobody"/>'))
     monkeypatch.setattr("artsim.simulators.load", lambda file: obj)
-    monkeypatch.setattr("artsim.simulators._poses_in_file", lambda file: lambda values: {})
+    monkeypatch.setattr("artsim.simulators.poses_in_file", lambda file: lambda values: {})
     (found,) = compare_simulators(tmp_path, simulators=[simulator])
     assert found.problem.startswith("does not load it")
     assert np.isinf(found.metres)
