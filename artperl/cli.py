@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -80,18 +81,31 @@ class Train:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Test an estimator on unseen objects, procedural ones or those of files, and print the table of its errors."""
+    """Test an estimator on unseen objects, procedural ones or those of files, and print the table of its errors.
 
-    estimator: tyro.conf.Positional[Path]
-    """Folder of the estimator, or the name of one that comes with the package."""
+    Or fill the rows of a benchmark with the estimators that come with the package:
+    artperl evaluate --benchmark artimage --json figures.json
+    """
+
+    estimator: tyro.conf.Positional[Path | None] = None
+    """Folder of the estimator, or the name of one that comes with the package. For a benchmark, folder of the
+    estimators by category; by default those that come with the package."""
+    benchmark: Literal["artimage"] | None = None
+    """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
+    rows: tuple[Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"], ...] = ()
+    """Rows of the benchmark; by default all that there are objects and weights for."""
+    real_weights: Path | None = None
+    """For the row real_trained: folder of the estimators that have learnt from real objects, too."""
+    partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
+    """For the rows of real objects: unpacked PartNet-Mobility; by default what ARTSIM_PARTNET_DIR names."""
     category: tuple[str, ...] = ()
     """Procedural categories; by default those that it was trained on."""
     objects: int = 40
     """Unseen procedural objects of each category."""
     files: tuple[Path, ...] = ()
     """Instead of procedural objects: URDF files, object folders, or folders of them."""
-    views: int = 4
-    """Views of each object."""
+    views: int | None = None
+    """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
     preset: Literal["artimage", "sphere"] = "artimage"
     """From where objects are seen."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
@@ -100,22 +114,48 @@ class Evaluate:
     """Write the figures to this file."""
 
     def run(self) -> None:
+        figures = self._single() if self.benchmark is None else self._rows()
+        if self.json is not None:
+            write_atomic(self.json, _json(figures))
+
+    def _rows(self) -> dict[str, Any]:
+        from artperl.benchmarks.artimage import ROWS, VIEWS
+        from artperl.benchmarks.rows import run_rows
+        from artperl.categories import ARTIMAGE
+
+        rows = self.rows or tuple(
+            row
+            for row in ROWS
+            if not (row == "real_trained" and self.real_weights is None)
+            and not (row.startswith("real") and self.partnet is None)
+        )
+        for row in (row for row in ROWS if not self.rows and row not in rows):
+            print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
+        return run_rows(
+            rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
+            self.views or VIEWS, sys.stderr.isatty(), lambda line: print(line, flush=True),
+        )  # fmt: skip
+
+    def _single(self) -> dict[str, Any]:
         from artperl.checkpoint import WEIGHTS, load_estimator, read_settings
         from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
         from artsim.sources import find_sources
 
+        if self.estimator is None:
+            raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
         estimator = load_estimator(self.estimator)
         folder = self.estimator if self.estimator.is_dir() else WEIGHTS / self.estimator
-        categories = self.category or tuple(read_settings(folder)["about"]["options"]["categories"])
+        learnt = read_settings(folder)["about"]["options"]
         options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
+        views = self.views or 4
         if self.files:
-            samples = samples_of((source.load() for source in find_sources(self.files)), self.views, options)
+            samples = samples_of((source.load() for source in find_sources(self.files)), views, options)
         else:
-            samples = frozen_samples(categories, self.objects, self.views, options)
+            categories = self.category or tuple(learnt["categories"])
+            samples = frozen_samples(categories, self.objects, views, options, parts=learnt["parts"])
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
         print(table(figures))
-        if self.json is not None:
-            write_atomic(self.json, _json(figures))
+        return figures
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 import threading
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
@@ -81,6 +82,8 @@ class TrainOptions:
     perception_steps: int = 6000
     """Batches of stage 1."""
     perception_rate: float = 2e-3
+    mixed_precision: bool = True
+    """Perception's backbone multiplies in bfloat16 while it learns, where the processor can."""
     batch_size: int = 32
     num_points: int = 1024
     """Points of a cloud."""
@@ -183,12 +186,14 @@ class Training:
             options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
             self.workers, options.sample, options.parts,
         )  # fmt: skip
+        mixed = options.mixed_precision and torch.ops.mkldnn._is_mkldnn_bf16_supported()
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
             clouds, truth = next(data)
             set_rate(optimizer, options.perception_rate * one_cycle(step, total))
             self.perception.train()
-            perceived = self.perception(clouds.points)
+            with torch.autocast("cpu", torch.bfloat16, enabled=mixed):
+                perceived = self.perception(clouds.points)
             losses = perception_losses(perceived, truth)
             loss = torch.stack(list(losses.values())).sum()
             optimizer.zero_grad()
@@ -254,8 +259,8 @@ class Training:
             best = replace(self.estimator(), calibration=calibrate([*scored, *foreign]))
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()
-        if self.progress:
-            tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")
+        tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")
+        sys.stdout.flush()
 
     def _foreign(self) -> list[Sample]:
         """Objects of other categories, for which confidence must be low."""

@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from artperl.batch import Batch
 from artperl.data import Truth
-from artperl.networks.pointnet2 import PointNet2
+from artperl.networks.pointnet2 import PointNet2, exact
 
 _SHARP = 0.05
 """Huber loss turns linear at this distance, in diagonals."""
@@ -80,7 +80,11 @@ class Perception(nn.Module):
 
     def forward(self, points: Tensor) -> Perceived:
         """(B, N, 3) points as in :class:`artperl.data.Clouds`."""
-        features, cloud = self.backbone(points)
+        return self._read(*(values.float() for values in self.backbone(points)))
+
+    @exact
+    def _read(self, features: Tensor, cloud: Tensor) -> Perceived:
+        """Coordinates are read in single precision, whatever the backbone's."""
         point = self.point_head(torch.relu(features + self.context(cloud)[:, None]))
         whole = self.cloud_head(cloud)
         P = self.num_rows

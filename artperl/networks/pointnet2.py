@@ -10,13 +10,30 @@ the centres of the coarser levels.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from itertools import pairwise
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+from typing_extensions import ParamSpec
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def exact(function: Callable[P, R]) -> Callable[P, R]:
+    """A function whose matrix products keep single precision when those around it do not."""
+
+    @wraps(function)
+    def inner(*args: P.args, **kwargs: P.kwargs) -> R:
+        with torch.autocast("cpu", enabled=False), torch.autocast("cuda", enabled=False):
+            return function(*args, **kwargs)
+
+    return inner
 
 
 @dataclass(frozen=True)
@@ -39,6 +56,7 @@ class Neighbourhoods:
 
     @staticmethod
     @torch.no_grad()
+    @exact
     def of(points: Tensor, sizes: Sequence[int], neighbours: int) -> Neighbourhoods:
         """Neighbourhoods of (B, N, 3) clouds in random order, with ``sizes`` points at the coarser levels."""
         levels, down, up = [points], [], []

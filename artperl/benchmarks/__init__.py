@@ -1,0 +1,1 @@
+"""Protocols that fill the paper's tables."""

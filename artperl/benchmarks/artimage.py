@@ -1,0 +1,130 @@
+"""Regenerated ArtImage: its five categories, seen as it sees them, objects that no estimator was trained on.
+
+The original images are not public; objects and views are made here, so that figures are not to be mixed with published
+ones. Rows:
+
+- ``procedural``: 40 objects of each category, seeds that streams, bases and validation never reach;
+- ``real``: PartNet-Mobility objects of the frozen test half, weights that have never seen a real object;
+- ``real_trained``: the same, weights that have learnt from the other half, too;
+- ``procedural_sphere`` and ``real_sphere``: seen from all round.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from artperl.categories import ARTIMAGE, objects_of
+from artperl.evaluation import TEST_SEEDS, samples_of
+from artsim.errors import AssetError
+from artsim.kinematics import KinematicTree
+from artsim.objects import ArticulatedObject, Part
+from artsim.plan import SampleOptions
+from artsim.sample import Sample
+from artsim.sampling import ViewOptions
+from artsim.urdf import load
+
+SPLIT = Path(__file__).parents[2] / "benchmarks" / "splits" / "artimage.json"
+"""Real objects: ``{category: {"train" or "test": {"Folder/id": SHA-256 of the URDF file}}}``."""
+
+Row = Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"]
+ROWS: tuple[Row, ...] = ("procedural", "real", "real_trained", "procedural_sphere", "real_sphere")
+
+OBJECTS, VIEWS = 40, 500
+"""Procedural objects of each category; and the least number of views of a row."""
+
+
+def row_samples(
+    row: Row, category: str, partnet: Path | None = None, objects: int = OBJECTS, views: int = VIEWS
+) -> list[Sample]:
+    """Test samples of one category: always the same ones. Empty where there is no real object.
+
+    Parameters
+    ----------
+    row : Row
+    category : str
+        One of :data:`ARTIMAGE`.
+    partnet : Path, optional
+        Folder of real objects, for the rows that need them.
+    objects : int
+        Procedural ones.
+    views : int
+        In all, at least.
+    """
+    preset: Literal["artimage", "sphere"] = "sphere" if row.endswith("_sphere") else "artimage"
+    if row.startswith("procedural"):
+        tested = objects_of([category], objects, TEST_SEEDS)
+    else:
+        tested = real_objects(category, "test", partnet)
+    if not tested:
+        return []
+    return samples_of(tested, -(-views // len(tested)), SampleOptions(views=ViewOptions(preset=preset)))
+
+
+def real_objects(category: str, half: Literal["train", "test"], partnet: Path | None) -> list[ArticulatedObject]:
+    """Real objects of one half of the frozen split, with the parts that the category has in ArtImage.
+
+    Raises
+    ------
+    AssetError
+        When one is missing, or is not the one that was split.
+    """
+    split = json.loads(SPLIT.read_text())
+    if split[category][half] and partnet is None:
+        raise AssetError("no folder of real objects is named", "partnet", "set ARTSIM_PARTNET_DIR")
+    objects = []
+    for name, digest in split[category][half].items():
+        path = Path(partnet or ".", name, "mobility.urdf")
+        if not path.is_file():
+            raise AssetError("an object of the split is missing", path, "complete the folder")
+        if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
+            raise AssetError("differs from the file that was split", path, "restore it")
+        objects.append(reduced(load(path), ARTIMAGE[category], category))
+    return objects
+
+
+def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:
+    """The object as one of another category: parts that move otherwise, such as a dishwasher's buttons, stay at rest.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    joint_types : sequence of str
+        Kinds of joints that go on moving.
+    category : str
+        That the object is to have.
+    """
+    tree = obj.native_tree
+    owner = list(range(len(tree)))
+    for k in range(1, len(tree)):
+        if tree.types[k] not in joint_types:
+            owner[k] = owner[int(tree.parents[k])]
+    kept = [k for k, own in enumerate(owner) if own == k]
+    number = {k: n for n, k in enumerate(kept)}
+    joints = []
+    for k in kept:
+        joint = tree.joints[k]
+        mimic = joint.mimic if joint.mimic is not None and joint.mimic.source in number else None
+        mimic = None if mimic is None else replace(mimic, source=number[mimic.source])
+        joints.append(replace(joint, parent=-1 if k == 0 else number[owner[joint.parent]], mimic=mimic))
+    parts = tuple(_joined([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
+    # What the file calls its joints no longer fits.
+    return replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={})
+
+
+def _joined(parts: Sequence[Part]) -> Part:
+    """One part of several; the first gives its name."""
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+    return replace(
+        parts[0], vertices=np.concatenate([part.vertices for part in parts]),
+        faces=np.concatenate(faces).astype(np.int32), body=None,
+    )  # fmt: skip
