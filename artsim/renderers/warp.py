@@ -22,111 +22,9 @@ from artsim.errors import ConfigError, RenderError
 from artsim.kinematics import ROTATING, Array
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import Frame
+from artsim.renderers.views import Clouds, Images, Views
 
 _MEND = "pip install 'artsim[warp]'"
-
-
-@dataclass(frozen=True, eq=False)
-class Views:
-    """B views, each of one object in one state by one camera, all of one image size.
-
-    Attributes
-    ----------
-    objects : (B,) int
-        Number of each view's object among those loaded.
-    q : (B, K) float
-        Joint states in radians or metres, K being the largest number of parts; further entries are ignored.
-    T_camera_object : (B, 4, 4) float
-        Pose of each object's rest frame in the camera.
-    K : (B, 3, 3) float
-        Intrinsic matrices in pixels.
-    width, height : int
-
-    Arrays can be NumPy's, or Warp's own (int32, float64, mat44d and mat33d) on the renderer's device.
-    """
-
-    objects: Any
-    q: Any
-    T_camera_object: Any
-    K: Any
-    width: int
-    height: int
-
-    def __len__(self) -> int:
-        return len(self.objects)
-
-    @staticmethod
-    def of(
-        objects: ArrayLike,
-        states: Sequence[ArrayLike],
-        cameras: Sequence[Camera],
-        T_world_object: ArrayLike | None = None,
-    ) -> Views:
-        """Views from cameras.
-
-        Parameters
-        ----------
-        objects : (B,) int
-        states : B of (K,) float
-        cameras : B of Camera
-        T_world_object : (4, 4) or (B, 4, 4) float, optional
-            Identity by default.
-
-        Raises
-        ------
-        ConfigError
-            When the lengths differ, or the cameras' image sizes do.
-        """
-        objects = np.asarray(objects, dtype=np.int32)
-        sizes = {(camera.width, camera.height) for camera in cameras}
-        if not len(objects) == len(states) == len(cameras):
-            raise ConfigError(f"{len(objects)} objects, {len(states)} states and {len(cameras)} cameras", "views")
-        if len(sizes) != 1:
-            raise ConfigError(f"a batch has one image size, not {len(sizes)}", "cameras", "draw each size by itself")
-        rows = [np.asarray(state, dtype=np.float64) for state in states]
-        q = np.zeros((len(rows), max(map(len, rows))))
-        for row, state in zip(q, rows, strict=True):
-            row[: len(state)] = state
-        T_camera_world = np.stack([camera.T_camera_world for camera in cameras])
-        T_camera_object = T_camera_world if T_world_object is None else T_camera_world @ np.asarray(T_world_object)
-        return Views(objects, q, T_camera_object, np.stack([camera.K for camera in cameras]), *sizes.pop())
-
-
-@dataclass(frozen=True, eq=False)
-class Images:
-    """What B views show, on the device.
-
-    Attributes
-    ----------
-    depth : (B, H, W) float32
-        z-depth in metres, 0 = no return.
-    part_ids : (B, H, W) uint8
-        255 where no part is seen.
-    T_camera_part : (B, K) mat44d
-        As an array (B, K, 4, 4); zero beyond an object's own parts.
-    """
-
-    depth: Any
-    part_ids: Any
-    T_camera_part: Any
-
-
-@dataclass(frozen=True, eq=False)
-class Clouds:
-    """Partial clouds of B views, on the device.
-
-    Attributes
-    ----------
-    points : (B, N) vec3
-        As an array (B, N, 3) float32: camera frame, metres.
-    part : (B, N) uint8
-        Part of each point; 255 throughout where the camera does not see the object.
-    T_camera_part : (B, K) mat44d
-    """
-
-    points: Any
-    part: Any
-    T_camera_part: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,9 +132,7 @@ class WarpRenderer:
             )
         return mesh
 
-    def _array(self, values: Any, dtype: Any) -> Any:
-        if isinstance(values, self._wp.array):
-            return values
+    def _array(self, values: ArrayLike, dtype: Any) -> Any:
         return self._wp.array(np.ascontiguousarray(values), dtype=dtype, device=self._device)
 
     def render_views(self, objects: ObjectSet, views: Views) -> Images:
@@ -310,21 +206,34 @@ class WarpRenderer:
         wp, count, most = self._wp, len(views), objects.bodies.shape[1]
         if not 0 < count * views.width * views.height < 2**31:
             raise ConfigError(f"{count} views of {views.width}x{views.height} are not made at once", "views", "split")
-        q = views.q if isinstance(views.q, wp.array) else np.asarray(views.q, dtype=np.float64)
-        if q.ndim != 2 or q.shape[0] != count or q.shape[1] < most:
-            raise ConfigError(f"states of shape {q.shape} do not fit", "q", f"pass ({count}, {most})")
         if not isinstance(views.objects, wp.array):
             numbers = np.asarray(views.objects)
             if numbers.min() < 0 or numbers.max() >= len(objects):
-                raise ConfigError(f"no object {numbers.max()}", "views.objects", f"use 0 to {len(objects) - 1}")
+                raise ConfigError("there is no such object", "views.objects", f"use 0 to {len(objects) - 1}")
+            most = int(objects.num_parts[numbers].max())
         return Views(
-            self._array(views.objects, wp.int32),
-            self._array(q, wp.float64),
-            self._array(views.T_camera_object, wp.mat44d),
-            self._array(views.K, wp.mat33d),
+            self._given("objects", views.objects, wp.int32, (count,)),
+            self._given("q", views.q, wp.float64, (count, max(most, *np.shape(views.q)[1:]))),
+            self._given("T_camera_object", views.T_camera_object, wp.mat44d, (count, 4, 4)),
+            self._given("K", views.K, wp.mat33d, (count, 3, 3)),
             views.width,
             views.height,
         )
+
+    def _given(self, name: str, values: Any, dtype: Any, shape: tuple[int, ...]) -> Any:
+        """An array of the user's on the device."""
+        ours = isinstance(values, self._wp.array)
+        if ours and (values.dtype is not dtype or values.device != self._device):
+            problem = f"an array of {values.dtype.__name__} on {values.device}"
+            raise ConfigError(problem, f"views.{name}", f"pass {dtype.__name__} on {self._device}")
+        found = values.shape + getattr(dtype, "_shape_", ()) if ours else np.shape(values)
+        if found != shape:
+            raise ConfigError(f"an array of shape {found} does not fit", f"views.{name}", f"pass {shape}")
+        if ours:
+            return values
+        if not np.isfinite(values).all():
+            raise ConfigError("numbers must be finite", f"views.{name}")
+        return self._array(values, dtype)
 
     def close(self) -> None:
         """Drop what was drawn one by one; sets of objects live as long as they are held."""

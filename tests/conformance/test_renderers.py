@@ -13,7 +13,12 @@ from artsim import Camera, make_renderer, observe
 from benchmarks.agreement import choose, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
 
-LIMITS = {"sapien": (0.005, 0.1, 0.999), "pybullet-egl": (0.05, 1.0, 0.998), "pybullet": (1.5, 1.0, 0.99)}
+LIMITS = {
+    "warp": (0.001, 0.01, 0.9999),
+    "sapien": (0.005, 0.1, 0.999),
+    "pybullet-egl": (0.05, 1.0, 0.998),
+    "pybullet": (1.5, 1.0, 0.99),
+}
 """Median and 99.9th percentile of depth differences in mm, share of equal part ids."""
 
 
@@ -34,7 +39,7 @@ def test_renderers_agree_on_real_objects(name: str, partnet_dir: Path) -> None:
     assert summary["part_ids_equal"] > ids
 
 
-@pytest.mark.parametrize("name", ["raycast", "sapien", "pybullet", "pybullet-egl"])
+@pytest.mark.parametrize("name", ["raycast", "warp", "sapien", "pybullet", "pybullet-egl"])
 def test_depth_is_along_the_optical_axis_in_metres(name: str) -> None:
     renderer = backend(name)
     box = rigid(trimesh.creation.box((1, 1, 1)))
@@ -47,7 +52,7 @@ def test_depth_is_along_the_optical_axis_in_metres(name: str) -> None:
     renderer.close()
 
 
-@pytest.mark.parametrize("name", ["sapien", "pybullet", "pybullet-egl"])
+@pytest.mark.parametrize("name", ["warp", "sapien", "pybullet", "pybullet-egl"])
 def test_principal_point_and_placement_are_honoured(name: str) -> None:
     obj = artsim.load(ASSETS / "cabinet")
     K = np.array([[500.0, 0, 280], [0, 520, 270], [0, 0, 1]])
@@ -75,7 +80,7 @@ def test_colour_comes_with_rasterisers(name: str) -> None:
     assert sample.renderer == name
 
 
-@pytest.mark.parametrize("name", ["sapien", "pybullet"])
+@pytest.mark.parametrize("name", ["warp", "sapien", "pybullet"])
 def test_many_objects_in_turn_keep_their_own_pictures(name: str) -> None:
     renderer = backend(name)
     objects = [artsim.load(path) for path in DEMO]

@@ -1,0 +1,117 @@
+"""Views of different objects at once, and what they show: what :mod:`artsim.renderers.warp` takes and gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from artsim.camera import Camera
+from artsim.errors import ConfigError
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """B views, each of one object in one state by one camera, all of one image size.
+
+    Attributes
+    ----------
+    objects : (B,) int
+        Number of each view's object among those loaded.
+    q : (B, K) float
+        Joint states in radians or metres, as many as the object of most parts has; an object of fewer ignores the rest.
+    T_camera_object : (B, 4, 4) float
+        Pose of each object's rest frame in the camera.
+    K : (B, 3, 3) float
+        Intrinsic matrices in pixels.
+    width, height : int
+
+    Arrays are NumPy's, or Warp's own (int32, float64, mat44d and mat33d) on the renderer's device, whose contents are
+    not looked at before they are used.
+    """
+
+    objects: Any
+    q: Any
+    T_camera_object: Any
+    K: Any
+    width: int
+    height: int
+
+    def __len__(self) -> int:
+        return len(self.objects)
+
+    @staticmethod
+    def of(
+        objects: ArrayLike,
+        states: Sequence[ArrayLike],
+        cameras: Sequence[Camera],
+        T_world_object: ArrayLike | None = None,
+    ) -> Views:
+        """Views from cameras.
+
+        Parameters
+        ----------
+        objects : (B,) int
+        states : B of (K,) float
+        cameras : B of Camera
+        T_world_object : (4, 4) or (B, 4, 4) float, optional
+            Identity by default.
+
+        Raises
+        ------
+        ConfigError
+            When the lengths differ, or the cameras' image sizes do.
+        """
+        objects = np.asarray(objects, dtype=np.int32)
+        sizes = {(camera.width, camera.height) for camera in cameras}
+        if not len(objects) == len(states) == len(cameras):
+            raise ConfigError(f"{len(objects)} objects, {len(states)} states and {len(cameras)} cameras", "views")
+        if len(sizes) != 1:
+            raise ConfigError(f"a batch has one image size, not {len(sizes)}", "cameras", "draw each size by itself")
+        rows = [np.asarray(state, dtype=np.float64) for state in states]
+        q = np.zeros((len(rows), max(map(len, rows))))
+        for row, state in zip(q, rows, strict=True):
+            row[: len(state)] = state
+        T_camera_world = np.stack([camera.T_camera_world for camera in cameras])
+        T_camera_object = T_camera_world if T_world_object is None else T_camera_world @ np.asarray(T_world_object)
+        return Views(objects, q, T_camera_object, np.stack([camera.K for camera in cameras]), *sizes.pop())
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """What B views show, on the device.
+
+    Attributes
+    ----------
+    depth : (B, H, W) float32
+        z-depth in metres, 0 = no return.
+    part_ids : (B, H, W) uint8
+        255 where no part is seen.
+    T_camera_part : (B, K) mat44d
+        As an array (B, K, 4, 4); zero beyond an object's own parts.
+    """
+
+    depth: Any
+    part_ids: Any
+    T_camera_part: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Clouds:
+    """Partial clouds of B views, on the device.
+
+    Attributes
+    ----------
+    points : (B, N) vec3
+        As an array (B, N, 3) float32: camera frame, metres.
+    part : (B, N) uint8
+        Part of each point; 255 throughout where the camera does not see the object.
+    T_camera_part : (B, K) mat44d
+    """
+
+    points: Any
+    part: Any
+    T_camera_part: Any
