@@ -22,6 +22,7 @@ from artsim.errors import ConfigError, RenderError
 from artsim.kinematics import ROTATING, Array
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import Frame
+from artsim.renderers.bullet import silent
 from artsim.renderers.views import Clouds, Images, Views
 
 _MEND = "pip install 'artsim[warp]'"
@@ -272,5 +273,6 @@ def import_warp() -> ModuleType:
     except ImportError as error:
         raise RenderError("Warp is not installed", "warp", _MEND) from error
     warp.config.log_level = warp.LOG_WARNING
-    warp.init()
+    with silent():  # on a machine without a GPU it says so, in C, in every process
+        warp.init()
     return warp
