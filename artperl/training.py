@@ -186,13 +186,12 @@ class Training:
             options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
             self.workers, options.sample, options.parts,
         )  # fmt: skip
-        mixed = options.mixed_precision and torch.ops.mkldnn._is_mkldnn_bf16_supported()
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
             clouds, truth = next(data)
             set_rate(optimizer, options.perception_rate * one_cycle(step, total))
             self.perception.train()
-            with torch.autocast("cpu", torch.bfloat16, enabled=mixed):
+            with autocast(options.mixed_precision):
                 perceived = self.perception(clouds.points)
             losses = perception_losses(perceived, truth)
             loss = torch.stack(list(losses.values())).sum()
@@ -337,6 +336,11 @@ class _Stop:
     def _in_charge(self) -> bool:
         """Only the main thread hears signals."""
         return threading.current_thread() is threading.main_thread()
+
+
+def autocast(wanted: bool = True) -> torch.autocast:
+    """Matrix products in bfloat16, where they are wanted and the processor has them."""
+    return torch.autocast("cpu", torch.bfloat16, enabled=wanted and torch.ops.mkldnn._is_mkldnn_bf16_supported())
 
 
 def one_cycle(step: int, total: int) -> float:
