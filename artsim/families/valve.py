@@ -15,6 +15,8 @@ from artsim.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring
 GAP = 0.0015
 IRON = 4000.0  # kg/m^3, as real ones are hollow
 UP = np.array([0.0, 0.0, 1.0])
+FLANGE = 1.9
+"""Radius of the widest flange over that of the pipe."""
 
 
 def build(rng: np.random.Generator) -> Assembly:
@@ -23,6 +25,7 @@ def build(rng: np.random.Generator) -> Assembly:
     count = int(rng.choice([1, 2, 3], p=[0.7, 0.2, 0.1]))
     lever = rng.random() < 0.3
     spacing = pipe * rng.uniform(5.5, 7.5)
+    room = 0.47 * spacing if count > 1 else np.inf
     half = 0.5 * count * spacing * (1.0 if count > 1 else rng.uniform(0.55, 0.9))
     body = tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(rng, half, pipe)
     style, joint_style = int(rng.integers(1 << 30)), int(rng.integers(1 << 30))
@@ -32,7 +35,7 @@ def build(rng: np.random.Generator) -> Assembly:
         y = (k - 0.5 * (count - 1)) * spacing
         alike = np.random.default_rng([style, joint_style])
         make = _ball_valve if lever else _gate_valve
-        fixed, moving, pivot, height = make(alike, pipe, 0.47 * spacing)
+        fixed, moving, pivot, height = make(alike, pipe, room)
         body += fixed.moved((0, y, 0))
         parts.append((moving.moved((0, y, 0)), pivot + (0, y, 0), height))
     valve.add("body", body, density=IRON)
@@ -55,7 +58,7 @@ def _ends(rng: np.random.Generator, half: float, pipe: float) -> Solid:
     solid = Solid()
     flanged = rng.random() < 0.65
     bolts, thick = int(rng.choice([4, 6, 8])), pipe * rng.uniform(0.25, 0.4)
-    wide = pipe * rng.uniform(1.6, 1.9)
+    wide = pipe * rng.uniform(1.6, FLANGE)
     for side in (-1.0, 1.0):
         end = np.array([0.0, side * half, 0.0])
         inward = np.array([0.0, -side, 0.0])
@@ -141,7 +144,7 @@ def _ball_valve(rng: np.random.Generator, pipe: float, room: float) -> tuple[Sol
     z = top + GAP
     thick, half = rng.uniform(0.003, 0.005), pipe * rng.uniform(0.22, 0.35)
     length = min(pipe * rng.uniform(2.8, 4.2), 2.0 * room - 1.5 * neck)
-    rise = pipe * rng.uniform(0.2, 0.8)
+    rise = max(pipe * rng.uniform(0.2, 0.8), FLANGE * pipe + thick + GAP - z)  # open, the grip lies over a flange
     # Shut, the lever stands across the pipe, towards the front.
     a = rounded_box((-0.9 * neck, -1.1 * half, z), (0.9 * neck, 1.1 * half, z + thick), 0.4 * thick)
     b = rounded_box((-0.35 * length, -half, z + rise), (-0.35 * length + 0.008, half, z + rise + thick), 0.4 * thick)
@@ -152,7 +155,7 @@ def _ball_valve(rng: np.random.Generator, pipe: float, room: float) -> tuple[Sol
                             (-0.4 * length, 1.2 * half, z + rise + 1.5 * thick), 0.6 * thick)  # fmt: skip
         lever += grown
     lever += hull_of(b, c)
-    if rng.random() < 0.25:  # a second wing: a butterfly handle
+    if rng.random() < 0.25 and length + 2 * GAP < room:  # a second wing: a butterfly handle
         lever += lever.mirrored(0)
     lever += cylinder((0, 0, z + 0.5 * thick), (0, 0, z + thick + 0.25 * pipe), 0.35 * pipe, sections=6)
     return solid, lever, np.array([0.0, 0.0, top]), 0.0
