@@ -73,7 +73,7 @@ class Sweep:
     def __init__(self, obj: ArticulatedObject):
         self.obj = obj
         self.solids = [_manifold(obj, k) for k in range(len(obj))]
-        self._surfaces = [_surface(obj, k) for k in range(len(obj))]
+        self._surfaces = [surface_model(obj, k) for k in range(len(obj))]
 
     @property
     def watertight(self) -> NDArray[np.bool_]:
@@ -148,7 +148,8 @@ def _posed_boxes(obj: ArticulatedObject, T: Array) -> tuple[Array, Array]:
     return middle - reach, middle + reach
 
 
-def _surface(obj: ArticulatedObject, k: int) -> fcl.BVHModel | None:
+def surface_model(obj: ArticulatedObject, k: int) -> fcl.BVHModel | None:
+    """Part k's triangles as FCL takes them, rest frame, metres; None for a part without geometry."""
     part = obj.parts[k]
     if len(part.faces) == 0:
         return None

@@ -110,7 +110,7 @@ def test_more_objects_than_are_kept_and_cameras_of_two_sizes_give_the_same_pictu
 
     first, again = pictures(), pictures()
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
-    assert len(sapien._scenes) <= 16  # type: ignore[attr-defined]
+    assert len(sapien._stages) <= 16  # type: ignore[attr-defined]
 
 
 def test_flat_shading_gives_each_corner_the_normal_of_its_triangle() -> None:

@@ -10,20 +10,24 @@ import sys
 import tempfile
 import weakref
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from artsim.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.camera import Camera
 from artsim.errors import RenderError
-from artsim.kinematics import Array
+from artsim.kinematics import Array, transform_points
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
 from artsim.renderers.raycast import pose
+from artsim.scene import Scene, SceneFrame, split_ids
 
 # As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
 _MAX_WORLDS = {"pybullet": 16, "pybullet-egl": 1}
@@ -52,7 +56,7 @@ class BulletRenderer:
     def __init__(self, egl: bool = False):
         self.name = "pybullet-egl" if egl else "pybullet"
         self._egl = egl
-        self._worlds: OrderedDict[tuple[Part, ...], _World] = OrderedDict()
+        self._worlds: OrderedDict[Hashable, _World] = OrderedDict()
         _World((), egl).close()  # says now, rather than at the first frame, that the backend is missing
 
     def render(
@@ -61,20 +65,59 @@ class BulletRenderer:
         """Render one posed object; see :class:`artsim.renderers.base.Renderer`."""
         T_camera_part = pose(obj, q, camera, T_world_object).T_camera_part
         T_camera_part[:, :3, 3] /= obj.scale  # drawn in native units
-        depth, part_ids, rgb = self._world(obj).draw(camera, T_camera_part, *depth_range(obj, T_camera_part))
+        world = self._kept(obj.parts, obj.num_faces)
+        if world is None:
+            world = self._worlds[obj.parts] = _World([_Solid(part) for part in obj.parts], self._egl)
+        depth, solid, rgb = world.draw(camera, T_camera_part, *depth_range(obj, T_camera_part))
+        part_ids = np.where(solid < 0, BACKGROUND, solid).astype(np.uint8)
         return Frame((depth * obj.scale).astype(np.float32), part_ids, rgb=rgb)
 
-    def _world(self, obj: ArticulatedObject) -> _World:
-        world = self._worlds.get(obj.parts)
+    def render_scene(self, scene: Scene, cameras: Sequence[Camera], samples: int = 1) -> list[SceneFrame]:
+        """See a scene with several cameras; it is loaded once.
+
+        Parameters
+        ----------
+        scene : Scene
+        cameras : sequence of Camera
+        samples : int
+            Pictures that each colour image is the mean of: more of them give smooth edges. All else is sharp.
+
+        Returns
+        -------
+        list of SceneFrame
+            One for each camera.
+        """
+        world = self._kept(scene, sum(thing.obj.num_faces for thing in scene.things))
         if world is None:
-            while self._worlds and (
-                len(self._worlds) >= _MAX_WORLDS[self.name]
-                or sum(w.num_faces for w in self._worlds.values()) + obj.num_faces > _MAX_FACES
-            ):
-                self._worlds.popitem(last=False)[1].close()
-            world = self._worlds[obj.parts] = _World(obj.parts, self._egl)
-        self._worlds.move_to_end(obj.parts)
-        return world
+            solids = [
+                _Solid(part, coat, thing.obj.scale)
+                for thing in scene.things
+                for part, coat in zip(thing.obj.parts, thing.coats, strict=True)
+            ]
+            world = self._worlds[scene] = _World(solids, self._egl)
+        T_world_solid = np.concatenate([thing.T_world_part for thing in scene.things])
+        points = np.concatenate([thing.vertices for thing in scene.things])
+        frames = []
+        for camera in cameras:
+            z = transform_points(camera.T_camera_world, points)[:, 2]
+            far = max(1.01 * float(z.max()), 0.1)
+            near = max(0.9 * float(z[z > 0].min(initial=far)), 0.01 * far)
+            T_camera_solid = camera.T_camera_world @ T_world_solid
+            depth, solid, rgb = world.draw(camera, T_camera_solid, near, far, scene.lights, samples)
+            frames.append(SceneFrame(depth.astype(np.float32), *split_ids(scene, solid), rgb))
+        return frames
+
+    def _kept(self, key: Hashable, num_faces: int) -> _World | None:
+        """What was loaded under this key; if nothing was, there is room for it now."""
+        if key in self._worlds:
+            self._worlds.move_to_end(key)
+            return self._worlds[key]
+        while self._worlds and (
+            len(self._worlds) >= _MAX_WORLDS[self.name]
+            or sum(w.num_faces for w in self._worlds.values()) + num_faces > _MAX_FACES
+        ):
+            self._worlds.popitem(last=False)[1].close()
+        return None
 
     def close(self) -> None:
         """Drop every world."""
@@ -82,29 +125,39 @@ class BulletRenderer:
             self._worlds.popitem()[1].close()
 
 
-class _World:
-    """A physics server that holds one object's parts, placed in the camera's own frame."""
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A part, drawn at a scale; without a coat, in PyBullet's own colours."""
 
-    def __init__(self, parts: tuple[Part, ...], egl: bool):
-        self.num_faces = sum(len(part.faces) for part in parts)
+    part: Part
+    coat: Coat | None = None
+    scale: float = 1.0
+
+
+class _World:
+    """A physics server that holds some solids, placed in the camera's own frame."""
+
+    def __init__(self, solids: Sequence[_Solid], egl: bool):
+        self.num_faces = sum(len(solid.part.faces) for solid in solids)
         self._bullet = import_pybullet()
         self._client: int = self._bullet.connect(self._bullet.DIRECT)
         self._flag = self._bullet.ER_BULLET_HARDWARE_OPENGL if egl else self._bullet.ER_TINY_RENDERER
         # TinyRenderer looks through the lower left corner of a pixel where others look through its centre (measured).
         self._shift = (0.0, 0.0) if egl else (-0.5, 0.5)
+        self._textures: dict[int, int] = {}
         self.close = weakref.finalize(self, _disconnect, self._bullet, self._client)  # at exit, if not before
         try:
             if egl:
                 self._start_egl()
-            self._bodies = [self._body(part) for part in parts]
+            with tempfile.TemporaryDirectory(prefix="artsim-bullet-") as folder:
+                self._bodies = [(k, body) for k, solid in enumerate(solids) for body in self._load(solid, Path(folder))]
         except RenderError:
             self.close()
             raise
-        # Body of each part -> part id; the last entry answers for the background.
-        self._part_of_body = np.full(max(self._bodies, default=-1) + 2, BACKGROUND, dtype=np.uint8)
-        for k, body in enumerate(self._bodies):
-            if body >= 0:
-                self._part_of_body[body] = k
+        # Body -> number of its solid; the last entry answers for the background.
+        self._solid_of_body = np.full(max((body for _, body in self._bodies), default=-1) + 2, -1, dtype=np.int64)
+        for k, body in self._bodies:
+            self._solid_of_body[body] = k
 
     def _start_egl(self) -> None:
         spec = importlib.util.find_spec("eglRenderer")
@@ -115,44 +168,103 @@ class _World:
         if plugin < 0:
             raise RenderError("EGL does not start", "pybullet-egl", _EGL_MEND)
 
-    def _body(self, part: Part) -> int:
-        """Body with the part's surface, -1 for a part without."""
-        if len(part.faces) == 0:
-            return -1
-        with tempfile.TemporaryDirectory(prefix="artsim-bullet-") as folder:
-            path = Path(folder) / "part.obj"
-            path.write_text(_obj_text(part))
-            visual = self._bullet.createVisualShape(
-                self._bullet.GEOM_MESH, fileName=str(path), physicsClientId=self._client
-            )
+    def _load(self, solid: _Solid, folder: Path) -> Iterator[int]:
+        """Bodies that show a solid: one, or one for each of its materials."""
+        if len(solid.part.faces) == 0:
+            return
+        if solid.coat is None:
+            yield self._body(_obj_text(solid.part.vertices, two_sided_faces(solid.part)), solid.part.name, folder)
+            return
+        for patch in patches(solid.part, solid.coat, solid.scale):
+            body = self._body(_patch_text(patch, solid.scale), solid.part.name, folder)
+            texture = patch.material.texture
+            look: dict[str, object] = {"rgbaColor": [*patch.material.colour, 1.0]}
+            if texture is not None:
+                if id(texture) not in self._textures:
+                    path = folder / f"{len(self._textures)}.png"
+                    Image.fromarray(texture).save(path)
+                    self._textures[id(texture)] = self._bullet.loadTexture(str(path), physicsClientId=self._client)
+                look = {"rgbaColor": [1.0] * 4, "textureUniqueId": self._textures[id(texture)]}
+            self._bullet.changeVisualShape(body, -1, physicsClientId=self._client, **look)
+            yield body
+
+    def _body(self, text: str, name: str, folder: Path) -> int:
+        path = folder / f"{self._bullet.getNumBodies(physicsClientId=self._client)}.obj"
+        path.write_text(text)
+        visual = self._bullet.createVisualShape(
+            self._bullet.GEOM_MESH, fileName=str(path), physicsClientId=self._client
+        )
         if visual < 0:
-            raise RenderError(f"PyBullet does not take the mesh of part {part.name!r}", "pybullet", "use raycast")
+            raise RenderError(f"PyBullet does not take the mesh of part {name!r}", "pybullet", "use raycast")
         return int(self._bullet.createMultiBody(0, -1, visual, physicsClientId=self._client))
 
     def draw(
-        self, camera: Camera, T_camera_part: Array, near: float, far: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.uint8]]:
-        """Depth in native units, part ids and colour."""
-        for body, T in zip(self._bodies, T_camera_part, strict=True):
-            if body >= 0:
-                quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()
-                self._bullet.resetBasePositionAndOrientation(body, T[:3, 3], quaternion, physicsClientId=self._client)
+        self,
+        camera: Camera,
+        T_camera_solid: Array,
+        near: float,
+        far: float,
+        lights: Lights | None = None,
+        samples: int = 1,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.uint8]]:
+        """Depth in the unit of the poses, numbers of solids (-1 for none) and colour.
+
+        The first picture is taken through the pixels' centres; the colour is the mean of all.
+        """
+        for k, body in self._bodies:
+            T = T_camera_solid[k]
+            quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()
+            self._bullet.resetBasePositionAndOrientation(body, T[:3, 3], quaternion, physicsClientId=self._client)
+        total = np.zeros((camera.height, camera.width, 3))
+        for sample in range(samples):
+            shift = np.asarray(self._shift) + subpixel(sample)
+            colour, buffer, bodies = self._picture(camera, near, far, shift, lights)
+            known = (bodies >= 0) & (bodies < len(self._solid_of_body) - 1)
+            seen = self._solid_of_body[np.where(known, bodies, -1)]
+            if lights is not None:
+                colour[seen < 0] = 255.0 * np.asarray(lights.background)
+            total += colour
+            if sample == 0:
+                solid, depth = seen, np.where(seen < 0, 0.0, far * near / (far - (far - near) * buffer))
+        return depth, solid, (total / samples).round().astype(np.uint8)
+
+    def _picture(
+        self, camera: Camera, near: float, far: float, shift: Array, lights: Lights | None
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Colour, depth buffer and bodies."""
+        projection = _projection(camera, near, far, (float(shift[0]), float(shift[1])))
+        light = {} if lights is None else _light_options(lights, camera)
         with silent():
             _, _, rgb, buffer, bodies = self._bullet.getCameraImage(
                 camera.width,
                 camera.height,
                 viewMatrix=_GL_FROM_CV.ravel(order="F").tolist(),
-                projectionMatrix=_projection(camera, near, far, self._shift).ravel(order="F").tolist(),
+                projectionMatrix=projection.ravel(order="F").tolist(),
                 renderer=self._flag,
                 physicsClientId=self._client,
+                **light,
             )
         shape = (camera.height, camera.width)
-        bodies = np.asarray(bodies).reshape(shape)
-        known = (bodies >= 0) & (bodies < len(self._part_of_body) - 1)
-        part_ids = self._part_of_body[np.where(known, bodies, -1)]
-        buffer = np.asarray(buffer, dtype=np.float64).reshape(shape)
-        depth = np.where(part_ids == BACKGROUND, 0.0, far * near / (far - (far - near) * buffer))
-        return depth, part_ids, np.ascontiguousarray(np.asarray(rgb, dtype=np.uint8).reshape(*shape, -1)[..., :3])
+        return (
+            np.asarray(rgb, dtype=np.float64).reshape(*shape, -1)[..., :3],
+            np.asarray(buffer, dtype=np.float64).reshape(shape),
+            np.asarray(bodies, dtype=np.int64).reshape(shape),
+        )
+
+
+def _light_options(lights: Lights, camera: Camera) -> dict[str, object]:
+    """The sun, and the light of the sky as if it came from everywhere."""
+    towards = -camera.T_camera_world[:3, :3] @ np.asarray(lights.sun.direction)
+    strongest = max(*lights.sun.colour, 1e-6)
+    return {
+        "lightDirection": (towards / np.linalg.norm(towards)).tolist(),
+        "lightDistance": 4.0,
+        "lightColor": [c / strongest for c in lights.sun.colour],
+        "lightAmbientCoeff": float(np.mean(lights.ambient) + 0.7 * np.mean(lights.sky)),
+        "lightDiffuseCoeff": float(strongest),
+        "lightSpecularCoeff": 0.05,
+        "shadow": 1,
+    }
 
 
 def _disconnect(bullet: ModuleType, client: int) -> None:
@@ -161,10 +273,19 @@ def _disconnect(bullet: ModuleType, client: int) -> None:
         bullet.disconnect(client)
 
 
-def _obj_text(part: Part) -> str:
-    """A part as a Wavefront file."""
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in part.vertices.tolist()]
-    lines += [f"f {a} {b} {c}\n" for a, b, c in (two_sided_faces(part) + 1).tolist()]
+def _obj_text(vertices: Array, faces: NDArray[np.int32]) -> str:
+    """A surface as a Wavefront file."""
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in vertices.tolist()]
+    lines += [f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist()]
+    return "".join(lines)
+
+
+def _patch_text(patch: Patch, scale: float) -> str:
+    """A patch as a Wavefront file with texture coordinates and normals."""
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in (patch.vertices * scale).tolist()]
+    lines += [f"vt {u:.7g} {v:.7g}\n" for u, v in patch.uv.tolist()]
+    lines += [f"vn {x:.6g} {y:.6g} {z:.6g}\n" for x, y, z in patch.normals.tolist()]
+    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n" for a, b, c in (patch.faces + 1).tolist()]
     return "".join(lines)
 
 

@@ -5,22 +5,25 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import OrderedDict
+from collections.abc import Hashable, Sequence
 from functools import cache
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
+from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.camera import Camera
 from artsim.errors import RenderError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
+from artsim.painted import painted_coats
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
 from artsim.renderers.raycast import pose
+from artsim.renderers.sapien_stage import Stage
+from artsim.scene import Scene, SceneFrame, split_ids
 
-_MAX_SCENES = 16  # as many objects as take turns in a plan
+_MAX_STAGES = 16  # as many objects as take turns in a plan
 _MAX_FACES = 1_500_000  # triangles kept loaded
 _PROBE_TIMEOUT = 120.0  # seconds
 _EXTRA_MEND = "pip install 'artsim[sapien]'"
@@ -28,18 +31,27 @@ _DRIVER_MEND = (
     "run scripts/install-vulkan.sh as root (Mesa's lavapipe >= 24.3 renders on a CPU) or install the GPU's Vulkan "
     "driver; or use --renderer raycast"
 )
-# SAPIEN's camera looks along x with z up.
-_SAPIEN_FROM_CV = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-_COLOURS = np.array(
-    [(0.72, 0.72, 0.70), (0.36, 0.52, 0.70), (0.80, 0.55, 0.36), (0.47, 0.64, 0.45), (0.70, 0.44, 0.47),
-     (0.56, 0.48, 0.68), (0.76, 0.70, 0.42), (0.40, 0.62, 0.63)]
+_NEAREST = 0.02  # metres from the camera of a scene
+_PLAIN = tuple(
+    Material(colour, roughness=0.7, specular=0.2)
+    for colour in (
+        (0.86, 0.86, 0.85), (0.63, 0.74, 0.85), (0.90, 0.76, 0.63), (0.71, 0.82, 0.70), (0.85, 0.69, 0.71),
+        (0.77, 0.72, 0.84), (0.88, 0.85, 0.67), (0.66, 0.80, 0.81),
+    )
 )  # fmt: skip
+"""Of the parts of an object whose files give it no colours."""
+_HEADLIGHT = Lights(
+    sun=Sun((-0.35, 0.6, 1.0), (0.54, 0.54, 0.54)),  # camera frame: from over the left shoulder
+    sky=(0.0, 0.0, 0.0),
+    ambient=(0.3, 0.3, 0.3),
+    background=(0.58, 0.58, 0.58),
+)
 
 
 class SapienRenderer:
     """Rasterises one entity per part, so that the segmentation picture holds part ids.
 
-    Each object has a scene of its own; the least recently drawn are dropped.
+    Each object, and each scene, is loaded once; the least recently drawn are dropped.
 
     Raises
     ------
@@ -51,106 +63,89 @@ class SapienRenderer:
 
     def __init__(self) -> None:
         self._sapien = import_sapien()
-        self._scenes: OrderedDict[tuple[Part, ...], _Scene] = OrderedDict()
+        self._stages: OrderedDict[Hashable, Stage] = OrderedDict()
 
     def render(
         self, obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None
     ) -> Frame:
         """Render one posed object; see :class:`artsim.renderers.base.Renderer`."""
         T_camera_part = pose(obj, q, camera, T_world_object).T_camera_part
-        T_camera_part[:, :3, 3] /= obj.scale  # drawn in native units
-        depth, part_ids, rgb = self._scene(obj).draw(camera, T_camera_part, *depth_range(obj, T_camera_part))
+        T_camera_part[:, :3, 3] /= obj.scale  # drawn in native units, in the camera's own frame
+        stage = self._kept(obj.parts, obj.num_faces)
+        if stage is None:
+            solids = [(part, coat, 1.0) for part, coat in zip(obj.parts, _coats(obj), strict=True)]
+            stage = self._stages[obj.parts] = Stage(self._sapien, solids, _HEADLIGHT)
+        stage.place(T_camera_part)
+        depth, solid, rgb = stage.picture(camera, np.eye(4), *depth_range(obj, T_camera_part))
+        part_ids = np.where(solid < 0, BACKGROUND, solid).astype(np.uint8)
         return Frame(depth * np.float32(obj.scale), part_ids, rgb=rgb)
 
-    def _scene(self, obj: ArticulatedObject) -> _Scene:
-        scene = self._scenes.get(obj.parts)
-        if scene is None:
-            while self._scenes and (
-                len(self._scenes) >= _MAX_SCENES
-                or sum(s.num_faces for s in self._scenes.values()) + obj.num_faces > _MAX_FACES
-            ):
-                self._scenes.popitem(last=False)[1].close()
-            scene = self._scenes[obj.parts] = _Scene(obj.parts, self._sapien)
-        self._scenes.move_to_end(obj.parts)
-        return scene
+    def render_scene(self, scene: Scene, cameras: Sequence[Camera], samples: int = 1) -> list[SceneFrame]:
+        """See a scene with several cameras; it is loaded once.
+
+        Parameters
+        ----------
+        scene : Scene
+        cameras : sequence of Camera
+        samples : int
+            Pictures that each colour image is the mean of: more of them give smooth edges and soft shadows. All else
+            is sharp, seen through the pixels' centres.
+
+        Returns
+        -------
+        list of SceneFrame
+            One for each camera.
+        """
+        stage = self._kept(scene, sum(thing.obj.num_faces for thing in scene.things))
+        if stage is None:
+            solids = [
+                (part, coat, thing.obj.scale)
+                for thing in scene.things
+                for part, coat in zip(thing.obj.parts, thing.coats, strict=True)
+            ]
+            stage = self._stages[scene] = Stage(self._sapien, solids, scene.lights)
+            stage.place(np.concatenate([thing.T_world_part for thing in scene.things]))
+            stage.cast_shadows(*_shadowed(scene))
+        points = np.concatenate([thing.vertices for thing in scene.things])
+        frames = []
+        for camera in cameras:
+            far = float((points @ camera.T_camera_world[2, :3] + camera.T_camera_world[2, 3]).max())
+            depth, solid, rgb = stage.picture(
+                camera, camera.T_world_camera, _NEAREST, max(1.01 * far, 2.0 * _NEAREST), samples
+            )
+            frames.append(SceneFrame(depth, *split_ids(scene, solid), rgb))
+        return frames
+
+    def _kept(self, key: Hashable, num_faces: int) -> Stage | None:
+        """What was loaded under this key; if nothing was, there is room for it now."""
+        if key in self._stages:
+            self._stages.move_to_end(key)
+            return self._stages[key]
+        while self._stages and (
+            len(self._stages) >= _MAX_STAGES or sum(s.num_faces for s in self._stages.values()) + num_faces > _MAX_FACES
+        ):
+            self._stages.popitem(last=False)[1].close()
+        return None
 
     def close(self) -> None:
-        """Drop every scene."""
-        while self._scenes:
-            self._scenes.popitem()[1].close()
+        """Drop everything loaded."""
+        while self._stages:
+            self._stages.popitem()[1].close()
 
 
-class _Scene:
-    """One object's parts around a camera that stands at the origin."""
+def _coats(obj: ArticulatedObject) -> Sequence[Coat]:
+    """What the object's files say, else a colour for each part."""
+    painted = painted_coats(obj)
+    return painted or [plain_coat(part, _PLAIN[k % len(_PLAIN)]) for k, part in enumerate(obj.parts)]
 
-    def __init__(self, parts: tuple[Part, ...], sapien: ModuleType):
-        self.num_faces = sum(len(part.faces) for part in parts)
-        self._sapien = sapien
-        self._scene: Any = sapien.Scene([sapien.render.RenderSystem()])
-        self._scene.set_ambient_light([0.3, 0.3, 0.3])
-        self._scene.add_directional_light([1.0, 0.35, -0.6], [1.7, 1.7, 1.7])  # over the camera's left shoulder
-        self._entities = [self._entity(k, part) for k, part in enumerate(parts)]
-        self._cameras: dict[tuple[int, int], Any] = {}
-        # Number of each part's entity in the segmentation picture -> part id; 0 is the background.
-        numbers = [0 if entity is None else int(entity.per_scene_id) for entity in self._entities]
-        self._part_of_number = np.full(max(numbers) + 1, BACKGROUND, dtype=np.uint8)
-        for k, number in enumerate(numbers):
-            if number:
-                self._part_of_number[number] = k
 
-    def _entity(self, k: int, part: Part) -> Any:
-        """Entity with the part's surface, None for a part without."""
-        if len(part.faces) == 0:
-            return None
-        vertices, faces, normals = flat_shaded(part)
-        render = self._sapien.render
-        material = render.RenderMaterial(
-            base_color=[*_COLOURS[k % len(_COLOURS)].tolist(), 1.0], specular=0.2, roughness=0.7
-        )
-        body = render.RenderBodyComponent()
-        body.attach(render.RenderShapeTriangleMesh(vertices, faces, normals, np.zeros((0, 2), np.float32), material))
-        entity = self._sapien.Entity()
-        entity.add_component(body)
-        self._scene.add_entity(entity)
-        return entity
-
-    def _camera(self, width: int, height: int) -> Any:
-        made = self._cameras.get((width, height))
-        if made is None:
-            # A picture is taken by one camera at a time: the others would be drawn along with it.
-            for old in self._cameras.values():
-                self._scene.remove_camera(old)
-            made = self._scene.add_camera("camera", width, height, 1.0, 0.01, 10.0)
-            made.set_entity_pose(self._sapien.Pose())
-            self._cameras = {(width, height): made}
-        return made
-
-    def draw(
-        self, camera: Camera, T_camera_part: Array, near: float, far: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
-        """Depth in native units, part ids and colour."""
-        for entity, T in zip(self._entities, _SAPIEN_FROM_CV @ T_camera_part, strict=True):
-            if entity is not None:
-                quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()[[3, 0, 1, 2]]
-                entity.set_pose(self._sapien.Pose(T[:3, 3], quaternion))
-        eye, K = self._camera(camera.width, camera.height), camera.K
-        eye.set_perspective_parameters(near, far, K[0, 0], K[1, 1], K[0, 2], K[1, 2], K[0, 1])
-        self._scene.update_render()
-        eye.take_picture()
-        numbers = eye.get_picture("Segmentation")[..., 1]
-        known = numbers < len(self._part_of_number)
-        part_ids = self._part_of_number[np.where(known, numbers, 0)]
-        # OpenGL's camera looks along -z.
-        depth = np.where(part_ids == BACKGROUND, np.float32(0.0), -eye.get_picture("Position")[..., 2])
-        rgb = (255.0 * eye.get_picture("Color")[..., :3].clip(0.0, 1.0)).round().astype(np.uint8)
-        return depth, part_ids, rgb
-
-    def close(self) -> None:
-        """Release the scene's pictures and meshes."""
-        self._cameras.clear()
-        self._entities.clear()
-        self._scene.clear()
-        self._scene = None
+def _shadowed(scene: Scene) -> tuple[Array, float, float]:
+    """Centre (3,) and radius of the objects that cast shadows, and the radius of all that is lit, metres."""
+    points = np.concatenate([thing.vertices for thing in (*scene.instances, *scene.distractors)] or [np.zeros((1, 3))])
+    center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    everything = np.concatenate([thing.vertices for thing in scene.things] or [np.zeros((1, 3))])
+    near, all_of_it = (float(np.linalg.norm(p - center, axis=1).max()) for p in (points, everything))
+    return center, 1.3 * near + 0.1, all_of_it + 0.1
 
 
 def flat_shaded(part: Part) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]:

@@ -1,0 +1,168 @@
+"""The colours and pictures that an object's own files give its surface: Wavefront materials and their textures.
+
+Files are untrusted: a material file or picture must lie inside the asset's folder, and is bounded in size.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image as Pictures
+
+from artsim.appearance import Coat, Colour, Material
+from artsim.bodies import merge_fixed_links
+from artsim.errors import AssetError
+from artsim.files import read_bounded
+from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError
+from artsim.objects import ArticulatedObject
+from artsim.partnet import read_side_files
+from artsim.textures import Image
+from artsim.urdf_xml import parse_robot
+
+_MAX_PICTURE_BYTES = 50_000_000
+_MAX_PICTURE_PIXELS = 64_000_000
+_MAX_SIDE = 1024
+_GREY: Colour = (0.7, 0.7, 0.7)
+
+
+def painted_coats(obj: ArticulatedObject) -> tuple[Coat, ...] | None:
+    """The coats that the files of a loaded object describe.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+        As :func:`artsim.load` gives it.
+
+    Returns
+    -------
+    tuple of Coat or None
+        None where its source is no URDF file that is still there, none of its meshes has materials, or its surface is
+        not made up of the files' triangles one by one.
+    """
+    file = Path(obj.source)
+    if file.suffix != ".urdf" or not file.is_file():
+        return None
+    try:
+        meshes = _meshes_of_links(file)
+    except (AssetError, UnusableMeshError):
+        return None
+    coats = []
+    pictures: dict[Path, Image | None] = {}
+    for part in obj.parts:
+        links = next((links for links in meshes if part.name in links), None)
+        painted = [_read(mesh, pictures) for mesh in meshes[links]] if links is not None else []
+        if sum(len(mesh.material_of_face) for mesh in painted) != len(part.faces):
+            return None
+        coats.append(_joined(painted))
+    return tuple(coats) if any(len(coat.materials) for coat in coats) and any(map(_tells, coats)) else None
+
+
+def _tells(coat: Coat) -> bool:
+    return any(material.texture is not None or material.colour != _GREY for material in coat.materials)
+
+
+def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
+    """Mesh files of each rigid body, keyed by its links, in the order in which :func:`artsim.load` joins them."""
+    limits = LoadLimits()
+    side = read_side_files(file.parent)
+    robot, repairs = parse_robot(
+        read_bounded(file, limits.max_urdf_bytes, "URDF file"), file, limits.max_links, side.helpers
+    )
+    reader = MeshReader(file.parent, {}, limits)
+    links = {link.name: link for link in robot.links}
+    found: dict[tuple[str, ...], list[Path]] = {}
+    for body in merge_fixed_links(robot, file, repairs):
+        paths = []
+        for name in body.links:
+            for visual in links[name].visuals:
+                if visual.geometry.mesh is None:
+                    raise UnusableMeshError("primitives have no material file")
+                paths.append(reader.resolve(visual.geometry.mesh.filename))
+        found[tuple(body.links)] = paths
+    return found
+
+
+def _read(path: Path, pictures: dict[Path, Image | None]) -> Coat:
+    """Coat of one Wavefront file, its materials grey where it says nothing of them."""
+    import trimesh
+
+    if path.suffix.lower() != ".obj":
+        raise UnusableMeshError(f"{path.name} has no materials that are read")
+    data = read_bounded(path, LoadLimits().max_mesh_bytes, "mesh")
+    scene = trimesh.load_scene(io.BytesIO(data), file_type="obj", process=False, resolver=_Inside(path.parent))
+    return _joined([_coat_of(mesh, path.parent, pictures) for mesh in scene.dump()] if len(scene.geometry) else [])
+
+
+class _Inside:
+    """Gives the bytes of files that an asset names: none but those in its folder or in the folder above it."""
+
+    def __init__(self, folder: Path):
+        self._folder = folder
+
+    def get(self, name: str) -> bytes:
+        path = (self._folder / name.replace("\\", "/")).resolve()
+        if not path.is_relative_to(self._folder.parent.resolve()):
+            raise FileNotFoundError(name)
+        try:
+            return read_bounded(path, _MAX_PICTURE_BYTES, "picture")
+        except AssetError as error:
+            raise FileNotFoundError(name) from error
+
+    __getitem__ = get
+
+
+def _coat_of(mesh: Any, folder: Path, pictures: dict[Path, Image | None]) -> Coat:
+    """Coat of a mesh of one material; each picture is read once."""
+    material, uv = getattr(mesh.visual, "material", None), getattr(mesh.visual, "uv", None)
+    picture, texture = getattr(material, "image", None), None
+    if picture is not None:
+        place = (folder / picture.info["file_path"]).resolve()
+        if place not in pictures:
+            pictures[place] = _texture(picture)
+        texture = pictures[place]
+    red, green, blue = _colour(getattr(material, "diffuse", None)) if material is not None else _GREY
+    own = Material((red, green, blue), roughness=0.5, specular=0.4, texture=texture)
+    laid = None
+    if uv is not None and texture is not None:
+        laid = np.asarray(uv, dtype=np.float64)[mesh.faces]
+    return Coat((own,), np.zeros(len(mesh.faces), dtype=np.int64), laid)
+
+
+def _colour(diffuse: ArrayLike | None) -> Colour:
+    if diffuse is None:
+        return _GREY
+    # trimesh keeps 8-bit RGBA, or what the file says where it cannot.
+    value = np.asarray(diffuse)
+    scale = 255.0 if value.dtype == np.uint8 else 1.0
+    red, green, blue = (value.astype(np.float64).ravel()[:3] / scale).clip(0.0, 1.0).tolist()
+    return red, green, blue
+
+
+def _texture(picture: Any) -> Image | None:
+    if picture.width * picture.height > _MAX_PICTURE_PIXELS:
+        return None
+    try:
+        picture = picture.convert("RGB")
+        picture.thumbnail((_MAX_SIDE, _MAX_SIDE))
+        return np.asarray(picture)
+    except (OSError, ValueError, Pictures.DecompressionBombError):
+        return None
+
+
+def _joined(coats: Sequence[Coat]) -> Coat:
+    """One coat of several meshes that follow each other; materials that look the same become one."""
+    materials: dict[tuple[Colour, int], Material] = {}
+    numbers: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
+    for coat in coats:
+        keys = [(material.colour, id(material.texture)) for material in coat.materials]
+        for key, material in zip(keys, coat.materials, strict=True):
+            materials.setdefault(key, material)
+        place = {key: number for number, key in enumerate(materials)}
+        numbers.append(np.array([place[key] for key in keys], dtype=np.int64)[coat.material_of_face])
+    laid = [np.full((len(coat.material_of_face), 3, 2), np.nan) if coat.uv is None else coat.uv for coat in coats]
+    return Coat(tuple(materials.values()), np.concatenate(numbers), np.concatenate([np.zeros((0, 3, 2)), *laid]))

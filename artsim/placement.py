@@ -1,0 +1,245 @@
+"""Putting things down: at rest on a level surface, none overlapping another."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from artsim.appearance import Coat
+from artsim.errors import ConfigError
+from artsim.kinematics import Array, transform_points
+from artsim.objects import ArticulatedObject, Part
+from artsim.scene import Thing
+from artsim.solids import rotation_about
+
+GAP = 0.004
+"""Metres between any two things."""
+_STEADY = np.deg2rad(6.0)
+"""What must be tipped further than this before it falls over stays the way it was made to stand."""
+_LEVEL = 1e-6  # of an object's size: corners that touch the ground together
+_TRIES = 300
+_CHOICE = 6  # places that are compared for each thing
+
+
+@dataclass(frozen=True)
+class Area:
+    """A level rectangle to put things on.
+
+    Attributes
+    ----------
+    low, high : 2 float
+        Corners in world x and y, metres.
+    height : float
+        World z, metres.
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    height: float = 0.0
+
+
+@dataclass
+class Arrangement:
+    """Things put down one after another.
+
+    Tall things tend to stand at the back (+X), and everything close together.
+
+    Attributes
+    ----------
+    area : Area
+    things : list of Thing
+    """
+
+    area: Area
+    things: list[Thing] = field(default_factory=list)
+
+    def put(
+        self,
+        obj: ArticulatedObject,
+        q: Array,
+        coats: tuple[Coat, ...],
+        rng: np.random.Generator,
+        turn: tuple[float, float] = (-0.6, 0.6),
+    ) -> Thing | None:
+        """Put an object down where there is room for it.
+
+        Parameters
+        ----------
+        obj : ArticulatedObject
+        q : (K,) float
+        coats : tuple of Coat
+        rng : numpy Generator
+        turn : 2 float
+            Range in radians about the vertical for what stands upright, 0 having its front towards -X; what lies lies
+            any way.
+
+        Returns
+        -------
+        Thing or None
+            None where no room was found.
+        """
+        upright = resting_rotation(obj, q)
+        if not np.array_equal(upright, np.eye(3)):
+            turn = (-np.pi, np.pi)
+        at_origin = Thing(obj, q, np.eye(4), coats).vertices
+        tall = float(np.ptp(at_origin @ upright[2]))
+        best, least, found = None, np.inf, 0
+        for _ in range(_TRIES):
+            rotation = rotation_about((0, 0, 1), rng.uniform(*turn)) @ upright
+            posed = at_origin @ rotation.T
+            low, high = posed.min(axis=0), posed.max(axis=0)
+            room_low, room_high = np.asarray(self.area.low) - low[:2], np.asarray(self.area.high) - high[:2]
+            if (room_low > room_high).any():
+                continue
+            spread = 0.25 + 0.75 * found / _CHOICE
+            middle, half = 0.5 * (room_low + room_high), 0.5 * (room_high - room_low)
+            place = middle + rng.uniform(-1.0, 1.0, 2) * half * max(spread, rng.random())
+            T = np.eye(4)
+            T[:3, :3], T[:3, 3] = rotation, (*place, self.area.height - low[2])
+            thing = Thing(obj, q, T, coats)
+            if any(not apart(thing, other) for other in self.things):
+                continue
+            found += 1
+            cost = float(np.hypot(*(place / (np.ptp([self.area.low, self.area.high], axis=0)))) - 1.5 * tall * place[0])
+            if cost < least:
+                best, least = thing, cost
+            if found == _CHOICE:
+                break
+        if best is not None:
+            self.things.append(best)
+        return best
+
+
+def resting_rotation(obj: ArticulatedObject, q: Array) -> Array:
+    """How an object stands or lies with its joints locked: upright where that is steady, else as low as is steady.
+
+    Every part weighs as much as its convex hull, at the density of its body where it has one.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    q : (K,) float
+
+    Returns
+    -------
+    (3, 3) float
+        Rotation from the rest frame to a world with Z up.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    posed = Thing(obj, q, np.eye(4), ()).vertices
+    try:
+        hull = ConvexHull(posed)
+    except QhullError:  # flat: it lies as it is
+        return np.eye(3)
+    corners, middle = posed[hull.vertices], _center_of_mass(obj, q)
+    normals = np.concatenate([[(0.0, 0.0, -1.0)], np.unique(np.round(hull.equations[:, :3], 4), axis=0)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    reach = (corners @ normals.T).max(axis=0)
+    height = reach - normals @ middle  # of the centre of mass above the ground, each normal pointing down
+    level = _LEVEL * float(np.ptp(posed, axis=0).max())
+    for n in (0, *(1 + np.argsort(height[1:], kind="stable"))):
+        touching = corners[corners @ normals[n] > reach[n] - max(level, 1e-4 * height[n])]
+        if _steadiness(touching, normals[n], middle, float(height[n])) > _STEADY:
+            return np.eye(3) if n == 0 else _turned_down(normals[n])
+    return np.eye(3)
+
+
+def _steadiness(touching: Array, down: Array, middle: Array, height: float) -> float:
+    """Angle in radians by which a body that touches the ground at some points must be tipped until it falls over."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    plane = _turned_down(down)[:2]
+    try:
+        base = ConvexHull((touching - middle) @ plane.T)
+    except (QhullError, ValueError):  # an edge or a corner
+        return 0.0
+    return float(np.arctan2((-base.equations[:, 2]).min(), height))
+
+
+def _turned_down(normal: Array) -> Array:
+    """(3, 3) rotation by the least angle that makes a unit vector point down."""
+    down = np.array([0.0, 0.0, -1.0])
+    axis, cosine = np.cross(normal, down), float(np.clip(normal @ down, -1.0, 1.0))
+    if axis @ axis < 1e-16:
+        return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
+    return rotation_about(axis, float(np.arccos(cosine)))
+
+
+def _center_of_mass(obj: ArticulatedObject, q: Array) -> Array:
+    total, moment = 0.0, np.zeros(3)
+    for T, part in zip(obj.tree.forward_kinematics(q), obj.parts, strict=True):
+        volume, center = _hull_volume(part)
+        mass = volume * (1.0 if part.body is None else part.body.density)
+        total, moment = total + mass, moment + mass * transform_points(T, center[None] * obj.scale)[0]
+    return moment / max(total, 1e-300)
+
+
+def _hull_volume(part: Part) -> tuple[float, Array]:
+    """Volume and centroid of a part's convex hull, native units; next to no volume for a flat part."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(part.faces) == 0:
+        return 0.0, np.zeros(3)
+    points = part.vertices[np.unique(part.faces)]
+    inside = points.mean(axis=0)
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return 1e-12, inside
+    tetrahedra = points[hull.simplices] - inside
+    volumes = np.abs(np.linalg.det(tetrahedra)) / 6.0
+    return float(volumes.sum()), inside + (volumes[:, None] * tetrahedra.sum(axis=1) / 4.0).sum(axis=0) / volumes.sum()
+
+
+def apart(one: Thing, other: Thing, gap: float = GAP) -> bool:
+    """Whether the surfaces of two things that stand on one plane keep a distance, metres.
+
+    Neither is then inside the other: the lowest point of a thing inside a solid would lie on that solid's underside.
+
+    Raises
+    ------
+    ConfigError
+        When python-fcl is not installed.
+    """
+    first, second = one.part_boxes, other.part_boxes
+    low, high = first[:, None, 0], first[:, None, 1]
+    near = ((low <= second[None, :, 1] + gap) & (second[None, :, 0] <= high + gap)).all(axis=2)
+    return all(_distance(one, int(i), other, int(j)) >= gap for i, j in zip(*near.nonzero(), strict=True))
+
+
+def _distance(one: Thing, i: int, other: Thing, j: int) -> float:
+    """Metres between the surfaces of two posed parts; 0 where they cross."""
+    fcl, first, second = _import_fcl(), _model(one.obj, i), _model(other.obj, j)
+    T, S = one.T_world_part[i], other.T_world_part[j]
+    here = fcl.CollisionObject(first, fcl.Transform(T[:3, :3], T[:3, 3]))
+    there = fcl.CollisionObject(second, fcl.Transform(S[:3, :3], S[:3, 3]))
+    if fcl.collide(here, there, fcl.CollisionRequest(), fcl.CollisionResult()):
+        return 0.0
+    return max(float(fcl.distance(here, there, fcl.DistanceRequest(), fcl.DistanceResult())), 0.0)
+
+
+_models: weakref.WeakKeyDictionary[Part, tuple[float, Any]] = weakref.WeakKeyDictionary()
+
+
+def _model(obj: ArticulatedObject, k: int) -> Any:
+    """FCL's model of a part, kept as long as the part."""
+    from artsim.collision import surface_model
+
+    scale, model = _models.get(obj.parts[k], (0.0, None))
+    if scale != obj.scale:
+        model = surface_model(obj, k)
+        _models[obj.parts[k]] = obj.scale, model
+    return model
+
+
+def _import_fcl() -> ModuleType:
+    try:
+        import fcl
+    except ImportError as error:
+        raise ConfigError("python-fcl is not installed", "scene", "pip install 'artsim[sim]'") from error
+    return fcl
