@@ -1,15 +1,29 @@
 """Environments for reinforcement learning, registered when this package is imported.
 
 ``artsim/Articulated-v0`` (gymnasium): :class:`artsim.envs.articulated.ArticulatedEnv`.
+``ArtSimArticulated-v1`` (ManiSkill 3): :mod:`artsim.envs.maniskill`. Of ManiSkill nothing is imported before one is made.
 """
 
 from __future__ import annotations
 
+from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
 from artsim.errors import ArtsimError
 
 try:
     import gymnasium
 except ImportError as error:
     raise ArtsimError("gymnasium is not installed", "artsim.envs", "pip install 'artsim[envs]'") from error
+from gymnasium.envs.registration import WrapperSpec
 
 gymnasium.register(id="artsim/Articulated-v0", entry_point="artsim.envs.articulated:ArticulatedEnv")
+# As ManiSkill's register_env does, which would have to import it: its own time limit knows batches.
+_TIME_LIMIT = WrapperSpec(
+    "MSTimeLimit", "mani_skill.utils.registration:TimeLimitWrapper", {"max_episode_steps": EPISODE_LENGTH}
+)
+gymnasium.register(
+    id=ENV_ID,
+    entry_point="artsim.envs.maniskill:make",
+    max_episode_steps=EPISODE_LENGTH,
+    disable_env_checker=True,
+    additional_wrappers=(_TIME_LIMIT,),
+)

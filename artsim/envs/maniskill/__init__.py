@@ -1,0 +1,39 @@
+"""``ArtSimArticulated-v1``: articulated objects as a ManiSkill 3 task, a different one in each parallel sub-scene.
+
+::
+
+    import gymnasium
+    import artsim.envs
+
+    env = gymnasium.make("ArtSimArticulated-v1", categories=("laptop",), goal="close", obs_mode="pointcloud")
+    observation, info = env.reset(seed=0)
+
+The environment itself is :class:`artsim.envs.maniskill.task.ArticulatedTask`; importing this package imports no part of
+ManiSkill.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from artsim.errors import ConfigError
+
+ENV_ID = "ArtSimArticulated-v1"
+EPISODE_LENGTH = 100
+"""Control steps, unless ``max_episode_steps`` says otherwise."""
+
+
+def make(**options: Any) -> Any:
+    """What ``gymnasium.make("ArtSimArticulated-v1")`` calls.
+
+    Raises
+    ------
+    ConfigError
+        When ManiSkill is not installed, or an option makes no sense.
+    """
+    try:
+        task = importlib.import_module("artsim.envs.maniskill.task")
+    except ImportError as error:
+        raise ConfigError(f"ManiSkill cannot be imported ({error})", ENV_ID, "pip install 'artsim[maniskill]'") from error
+    return task.ArticulatedTask(**options)

@@ -1,0 +1,100 @@
+"""Where things are: objects on the ground, handles on their parts, the robot before them, and who looks on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.camera import look_at_transform
+from artsim.episode import widest_state
+from artsim.kinematics import ROTATING, Array
+from artsim.objects import ArticulatedObject
+from artsim.sampling import bounding_sphere, joint_intervals
+
+_READY = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4, 0.04, 0.04)
+ROBOTS = {
+    "panda": _READY,
+    "panda_wristcam": _READY,
+    "floating_panda_gripper": (0.0, 0.0, 0.0, 0.0, np.pi / 2, 0.0, 0.04, 0.04),
+}
+"""Robots that do the task, and the state in which each of them begins; fingers come last."""
+SLICE = 0.1
+"""Share of a part's reach that its handle lies in."""
+ONLOOKER_FOV = 0.8
+"""Vertical field of view of the camera that shows everything, radians."""
+_NEAR, _FAR = 0.55, 0.75  # metres between an arm's base and the handles
+_CLEARANCE = 0.12  # metres between an object and what stands before it at first
+_FINGERS = 0.11  # metres from a hand to the tips of its fingers
+_READY_REACH = 0.37  # metres from an arm's base to the far side of its hand as it begins
+_ARM = np.array([0.2, 0.3, 0.8])  # half the room that an arm takes around its base in x and y, and its height
+
+
+def T_world_object(obj: ArticulatedObject) -> Array:
+    """(4, 4) pose of an object that stands on the ground, or, where a joint goes below its foot, just above it."""
+    T = np.eye(4)
+    bottoms = []
+    for q in (obj.tree.rest, widest_state(obj)):
+        posed = obj.tree.forward_kinematics(q)
+        reach = 0.5 * (np.abs(posed[:, 2, :3]) * obj.box_size).sum(axis=1)
+        height = (posed[:, 2, :3] * obj.box_center).sum(axis=1) + posed[:, 2, 3]
+        bottoms.append((height - reach)[obj.has_surface].min())
+    T[2, 3] = -min(bottoms)
+    return T
+
+
+def handle(obj: ArticulatedObject, k: int) -> Array:
+    """Where to take hold of part k to move its joint: the middle of what lies farthest from a hinge's axis, or farthest
+    along the way that a slide opens.
+
+    Returns
+    -------
+    (3,) float
+        Rest frame, at rest, metres.
+    """
+    joint, part = obj.tree.joints[k], obj.parts[k]
+    axis, origin = np.asarray(joint.axis), np.asarray(joint.origin)
+    if len(part.faces) == 0:
+        return origin
+    points = part.vertices[np.unique(part.faces)] * obj.scale
+    if joint.type in ROTATING:
+        arm = points - origin
+        far, least = np.linalg.norm(arm - (arm @ axis)[:, None] * axis, axis=1), 0.0
+    else:
+        low, high = joint_intervals(obj)[k]
+        far = points @ axis * (1.0 if high - joint.rest >= joint.rest - low else -1.0)
+        least = far.min()
+    there = points[far >= far.max() - SLICE * (far.max() - least)]
+    middle: Array = 0.5 * (there.min(axis=0) + there.max(axis=0))
+    return middle
+
+
+def robot_stand(obj: ArticulatedObject, robot: str, goal: str) -> Array:
+    """(3,) where the robot's base stands: an arm on the ground before the object, a hand before its handles."""
+    up = T_world_object(obj)[:3, 3]
+    moving = obj.tree.free_joints if len(obj.tree.free_joints) else np.arange(len(obj))
+    handles = np.mean([handle(obj, int(k)) for k in moving], axis=0) + up
+    closed = float(obj.bounds[0, 0])
+    opened = min(closed, _front(obj, widest_state(obj)))
+    if robot == "floating_panda_gripper":
+        front = closed if goal == "open" else opened
+        return np.array([front - _CLEARANCE - _FINGERS, handles[1], max(handles[2], 0.1)])
+    x = np.clip(opened - _CLEARANCE - _READY_REACH, handles[0] - _FAR, handles[0] - _NEAR)
+    return np.array([min(x, closed - _CLEARANCE - _READY_REACH), handles[1], 0.0])
+
+
+def onlooker(obj: ArticulatedObject, stand: Array) -> Array:
+    """(4, 4) ``T_world_camera`` from which object and robot are seen, from the front and the object's right side."""
+    center, radius = bounding_sphere(obj, widest_state(obj))
+    center = center + T_world_object(obj)[:3, 3]
+    low, high = np.minimum(center - radius, stand - [*_ARM[:2], 0.0]), np.maximum(center + radius, stand + [*_ARM[:2], 0.0])
+    low[2], high[2] = 0.0, max(high[2], _ARM[2] if stand[2] == 0 else 0.0)
+    middle, reach = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    away = np.array([-0.35, -0.8, 0.45])
+    return look_at_transform(middle + away / np.linalg.norm(away) * reach / np.sin(0.5 * ONLOOKER_FOV), middle)
+
+
+def _front(obj: ArticulatedObject, q: Array) -> float:
+    """Smallest x of the boxes of the posed parts, metres."""
+    T = obj.tree.forward_kinematics(q)
+    reach = 0.5 * (np.abs(T[:, 0, :3]) * obj.box_size).sum(axis=1)
+    at = (T[:, 0, :3] * obj.box_center).sum(axis=1) + T[:, 0, 3]
+    return float((at - reach)[obj.has_surface].min())
