@@ -45,6 +45,10 @@ class Train:
     """Batches that perception learns from; by default the preset's."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
+    real: bool = False
+    """Learn from real objects, too: every other one, of the half of ArtImage's frozen split that is not for testing."""
+    start_from: Path | None = None
+    """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
     workers: int = 1
@@ -55,7 +59,8 @@ class Train:
     def run(self) -> None:
         import torch
 
-        from artperl.training import PRESETS, Training
+        from artperl.settings import PRESETS
+        from artperl.training import Training
         from artsim.families import FAMILIES
 
         if self.threads is not None:
@@ -64,7 +69,9 @@ class Train:
         preset = PRESETS[self.preset]
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
-            preset, categories=categories, parts=self.parts, seed=self.seed, sample=SampleOptions(noise=self.noise),
+            preset, categories=categories, parts=self.parts, real=self.real, seed=self.seed,
+            start_from=None if self.start_from is None else str(self.start_from),
+            sample=SampleOptions(noise=self.noise),
             perception_steps=preset.perception_steps if steps is None else steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
         )  # fmt: skip

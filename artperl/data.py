@@ -16,7 +16,9 @@ from artperl.batch import Batch
 from artperl.categories import Parts, has_parts
 from artsim.errors import AssetError, ConfigError
 from artsim.kinematics import Array
-from artsim.plan import SampleOptions
+from artsim.objects import ArticulatedObject
+from artsim.plan import SampleOptions, draw_sample
+from artsim.renderers import make_renderer
 from artsim.sample import Sample
 from artsim.stream import FamilyStream
 
@@ -88,6 +90,8 @@ class Samples:
     views_per_object : int
     num_rows : int
     parts : Parts
+    real : sequence of ArticulatedObject
+        Every other object is one of these, if there are any.
     """
 
     def __init__(
@@ -98,13 +102,18 @@ class Samples:
         views_per_object: int,
         num_rows: int,
         parts: Parts = "artimage",
+        real: Sequence[ArticulatedObject] = (),
     ):
         self.stream = FamilyStream(categories, options, seed, views_per_object)
-        self.num_rows, self.parts = num_rows, parts
+        self.num_rows, self.parts, self.real = num_rows, parts, real
         self._right = lru_cache(maxsize=64)(self._find_right)
 
     def __getitem__(self, i: int) -> Sample:
         n, view = divmod(i, self.stream.views_per_object)
+        if self.real and n % 2:
+            chosen = self.real[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.real)))]
+            renderer = make_renderer(self.stream.options.renderer)
+            return draw_sample(chosen, self.stream.options, self.stream.seed, i, renderer)
         return self.stream[self._right(n) * self.stream.views_per_object + view]
 
     def _find_right(self, n: int) -> int:
@@ -195,6 +204,7 @@ def batches(
     workers: int = 1,
     sample: SampleOptions | None = None,
     parts: Parts = "artimage",
+    real: Sequence[ArticulatedObject] = (),
 ) -> Iterator[tuple[Clouds, Truth]]:
     """Endless batches of fresh procedural objects.
 
@@ -214,10 +224,11 @@ def batches(
     sample : SampleOptions, optional
         View preset, noise and the like; ``num_points`` overrides its own.
     parts : Parts
-        Of the objects.
+    real : sequence of ArticulatedObject
+        See :class:`Samples`.
     """
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-    samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows, parts)
+    samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows, parts, real)
     rows = _Rows(samples, num_points, batch_size, first_batch * batch_size)
     loader = DataLoader(
         rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on

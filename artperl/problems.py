@@ -19,6 +19,7 @@ from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
 from artperl.shapes import Observed, Shapes
 from artperl.start import sized
+from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 
@@ -72,7 +73,8 @@ class Problems:
         Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
         it.
     parts : Parts
-        Of the objects.
+    real : sequence of ArticulatedObject
+        See :class:`artperl.data.Samples`.
     """
 
     def __init__(
@@ -87,9 +89,10 @@ class Problems:
         choices: int = 4,
         perception: Perception | None = None,
         parts: Parts = "artimage",
+        real: Sequence[ArticulatedObject] = (),
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-        self.samples = Samples(categories, options, seed, 2, base.shapes.trees.num_rows, parts)
+        self.samples = Samples(categories, options, seed, 2, base.shapes.trees.num_rows, parts, real)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
         self.start, self.perception = start or StartOptions(), perception
 

@@ -12,12 +12,9 @@ steps taken have to be kept.
 from __future__ import annotations
 
 import json
-import signal
 import sys
-import threading
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
-from math import cos, pi
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +24,8 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
-from artperl.categories import Parts, objects_of
+from artperl.benchmarks.artimage import real_train_objects
+from artperl.categories import objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
 from artperl.data import batches
 from artperl.embedding import by_boxes
@@ -43,81 +41,23 @@ from artperl.evaluation import (
     summary,
     table,
 )
-from artperl.fitting import Fitting, FittingOptions
+from artperl.fitting import Fitting
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception, perception_losses
-from artperl.ppo import PPOOptions, collect, update
-from artperl.problems import Problems, StartOptions
+from artperl.ppo import collect, update
+from artperl.problems import Problems
 from artperl.retrieval import ShapeBase
-from artsim.errors import DatasetError
+from artperl.settings import TrainOptions
+from artperl.steps import Stop, autocast, one_cycle, set_rate
+from artsim.errors import ConfigError, DatasetError
 from artsim.families import FAMILIES
 from artsim.files import write_atomic
-from artsim.plan import SampleOptions
 from artsim.sample import Sample
 
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
 _TEST_POINTS = 2048
-_WARM_UP = 0.1
-_LAST_RATE = 0.01
-
-
-@dataclass(frozen=True)
-class TrainOptions:
-    """What a run depends on."""
-
-    categories: tuple[str, ...] = ("laptop",)
-    """Procedural categories; several share one estimator."""
-    parts: Parts = "artimage"
-    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
-    objects of the families."""
-    seed: int = 0
-    base_objects: int = 64
-    """Reference objects of each category."""
-    reference_points: int = 192
-    """Points of each part of a reference."""
-    width: int = 48
-    """Channels of perception's finest level."""
-    perception_steps: int = 6000
-    """Batches of stage 1."""
-    perception_rate: float = 2e-3
-    mixed_precision: bool = True
-    """Perception's backbone multiplies in bfloat16 while it learns, where the processor can."""
-    batch_size: int = 32
-    num_points: int = 1024
-    """Points of a cloud."""
-    agent_rollouts: int = 200
-    """Batches of episodes of stage 2; 0 goes without an agent."""
-    agent_rate: float = 1e-3
-    episodes: int = 64
-    """Episodes of a rollout."""
-    validate_every: int = 1000
-    """Steps of stage 1 between tests."""
-    validate_rollouts: int = 50
-    """Rollouts of stage 2 between tests."""
-    test_objects: int = 40
-    """Unseen objects of each category, others for validation than for the test at the end."""
-    foreign_categories: int = 12
-    """Other categories, of which two objects each show what confidence must be low for."""
-    validation_views: int = 2
-    """Views of each object when the estimator is validated."""
-    test_views: int = 4
-    """Views of each object when the best estimator is tested."""
-    sample: SampleOptions = field(default_factory=SampleOptions)
-    ppo: PPOOptions = field(default_factory=PPOOptions)
-    fitting: FittingOptions = field(default_factory=FittingOptions)
-    start: StartOptions = field(default_factory=StartOptions)
-
-
-PRESETS = {
-    "quick": TrainOptions(
-        base_objects=32, width=32, perception_steps=500, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
-        validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
-    ),
-    "full": TrainOptions(),
-}  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour."""
 
 
 class Training:
@@ -143,10 +83,13 @@ class Training:
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
         objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts)
-        self.base = by_boxes(ShapeBase.of(objects, options.reference_points))
+        self.real = real_train_objects(options.categories) if options.real else []
+        self.base = by_boxes(ShapeBase.of([*objects, *self.real], options.reference_points))
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width)
         self.agent = Agent()
+        if options.start_from is not None:
+            self._take_over(load_estimator(options.start_from))
         self.optimizers = {
             "perception": torch.optim.AdamW(self.perception.parameters(), weight_decay=1e-2),
             "agent": torch.optim.AdamW(self.agent.parameters(), weight_decay=1e-4),
@@ -167,7 +110,7 @@ class Training:
             After Ctrl-C, once the step has come to its end and been written down. A second Ctrl-C does not wait.
         """
         self.out.mkdir(parents=True, exist_ok=True)
-        with closing(SummaryWriter(str(self.out / "events"))) as board, _Stop() as stop:
+        with closing(SummaryWriter(str(self.out / "events"))) as board, Stop() as stop:
             self._learn_to_perceive(board, stop)
             self._learn_to_fit(board, stop)
         return self._finish()
@@ -177,14 +120,27 @@ class Training:
         agent = self.agent if self.done["agent"] else None
         return Estimator(self.perception, self.base, agent, EstimatorOptions(num_points=self.options.num_points))
 
-    def _learn_to_perceive(self, board: SummaryWriter, stop: _Stop) -> None:
+    def _take_over(self, estimator: Estimator) -> None:
+        """Begin with the networks of another estimator."""
+        if (estimator.perception.num_rows, estimator.perception.width) != (
+            self.perception.num_rows,
+            self.options.width,
+        ):
+            raise ConfigError(
+                "networks of another size are to be learnt on", str(self.options.start_from), "use the same categories"
+            )
+        own.load_state_dict(theirs.state_dict())
+        if estimator.agent is not None:
+            self.agent.load_state_dict(estimator.agent.state_dict())
+
+    def _learn_to_perceive(self, board: SummaryWriter, stop: Stop) -> None:
         options, optimizer = self.options, self.optimizers["perception"]
         first, total = self.done["perception"], options.perception_steps
         if first >= total:
             return
         data = batches(
             options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
-            self.workers, options.sample, options.parts,
+            self.workers, options.sample, options.parts, self.real,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
@@ -211,7 +167,7 @@ class Training:
             self._stop_if(stop)
         bar.close()
 
-    def _learn_to_fit(self, board: SummaryWriter, stop: _Stop) -> None:
+    def _learn_to_fit(self, board: SummaryWriter, stop: Stop) -> None:
         options, optimizer = self.options, self.optimizers["agent"]
         first, total = self.done["agent"], options.agent_rollouts
         if first >= total:
@@ -219,6 +175,7 @@ class Training:
         problems = Problems(
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
             options.sample, perception=self.perception, parts=options.parts,
+            real=self.real,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
         for n in range(first, total):
@@ -226,9 +183,10 @@ class Training:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             problem = problems[n]
             fitting = Fitting(problem.shapes, problem.observed, problem.start, options.fitting)
-            rollout = collect(self.agent, fitting, problem.goal, options.ppo, generator)
             updates: list[dict[str, float]] = []
-            update(self.agent, optimizer, rollout, options.ppo, generator, updates.append)
+            with autocast(options.mixed_precision):
+                rollout = collect(self.agent, fitting, problem.goal, options.ppo, generator)
+                update(self.agent, optimizer, rollout, options.ppo, generator, updates.append)
             self.done["agent"] = n + 1
             figures = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]} | rollout.figures
             _write(board, "agent", figures, n)
@@ -239,7 +197,7 @@ class Training:
             self._stop_if(stop)
         bar.close()
 
-    def _stop_if(self, stop: _Stop) -> None:
+    def _stop_if(self, stop: Stop) -> None:
         if stop.asked:
             self._save()
             raise KeyboardInterrupt
@@ -312,49 +270,6 @@ class Training:
                     moments.setdefault(int(number), {})[moment] = value
             optimizer = self.optimizers[name]
             optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
-
-
-class _Stop:
-    """Ctrl-C as a wish, so that no step is left half done."""
-
-    def __init__(self) -> None:
-        self.asked = False
-
-    def __enter__(self) -> _Stop:
-        self._before = signal.signal(signal.SIGINT, self._ask) if self._in_charge() else None
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._in_charge():
-            signal.signal(signal.SIGINT, self._before)
-
-    def _ask(self, *_: object) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
-
-    def _in_charge(self) -> bool:
-        """Only the main thread hears signals."""
-        return threading.current_thread() is threading.main_thread()
-
-
-def autocast(wanted: bool = True) -> torch.autocast:
-    """Matrix products in bfloat16, where they are wanted and the processor has them."""
-    return torch.autocast("cpu", torch.bfloat16, enabled=wanted and torch.ops.mkldnn._is_mkldnn_bf16_supported())
-
-
-def one_cycle(step: int, total: int) -> float:
-    """Share of the highest learning rate: a linear rise, then half a cosine down to a hundredth (Smith 2018)."""
-    rise = max(1.0, _WARM_UP * total)
-    if step < rise:
-        return (step + 1) / rise if rise > step + 1 else 1.0
-    return _LAST_RATE + 0.5 * (1.0 - _LAST_RATE) * (1.0 + cos(pi * (step - rise) / max(1.0, total - rise)))
-
-
-def set_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
-    """Use a learning rate from now on."""
-    for group in optimizer.param_groups:
-        group["lr"] = rate
 
 
 def _write(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:

@@ -28,7 +28,8 @@ from artperl.networks.perception import Perception, perception_losses
 from artperl.ppo import PPOOptions, collect, update
 from artperl.problems import Problem, Problems
 from artperl.retrieval import ShapeBase
-from artperl.training import BASE_SEEDS, autocast
+from artperl.steps import autocast
+from artperl.training import BASE_SEEDS
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ import numpy as np
 
 from artperl.categories import ARTIMAGE, objects_of
 from artperl.evaluation import TEST_SEEDS, samples_of
-from artsim.errors import AssetError
+from artsim.errors import AssetError, ConfigError
 from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject, Part
 from artsim.plan import SampleOptions
@@ -86,6 +87,22 @@ def real_objects(category: str, half: Literal["train", "test"], partnet: Path | 
         if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
             raise AssetError("differs from the file that was split", path, "restore it")
         objects.append(reduced(load(path), ARTIMAGE[category], category))
+    return objects
+
+
+def real_train_objects(categories: Sequence[str]) -> list[ArticulatedObject]:
+    """Real objects to learn from, in the folder that ``ARTSIM_PARTNET_DIR`` names.
+
+    Raises
+    ------
+    ConfigError
+        When there is none of these categories.
+    """
+    folder = os.environ.get("ARTSIM_PARTNET_DIR")
+    partnet = Path(folder) if folder else None
+    objects = [obj for c in categories if c in ARTIMAGE for obj in real_objects(c, "train", partnet)]
+    if not objects:
+        raise ConfigError("there is no real object to learn from", ", ".join(categories))
     return objects
 
 

@@ -61,7 +61,7 @@ class Agent(nn.Module):
         local = self.parent(torch.cat([part, whole[:, None].expand(-1, P, -1)], dim=-1))
         logits = self.heads(local).reshape(B, P, -1, NUM_AXES, NUM_BINS)
         head = self.head_of[view.kind][..., None, None, None].expand(-1, -1, 1, NUM_AXES, NUM_BINS)
-        return logits.gather(2, head)[:, :, 0], self.value(whole)[:, 0]
+        return logits.gather(2, head)[:, :, 0].float(), self.value(whole)[:, 0].float()
 
 
 def _encoder(inputs: int, width: int, outputs: int) -> nn.Sequential:

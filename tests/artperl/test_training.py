@@ -20,7 +20,9 @@ from artperl.checkpoint import load_estimator
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
 from artperl.ppo import PPOOptions
-from artperl.training import BASE_SEEDS, PRESETS, Training, TrainOptions, one_cycle
+from artperl.settings import PRESETS, TrainOptions
+from artperl.steps import one_cycle
+from artperl.training import BASE_SEEDS, Training
 from artsim.errors import DatasetError
 from artsim.stream import STREAM_SEEDS
 

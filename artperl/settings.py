@@ -1,0 +1,72 @@
+"""What a training run depends on, and presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from artperl.categories import Parts
+from artperl.fitting import FittingOptions
+from artperl.ppo import PPOOptions
+from artperl.problems import StartOptions
+from artsim.plan import SampleOptions
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """What a run depends on."""
+
+    categories: tuple[str, ...] = ("laptop",)
+    """Procedural categories; several share one estimator."""
+    parts: Parts = "artimage"
+    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
+    objects of the families."""
+    real: bool = False
+    """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
+    start_from: str | None = None
+    """Folder of an estimator whose networks are learnt on; by default they begin at random."""
+    seed: int = 0
+    base_objects: int = 64
+    """Reference objects of each category."""
+    reference_points: int = 192
+    """Points of each part of a reference."""
+    width: int = 48
+    """Channels of perception's finest level."""
+    perception_steps: int = 6000
+    """Batches of stage 1."""
+    perception_rate: float = 2e-3
+    mixed_precision: bool = True
+    """Networks multiply in bfloat16 while they learn, where the processor can."""
+    batch_size: int = 32
+    num_points: int = 1024
+    """Points of a cloud."""
+    agent_rollouts: int = 200
+    """Batches of episodes of stage 2; 0 goes without an agent."""
+    agent_rate: float = 1e-3
+    episodes: int = 64
+    """Episodes of a rollout."""
+    validate_every: int = 1000
+    """Steps of stage 1 between tests."""
+    validate_rollouts: int = 50
+    """Rollouts of stage 2 between tests."""
+    test_objects: int = 40
+    """Unseen objects of each category, others for validation than for the test at the end."""
+    foreign_categories: int = 12
+    """Other categories, of which two objects each show what confidence must be low for."""
+    validation_views: int = 2
+    """Views of each object when the estimator is validated."""
+    test_views: int = 4
+    """Views of each object when the best estimator is tested."""
+    sample: SampleOptions = field(default_factory=SampleOptions)
+    ppo: PPOOptions = field(default_factory=PPOOptions)
+    fitting: FittingOptions = field(default_factory=FittingOptions)
+    start: StartOptions = field(default_factory=StartOptions)
+
+
+PRESETS = {
+    "quick": TrainOptions(
+        base_objects=32, width=32, perception_steps=500, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
+        validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
+    ),
+    "full": TrainOptions(),
+}  # fmt: skip
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour."""
