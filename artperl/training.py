@@ -122,10 +122,8 @@ class Training:
 
     def _take_over(self, estimator: Estimator) -> None:
         """Begin with the networks of another estimator."""
-        if (estimator.perception.num_rows, estimator.perception.width) != (
-            self.perception.num_rows,
-            self.options.width,
-        ):
+        theirs, own = estimator.perception, self.perception
+        if (theirs.num_rows, theirs.width) != (own.num_rows, own.width):
             raise ConfigError(
                 "networks of another size are to be learnt on", str(self.options.start_from), "use the same categories"
             )
