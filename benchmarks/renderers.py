@@ -21,7 +21,8 @@ from tqdm import tqdm
 from artsim import Camera, make_renderer
 from artsim.doctor import Finding, examine
 from artsim.renderers import RENDERERS, Renderer
-from benchmarks.agreement import Scene, choose, choose_procedural, draw_scenes
+from benchmarks.agreement import choose, choose_procedural, draw_scenes
+from benchmarks.differences import Scene
 
 _SIZES = ((640, 480), (128, 128))
 

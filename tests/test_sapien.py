@@ -20,7 +20,7 @@ from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.renderers.sapien import flat_shaded
 from artsim.sources import find_sources
 from artsim.verify import sample_problems
-from benchmarks.agreement import compare, draw_scenes
+from benchmarks.agreement import LIMITS, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid, solid
 
 
@@ -33,11 +33,8 @@ def sapien() -> Iterator[Renderer]:
 
 def assert_agrees(obj: ArticulatedObject, renderer: Renderer, states: int = 2) -> None:
     agreement = compare(draw_scenes(obj, states, 1, seed=3), renderer)
-    summary = agreement.summary()
-    assert summary["median_mm"] < 0.005
-    assert summary["p999_mm"] < 0.1
-    assert summary["part_ids_equal_without_coincident"] > 0.999
-    assert agreement.reasons["not explained"] == 0
+    assert agreement.agrees(LIMITS["sapien"]), agreement.summary()
+    assert agreement.ids_differ["unexplained"] == 0
 
 
 @pytest.mark.parametrize("path", DEMO, ids=lambda path: path.name)

@@ -24,7 +24,8 @@ from artsim.renderers import BACKGROUND, Frame, render_cameras
 from artsim.renderers.raycast import pose
 from artsim.renderers.views import Views
 from artsim.renderers.warp import WarpRenderer
-from benchmarks.agreement import Agreement, Scene, draw_scenes
+from benchmarks.agreement import Agreement, draw_scenes
+from benchmarks.differences import Scene
 from tests.conftest import ASSETS, DEMO, absent, installed, rigid, solid, valve
 
 

@@ -10,16 +10,8 @@ import trimesh
 
 import artsim
 from artsim import Camera, make_renderer, observe
-from benchmarks.agreement import choose, compare, draw_scenes
+from benchmarks.agreement import LIMITS, choose, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
-
-LIMITS = {
-    "warp": (0.001, 0.01, 0.9999),
-    "sapien": (0.005, 0.1, 0.999),
-    "pybullet-egl": (0.05, 1.0, 0.998),
-    "pybullet": (1.5, 1.0, 0.99),
-}
-"""Median and 99.9th percentile of depth differences in mm, share of equal part ids."""
 
 
 @pytest.mark.parametrize("name", LIMITS)
@@ -32,11 +24,7 @@ def test_renderers_agree_on_real_objects(name: str, partnet_dir: Path) -> None:
     ]
     agreement = compare(scenes, renderer)
     renderer.close()
-    summary = agreement.summary()
-    median, percentile, ids = LIMITS[name]
-    assert summary["median_mm"] < median
-    assert summary["p999_mm"] < percentile
-    assert summary["part_ids_equal"] > ids
+    assert agreement.agrees(LIMITS[name]), agreement.summary()
 
 
 @pytest.mark.parametrize("name", ["raycast", "warp", "sapien", "pybullet", "pybullet-egl"])
