@@ -31,7 +31,7 @@ _MENDS = {
     "pybullet": "pip install 'artsim[pybullet]'",
     "pybullet-egl": "pip install 'artsim[pybullet]', then scripts/install-system.sh as root",
     "sapien": "pip install 'artsim[sapien]', then scripts/install-vulkan.sh as root",
-    "maniskill": "pip install mani-skill, then scripts/install-vulkan.sh as root",
+    "maniskill": "pip install 'artsim[maniskill]', then scripts/install-vulkan.sh as root",
     "warp": "pip install 'artsim[warp]'",
     "ray": "none needed: artsim's own processes make its data; pip install ray to spread code of yours over machines",
     "torch": "pip install 'artsim[train]'",
@@ -163,16 +163,22 @@ def _sapien() -> tuple[str, float | None]:
 
 
 def _maniskill() -> tuple[str, float | None]:
-    """ManiSkill's own simplest scene with a camera, a step each time."""
+    """A step of the environment, with a picture, each time."""
+    import mani_skill  # noqa: F401 - tells which module is missing
+
+    import artsim.envs  # noqa: F401 - registers it
+    from artsim.envs.maniskill import ENV_ID
     from artsim.renderers.sapien import import_sapien
+    from artsim.sampling import ViewOptions
 
     device = str(import_sapien().render.RenderSystem().device.name)
     import gymnasium
-    import mani_skill.envs  # noqa: F401 - registers its environments
 
-    backend = "gpu" if _torch_device() != "cpu" else "cpu"
-    env = gymnasium.make("PickCube-v1", obs_mode="depth+segmentation", render_backend=backend, sim_backend="cpu")
-    env.reset(seed=0)
+    views = ViewOptions(width=SIZE, height=SIZE)
+    env = gymnasium.make(ENV_ID, categories=("laptop",), obs_mode="depth+segmentation", views=views)
+    observation, info = env.reset(seed=0)
+    if not (observation["sensor_data"]["base_camera"]["segmentation"] == info["segmentation_id"][0, 0]).any():
+        raise RenderError("draws no part of the object", "maniskill")
     return device, _rate(lambda: env.step(None))
 
 

@@ -14,7 +14,7 @@ from artsim.renderers import RENDERERS
 from tests.conftest import absent
 
 
-@pytest.mark.parametrize("backend", RENDERERS)
+@pytest.mark.parametrize("backend", [*RENDERERS, "maniskill"])
 def test_installed_renderers_are_found_to_work(backend: str) -> None:
     finding = examine(backend)
     if not finding.works:
@@ -38,7 +38,7 @@ def pretend(monkeypatch: pytest.MonkeyPatch, folder: Path, module: str, source: 
 @pytest.mark.parametrize(
     ("module", "backend", "mend"),
     [("torch", "torch", "artsim[train]"), ("pybullet", "pybullet", "artsim[pybullet]"),
-     ("gymnasium", "maniskill", "mani-skill"), ("sapien", "sapien", "artsim[sapien]"),
+     ("mani_skill", "maniskill", "artsim[maniskill]"), ("sapien", "sapien", "artsim[sapien]"),
      ("warp", "warp", "artsim[warp]"), ("ray", "ray", "none needed")],
 )  # fmt: skip
 def test_what_is_not_installed_is_named_with_its_mend(
