@@ -1,8 +1,9 @@
 """Frames per second of each renderer: ``python -m benchmarks.renderers``.
 
 Depth and part ids (and colour, where a renderer always makes it) of the same objects, states and views at two image
-sizes. An object's first frame, for which it is loaded and its scene built, does not count. The last line is one JSON
-object: ``fps`` by renderer and size.
+sizes. An object's first frame, for which it is loaded and its scene built, does not count. Then many views of different
+objects at once, by Warp and, where there is a GPU, by ManiSkill's batched camera. The last line is one JSON object:
+``fps`` by renderer and size, and ``batched``, views per second.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from artsim import Camera, make_renderer
 from artsim.doctor import Finding, examine
 from artsim.renderers import RENDERERS, Renderer
 from benchmarks.agreement import choose, choose_procedural, draw_scenes
+from benchmarks.batches import SIZE, measure_batches
 from benchmarks.differences import Scene
 
 _SIZES = ((640, 480), (128, 128))
@@ -47,14 +49,18 @@ def resized(camera: Camera, width: int, height: int) -> Camera:
     return replace(camera, K=K, width=width, height=height)
 
 
-def measure(renderer: Renderer, scenes: Sequence[Scene], size: tuple[int, int]) -> tuple[int, float]:
+def sized(scenes: Sequence[Scene], size: tuple[int, int]) -> list[Scene]:
+    """Scenes with another image size."""
+    return [(obj, q, resized(camera, *size)) for obj, q, camera in scenes]
+
+
+def measure(renderer: Renderer, scenes: Sequence[Scene]) -> tuple[int, float]:
     """Frames drawn of one object, and the seconds that they took."""
-    sized = [(obj, q, resized(camera, *size)) for obj, q, camera in scenes]
-    renderer.render(*sized[0])
+    renderer.render(*scenes[0])
     start = time.perf_counter()
-    for scene in sized[1:]:
+    for scene in scenes[1:]:
         renderer.render(*scene)
-    return len(sized) - 1, time.perf_counter() - start
+    return len(scenes) - 1, time.perf_counter() - start
 
 
 def main(options: Options) -> None:
@@ -72,7 +78,8 @@ def main(options: Options) -> None:
         if finding.works:
             fps[name] = _rates(name, per_object)
         print(_row(finding, fps.get(name)))
-    print(json.dumps({"fps": fps}))
+    batched = measure_batches([sized(scenes, (SIZE, SIZE)) for scenes in per_object]) if "warp" in fps else None
+    print(json.dumps({"fps": fps, "batched": batched}))
 
 
 def _rates(name: str, per_object: Sequence[Sequence[Scene]]) -> dict[str, float]:
@@ -80,7 +87,7 @@ def _rates(name: str, per_object: Sequence[Sequence[Scene]]) -> dict[str, float]
     total = dict.fromkeys(_SIZES, (0, 0.0))
     for scenes in tqdm(per_object, desc=name, leave=False):
         for size in _SIZES:
-            frames, seconds = measure(renderer, scenes, size)
+            frames, seconds = measure(renderer, sized(scenes, size))
             total[size] = total[size][0] + frames, total[size][1] + seconds
     renderer.close()
     return {f"{w}x{h}": round(frames / seconds, 1) for (w, h), (frames, seconds) in total.items()}
