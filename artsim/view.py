@@ -31,7 +31,7 @@ PALETTE = np.array(
      (110, 110, 110), (146, 108, 196), (140, 190, 90), (170, 120, 90), (90, 200, 200)]
 )  # fmt: skip
 _LIGHT = np.array([0.35, -0.55, -0.76])  # towards the light, camera frame
-_BOX_EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
+BOX_EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
 _SAMPLES_PER_ROW = 2
 
 
@@ -167,7 +167,7 @@ def draw_parts(axes: Axes, shown: Shown) -> None:
         corners = box_corners(sample, k)
         if (corners[:, 2] > 1e-3).all():
             image = shown.camera.project(corners) - 0.5
-            for a, b in _BOX_EDGES:
+            for a, b in BOX_EDGES:
                 axes.plot(*image[[a, b]].T, color=0.75 * colour, linewidth=0.8, alpha=0.9)
     for k in range(1, len(sample.joint_type)):
         start, end = axis_segment(sample, k)
