@@ -349,10 +349,11 @@ class _Rays:
 
     def visible_fraction(self) -> Array:
         """(K,) estimate with a standard error of at most about 0.05."""
-        met, saw = self.met.copy(), self.saw.copy()
-        for k in np.flatnonzero(met < self.enough):
-            more_met, more_saw = visibility(self.posed, int(k), max_rays=256)
-            met[k], saw[k] = met[k] + more_met, saw[k] + more_saw
+        counts = np.stack([self.met, self.saw], axis=1)
+        few = np.flatnonzero(self.met < self.enough).tolist()
+        if few:
+            counts[few] += visibility(self.posed, few, max_rays=256)
+        met, saw = counts.T
         fraction: Array = saw / np.maximum(met, 1)
         return fraction
 

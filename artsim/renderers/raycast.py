@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -276,24 +277,37 @@ def _cast_part(posed: PosedObject, k: int, directions: NDArray[np.float32]) -> N
     return distance
 
 
-def visibility(posed: PosedObject, k: int, max_rays: int) -> tuple[int, int]:
-    """Of the pixels within part k's spans, or every n-th of them: how many meet the part, and how many show it.
+def visibility(posed: PosedObject, parts: Sequence[int], max_rays: int) -> NDArray[np.int64]:
+    """Of the pixels within the spans of some parts, or every n-th of them: how many meet the part, how many show it.
 
     Parameters
     ----------
     posed : PosedObject
-    k : int
+    parts : sequence of int
     max_rays : int
-        About the most rays to cast; all pixels are looked at when there are fewer.
+        About the most rays to cast at each part; all its pixels are looked at when there are fewer.
+
+    Returns
+    -------
+    (len(parts), 2) int
     """
-    row, column = _span_pixels(posed, k)
-    if len(row) == 0:
-        return 0, 0
-    step = max(1, len(row) // max_rays)
-    row, column = row[step // 2 :: step], column[step // 2 :: step]
-    met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
-    _, part_ids, _ = cast(posed, row[met], column[met])
-    return int(met.sum()), int(np.count_nonzero(part_ids == k))
+    counts = np.zeros((len(parts), 2), dtype=np.int64)
+    found: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []
+    for i, k in enumerate(parts):
+        row, column = _span_pixels(posed, k)
+        step = max(1, len(row) // max_rays)
+        row, column = row[step // 2 :: step], column[step // 2 :: step]
+        if len(row):
+            met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
+            found.append((row[met], column[met], np.full(np.count_nonzero(met), i)))
+    if found:
+        row, column, owner = (np.concatenate(pieces) for pieces in zip(*found, strict=True))
+        order = np.argsort(row, kind="stable")
+        _, part_ids, _ = cast(posed, row[order], column[order])
+        owner = owner[order]
+        counts[:, 0] = np.bincount(owner, minlength=len(parts))
+        counts[:, 1] = np.bincount(owner[part_ids == np.asarray(parts)[owner]], minlength=len(parts))
+    return counts
 
 
 def render_posed(posed: PosedObject, only: int | None = None) -> Frame:
