@@ -15,11 +15,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from artperl.estimator import Calibration, Estimator, EstimatorOptions
+from artperl.estimator import Calibration, Estimator
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception
 from artperl.refine import RefineOptions
 from artperl.retrieval import ShapeBase
+from artperl.search import EstimatorOptions
 from artsim.errors import DatasetError
 from artsim.files import write_atomic
 
@@ -78,7 +79,8 @@ def load_estimator(name: str | Path) -> Estimator:
         agent = None if settings["agent"] is None else Agent(**settings["agent"])
         if agent is not None:
             agent.load_state_dict(_under(tensors, "agent."))
-        options = {**settings["options"], "refine": RefineOptions(**settings["options"]["refine"])}
+        options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings["options"].items()}
+        options["refine"] = RefineOptions(**options["refine"])
         return Estimator(
             perception, ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**options),
             Calibration(**settings["calibration"]),

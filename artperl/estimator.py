@@ -1,15 +1,12 @@
 """From a cloud to the 9D pose of every part, in one call (ArtPERL, section 4).
 
-Perception says which part each point belongs to and where it lies in the object's rest frame; the references most like
-the object are placed by that, moved on by the agent, and refined as one batch; the best is refined to the end.
+Perception says which part each point belongs to and where it lies in the object's rest frame; :mod:`artperl.search`
+finds the reference and the pose that explain it.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -17,17 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from artperl.batch import concatenate
 from artperl.data import Clouds
-from artperl.embedding import box_embedding
-from artperl.fitting import Fitting, FittingOptions
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perceived, Perception
 from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts
-from artperl.refine import Refined, RefineOptions, refine
 from artperl.retrieval import ShapeBase
+from artperl.search import Clock, EstimatorOptions, Found, find
 from artperl.shapes import Observed, Shapes
-from artperl.start import start
 from artsim.errors import ArtsimError
 
 Array = NDArray[np.float64]
@@ -39,30 +32,8 @@ _CLEANED = 4096
 """Points that are looked at for outliers."""
 _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
-_LABEL_DISTANCE = 0.03
-"""Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 _FEWEST = 8
 """Points below which there is nothing to fit."""
-
-
-@dataclass(frozen=True)
-class EstimatorOptions:
-    """The pipeline."""
-
-    num_points: int = 1024
-    """Points that perception sees."""
-    early_points: int = 256
-    """Of these, points by which the best start is found."""
-    fit_points: int = 1024
-    """Of these, points that the best one is fitted to."""
-    references: int = 3
-    """References that are tried, the nearest first."""
-    agent_steps: int = 8
-    """Steps of the agent from each start; 0 goes without it."""
-    early_iterations: int = 6
-    """Iterations of every start, before the best one is kept."""
-    refine: RefineOptions = field(default_factory=RefineOptions)
-    """The last refinement."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +87,7 @@ class Estimate:
     confidence : float
         0 to 1.
     trajectory : (S, K, 4, 4) float
-        ``T_camera_part`` at the start, after each step of the agent, and after refinement.
+        ``T_camera_part`` at the start, after each step of the agent where it was needed, and after refinement.
     milliseconds : dict
         By stage.
     """
@@ -177,61 +148,33 @@ class Estimator:
         ArtsimError
             When there is no object to be seen in the cloud.
         """
-        options, clock = self.options, _Clock()
+        options, clock = self.options, Clock()
         points = np.asarray(points, dtype=np.float64)
         with clock("clean"):
             good = clean(points)
-            rng = np.random.default_rng(0)
-            chosen = draw(len(good), options.num_points, rng)
+            chosen = draw(len(good), options.num_points, np.random.default_rng(0))
             cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None]
         with clock("perception"):
             clouds = Clouds.of(cloud)
             perceived = self.perception(clouds.points)
-        with clock("start"):
-            query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-            rows = self.base.nearest(query, min(options.references, len(self.base)))[0][0]
-            shapes, theta = start(clouds, perceived, self.base.shapes[rows], len(rows))
-            some = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
-            observed = some.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(rows))
-            steps = [theta]
-        with clock("agent"):
-            if self.agent is not None and options.agent_steps:
-                steps += greedy_steps(self.agent, shapes, observed, theta, options.agent_steps)
-                shapes, observed = concatenate([shapes, shapes]), concatenate([observed, observed])
-                theta = concatenate([theta, steps[-1]])
-        with clock("refine"):
-            early = replace(
-                options.refine, iterations=options.early_iterations, rigid_iterations=options.early_iterations
-            )
-            refined = refine(shapes, observed, theta, early)
-            best = refined.energy.argmin()[None]
-            shapes, theta = shapes[best], refined.theta[best]
-        with clock("relabel"):
-            observed = replace(some, part=relabel(shapes, some, theta, perceived.part_logits))
-        with clock("last"):
-            refined = refine(shapes, observed, theta, replace(options.refine, rigid_iterations=2))
+        found = find(cloud, clouds, perceived, self.base, self.agent, options, clock)
         with clock("report"):
-            chosen_row = int(best) % len(rows)
-            trajectory = [*(step[chosen_row : chosen_row + 1] for step in steps), refined.theta]
-            return self._report(
-                points, good, shapes, observed, refined, clouds, perceived, trajectory, int(rows[chosen_row]), clock
-            )  # fmt: skip
+            return self._report(points, good, found, clouds, perceived, clock)
 
     def _report(
-        self, points: Array, good: NDArray[np.int64], shapes: Shapes, observed: Observed, refined: Refined,
-        clouds: Clouds, perceived: Perceived, trajectory: list[Theta], reference: int, clock: _Clock,
-    ) -> Estimate:  # fmt: skip
+        self, points: Array, good: NDArray[np.int64], found: Found, clouds: Clouds, perceived: Perceived, clock: Clock
+    ) -> Estimate:
         """Everything about one fitted reference, as arrays."""
-        trees, theta = shapes.trees, refined.theta
+        shapes, observed, theta = found.shapes, found.observed, found.refined.theta
+        trees, reference = shapes.trees, found.reference
         K = int(trees.valid[0].sum())
         posed = pose_parts(trees, theta, shapes.box_center)
         axis, origin = joint_axes(trees, posed)
         part = np.full(len(points), -1)
         nearest = cKDTree(observed.points[0].numpy()).query(points[good], workers=1)[1]
         part[good] = observed.part[0].numpy()[nearest]
-        residual = float(refined.energy[0].clamp(min=0).sqrt())
         disagreement = _disagreement(shapes, observed, posed, theta, clouds, perceived)
-        poses = [_transforms(shapes, step)[:K] for step in trajectory]
+        poses = [_transforms(shapes, step)[:K] for step in found.path]
         return Estimate(
             rotation=_numpy(posed.rotation)[:K],
             translation=_numpy(posed.center)[:K],
@@ -244,10 +187,10 @@ class Estimator:
             joint_origin=_numpy(origin)[:K],
             part=part,
             reference=f"{self.base.categories[reference]}:{self.base.object_ids[reference]}",
-            residual=residual,
+            residual=found.residual,
             disagreement=disagreement,
             visibility=visibility(shapes, observed, posed)[:K],
-            confidence=self.calibration(residual, disagreement),
+            confidence=self.calibration(found.residual, disagreement),
             trajectory=np.stack(poses),
             milliseconds=clock.milliseconds,
         )
@@ -283,32 +226,6 @@ def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int
     return np.concatenate(rounds)[:count]
 
 
-def greedy_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
-    """States after each of the agent's most likely actions."""
-    fitting = Fitting(shapes, observed, theta, FittingOptions(steps=steps))
-    path = []
-    while not fitting.done:
-        fitting.step(agent(fitting.view())[0].argmax(-1))
-        path.append(fitting.theta)
-    return path
-
-
-def relabel(shapes: Shapes, observed: Observed, theta: Theta, logits: Tensor) -> Tensor:
-    """(B, N) parts of the observed points, given both what perception says and how near each fitted part is.
-
-    Parameters
-    ----------
-    logits : (B, >= N, >= P) float
-        Perception's.
-    """
-    N, P = observed.part.shape[1], shapes.trees.num_rows
-    points = pose_parts(shapes.trees, theta, shapes.box_center).points(shapes.points, shapes.box_center)
-    apart = torch.cdist(observed.points[:, None].expand(-1, P, -1, -1), points).amin(-1).transpose(1, 2)
-    apart = apart / (shapes.diagonal[:, None, None] * _LABEL_DISTANCE)
-    score = logits[:, :N, :P].log_softmax(-1) - apart**2
-    return score.masked_fill(~shapes.has_surface[:, None], -torch.inf).argmax(-1)
-
-
 def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
     """(P,) share of the surface of each part, of the first object, that has an observed point of the part near it."""
     points = posed.points(shapes.points, shapes.box_center)[0].numpy()
@@ -341,18 +258,3 @@ def _transforms(shapes: Shapes, theta: Theta) -> Array:
 def _numpy(values: Tensor) -> Array:
     """The first row, in double precision."""
     return values[0].double().numpy()
-
-
-class _Clock:
-    """Milliseconds by stage."""
-
-    def __init__(self) -> None:
-        self.milliseconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.milliseconds[stage] = 1e3 * (time.perf_counter() - begun)

@@ -27,7 +27,7 @@ class RefineOptions:
     """
 
     iterations: int = 20
-    """At most; fewer when nothing improves any more."""
+    """At most; fewer when nothing improves any more, and none to leave the start as it is."""
     rigid_iterations: int = 4
     """Of these, the first that leave the reference's shape as it is."""
     robust_start: float = 0.2
@@ -52,8 +52,8 @@ class RefineOptions:
     """Relative decrease of the energy below which an object counts as done."""
 
     def __post_init__(self) -> None:
-        if self.iterations < 1 or not 0.0 < self.robust_end <= self.robust_start:
-            raise ConfigError("refinement needs at least one iteration and 0 < robust_end <= robust_start")
+        if self.iterations < 0 or not 0.0 < self.robust_end <= self.robust_start:
+            raise ConfigError("refinement needs a number of iterations and 0 < robust_end <= robust_start")
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ from artperl.categories import objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
 from artperl.data import batches
 from artperl.embedding import by_boxes
-from artperl.estimator import Estimator, EstimatorOptions
+from artperl.estimator import Estimator
 from artperl.evaluation import (
     TEST_SEEDS,
     VALIDATION_SEEDS,
@@ -47,6 +47,7 @@ from artperl.networks.perception import Perception, perception_losses
 from artperl.ppo import collect, update
 from artperl.problems import Problems
 from artperl.retrieval import ShapeBase
+from artperl.search import EstimatorOptions
 from artperl.settings import TrainOptions
 from artperl.steps import Stop, autocast, one_cycle, set_rate
 from artsim.errors import ConfigError, DatasetError

@@ -14,7 +14,7 @@ from artperl import metrics
 from artperl.checkpoint import load_estimator, save_estimator
 from artperl.data import Clouds, to_batch, training_rows
 from artperl.embedding import by_boxes
-from artperl.estimator import Calibration, Estimator, EstimatorOptions, clean, draw
+from artperl.estimator import Calibration, Estimator, clean, draw
 from artperl.evaluation import (
     Scored,
     calibrate,
@@ -30,6 +30,7 @@ from artperl.evaluation import (
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perceived, Perception
 from artperl.retrieval import ShapeBase
+from artperl.search import EstimatorOptions
 from artsim.errors import ArtsimError, DatasetError
 from artsim.sample import Sample
 

@@ -293,6 +293,6 @@ def test_points_of_a_shape_are_spread_evenly() -> None:
 
 def test_options_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ConfigError):
-        RefineOptions(iterations=0)
+        RefineOptions(iterations=-1)
     with pytest.raises(ConfigError):
         RefineOptions(robust_end=0.5)

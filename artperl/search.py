@@ -1,0 +1,173 @@
+"""The search for the pose that explains a cloud: starts, the agent, refinement, and a second try where that fails.
+
+Perception's own starts, refined, are right for nearly all clouds, and an estimate that does not fit says so by its
+residual. Only for such a cloud is it worth looking farther: references that face the camera from several sides are
+moved on by the agent, whose steps see the whole of a wrong pose where refinement sees the nearest points alone.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import torch
+from torch import Tensor
+
+from artperl.batch import concatenate
+from artperl.data import Clouds
+from artperl.embedding import box_embedding
+from artperl.fitting import Fitting, FittingOptions
+from artperl.networks.agent import Agent
+from artperl.networks.perception import Perceived
+from artperl.pose import Theta, pose_parts
+from artperl.refine import Refined, RefineOptions, refine
+from artperl.retrieval import ShapeBase
+from artperl.shapes import Observed, Shapes
+from artperl.start import facing, start
+
+_LABEL_DISTANCE = 0.03
+"""Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
+
+
+@dataclass(frozen=True)
+class EstimatorOptions:
+    """The pipeline."""
+
+    num_points: int = 1024
+    """Points that perception sees."""
+    early_points: int = 256
+    """Of these, points by which the best start is found."""
+    fit_points: int = 1024
+    """Of these, points that the best one is fitted to."""
+    references: int = 3
+    """References that are tried, the nearest first."""
+    early_iterations: int = 6
+    """Iterations of every start, before the best one is kept."""
+    retry_residual: float = 0.006
+    """Estimates with a larger residual are looked for again, from other starts; infinite for never, 0 for always."""
+    azimuths: tuple[float, ...] = (-50.0, 0.0, 50.0)
+    """Of these other starts, degrees about the object's vertical, 0 for its front."""
+    elevation: float = 35.0
+    """Degrees from which the other starts are seen."""
+    agent_steps: int = 16
+    """Steps of the agent from each of them; 0 goes without it."""
+    refine: RefineOptions = field(default_factory=RefineOptions)
+    """The last refinement."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The best fit to one cloud: records of one row.
+
+    Attributes
+    ----------
+    shapes : Shapes
+    observed : Observed
+        With the labels of the last refinement.
+    refined : Refined
+    path : list of Theta
+        The start, the agent's steps, and the end.
+    reference : int
+        Row of the base.
+    """
+
+    shapes: Shapes
+    observed: Observed
+    refined: Refined
+    path: list[Theta]
+    reference: int
+
+    @property
+    def residual(self) -> float:
+        """Root of the mean robust squared distance from the reference, in diagonals."""
+        return float(self.refined.energy[0].clamp(min=0).sqrt())
+
+
+class Clock:
+    """Milliseconds by stage."""
+
+    def __init__(self) -> None:
+        self.milliseconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.milliseconds[stage] = self.milliseconds.get(stage, 0.0) + 1e3 * (time.perf_counter() - begun)
+
+
+def find(
+    cloud: Tensor, clouds: Clouds, perceived: Perceived, base: ShapeBase, agent: Agent | None,
+    options: EstimatorOptions, clock: Clock,
+) -> Found:  # fmt: skip
+    """The best fit to a cloud (1, N, 3) that has been perceived."""
+    with clock("start"):
+        query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
+        rows = base.nearest(query, min(options.references, len(base)))[0][0]
+        shapes, theta = start(clouds, perceived, base.shapes[rows], len(rows))
+        observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
+    found = _settle(shapes, observed, perceived, [theta], rows.tolist(), options, clock)
+    if found.residual <= options.retry_residual:
+        return found
+    with clock("start"):
+        shapes = concatenate([shapes[:1].repeat(len(options.azimuths)), shapes[:1]])
+        theta = concatenate([facing(shapes[:-1], clouds.center, options.azimuths, options.elevation), theta[:1]])
+    path = [theta]
+    with clock("agent"):
+        if agent is not None and options.agent_steps:
+            few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
+            path += greedy_steps(agent, shapes, few, theta, options.agent_steps)
+    again = _settle(shapes, observed, perceived, path, [int(rows[0])] * len(shapes), options, clock)
+    return again if again.residual < found.residual else found
+
+
+def _settle(
+    shapes: Shapes, observed: Observed, perceived: Perceived, path: list[Theta], rows: list[int],
+    options: EstimatorOptions, clock: Clock,
+) -> Found:  # fmt: skip
+    """The best of several starts, and of where the agent led from them, refined."""
+    with clock("refine"):
+        ends = [path[0]] if len(path) == 1 else [path[0], path[-1]]
+        all_shapes, theta = concatenate([shapes] * len(ends)), concatenate(ends)
+        few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(all_shapes))
+        count = min(options.early_iterations, options.refine.iterations)
+        early = refine(all_shapes, few, theta, replace(options.refine, iterations=count, rigid_iterations=count))
+        best = int(early.energy.argmin())
+        own, theta = all_shapes[best : best + 1], early.theta[best : best + 1]
+    with clock("relabel"):
+        observed = replace(observed, part=relabel(own, observed, theta, perceived.part_logits))
+    with clock("last"):
+        refined = refine(own, observed, theta, replace(options.refine, rigid_iterations=2))
+    row = best % len(shapes)
+    steps = path[:1] if best < len(shapes) else path
+    return Found(own, observed, refined, [*(step[row : row + 1] for step in steps), refined.theta], rows[row])
+
+
+def greedy_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
+    """States after each of the agent's most likely actions."""
+    fitting = Fitting(shapes, observed, theta, FittingOptions(steps=steps))
+    path = []
+    while not fitting.done:
+        fitting.step(agent(fitting.view())[0].argmax(-1))
+        path.append(fitting.theta)
+    return path
+
+
+def relabel(shapes: Shapes, observed: Observed, theta: Theta, logits: Tensor) -> Tensor:
+    """(B, N) parts of the observed points, given both what perception says and how near each fitted part is.
+
+    Parameters
+    ----------
+    logits : (B, >= N, >= P) float
+        Perception's.
+    """
+    N, P = observed.part.shape[1], shapes.trees.num_rows
+    points = pose_parts(shapes.trees, theta, shapes.box_center).points(shapes.points, shapes.box_center)
+    apart = torch.cdist(observed.points[:, None].expand(-1, P, -1, -1), points).amin(-1).transpose(1, 2)
+    apart = apart / (shapes.diagonal[:, None, None] * _LABEL_DISTANCE)
+    score = logits[:, :N, :P].log_softmax(-1) - apart**2
+    return score.masked_fill(~shapes.has_surface[:, None], -torch.inf).argmax(-1)
