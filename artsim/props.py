@@ -15,8 +15,9 @@ from artsim.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, 
 
 _THICKNESS = 0.06  # of floors and walls
 _ROOM_HEIGHT = 2.6
+_FURTHER = 3.0  # that a room goes on where it has no wall
 _FLOOR_FINISHES = ("parquet", "parquet", "tiles", "stone", "fabric")
-_TABLE_FINISHES = ("wood", "wood", "wood", "stone", "plastic")
+_TABLE_FINISHES = ("wood", "wood", "wood", "stone", "enamel")
 TABLE_HEIGHT = 0.74
 """Metres from the floor to the top of a table."""
 
@@ -75,12 +76,12 @@ def table(size: Vector, rng: np.random.Generator) -> list[Thing]:
 
 
 def room(low: Vector, high: Vector, floor: float, rng: np.random.Generator) -> list[Thing]:
-    """A floor, a wall at the back (+X) and one at a side (+Y or -Y).
+    """A floor, a wall at the back (+X) and one at a side (+Y or -Y); on the other side the room goes on.
 
     Parameters
     ----------
     low, high : 2 float
-        Corners of the floor in world x and y, metres.
+        Corners of the place that is kept free, in world x and y, metres.
     floor : float
         Its height.
     rng : numpy Generator
@@ -88,14 +89,19 @@ def room(low: Vector, high: Vector, floor: float, rng: np.random.Generator) -> l
     """
     ground = draw_material(str(rng.choice(_FLOOR_FINISHES)), rng)
     wall = draw_material("plaster", rng)
-    side = float(high[1]) if rng.random() < 0.5 else float(low[1]) - _THICKNESS
-    top = floor + _ROOM_HEIGHT
     skirting = Material((0.9, 0.9, 0.88), 0.5)
+    (x0, x1), (y0, y1), top = (low[0], high[0]), (low[1], high[1]), floor + _ROOM_HEIGHT
+    if rng.random() < 0.5:
+        y0 -= _FURTHER
+        side = (y1, y1 + _THICKNESS)
+    else:
+        y1 += _FURTHER
+        side = (y0 - _THICKNESS, y0)
     return [
-        placed("floor", box((*low, floor - _THICKNESS), (*high, floor)), ground),
-        placed("wall", box((high[0], low[1], floor), (high[0] + _THICKNESS, high[1], top)), wall),
-        placed("wall", box((low[0], side, floor), (high[0], side + _THICKNESS, top)), wall),
-        placed("wall", box((high[0] - 0.012, low[1], floor), (high[0], high[1], floor + 0.07)), skirting),
+        placed("floor", box((x0, y0, floor - _THICKNESS), (x1, y1, floor)), ground),
+        placed("wall", box((x1, y0, floor), (x1 + _THICKNESS, y1, top)), wall),
+        placed("wall", box((x0, side[0], floor), (x1, side[1], top)), wall),
+        placed("skirting", box((x1 - 0.012, y0, floor), (x1, y1, floor + 0.07)), skirting),
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -23,8 +24,9 @@ from artsim.sampling import StateOptions, sample_state
 from artsim.scene import Scene, Thing
 from artsim.sources import FileSource, family_sources, find_sources
 
-_TABLE_DIAGONAL = 0.85
+_TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""
+_DRAWS = 12  # of a procedural object until one is small enough for a table
 _CROWD = 3.2  # of the sum of footprints: the area that things are spread over
 _ATTEMPTS = 4  # arrangements that are begun before a scene is given up
 _KIN = {"knife": "folding_knife", "table": "drawer"}
@@ -136,7 +138,8 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
             f"{area.high[1] - area.low[1]:.2f} m", "scene", "use fewer or smaller ones, fewer distractors, or the floor"
         )  # fmt: skip
     supports = _supports(area, on_table, looks)
-    return Scene(tuple(things[: len(objects)]), tuple(things[len(objects) :]), tuple(supports), draw_lights(looks))
+    lights = draw_lights(supports, looks)
+    return Scene(tuple(things[: len(objects)]), tuple(things[len(objects) :]), tuple(supports), lights)
 
 
 def with_appearance(scene: Scene, seed: int) -> Scene:
@@ -154,7 +157,7 @@ def with_appearance(scene: Scene, seed: int) -> Scene:
         tuple(repaint(thing, True) for thing in scene.instances),
         tuple(repaint(thing, False) for thing in scene.distractors),
         tuple(repaint(thing, False) for thing in scene.supports),
-        draw_lights(rng),
+        draw_lights(scene.supports, rng),
     )
 
 
@@ -162,9 +165,20 @@ def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
     """The objects of a scene, files in a usual size."""
     family_sources(options.categories, 1)  # says which category is unknown
     rng = np.random.default_rng([seed, 0])
-    made = [make(category, int(rng.integers(2**31))) for category in options.categories]
+    made = [_drawn(category, options.place != "floor", rng) for category in options.categories]
     loaded = [source.load() for source in find_sources(options.objects)] if options.objects else []
     return [*made, *(_in_usual_size(obj, int(rng.integers(2**31))) for obj in loaded), *options.obj]
+
+
+def _drawn(category: str, small: bool, rng: np.random.Generator) -> ArticulatedObject:
+    """A procedural object: one that fits a table, if that is wanted, and the category has such."""
+    seeds = rng.integers(2**31, size=_DRAWS).tolist()
+    first = obj = make(category, seeds[0])
+    for seed in seeds[1:]:
+        if not small or obj.diagonal <= _TABLE_DIAGONAL:
+            return obj
+        obj = make(category, seed)
+    return first
 
 
 def _in_usual_size(obj: ArticulatedObject, seed: int) -> ArticulatedObject:
@@ -205,25 +219,27 @@ def _supports(area: Area, on_table: bool, rng: np.random.Generator) -> list[Thin
     low, high = np.asarray(area.low), np.asarray(area.high)
     if not on_table:
         back = rng.uniform(0.15, 0.6)
-        return room((low[0] - 3.0, low[1] - 2.0), (high[0] + back, high[1] + 2.0), 0.0, rng)
+        return room((low[0] - 4.0, low[1] - 1.9), (high[0] + back, high[1] + 1.9), 0.0, rng)
     margin = 0.04
     size = high - low + 2 * margin
     back = rng.uniform(0.02, 0.5)
-    around = room((low[0] - 2.5, low[1] - 1.2), (high[0] + margin + back, high[1] + 1.2), -TABLE_HEIGHT, rng)
+    around = room((low[0] - 3.0, low[1] - 1.4), (high[0] + margin + back, high[1] + 1.4), -TABLE_HEIGHT, rng)
     return [*table(size, rng), *around]
 
 
-def draw_lights(rng: np.random.Generator) -> Lights:
-    """A sun or lamp from the front or a side, and the light of the sky."""
-    azimuth, elevation = np.deg2rad(rng.uniform(-75.0, 75.0)), np.deg2rad(rng.uniform(38.0, 68.0))
+def draw_lights(supports: Sequence[Thing], rng: np.random.Generator) -> Lights:
+    """A sun or lamp that shines past the side wall from the front, and the light of the sky."""
+    sides = [thing.T_world_object[1, 3] for thing in supports if thing.obj.category == "wall"]
+    away = -np.sign(max(sides, key=abs, default=1.0))  # the side without a wall
+    azimuth, elevation = np.deg2rad(rng.uniform(25.0, 70.0)), np.deg2rad(rng.uniform(38.0, 60.0))
     direction = (
         float(np.cos(azimuth) * np.cos(elevation)),
-        float(np.sin(azimuth) * np.cos(elevation)),
+        float(-away * np.sin(azimuth) * np.cos(elevation)),
         float(-np.sin(elevation)),
     )
     warm = rng.uniform(-0.06, 0.1)
-    sun = Sun(direction, _tinted(rng.uniform(0.75, 1.15), warm), float(np.deg2rad(rng.uniform(2.0, 7.0))))
-    return Lights(sun, _tinted(rng.uniform(0.5, 0.75), -0.3 * warm), _tinted(rng.uniform(0.12, 0.2), 0.0))
+    sun = Sun(direction, _tinted(rng.uniform(0.85, 1.25), warm), float(np.deg2rad(rng.uniform(2.0, 6.0))))
+    return Lights(sun, _tinted(rng.uniform(0.45, 0.65), -0.3 * warm), _tinted(rng.uniform(0.08, 0.14), 0.0))
 
 
 def _tinted(strength: float, warm: float) -> Colour:

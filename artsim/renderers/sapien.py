@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.camera import Camera
 from artsim.errors import RenderError
-from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
 from artsim.painted import painted_coats
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
 from artsim.renderers.raycast import pose
-from artsim.renderers.sapien_stage import Stage
+from artsim.renderers.sapien_stage import Shadows, Stage
 from artsim.scene import Scene, SceneFrame, split_ids
 
 _MAX_STAGES = 16  # as many objects as take turns in a plan
@@ -103,9 +102,8 @@ class SapienRenderer:
                 for thing in scene.things
                 for part, coat in zip(thing.obj.parts, thing.coats, strict=True)
             ]
-            stage = self._stages[scene] = Stage(self._sapien, solids, scene.lights)
+            stage = self._stages[scene] = Stage(self._sapien, solids, scene.lights, _shadows(scene))
             stage.place(np.concatenate([thing.T_world_part for thing in scene.things]))
-            stage.cast_shadows(*_shadowed(scene))
         points = np.concatenate([thing.vertices for thing in scene.things])
         frames = []
         for camera in cameras:
@@ -139,13 +137,13 @@ def _coats(obj: ArticulatedObject) -> Sequence[Coat]:
     return painted or [plain_coat(part, _PLAIN[k % len(_PLAIN)]) for k, part in enumerate(obj.parts)]
 
 
-def _shadowed(scene: Scene) -> tuple[Array, float, float]:
-    """Centre (3,) and radius of the objects that cast shadows, and the radius of all that is lit, metres."""
-    points = np.concatenate([thing.vertices for thing in (*scene.instances, *scene.distractors)] or [np.zeros((1, 3))])
+def _shadows(scene: Scene) -> Shadows:
+    """Around the objects and distractors; the sky lights everything."""
+    points = np.concatenate([thing.vertices for thing in (*scene.instances, *scene.distractors)])
+    everything = np.concatenate([thing.vertices for thing in scene.things])
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    everything = np.concatenate([thing.vertices for thing in scene.things] or [np.zeros((1, 3))])
-    near, all_of_it = (float(np.linalg.norm(p - center, axis=1).max()) for p in (points, everything))
-    return center, 1.3 * near + 0.1, all_of_it + 0.1
+    near, lit = (float(np.linalg.norm(p - center, axis=1).max()) for p in (points, everything))
+    return Shadows(center, 1.3 * near + 0.1, lit + 0.1)
 
 
 def flat_shaded(part: Part) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]:

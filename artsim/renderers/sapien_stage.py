@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
@@ -18,10 +19,29 @@ from artsim.objects import Part
 _GAMMA = 2.2  # of the pictures that SAPIEN gives
 _SKY_LAMPS = 3  # of the ten spot lights with shadows that SAPIEN's shaders have
 _SKY_DISTANCE = 4.0  # of a sky lamp, over the radius of what is lit
-_SHADOW_PIXELS = 2048
+_SHADOW_PIXELS = 4096
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 # SAPIEN's camera looks along x with z up.
 _CV_FROM_SAPIEN = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Shadows:
+    """Where shadows are cast.
+
+    Attributes
+    ----------
+    center : (3,) float
+        Of what casts them, in the stage's frame.
+    radius : float
+        Of a sphere around it.
+    lit : float
+        Radius of the sphere that the sky lights.
+    """
+
+    center: Array
+    radius: float
+    lit: float
 
 
 class Stage:
@@ -33,17 +53,25 @@ class Stage:
     solids : sequence of (Part, Coat, float)
         Each with the scale of its object, by which it is drawn. Their places in this list are their numbers.
     lights : Lights
-        In the stage's frame.
+        In the stage's frame. The sky shines only where there are shadows.
+    shadows : Shadows, optional
     """
 
-    def __init__(self, sapien: ModuleType, solids: Sequence[tuple[Part, Coat, float]], lights: Lights):
+    def __init__(
+        self,
+        sapien: ModuleType,
+        solids: Sequence[tuple[Part, Coat, float]],
+        lights: Lights,
+        shadows: Shadows | None = None,
+    ):
         self.num_faces = sum(len(part.faces) for part, _, _ in solids)
-        self._sapien, self._lights = sapien, lights
+        self._sapien, self._lights, self._shadows = sapien, lights, shadows
         self._scene: Any = sapien.Scene([sapien.render.RenderSystem()])
         self._scene.set_ambient_light(list(lights.ambient))
-        self._sun = self._scene.add_directional_light(list(lights.sun.direction), _radiance(lights.sun.colour))
-        self._sky: list[Any] = []
-        self._center, self._distance = np.zeros(3), 1.0
+        self._sun = self._scene.add_directional_light(
+            list(lights.sun.direction), _radiance(lights.sun.colour), **self._reach("sun")
+        )
+        self._sky = self._sky_lamps()
         self._materials: dict[Material, Any] = {}
         self._entities = [self._entity(*solid) for solid in solids]
         self._cameras: dict[tuple[int, int], Any] = {}
@@ -100,27 +128,30 @@ class Stage:
             if entity is not None:
                 entity.set_pose(self._pose(T))
 
-    def cast_shadows(self, center: Array, radius: float, lit: float) -> None:
-        """Let the sun and the sky cast shadows of what stands in a sphere; the sky lights a larger one."""
-        add, lights = self._scene, self._lights
-        add.remove_light(self._sun)
-        reach: dict[str, Any] = {"shadow": True, "shadow_map_size": _SHADOW_PIXELS}
-        self._sun = add.add_directional_light(
-            [0.0, 0.0, -1.0], _radiance(lights.sun.colour),
-            shadow_scale=radius, shadow_near=-4.0 * radius, shadow_far=4.0 * radius, **reach,
-        )  # fmt: skip
-        self._center, self._distance = center, _SKY_DISTANCE * lit
-        width = 2.0 * np.arcsin(1.0 / _SKY_DISTANCE)
-        # Light that falls on a level surface from evenly spread directions loses half of its strength on the way.
-        strength = [2.0 * c * self._distance**2 / _SKY_LAMPS for c in _radiance(lights.sky)]
-        if any(strength):
-            self._sky = [
-                add.add_spot_light(
-                    [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], width, 1.01 * width, strength,
-                    shadow_near=self._distance - lit, shadow_far=self._distance + lit, **reach,
-                )
-                for _ in range(_SKY_LAMPS)
-            ]  # fmt: skip
+    def _reach(self, light: str) -> dict[str, Any]:
+        """How SAPIEN is to cast a light's shadows."""
+        if self._shadows is None:
+            return {}
+        common: dict[str, Any] = {"shadow": True, "shadow_map_size": _SHADOW_PIXELS}
+        radius, lit = self._shadows.radius, self._shadows.lit
+        if light == "sun":
+            return {"shadow_scale": radius, "shadow_near": -4.0 * radius, "shadow_far": 4.0 * radius, **common}
+        away = _SKY_DISTANCE * lit
+        return {"shadow_near": away - lit, "shadow_far": away + lit, **common}
+
+    def _sky_lamps(self) -> list[Any]:
+        if self._shadows is None or not any(self._lights.sky):
+            return []
+        width = 2.0 * float(np.arcsin(1.0 / _SKY_DISTANCE))
+        # On a level surface, light from evenly spread directions counts half as much as from straight above.
+        square = (_SKY_DISTANCE * self._shadows.lit) ** 2
+        strength = [2.0 * c * square / _SKY_LAMPS for c in _radiance(self._lights.sky)]
+        return [
+            self._scene.add_spot_light(
+                [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], width, 1.01 * width, strength, **self._reach("sky")
+            )
+            for _ in range(_SKY_LAMPS)
+        ]
 
     def _light(self, sample: int, samples: int) -> None:
         """Stand sun and sky lamps where they are in one of several pictures."""
@@ -131,15 +162,17 @@ class Stage:
         off, angle = np.tan(sun.radius) * np.sqrt((sample + 0.5) / samples), _GOLDEN_ANGLE * sample
         if samples > 1:
             direction = direction + off * (np.cos(angle) * across + np.sin(angle) * np.cross(direction, across))
-        self._aim(self._sun, self._center, direction)
+        center = np.zeros(3) if self._shadows is None else self._shadows.center
+        self._aim(self._sun, center, direction)
         count = samples * len(self._sky)
         for k, lamp in enumerate(self._sky):
             # Every count-th part of the hemisphere has one lamp in one of the pictures.
-            n = (sample + k * samples) % max(count, 1)
+            n = sample + k * samples
             height, turn = (n + 0.5) / count, _GOLDEN_ANGLE * n
             level = np.sqrt(1.0 - height**2)
             up = np.array([level * np.cos(turn), level * np.sin(turn), height])
-            self._aim(lamp, self._center + self._distance * up, -up)
+            assert self._shadows is not None
+            self._aim(lamp, center + _SKY_DISTANCE * self._shadows.lit * up, -up)
 
     def _aim(self, light: Any, position: Array, direction: Array) -> None:
         turn = self._sapien.math.shortest_rotation([1.0, 0.0, 0.0], direction.tolist())
