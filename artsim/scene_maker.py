@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from artsim.appearance import Colour, Lights, Sun
+from artsim.appearance import Coat, Colour, Lights, Sun
 from artsim.camera import Camera
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
@@ -22,7 +22,7 @@ from artsim.placement import Area, Arrangement
 from artsim.props import TABLE_HEIGHT, distractor, room, table
 from artsim.sampling import StateOptions, sample_state
 from artsim.scene import Scene, Thing
-from artsim.sources import FileSource, family_sources, find_sources
+from artsim.sources import family_sources, find_sources
 
 _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""
@@ -59,9 +59,9 @@ class SceneCameraOptions:
                 raise ConfigError(f"{low} to {high} is not a range", name, "write LOW HIGH")
         if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
             raise ConfigError(f"images of {self.width}x{self.height} are not made", "width, height", "use 1 to 8192")
-        if not (1.0 <= self.fov[0] and self.fov[1] <= 150.0):
+        if not (self.fov[0] >= 1.0 and self.fov[1] <= 150.0):
             raise ConfigError(f"fields of view of {self.fov} deg are not within 1..150", "fov", "write 38 50")
-        if not (0.0 < self.fill[0] and self.fill[1] <= 1.0 and self.aspect[0] > 0.0):
+        if not (self.fill[0] > 0.0 and self.fill[1] <= 1.0 and self.aspect[0] > 0.0):
             raise ConfigError("fill and aspect are shares above 0, fill up to 1", "fill, aspect", "write 0.78 0.92")
         if not 0.0 <= self.off_center <= 0.3:
             raise ConfigError(f"{self.off_center} is not within 0..0.3", "off_center", "write 0.01")
@@ -187,10 +187,10 @@ def _in_usual_size(obj: ArticulatedObject, seed: int) -> ArticulatedObject:
     return obj.with_diagonal(make(family, seed).diagonal) if family in FAMILIES else obj
 
 
-Placeable = tuple[ArticulatedObject, Array, tuple]  # type: ignore[type-arg]
+_Placeable = tuple[ArticulatedObject, Array, tuple[Coat, ...]]
 
 
-def _area(solids: list[Placeable], on_table: bool, attempt: int) -> Area:
+def _area(solids: list[_Placeable], on_table: bool, attempt: int) -> Area:
     """Room for some things, more of it with each attempt; a table has its limits."""
     sizes = np.array([np.sort(obj.bounds[1] - obj.bounds[0])[1:] for obj, _, _ in solids])
     total = _CROWD * (1.0 + 0.3 * attempt) * float((sizes + 0.06).prod(axis=1).sum())
@@ -202,7 +202,7 @@ def _area(solids: list[Placeable], on_table: bool, attempt: int) -> Area:
     return Area((-0.5 * depth, -0.5 * width), (0.5 * depth, 0.5 * width))
 
 
-def _arranged(solids: list[Placeable], area: Area, rng: np.random.Generator) -> list[Thing] | None:
+def _arranged(solids: list[_Placeable], area: Area, rng: np.random.Generator) -> list[Thing] | None:
     """All things put down, the largest first; None where they do not fit."""
     arrangement = Arrangement(area)
     placed: dict[int, Thing] = {}

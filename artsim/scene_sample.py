@@ -106,8 +106,8 @@ def observe_scene(
         for i, thing in enumerate(scene.instances):
             shown = frame.instance_ids == i
             alone = render_posed(pose(thing.obj, thing.q, camera, thing.T_world_object))
-            covered = np.count_nonzero(alone.part_ids != BACKGROUND)
-            fractions.append(min(np.count_nonzero(shown) / max(covered, 1), 1.0))
+            covered = int(np.count_nonzero(alone.part_ids != BACKGROUND))
+            fractions.append(min(int(np.count_nonzero(shown)) / max(covered, 1), 1.0))
             boxes.append(_box(shown))
             sample = None
             if (shown & (depth > 0)).any():
@@ -125,7 +125,7 @@ def observe_scene(
     return views
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Window:
     """A renderer that has one frame to show: an instance as the rest of the scene leaves it."""
 
@@ -163,7 +163,7 @@ def write_view(view: SceneView, folder: Path) -> None:
     frame, files = view.frame, {}
     files["depth.npy"] = npy_bytes(view.depth)
     pictures = {"instance_ids": frame.instance_ids, "part_ids": frame.part_ids, "rgb": frame.rgb}
-    files |= {f"{name}.png": _png(image) for name, image in pictures.items() if image is not None}
+    files |= {f"{name}.png": png_bytes(image) for name, image in pictures.items() if image is not None}
     for i, sample in enumerate(view.samples):
         if sample is not None:
             files |= {f"instance_{i}.{member}": content for member, content in sample_members(sample).items()}
@@ -172,7 +172,8 @@ def write_view(view: SceneView, folder: Path) -> None:
         write_atomic(folder / name, content)
 
 
-def _png(image: NDArray[np.uint8]) -> bytes:
+def png_bytes(image: NDArray[np.uint8]) -> bytes:
+    """A picture as a PNG file."""
     buffer = io.BytesIO()
     Image.fromarray(image).save(buffer, "PNG")
     return buffer.getvalue()

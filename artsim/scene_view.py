@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from artsim.camera import Camera
+from artsim.files import write_atomic
 from artsim.renderers import BACKGROUND
 from artsim.sample import Sample
-from artsim.scene_sample import SceneView
+from artsim.scene_sample import SceneView, png_bytes, write_view
 from artsim.view import BOX_EDGES, PALETTE, axis_segment, box_corners
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
@@ -22,6 +25,12 @@ def overview(view: SceneView) -> NDArray[np.uint8]:
     """(2 H, 2 W, 3) picture: colour and depth above, parts with boxes and joint axes and instances below."""
     top = np.hstack([colour_picture(view), depth_picture(view)])
     return np.vstack([top, np.hstack([parts_picture(view), instances_picture(view)])])
+
+
+def write_overview(view: SceneView, folder: Path) -> None:
+    """Write a view's files (see :func:`artsim.scene_sample.write_view`), and ``overview.png``."""
+    write_view(view, folder)
+    write_atomic(folder / "overview.png", png_bytes(overview(view)))
 
 
 def colour_picture(view: SceneView) -> NDArray[np.uint8]:

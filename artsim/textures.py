@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,8 +56,8 @@ def wood(rng: np.random.Generator, tone: ArrayLike, rings: int = 9, size: int = 
 def parquet(rng: np.random.Generator, tone: ArrayLike, rows: int = 6, size: int = SIZE) -> Image:
     """Floor boards, each of a piece of wood of its own, in rows that are set off against each other."""
     picture = np.empty((size, size, 3), dtype=np.uint8)
-    edges = np.linspace(0, size, rows + 1).astype(int)
-    for top, bottom in zip(edges[:-1], edges[1:], strict=True):
+    edges = np.linspace(0, size, rows + 1).astype(int).tolist()
+    for top, bottom in pairwise(edges):
         cut = int(rng.integers(size))
         for start, end in ((cut, cut + size // 2), (cut + size // 2, cut + size)):
             shade = np.asarray(tone, dtype=np.float64) * rng.uniform(0.86, 1.08)
