@@ -59,6 +59,8 @@ BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
 _TEST_POINTS = 2048
+_SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
+"""Steps and rollouts after which a run is written down, for when it is not asked before it ends."""
 
 
 class Training:
@@ -88,7 +90,7 @@ class Training:
         self.base = by_boxes(ShapeBase.of([*objects, *self.real], options.reference_points))
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width)
-        self.agent = Agent()
+        self.agent, self._agent_known = Agent(), False
         if options.start_from is not None:
             self._take_over(load_estimator(options.start_from))
         self.optimizers = {
@@ -118,7 +120,7 @@ class Training:
 
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
-        agent = self.agent if self.done["agent"] else None
+        agent = self.agent if self.done["agent"] or self._agent_known else None
         return Estimator(self.perception, self.base, agent, EstimatorOptions(num_points=self.options.num_points))
 
     def _take_over(self, estimator: Estimator) -> None:
@@ -131,6 +133,7 @@ class Training:
         own.load_state_dict(theirs.state_dict())
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())
+            self._agent_known = True
 
     def _learn_to_perceive(self, board: SummaryWriter, stop: Stop) -> None:
         options, optimizer = self.options, self.optimizers["perception"]
@@ -163,6 +166,8 @@ class Training:
             bar.update()
             if (step + 1) % options.validate_every == 0 or step + 1 == total:
                 self._validate(board, step + 1)
+            elif (step + 1) % _SAVE_STEPS == 0:
+                self._save()
             self._stop_if(stop)
         bar.close()
 
@@ -193,6 +198,8 @@ class Training:
             bar.update()
             if (n + 1) % options.validate_rollouts == 0 or n + 1 == total:
                 self._validate(board, options.perception_steps + n + 1)
+            elif (n + 1) % _SAVE_ROLLOUTS == 0:
+                self._save()
             self._stop_if(stop)
         bar.close()
 
@@ -254,7 +261,9 @@ class Training:
 
     def _load(self) -> None:
         state = json.loads((self.out / f"{_STATE}.json").read_text())
-        if state["options"] != json.loads(json.dumps(_plain(self.options))):
+        # An option that was not known yet when the run was begun has its default.
+        begun_with = json.loads(json.dumps(_plain(TrainOptions()))) | state["options"]
+        if begun_with != json.loads(json.dumps(_plain(self.options))):
             raise DatasetError("a run with other options is here", self.out, "give the same options, or another folder")
         self.best, self.history = state["best"], state["history"]
         tensors = load_file(self.out / f"{_STATE}.safetensors")
