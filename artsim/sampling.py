@@ -72,6 +72,12 @@ class ViewOptions:
         if not 1.0 <= self.fov <= 170.0:
             raise ConfigError(f"a field of view of {self.fov} deg is not within 1..170", "fov", "write 45")
 
+    @property
+    def directions(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Ranges of azimuth and elevation, degrees."""
+        azimuth, elevation = _PRESETS[self.preset]
+        return self.azimuth or azimuth, self.elevation or elevation
+
 
 _PRESETS = {"artimage": ((-75.0, 75.0), (10.0, 60.0)), "sphere": ((-180.0, 180.0), (-10.0, 85.0))}
 
@@ -100,15 +106,30 @@ def sample_state(obj: ArticulatedObject, options: StateOptions, rng: np.random.G
     (K,) float
         Complete state, mimic joints set; radians or metres at the object's scale.
     """
+    return states_at(obj, options, rng.random(len(obj.tree)))
+
+
+def states_at(obj: ArticulatedObject, options: StateOptions, draw: Array) -> Array:
+    """The joint states that numbers drawn uniformly from [0, 1) stand for; see :func:`sample_state`.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    options : StateOptions
+    draw : (..., K) float
+
+    Returns
+    -------
+    (..., K) float
+    """
     tree, intervals = obj.tree, joint_intervals(obj)
     low, high = intervals.T
-    draw = rng.random(len(tree))
     if options.fraction_open is not None:
         far = np.where(high - tree.rest >= tree.rest - low, high, low)
         start, end = options.fraction_open
         q = tree.rest + (start + draw * (end - start)) * (far - tree.rest)
     elif options.mode == "rest":
-        q = tree.rest.copy()
+        q = np.broadcast_to(tree.rest, draw.shape).copy()
     elif options.mode == "limits":
         q = np.where(draw < 0.5, low, high)
     else:
@@ -117,7 +138,7 @@ def sample_state(obj: ArticulatedObject, options: StateOptions, rng: np.random.G
         for k in tree.free_joints:
             if fnmatch.fnmatchcase(tree.joints[k].name, pattern) or fnmatch.fnmatchcase(obj.parts[k].label, pattern):
                 first, last = np.clip(bounds, low[k], high[k])
-                q[k] = first + draw[k] * (last - first)
+                q[..., k] = first + draw[..., k] * (last - first)
     return tree.complete_state(q)
 
 
@@ -144,26 +165,35 @@ def sample_view(obj: ArticulatedObject, q: ArrayLike, options: ViewOptions, rng:
     """
     if options.custom is not None:
         return view_sampler(options.custom)(rng, obj, np.asarray(q, dtype=np.float64))
-    default_azimuth, default_elevation = _PRESETS[options.preset]
-    azimuth = np.deg2rad(rng.uniform(*(options.azimuth or default_azimuth)))
-    elevation = np.deg2rad(rng.uniform(*(options.elevation or default_elevation)))
+    azimuth, elevation = (np.deg2rad(rng.uniform(*bounds)) for bounds in options.directions)
     fill = rng.uniform(*options.fill)
     center, radius = bounding_sphere(obj, q)
     fov_y = np.deg2rad(options.fov)
-    half_side = np.tan(0.5 * fov_y) * min(1.0, options.width / options.height)
-    distance = radius / np.sin(np.arctan(fill * half_side))
+    distance = radius / half_width(options, fill)
     away = np.array([-np.cos(azimuth) * np.cos(elevation), -np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
     return Camera.look_at(center + distance * away, center, options.width, options.height, fov_y)
 
 
+def half_width(options: ViewOptions, fill: ArrayLike) -> Array:
+    """Sine of the angle between the optical axis and a bounding sphere that fills so much of the image."""
+    half_side = np.tan(0.5 * np.deg2rad(options.fov)) * min(1.0, options.width / options.height)
+    sine: Array = np.sin(np.arctan(np.asarray(fill) * half_side))
+    return sine
+
+
 def bounding_sphere(obj: ArticulatedObject, q: ArrayLike) -> tuple[Array, float]:
     """Centre (3,) and radius of a sphere around the posed object, from its parts' boxes, rest frame, metres."""
+    bottom, top = posed_bounds(obj, q)
+    return 0.5 * (bottom + top), 0.5 * float(np.linalg.norm(top - bottom))
+
+
+def posed_bounds(obj: ArticulatedObject, q: ArrayLike) -> tuple[Array, Array]:
+    """Lower and upper corners (..., 3) of a box around the posed object in states (..., K), rest frame, metres."""
     low, high = obj.part_bounds[:, 0], obj.part_bounds[:, 1]
     T = obj.tree.forward_kinematics(q)
-    center = (T[:, :3, :3] @ (0.5 * (low + high))[:, :, None])[..., 0] + T[:, :3, 3]
-    reach = (np.abs(T[:, :3, :3]) @ (0.5 * (high - low))[:, :, None])[..., 0]
-    bottom, top = (center - reach).min(axis=0), (center + reach).max(axis=0)
-    return 0.5 * (bottom + top), 0.5 * float(np.linalg.norm(top - bottom))
+    center = (T[..., :3, :3] @ (0.5 * (low + high))[:, :, None])[..., 0] + T[..., :3, 3]
+    reach = (np.abs(T[..., :3, :3]) @ (0.5 * (high - low))[:, :, None])[..., 0]
+    return (center - reach).min(axis=-2), (center + reach).max(axis=-2)
 
 
 def view_sampler(name: str) -> ViewSampler:

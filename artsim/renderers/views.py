@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 
 from artsim.camera import Camera
 from artsim.errors import ConfigError
+from artsim.kinematics import Array
+from artsim.objects import ArticulatedObject
+from artsim.sampling import StateOptions, ViewOptions, half_width, posed_bounds, states_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +81,62 @@ class Views:
         T_camera_world = np.stack([camera.T_camera_world for camera in cameras])
         T_camera_object = T_camera_world if T_world_object is None else T_camera_world @ np.asarray(T_world_object)
         return Views(objects, q, T_camera_object, np.stack([camera.K for camera in cameras]), *sizes.pop())
+
+
+def draw_views(
+    objects: Sequence[ArticulatedObject],
+    count: int,
+    rng: np.random.Generator,
+    states: StateOptions | None = None,
+    cameras: ViewOptions | None = None,
+) -> Views:
+    """Random views, many at once: objects evenly, each as ``sample_state`` and ``sample_view`` would show it.
+
+    Parameters
+    ----------
+    objects : sequence of ArticulatedObject
+    count : int
+    rng : numpy Generator
+    states : StateOptions, optional
+    cameras : ViewOptions, optional
+        128x128 by default.
+
+    Raises
+    ------
+    ConfigError
+        When there is no object, or cameras are to be drawn by a function of the user's, which draws one at a time.
+    """
+    if not objects or count < 1:
+        raise ConfigError(f"{count} views of {len(objects)} objects show no object", "objects, count", "use 1 or more")
+    states, cameras = states or StateOptions(), cameras or ViewOptions(width=128, height=128)
+    if cameras.custom is not None:
+        raise ConfigError("views of one's own are drawn one at a time", "cameras.custom", "use sample_view, Views.of")
+    numbers = rng.permutation(np.arange(count) % len(objects))
+    q = np.zeros((count, max(map(len, objects))))
+    low, high = np.zeros((2, count, 3))
+    for number in np.unique(numbers):
+        chosen, obj = np.flatnonzero(numbers == number), objects[number]
+        state = states_at(obj, states, rng.random((len(chosen), len(obj))))
+        q[chosen, : len(obj)] = state
+        low[chosen], high[chosen] = posed_bounds(obj, state)
+    azimuth, elevation = (np.deg2rad(rng.uniform(*bounds, count)) for bounds in cameras.directions)
+    distance = 0.5 * np.linalg.norm(high - low, axis=1) / half_width(cameras, rng.uniform(*cameras.fill, count))
+    T_camera_object = np.zeros((count, 4, 4))
+    T_camera_object[:, :3, :3] = rotation = _facing(azimuth, elevation)
+    T_camera_object[:, :3, 3] = -(rotation @ (0.5 * (low + high))[..., None])[..., 0]
+    T_camera_object[:, 2, 3] += distance
+    T_camera_object[:, 3, 3] = 1.0
+    K = Camera.look_at((1, 0, 0), (0, 0, 0), cameras.width, cameras.height, np.deg2rad(cameras.fov)).K
+    return Views(numbers, q, T_camera_object, np.tile(K, (count, 1, 1)), cameras.width, cameras.height)
+
+
+def _facing(azimuth: Array, elevation: Array) -> Array:
+    """(B, 3, 3) rotations from the world to cameras that look at it from directions as ``ViewOptions`` has them."""
+    sin_a, cos_a, sin_e, cos_e = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
+    right = np.stack([sin_a, -cos_a, np.zeros_like(azimuth)], axis=1)
+    down = np.stack([-cos_a * sin_e, -sin_a * sin_e, -cos_e], axis=1)
+    forward = np.stack([cos_a * cos_e, sin_a * cos_e, -sin_e], axis=1)
+    return np.stack([right, down, forward], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
