@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from artsim.kinematics import Array
 from artsim.objects import Part
@@ -170,6 +169,8 @@ def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
 
 def corner_normals(vertices: Array, faces: NDArray[np.int32]) -> NDArray[np.float32]:
     """(3 F, 3) unit normal at each corner of each face: the mean over the faces that meet it smoothly there."""
+    from scipy import sparse
+
     corners = vertices[faces].astype(np.float64)
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(area, axis=1)

@@ -18,8 +18,9 @@ from artsim.solids import rotation_about
 
 GAP = 0.004
 """Metres between any two things."""
-_STEADY = np.deg2rad(6.0)
+_STEADY = np.deg2rad(2.5)
 """What must be tipped further than this before it falls over stays the way it was made to stand."""
+_YIELD = 0.02  # of the height of its centre of mass: how deep a thing may sink in to find its footing
 _LEVEL = 1e-6  # of an object's size: corners that touch the ground together
 _TRIES = 300
 _CHOICE = 8  # places that are compared for each thing
@@ -84,7 +85,7 @@ class Arrangement:
         Thing or None
             None where no room was found.
         """
-        upright = resting_rotation(obj, q)
+        upright = resting_rotation(obj)
         if upright[2, 2] < _UPRIGHT:
             turn = (-np.pi, np.pi)
         at_origin = Thing(obj, q, np.eye(4), coats).vertices
@@ -117,15 +118,14 @@ class Arrangement:
         return best
 
 
-def resting_rotation(obj: ArticulatedObject, q: Array) -> Array:
-    """How an object stands or lies with its joints locked: upright where that is steady, else as low as is steady.
+def resting_rotation(obj: ArticulatedObject) -> Array:
+    """How an object at rest stands or lies on the ground: upright or nearly so where that is steady, else as low as can be.
 
     Every part weighs as much as its convex hull, at the density of its body where it has one.
 
     Parameters
     ----------
     obj : ArticulatedObject
-    q : (K,) float
 
     Returns
     -------
@@ -134,19 +134,20 @@ def resting_rotation(obj: ArticulatedObject, q: Array) -> Array:
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    posed = Thing(obj, q, np.eye(4), ()).vertices
+    posed = Thing(obj, obj.tree.rest, np.eye(4), ()).vertices
     try:
         hull = ConvexHull(posed)
     except QhullError:  # flat: it lies as it is
         return np.eye(3)
-    corners, middle = posed[hull.vertices], _center_of_mass(obj, q)
+    corners, middle = posed[hull.vertices], _center_of_mass(obj)
     normals = np.concatenate([[(0.0, 0.0, -1.0)], np.unique(np.round(hull.equations[:, :3], 4), axis=0)])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     reach = (corners @ normals.T).max(axis=0)
     height = reach - normals @ middle  # of the centre of mass above the ground, each normal pointing down
     level = _LEVEL * float(np.ptp(posed, axis=0).max())
-    for n in (0, *(1 + np.argsort(height[1:], kind="stable"))):
-        touching = corners[corners @ normals[n] > reach[n] - max(level, 1e-4 * height[n])]
+    leaning = normals[:, 2] > -_UPRIGHT
+    for n in (0, *np.lexsort((height, leaning))):
+        touching = corners[corners @ normals[n] > reach[n] - max(level, _YIELD * height[n])]
         if _steadiness(touching, normals[n], middle, float(height[n])) > _STEADY:
             return np.eye(3) if n == 0 else _turned_down(normals[n])
     return np.eye(3)
@@ -173,12 +174,13 @@ def _turned_down(normal: Array) -> Array:
     return rotation_about(axis, float(np.arccos(cosine)))
 
 
-def _center_of_mass(obj: ArticulatedObject, q: Array) -> Array:
+def _center_of_mass(obj: ArticulatedObject) -> Array:
+    """(3,) at rest, rest frame, metres."""
     total, moment = 0.0, np.zeros(3)
-    for T, part in zip(obj.tree.forward_kinematics(q), obj.parts, strict=True):
+    for part in obj.parts:
         volume, center = _hull_volume(part)
         mass = volume * (1.0 if part.body is None else part.body.density)
-        total, moment = total + mass, moment + mass * transform_points(T, center[None] * obj.scale)[0]
+        total, moment = total + mass, moment + mass * center * obj.scale
     return moment / max(total, 1e-300)
 
 
