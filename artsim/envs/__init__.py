@@ -1,7 +1,7 @@
 """Environments for reinforcement learning, registered when this package is imported.
 
 ``artsim/Articulated-v0`` (gymnasium): :class:`artsim.envs.articulated.ArticulatedEnv`.
-``ArtSimArticulated-v1`` (ManiSkill 3): :mod:`artsim.envs.maniskill`. Of ManiSkill nothing is imported before one is made.
+``ArtSimArticulated-v1`` (ManiSkill 3): :mod:`artsim.envs.maniskill`, of which nothing heavy is imported before use.
 """
 
 from __future__ import annotations

@@ -35,5 +35,7 @@ def make(**options: Any) -> Any:
     try:
         task = importlib.import_module("artsim.envs.maniskill.task")
     except ImportError as error:
-        raise ConfigError(f"ManiSkill cannot be imported ({error})", ENV_ID, "pip install 'artsim[maniskill]'") from error
+        raise ConfigError(
+            f"ManiSkill cannot be imported ({error})", ENV_ID, "pip install 'artsim[maniskill]'"
+        ) from error
     return task.ArticulatedTask(**options)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import sapien
 from mani_skill.envs.scene import ManiSkillScene
-from mani_skill.utils.structs import Articulation
 from numpy.typing import NDArray
 from sapien.wrapper.articulation_builder import LinkBuilder
 from scipy.spatial.transform import Rotation
@@ -33,7 +32,7 @@ class Built:
 
     Attributes
     ----------
-    articulation : Articulation
+    articulation : ManiSkill's Articulation
     links : list of PhysxArticulationLinkComponent, length K
         Body of each part. Its frame stands at the part's joint, with the axes of the rest frame.
     origins : (K, 3) float

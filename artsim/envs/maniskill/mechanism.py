@@ -1,4 +1,4 @@
-"""The objects of all sub-scenes as one: their parts' poses and joint states, read from the simulation and put into it."""
+"""The objects of all sub-scenes as one: poses and joint states, read from the simulation and put into it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from mani_skill.envs.scene import ManiSkillScene
 from mani_skill.utils.structs import Articulation, Link
+from numpy.typing import NDArray
 from torch import Tensor
 
 from artsim.envs.maniskill.build import Built
@@ -65,7 +66,7 @@ class Mechanism:
             self._project = tensor([_padded(_projection(each), (most, most)) for each in built])
 
     def T_world_part(self) -> Tensor:
-        """(B, P, 4, 4): the rest frame, as carried by each part, to the sub-scene's world; rows of padding repeat it."""
+        """(B, P, 4, 4): the rest frame, as carried by each part, to the sub-scene's world; padding repeats it."""
         T = self._links.pose.to_transformation_matrix().reshape(*self._origins.shape[:2], 4, 4).clone()
         T[..., :3, 3] -= (T[..., :3, :3] @ self._origins[..., None])[..., 0]
         return T
@@ -119,7 +120,7 @@ def _projection(built: Built) -> Array:
     return projection
 
 
-def _padded(array: Array, shape: tuple[int, ...]) -> Array:
-    padded = np.zeros(shape, dtype=array.dtype)
+def _padded(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    padded: NDArray[Any] = np.zeros(shape, dtype=array.dtype)
     padded[tuple(slice(n) for n in array.shape)] = array
     return padded

@@ -43,7 +43,7 @@ def T_world_object(obj: ArticulatedObject) -> Array:
 
 def handle(obj: ArticulatedObject, k: int) -> Array:
     """Where to take hold of part k to move its joint: the middle of what lies farthest from a hinge's axis, or farthest
-    along the way that a slide opens.
+    along the way that a slide opens. Of a knob, which is equally far on all sides, it is the side that faces the robot.
 
     Returns
     -------
@@ -57,13 +57,16 @@ def handle(obj: ArticulatedObject, k: int) -> Array:
     points = part.vertices[np.unique(part.faces)] * obj.scale
     if joint.type in ROTATING:
         arm = points - origin
-        far, least = np.linalg.norm(arm - (arm @ axis)[:, None] * axis, axis=1), 0.0
+        arm -= (arm @ axis)[:, None] * axis
+        far = np.linalg.norm(arm, axis=1)
+        end = far >= (1.0 - SLICE) * far.max()
+        facing = arm[end][np.argmin(points[end, 0])]
+        there = points[end & (arm @ facing > 0.5 * far * np.linalg.norm(facing))]
     else:
         low, high = joint_intervals(obj)[k]
         far = points @ axis * (1.0 if high - joint.rest >= joint.rest - low else -1.0)
-        least = far.min()
-    there = points[far >= far.max() - SLICE * (far.max() - least)]
-    middle: Array = 0.5 * (there.min(axis=0) + there.max(axis=0))
+        there = points[far >= far.max() - SLICE * (far.max() - far.min())]
+    middle: Array = 0.5 * (there.min(axis=0) + there.max(axis=0)) if len(there) else origin
     return middle
 
 
@@ -85,7 +88,10 @@ def onlooker(obj: ArticulatedObject, stand: Array) -> Array:
     """(4, 4) ``T_world_camera`` from which object and robot are seen, from the front and the object's right side."""
     center, radius = bounding_sphere(obj, widest_state(obj))
     center = center + T_world_object(obj)[:3, 3]
-    low, high = np.minimum(center - radius, stand - [*_ARM[:2], 0.0]), np.maximum(center + radius, stand + [*_ARM[:2], 0.0])
+    low, high = (
+        np.minimum(center - radius, stand - [*_ARM[:2], 0.0]),
+        np.maximum(center + radius, stand + [*_ARM[:2], 0.0]),
+    )
     low[2], high[2] = 0.0, max(high[2], _ARM[2] if stand[2] == 0 else 0.0)
     middle, reach = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     away = np.array([-0.35, -0.8, 0.45])

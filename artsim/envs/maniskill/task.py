@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -37,6 +37,7 @@ from artsim.sampling import Scale, ViewOptions, sample_view
 CAMERA = "base_camera"
 """The camera of the observations."""
 _SEEDS = 2**31
+_TRIES = 100  # objects drawn until one fits
 # SAPIEN's camera looks along x with z up.
 SAPIEN_FROM_CV = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 CV_FROM_SAPIEN = SAPIEN_FROM_CV.T
@@ -60,10 +61,12 @@ class TaskOptions:
     """Share of its range within which a joint is at its goal."""
     gravity: bool = False
     """Whether gravity pulls on the object's parts; without it, lids stay where they are left."""
-    views: ViewOptions = ViewOptions(width=128, height=128, azimuth=(30.0, 75.0), elevation=(25.0, 55.0))
+    views: ViewOptions = field(
+        default_factory=lambda: ViewOptions(width=128, height=128, azimuth=(30.0, 75.0), elevation=(25.0, 55.0))
+    )
     """Where the camera of the observations is."""
     max_joints: int = 16
-    """Joints of the largest object: observations and infos have as many rows, and one more for the root."""
+    """Objects with more joints are passed over. Observations have as many rows, infos one more, for the root."""
 
     def __post_init__(self) -> None:
         if self.goal not in get_args(Goal):
@@ -85,14 +88,15 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     how far it has to go (shares of its range), its speed, where its handle is from the gripper, in which direction it
     moves, and whether it counts. The other modes tell of joints only how far each has to go at first.
 
-    The **info** is the ground truth, batched: the record of ``artsim/Articulated-v0`` (without what belongs to its cloud)
-    with P = ``max_joints + 1`` rows, seen from ``base_camera``, and
+    The **info** is the ground truth, batched: the record of ``artsim/Articulated-v0`` (without what belongs to its
+    cloud) with P = ``max_joints + 1`` rows, seen from ``base_camera``, and
 
     - ``T_world_object`` (B, 4, 4), ``T_world_part`` (B, P, 4, 4): ManiSkill's world; points of the mode ``pointcloud``
       are in it,
     - ``segmentation_id`` (B, P): what segmentation images call each part; -1 beyond an object's parts,
     - ``time`` (B,), ``joint_velocity`` (B, P), ``openness`` (B,),
-    - ``joint_goal`` (B, P), ``joint_error`` (B, P): way left over the joint's range, ``joint_free`` (B, P): which count,
+    - ``joint_goal`` (B, P), ``joint_error`` (B, P): way left over the joint's range, ``joint_free`` (B, P): which
+      count, ``handle``, ``handle_direction`` (B, P, 3): where to take hold of parts, and which way opening moves that,
     - ``success`` (B,): whether all of these are within ``tolerance``.
 
     **Reward**: :func:`artsim.envs.maniskill.goal.dense_reward`. Success ends an episode.
@@ -118,7 +122,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         When something is to be drawn, and there is no device that can.
     """
 
-    SUPPORTED_ROBOTS = list(ROBOTS)
+    SUPPORTED_ROBOTS = tuple(ROBOTS)
     SUPPORTED_REWARD_MODES = ("normalized_dense", "dense", "sparse", "none")
 
     truth: Truth
@@ -168,7 +172,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
 
     def _load_scene(self, options: dict[str, Any]) -> None:
         rngs = [np.random.default_rng(int(seed)) for seed in self._batched_episode_rng.randint(_SEEDS)]
-        self.objects = tuple(self._source.draw_object(rng) for rng in rngs)
+        self.objects = tuple(self._draw_object(rng) for rng in rngs)
         self.truth = truth_of(self.objects, self.options.max_joints, self.device)
         self._cameras = [_look(obj, self.options.views, rng) for obj, rng in zip(self.objects, rngs, strict=True)]
         ground = build_ground(self.scene)
@@ -185,6 +189,19 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         )
         self.goal = torch.zeros_like(self.truth.low)
 
+    def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
+        """An object that has joints, and not too many."""
+        least, most = 1, self.options.max_joints
+        for _ in range(_TRIES):
+            obj = self._source.draw_object(rng)
+            if least <= len(obj.tree.free_joints) and len(obj) - 1 <= most:
+                return obj
+        raise ConfigError(
+            f"has {len(obj) - 1} joints; {least} to {most} are asked for, and {_TRIES} draws gave no other object",
+            f"{obj.category} {obj.object_id}",
+            f"set max_joints={max(len(obj) - 1, least)}, or name other objects",
+        )
+
     @property
     def _default_sensor_configs(self) -> list[CameraConfig]:
         first, views = self._cameras[0], self.options.views
@@ -196,8 +213,12 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
 
     @property
     def _default_human_render_camera_configs(self) -> CameraConfig:
-        pose = _poses([onlooker(obj, stand) for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)])
-        return CameraConfig("render_camera", pose, 512, 512, fov=ONLOOKER_FOV, near=0.01, far=100.0, shader_pack="default")
+        pose = _poses(
+            [onlooker(obj, stand) for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)]
+        )
+        return CameraConfig(
+            "render_camera", pose, 512, 512, fov=ONLOOKER_FOV, near=0.01, far=100.0, shader_pack="default"
+        )
 
     def _after_reconfigure(self, options: dict[str, Any]) -> None:
         """What the camera of the observations is in the end: users may have changed it."""
@@ -296,7 +317,10 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             given = torch.as_tensor(action)
             single = self.single_action_space.shape
             whole = (self.num_envs, *single)
-            if tuple(given.shape) not in ({single, whole} if self.num_envs == 1 else {whole}) or not given.isfinite().all():
+            if (
+                tuple(given.shape) not in ({single, whole} if self.num_envs == 1 else {whole})
+                or not given.isfinite().all()
+            ):
                 raise ConfigError(
                     f"an action of shape {tuple(given.shape)} is not {self.num_envs} times {single[0]} finite numbers",
                     ENV_ID,
