@@ -14,7 +14,7 @@ import tyro
 
 from artsim.cli import run_program
 from artsim.errors import ConfigError
-from artsim.files import write_atomic
+from artsim.files import atomic_file, write_atomic
 from artsim.plan import SampleOptions
 from artsim.sampling import ViewOptions
 
@@ -167,49 +167,48 @@ class Evaluate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate the poses of the parts of the object that a cloud shows, and print them as JSON."""
+    """Estimate the poses of the parts of an object, and print them as JSON.
+
+    From a cloud: artperl estimate cloud.ply --category laptop --view out.html
+
+    From a depth image: artperl estimate depth.png --mask mask.png --intrinsics camera.json --category laptop
+    """
 
     cloud: tyro.conf.Positional[Path]
-    """PLY or other mesh file with vertices, .npy with (N, 3), or .npz with an array 'points': camera frame, metres."""
+    """PLY or other mesh file with vertices, .npy with (N, 3), or .npz with an array 'points': camera frame, metres.
+    With --intrinsics, a depth image: .png of whole numbers, or .npy of metres."""
     category: str = "laptop"
     """Folder of an estimator, or the name of one that comes with the package."""
+    mask: Path | None = None
+    """Image that is not 0 where the object is in the depth image."""
+    intrinsics: Path | None = None
+    """JSON with fx, fy, cx, cy, or with a matrix K, in pixels."""
+    depth_scale: float = 0.001
+    """Metres of one unit of a depth image of whole numbers."""
     out: Path | None = None
     """Write here, as .json or as .npz with the part of every point; by default print."""
+    view: Path | None = None
+    """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
 
     def run(self) -> None:
         from artperl.checkpoint import load_estimator
+        from artperl.inputs import read_points
 
-        estimate = load_estimator(self.category)(read_cloud(self.cloud))
+        points = read_points(self.cloud, self.mask, self.intrinsics, self.depth_scale)
+        estimate = load_estimator(self.category)(points)
         record = {name: _plain(value) for name, value in vars(estimate).items() if name != "part"}
+        if self.view is not None:
+            from artperl.view import page
+
+            write_atomic(self.view, page(estimate, points, f"{self.cloud.name}: {self.category}").encode())
         if self.out is None:
             print(json.dumps(record, indent=1))
         elif self.out.suffix == ".npz":
             arrays = {name: np.asarray(v) for name, v in vars(estimate).items() if name != "milliseconds"}
-            np.savez(self.out, allow_pickle=False, **arrays)
+            with atomic_file(self.out) as file:
+                np.savez(file, allow_pickle=False, **arrays)
         else:
             write_atomic(self.out, _json(record))
-
-
-def read_cloud(path: Path) -> np.ndarray:
-    """(N, 3) points of a file.
-
-    Raises
-    ------
-    ConfigError
-        When it holds no cloud.
-    """
-    mend = "give (N, 3) points as .npy, .npz with 'points', or .ply"
-    try:
-        if path.suffix == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False))
-        if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as arrays:
-                return np.asarray(arrays["points"])
-        import trimesh
-
-        return np.asarray(trimesh.load(path).vertices)
-    except (ValueError, KeyError, AttributeError, EOFError) as error:
-        raise ConfigError(f"no cloud can be read: {error}", path, mend) from error
 
 
 def _plain(value: Any) -> Any:

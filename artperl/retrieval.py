@@ -46,10 +46,10 @@ class ShapeBase:
 
     @staticmethod
     def of(objects: Sequence[ArticulatedObject], points_per_part: int = 512) -> ShapeBase:
-        """A base of any set of objects, each brought to diagonal 1."""
+        """A base of any set of objects, each brought to diagonal 1, with limits as wide as any object's of its kind."""
         if not objects:
             raise ConfigError("a shape base needs objects", mend="pass at least one")
-        units = [obj.with_diagonal(1.0) for obj in objects]
+        units = widened([obj.with_diagonal(1.0) for obj in objects])
         return ShapeBase(
             tuple(obj.object_id for obj in units),
             tuple(obj.category for obj in units),
@@ -148,3 +148,24 @@ class ShapeBase:
             Shapes(trees=stacked, **tensors),
             None if embeddings is None else torch.from_numpy(embeddings),
         )
+
+
+def widened(objects: Sequence[ArticulatedObject]) -> list[ArticulatedObject]:
+    """Objects whose joints go as far as those of any other one of the same category and kinematic tree.
+
+    How far the joints of an observed object go is not known, and a reference that stops earlier could not follow it.
+    """
+    kinds = [(obj.category, obj.tree.types, tuple(obj.tree.parents)) for obj in objects]
+    limits = {
+        kind: np.stack([obj.tree.limits for obj, own in zip(objects, kinds, strict=True) if own == kind])
+        for kind in dict.fromkeys(kinds)
+    }
+    result = []
+    for obj, kind in zip(objects, kinds, strict=True):
+        low, high = limits[kind][..., 0].min(axis=0), limits[kind][..., 1].max(axis=0)
+        joints = [
+            replace(joint, lower=float(low[k]), upper=float(high[k])) if k else joint
+            for k, joint in enumerate(obj.tree.joints)
+        ]
+        result.append(replace(obj, native_tree=KinematicTree(joints).scaled(1.0 / obj.scale)))
+    return result

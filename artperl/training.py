@@ -46,11 +46,12 @@ from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception, perception_losses
 from artperl.ppo import collect, update
 from artperl.problems import Problems
+from artperl.report import write_report
 from artperl.retrieval import ShapeBase
 from artperl.search import EstimatorOptions
 from artperl.settings import TrainOptions
 from artperl.steps import Stop, autocast, one_cycle, set_rate
-from artsim.errors import ConfigError, DatasetError
+from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.families import FAMILIES
 from artsim.files import write_atomic
 from artsim.sample import Sample
@@ -238,11 +239,17 @@ class Training:
     def _finish(self) -> dict[str, Any]:
         """Test the best estimator on objects that had no say in which one that is."""
         best = load_estimator(self.out / "best")
-        figures = summary(evaluate(best, self._unseen(self.options.test_views, TEST_SEEDS), self.progress))
+        samples = self._unseen(self.options.test_views, TEST_SEEDS)
+        scored = evaluate(best, samples, self.progress)
+        figures = summary(scored)
         about = read_settings(self.out / "best")["about"]
         save_estimator(best, self.out / "best", {**about, "test": figures})
         write_atomic(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
         write_atomic(self.out / "table.txt", (table(figures) + "\n").encode())
+        try:
+            write_report(self.out, best, samples, scored, table(figures))
+        except ArtsimError as error:  # without matplotlib there are no pictures
+            tqdm.write(f"no report: {error}")
         return figures
 
     def _about(self, figures: dict[str, Any]) -> dict[str, Any]:
