@@ -12,7 +12,7 @@ from artsim.families import make
 from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject
 from artsim.pipeline import generate
-from artsim.renderers import Frame, make_renderer, render
+from artsim.renderers import Frame, make_renderer, render, render_cameras
 from artsim.sample import Sample, observe
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.urdf import load
@@ -34,6 +34,7 @@ __all__ = [
     "observe",
     "open_dataset",
     "render",
+    "render_cameras",
     "sample_state",
     "sample_view",
 ]

@@ -45,6 +45,14 @@ class ObjectSet:
 class WarpRenderer:
     """Casts rays on a GPU, or on the CPU, many views at once.
 
+    ::
+
+        renderer = WarpRenderer()
+        objects = [artsim.make("laptop", seed) for seed in range(100)]
+        loaded = renderer.load(objects)
+        while True:
+            clouds = renderer.clouds(loaded, draw_views(objects, 4096, rng), num_points=1024)
+
     Parameters
     ----------
     device : str, optional
