@@ -10,25 +10,25 @@ import numpy as np
 
 from artsim.doctor import examine
 from artsim.errors import RenderError
-from artsim.renderers.views import Views
+from artsim.objects import ArticulatedObject
+from artsim.renderers.views import draw_views
 from artsim.renderers.warp import WarpRenderer, import_warp
-from benchmarks.differences import Scene
 
 SIZE = 128
 NUM_POINTS = 1024
 _BATCH = {"cuda": 4096, "cpu": 64}
 _SUB_SCENES = 1024  # as ManiSkill's own benchmarks have them
 _SECONDS = 3.0
-_MANISKILL = ("MS-CartpoleBalance-v1", "ArtSimArticulated-v1")  # its fastest scene, and our objects
+_MANISKILL = ("MS-CartpoleBalance-v1", "ArtSimArticulated-v1")  # its fastest scene, and drawers of ours
 
 
-def measure_batches(per_object: Sequence[Sequence[Scene]]) -> dict[str, Any]:
+def measure_batches(objects: Sequence[ArticulatedObject]) -> dict[str, Any]:
     """Measure and print.
 
     Parameters
     ----------
-    per_object : sequence of sequences of Scene
-        States and views of each object, at 128x128.
+    objects : sequence of ArticulatedObject
+        As many views of each.
 
     Returns
     -------
@@ -38,10 +38,10 @@ def measure_batches(per_object: Sequence[Sequence[Scene]]) -> dict[str, Any]:
     renderer = WarpRenderer()
     gpu = renderer.device != "cpu"
     batch, device = _BATCH["cuda" if gpu else "cpu"], str(import_warp().get_device(renderer.device).name)
-    views, clouds = _warp_rates(renderer, per_object, batch)
+    views, clouds = _warp_rates(renderer, objects, batch)
     renderer.close()
-    print(f"\n{batch} views of {len(per_object)} objects at once, {SIZE}x{SIZE}, depth and part ids, on {device}")
-    print(f"{'warp':32s}{views:10.0f} views/s; as clouds of {NUM_POINTS} points {clouds:.0f}/s")
+    print(f"\n{batch} views of {len(objects)} objects at once, {SIZE}x{SIZE}, depth and part ids, on {device}")
+    print(f"{'warp':32s}{views:10.0f} views/s; clouds of {NUM_POINTS} points, each of a new view, {clouds:.0f}/s")
     problem = examine("maniskill").problem if gpu else "no GPU here"
     rates = {name: None if problem else _maniskill_rate(name, _SUB_SCENES, "gpu") for name in _MANISKILL}
     for name, rate in rates.items():
@@ -55,16 +55,14 @@ def measure_batches(per_object: Sequence[Sequence[Scene]]) -> dict[str, Any]:
     }
 
 
-def _warp_rates(renderer: WarpRenderer, per_object: Sequence[Sequence[Scene]], batch: int) -> tuple[float, float]:
-    """Views and clouds per second, states and cameras being brought to the device each time."""
-    objects = renderer.load([scenes[0][0] for scenes in per_object])
-    rng = np.random.default_rng(0)
-    numbers = rng.integers(len(per_object), size=batch)
-    scenes = [per_object[number][rng.integers(len(per_object[number]))] for number in numbers]
-    views = Views.of(numbers, [q for _, q, _ in scenes], [camera for _, _, camera in scenes])
-    finish = import_warp().synchronize
-    drawn = _rate(lambda: renderer.render_views(objects, views), finish)
-    return batch * drawn, batch * _rate(lambda: renderer.clouds(objects, views, NUM_POINTS), finish)
+def _warp_rates(renderer: WarpRenderer, objects: Sequence[ArticulatedObject], batch: int) -> tuple[float, float]:
+    """Views per second, states and cameras being brought to the device each time; clouds per second of new ones."""
+    loaded, rng = renderer.load(objects), np.random.default_rng(0)
+    views, finish = draw_views(objects, batch, rng), import_warp().synchronize
+    drawn = _rate(lambda: renderer.render_views(loaded, views), finish)
+    return batch * drawn, batch * _rate(
+        lambda: renderer.clouds(loaded, draw_views(objects, batch, rng), NUM_POINTS), finish
+    )
 
 
 def _maniskill_rate(env_id: str, batch: int, backend: str) -> float:
