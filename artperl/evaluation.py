@@ -32,6 +32,8 @@ VALIDATION_SEEDS = 1_500_000
 _RIGHT = (10.0, 0.05)
 """An estimate is right when every part is within that many degrees and diagonals: what confidence speaks of."""
 
+_FAR_OFF = 10.0
+
 
 @dataclass(frozen=True, eq=False)
 class Scored:
@@ -240,17 +242,20 @@ def table(figures: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def headline(figures: dict[str, Any]) -> float:
+def headline(scored: Sequence[Scored]) -> float:
     """One number to keep the best by: mean over categories and parts of rotation in degrees and translation in % of the
     diagonal, means and medians.
+
+    Each error counts for ten at most: how many fail matters, but whether one that fails is off by 15 or by 150 degrees
+    says more about the draw than about the estimator.
     """
-    terms = [
-        part[name][middle]
-        for figure in figures.values()
-        for part in figure["parts"]
-        for name in ("rotation_deg", "translation_percent_diagonal")
-        for middle in ("median", "mean")
-    ]
+    terms = []
+    for category in dict.fromkeys(s.category for s in scored):
+        own = [s for s in scored if s.category == category]
+        for errors in ([s.rotation for s in own], [100.0 * s.translation for s in own]):
+            for k in range(max(len(e) for e in errors)):
+                clipped = np.minimum([e[k] for e in errors if len(e) > k], _FAR_OFF)
+                terms += [np.median(clipped), np.mean(clipped)]
     return float(np.mean(terms))
 
 

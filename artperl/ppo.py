@@ -46,6 +46,9 @@ class PPOOptions:
     minibatch: int = 256
     """States of an update."""
     max_gradient: float = 0.5
+    guided: float = 0.5
+    """Share of the steps that the expert takes while the agent learns by cloning alone: left to itself, an agent that
+    knows nothing yet strays so far that what it learns there is of no use."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +76,13 @@ def collect(agent: Agent, fitting: Fitting, goal: Theta, options: PPOOptions, ge
         logits, value = agent(view)
         flat = logits.softmax(-1).flatten(0, 2)
         action = torch.multinomial(flat, 1, generator=generator).view(mask.shape)
+        expert = fitting.expert(goal)
+        if not options.reinforcement:
+            guided = torch.rand(len(action), generator=generator) < options.guided
+            action = torch.where(guided[:, None, None], expert, action)
         views.append(view)
         actions.append(action)
-        experts.append(fitting.expert(goal))
+        experts.append(expert)
         log_probs.append(log_probability(logits, action, mask))
         values.append(value)
         rewards.append(fitting.step(action))

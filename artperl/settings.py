@@ -41,6 +41,8 @@ class TrainOptions:
     """Points of a cloud."""
     agent_rollouts: int = 200
     """Batches of episodes of stage 2; 0 goes without an agent."""
+    cloning_share: float = 0.6
+    """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
     agent_rate: float = 1e-3
     episodes: int = 64
     """Episodes of a rollout."""
@@ -52,7 +54,7 @@ class TrainOptions:
     """Unseen objects of each category, others for validation than for the test at the end."""
     foreign_categories: int = 12
     """Other categories, of which two objects each show what confidence must be low for."""
-    validation_views: int = 2
+    validation_views: int = 4
     """Views of each object when the estimator is validated."""
     test_views: int = 4
     """Views of each object when the best estimator is tested."""

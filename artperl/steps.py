@@ -38,7 +38,9 @@ class Stop:
 
 def autocast(wanted: bool = True) -> torch.autocast:
     """Matrix products in bfloat16, where they are wanted and the processor has them."""
-    return torch.autocast("cpu", torch.bfloat16, enabled=wanted and torch.ops.mkldnn._is_mkldnn_bf16_supported())
+    known = torch.ops.mkldnn._is_mkldnn_bf16_supported()
+    # Weights that are kept in bfloat16 would outlive the steps that change them.
+    return torch.autocast("cpu", torch.bfloat16, enabled=wanted and known, cache_enabled=False)
 
 
 def one_cycle(step: int, total: int) -> float:

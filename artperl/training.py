@@ -189,9 +189,11 @@ class Training:
             problem = problems[n]
             fitting = Fitting(problem.shapes, problem.observed, problem.start, options.fitting)
             updates: list[dict[str, float]] = []
+            cloning = options.ppo.behaviour_cloning and n < options.cloning_share * total
+            ppo = replace(options.ppo, reinforcement=False) if cloning else options.ppo
             with autocast(options.mixed_precision):
-                rollout = collect(self.agent, fitting, problem.goal, options.ppo, generator)
-                update(self.agent, optimizer, rollout, options.ppo, generator, updates.append)
+                rollout = collect(self.agent, fitting, problem.goal, ppo, generator)
+                update(self.agent, optimizer, rollout, ppo, generator, updates.append)
             self.done["agent"] = n + 1
             figures = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]} | rollout.figures
             _write(board, "agent", figures, n)
@@ -214,7 +216,7 @@ class Training:
         if not self._validation:
             self._validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
         scored = evaluate(self.estimator(), self._validation, self.progress)
-        figures, score = summary(scored), headline(summary(scored))
+        figures, score = summary(scored), headline(scored)
         self.history.append({"step": step, "score": score, "done": dict(self.done)})
         _write(board, "validation", _curves(figures) | {"score": score}, step)
         if score < self.best:
