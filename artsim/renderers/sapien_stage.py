@@ -86,41 +86,11 @@ class Stage:
         """Entity with the part's surface, None for a part without."""
         if len(part.faces) == 0:
             return None
-        body = self._sapien.render.RenderBodyComponent()
-        for patch in patches(part, coat, scale):
-            uv = np.stack([patch.uv[:, 0], 1.0 - patch.uv[:, 1]], axis=1)  # Vulkan counts rows from the top
-            body.attach(
-                self._sapien.render.RenderShapeTriangleMesh(
-                    patch.vertices * np.float32(scale), patch.faces, patch.normals, uv, self._material(patch.material)
-                )
-            )
+        body = render_body(self._sapien, part, coat, scale, self._materials)
         entity = self._sapien.Entity()
         entity.add_component(body)
         self._scene.add_entity(entity)
         return entity
-
-    def _material(self, material: Material) -> Any:
-        made = self._materials.get(material)
-        if made is None:
-            colour = _linear(material.colour)
-            glow = [material.emission] * 3 if material.texture is not None else [material.emission * c for c in colour]
-            made = self._materials[material] = self._sapien.render.RenderMaterial(
-                base_color=[*colour, 1.0],
-                emission=[*glow, 1.0],
-                specular=material.specular,
-                roughness=float(np.clip(material.roughness, 0.05, 1.0)),
-                metallic=material.metallic,
-            )
-            if material.texture is not None:
-                rgba = np.dstack([material.texture, np.full(material.texture.shape[:2], 255, np.uint8)])
-                levels = int(np.log2(max(rgba.shape[:2]))) + 1
-                picture = self._sapien.render.RenderTexture2D(
-                    np.ascontiguousarray(rgba), "R8G8B8A8Unorm", mipmap_levels=levels, srgb=True
-                )
-                made.set_base_color_texture(picture)
-                if material.emission:
-                    made.set_emission_texture(picture)
-        return made
 
     def place(self, T_stage_solid: Array) -> None:
         """Move every solid to its (N, 4, 4) pose."""
@@ -230,6 +200,53 @@ class Stage:
         self._sun = None
         self._scene.clear()
         self._scene = None
+
+
+def render_body(sapien: ModuleType, part: Part, coat: Coat, scale: float, materials: dict[Material, Any]) -> Any:
+    """SAPIEN's component that draws a part at its object's scale, in the rest frame.
+
+    Parameters
+    ----------
+    sapien : module
+    part : Part
+    coat : Coat
+    scale : float
+    materials : dict
+        SAPIEN's material of each of artsim's; more are put into it.
+    """
+    body = sapien.render.RenderBodyComponent()
+    for patch in patches(part, coat, scale):
+        if patch.material not in materials:
+            materials[patch.material] = _render_material(sapien, patch.material)
+        uv = np.stack([patch.uv[:, 0], 1.0 - patch.uv[:, 1]], axis=1)  # Vulkan counts rows from the top
+        body.attach(
+            sapien.render.RenderShapeTriangleMesh(
+                patch.vertices * np.float32(scale), patch.faces, patch.normals, uv, materials[patch.material]
+            )
+        )
+    return body
+
+
+def _render_material(sapien: ModuleType, material: Material) -> Any:
+    colour = _linear(material.colour)
+    glow = [material.emission] * 3 if material.texture is not None else [material.emission * c for c in colour]
+    made = sapien.render.RenderMaterial(
+        base_color=[*colour, 1.0],
+        emission=[*glow, 1.0],
+        specular=material.specular,
+        roughness=float(np.clip(material.roughness, 0.05, 1.0)),
+        metallic=material.metallic,
+    )
+    if material.texture is not None:
+        rgba = np.dstack([material.texture, np.full(material.texture.shape[:2], 255, np.uint8)])
+        levels = int(np.log2(max(rgba.shape[:2]))) + 1
+        picture = sapien.render.RenderTexture2D(
+            np.ascontiguousarray(rgba), "R8G8B8A8Unorm", mipmap_levels=levels, srgb=True
+        )
+        made.set_base_color_texture(picture)
+        if material.emission:
+            made.set_emission_texture(picture)
+    return made
 
 
 def _linear(colour: Colour) -> list[float]:
