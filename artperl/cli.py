@@ -179,16 +179,16 @@ class Estimate:
     With --intrinsics, a depth image: .png of whole numbers, or .npy of metres."""
     category: str = "laptop"
     """Folder of an estimator, or the name of one that comes with the package."""
+    out: Path | None = None
+    """Write here, as .json or as .npz with the part of every point; by default print."""
+    view: Path | None = None
+    """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
     mask: Path | None = None
     """Image that is not 0 where the object is in the depth image."""
     intrinsics: Path | None = None
     """JSON with fx, fy, cx, cy, or with a matrix K, in pixels."""
     depth_scale: float = 0.001
     """Metres of one unit of a depth image of whole numbers."""
-    out: Path | None = None
-    """Write here, as .json or as .npz with the part of every point; by default print."""
-    view: Path | None = None
-    """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
 
     def run(self) -> None:
         from artperl.checkpoint import load_estimator

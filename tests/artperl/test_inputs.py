@@ -1,0 +1,103 @@
+"""Clouds, depth images and intrinsics of files are read as what they are; a page shows what was estimated."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import artsim
+from artperl.estimator import Estimator
+from artperl.evaluation import samples_of
+from artperl.inputs import points_of_depth, read_intrinsics, read_points
+from artperl.networks.perception import Perception
+from artperl.view import page
+from artsim.errors import ArtsimError, ConfigError
+from artsim.plan import SampleOptions
+from artsim.renderers import BACKGROUND
+from artsim.sample import Sample
+from tests.artperl.worlds import small_base
+
+
+@pytest.fixture(scope="module")
+def sample() -> Sample:
+    (one,) = samples_of([artsim.make("laptop", 3)], 1, SampleOptions(num_points=512, images=("depth", "part_mask")))
+    return one
+
+
+def test_a_depth_image_holds_the_sampled_points(sample: Sample) -> None:
+    assert sample.depth is not None
+    assert sample.part_mask is not None
+    points = points_of_depth(sample.depth, sample.K, sample.part_mask != BACKGROUND)
+    apart = np.abs(points[:, None] - sample.points[None, :8]).max(axis=-1).min(axis=0)
+    assert apart.max() < 1e-5
+
+
+def test_files_of_a_depth_image(sample: Sample, tmp_path: Path) -> None:
+    assert sample.depth is not None
+    assert sample.part_mask is not None
+    mask = sample.part_mask == 1
+    Image.fromarray((sample.depth * 1000).round().astype(np.uint16)).save(tmp_path / "depth.png")
+    Image.fromarray((mask * 255).astype(np.uint8)).convert("RGB").save(tmp_path / "mask.png")
+    np.save(tmp_path / "depth.npy", sample.depth)
+    (tmp_path / "camera.json").write_text(json.dumps({"cam_K": sample.K.ravel().tolist()}))
+    rounded = read_points(tmp_path / "depth.png", tmp_path / "mask.png", tmp_path / "camera.json")
+    exact = read_points(tmp_path / "depth.npy", tmp_path / "mask.png", tmp_path / "camera.json")
+    assert len(rounded) == len(exact) == mask.sum()
+    assert np.abs(rounded - exact).max() < 0.001
+
+
+def test_intrinsics_in_every_spelling(tmp_path: Path) -> None:
+    K = np.array([[600.0, 0.0, 320.0], [0.0, 610.0, 240.0], [0.0, 0.0, 1.0]])
+    for content in (
+        {"fx": 600, "fy": 610, "cx": 320, "cy": 240},
+        {"K": K.tolist()},
+        {"cam_K": K.ravel().tolist(), "depth_scale": 1.0},
+        {"intrinsic_matrix": K.T.ravel().tolist(), "width": 640, "height": 480},
+    ):
+        (tmp_path / "camera.json").write_text(json.dumps(content))
+        np.testing.assert_array_equal(read_intrinsics(tmp_path / "camera.json"), K)
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"K": [1, 2]}', '{"fx": 1}', '{"K": "none"}'])
+def test_other_intrinsics_are_refused(tmp_path: Path, content: str) -> None:
+    (tmp_path / "camera.json").write_text(content)
+    with pytest.raises(ConfigError, match="intrinsics"):
+        read_intrinsics(tmp_path / "camera.json")
+
+
+def test_images_that_make_no_cloud_are_refused(tmp_path: Path) -> None:
+    depth, K = np.ones((4, 5)), np.eye(3)
+    for wrong in (
+        lambda: points_of_depth(np.ones((4, 5, 3)), K),
+        lambda: points_of_depth(np.zeros((4, 5)), K),
+        lambda: points_of_depth(depth, K, np.zeros((4, 5))),
+        lambda: points_of_depth(depth, K, np.ones((5, 4))),
+        lambda: points_of_depth(depth, np.zeros((3, 3))),
+        lambda: points_of_depth(np.full((4, 5), np.nan), K),
+    ):
+        with pytest.raises(ArtsimError):
+            wrong()
+    (tmp_path / "depth.png").write_bytes(b"nothing")
+    with pytest.raises(ConfigError, match="intrinsics"):
+        read_points(tmp_path / "depth.png")
+    (tmp_path / "camera.json").write_text('{"fx": 1, "fy": 1, "cx": 0, "cy": 0}')
+    with pytest.raises((ConfigError, OSError)):
+        read_points(tmp_path / "depth.png", intrinsics=tmp_path / "camera.json")
+
+
+def test_a_page_holds_the_cloud_and_every_box_of_the_way(sample: Sample) -> None:
+    estimate = Estimator(Perception(2, 16), small_base("laptop"))(sample.points)
+    text = page(estimate, sample.points, "a <laptop>")
+    assert "a &lt;laptop&gt;" in text
+    found = re.search(r"const data = (\{.*\});", text)
+    assert found is not None
+    data = json.loads(found[1])
+    assert len(data["points"]) == len(data["part"]) == 512
+    assert np.shape(data["boxes"]) == (len(estimate.trajectory), 2, 8, 3)
+    np.testing.assert_allclose(np.mean(data["boxes"][-1], axis=1), estimate.translation, atol=1e-3)
+    assert "http" not in text  # nothing is loaded from elsewhere
