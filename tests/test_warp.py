@@ -261,15 +261,19 @@ def test_an_unknown_device_is_refused_with_those_there_are(device: str, warp: Mo
         WarpRenderer(device)
 
 
-def test_without_warp_the_extra_is_named(tmp_path: Path) -> None:
-    (tmp_path / "warp.py").write_text("raise ModuleNotFoundError(\"No module named 'warp'\")\n")
+@pytest.mark.parametrize(("missing", "mend"), [("warp", "artsim[warp]"), ("cache", "WARP_CACHE_PATH")])
+def test_what_warp_lacks_is_said_with_the_mend(missing: str, mend: str, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path / "file" / "cache")}
+    if missing == "warp":
+        (tmp_path / "warp.py").write_text("raise ModuleNotFoundError(\"No module named 'warp'\")\n")
+        environment["PYTHONPATH"] = str(tmp_path)
     program = (
         "import artsim\ntry:\n    artsim.make_renderer('warp')\nexcept artsim.ArtsimError as error:\n    print(error)"
     )
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert "artsim[warp]" in done.stdout
+    assert mend in done.stdout
 
 
 def test_importing_artsim_does_not_import_warp() -> None:

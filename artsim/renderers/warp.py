@@ -274,13 +274,17 @@ def import_warp() -> ModuleType:
     Raises
     ------
     RenderError
-        When it is not installed.
+        When it is not installed, or cannot write its cache.
     """
     try:
         import warp
     except ImportError as error:
         raise RenderError("Warp is not installed", "warp", _MEND) from error
     warp.config.log_level = warp.LOG_WARNING
-    with silent():  # on a machine without a GPU it says so, in C, in every process
-        warp.init()
+    try:
+        with silent():  # on a machine without a GPU it says so, in C, in every process
+            warp.init()
+    except OSError as error:
+        mend = "set WARP_CACHE_PATH to a folder that can be written"
+        raise RenderError(f"Warp has no place for its compiled kernels ({error})", "warp", mend) from error
     return warp
