@@ -11,9 +11,9 @@ import numpy as np
 
 from artsim.appearance import Coat
 from artsim.errors import ConfigError
-from artsim.kinematics import Array, transform_points
+from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
-from artsim.scene import Thing
+from artsim.scene import Thing, used_vertices
 from artsim.solids import rotation_about
 
 GAP = 0.004
@@ -22,7 +22,7 @@ _STEADY = np.deg2rad(2.5)
 """What must be tipped further than this before it falls over stays the way it was made to stand."""
 _YIELD = 0.02  # of the height of its centre of mass: how deep a thing may sink in to find its footing
 _LEVEL = 1e-6  # of an object's size: corners that touch the ground together
-_TRIES = 300
+_TRIES = 200
 _CHOICE = 8  # places that are compared for each thing
 _TALL = 0.15  # metres: what is higher stands rather at the back, what is lower at the front
 _UPRIGHT = np.cos(np.deg2rad(30.0))  # what leans less is turned like what stands upright
@@ -119,7 +119,7 @@ class Arrangement:
 
 
 def resting_rotation(obj: ArticulatedObject) -> Array:
-    """How an object at rest stands or lies on the ground: upright or nearly so where that is steady, else as low as can be.
+    """How an object at rest stands or lies on the ground: (nearly) upright where that is steady, else as low as can be.
 
     Every part weighs as much as its convex hull, at the density of its body where it has one.
 
@@ -190,7 +190,7 @@ def _hull_volume(part: Part) -> tuple[float, Array]:
 
     if len(part.faces) == 0:
         return 0.0, np.zeros(3)
-    points = part.vertices[np.unique(part.faces)]
+    points = used_vertices(part)
     inside = points.mean(axis=0)
     try:
         hull = ConvexHull(points)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,7 +48,7 @@ class Thing:
     def part_vertices(self) -> tuple[Array, ...]:
         """(V, 3) vertices of each part as posed, world frame."""
         return tuple(
-            transform_points(T, part.vertices[np.unique(part.faces)] * self.obj.scale)
+            transform_points(T, used_vertices(part) * self.obj.scale)
             for T, part in zip(self.T_world_part, self.obj.parts, strict=True)
         )
 
@@ -114,6 +115,17 @@ class SceneFrame:
     instance_ids: NDArray[np.uint8]
     part_ids: NDArray[np.uint8]
     rgb: NDArray[np.uint8] | None = None
+
+
+_used: weakref.WeakKeyDictionary[Part, Array] = weakref.WeakKeyDictionary()
+
+
+def used_vertices(part: Part) -> Array:
+    """(V, 3) vertices that a part's triangles use, native units; found once for each part."""
+    found = _used.get(part)
+    if found is None:
+        found = _used[part] = part.vertices[np.unique(part.faces)]
+    return found
 
 
 def rigid(name: str, mesh: Mesh) -> ArticulatedObject:

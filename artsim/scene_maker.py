@@ -27,7 +27,7 @@ from artsim.sources import family_sources, find_sources
 _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""
 _DRAWS = 12  # of a procedural object until one is small enough for a table
-_CROWD = 3.2  # of the sum of footprints: the area that things are spread over
+_CROWD = 2.5  # of the sum of footprints: the area that things are spread over
 _ATTEMPTS = 4  # arrangements that are begun before a scene is given up
 _KIN = {"knife": "folding_knife", "table": "drawer"}
 """Families whose sizes the real objects of other categories have."""

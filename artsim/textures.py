@@ -61,9 +61,9 @@ def parquet(rng: np.random.Generator, tone: ArrayLike, rows: int = 6, size: int 
         cut = int(rng.integers(size))
         for start, end in ((cut, cut + size // 2), (cut + size // 2, cut + size)):
             shade = np.asarray(tone, dtype=np.float64) * rng.uniform(0.86, 1.08)
-            board = wood(rng, shade.clip(0.0, 1.0), 4)
+            board = wood(rng, shade.clip(0.0, 1.0), 4, size // 2)
             columns = np.arange(start, end) % size
-            picture[top:bottom, columns] = board[top:bottom, : len(columns)]
+            picture[top:bottom, columns] = board[: bottom - top, : len(columns)]
             picture[top:bottom, columns[:2]] = picture[top:bottom, columns[:2]] // 2
         picture[top : top + 2] = picture[top : top + 2] // 2
     return picture

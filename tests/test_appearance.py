@@ -1,0 +1,305 @@
+"""Materials, textures, coats and light are what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+import artsim
+from artsim import Camera, make
+from artsim.appearance import Coat, Lights, Material, Sun, corner_normals, patches, plain_coat, subpixel
+from artsim.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repainted
+from artsim.objects import Part
+from artsim.painted import painted_coats
+from artsim.props import placed
+from artsim.renderers import Renderer
+from artsim.renderers.base import two_sided_faces
+from artsim.renderers.sapien import SapienRenderer
+from artsim.renderers.scenes import render_scene
+from artsim.scene import Scene, Thing
+from artsim.solids import box, cylinder
+from artsim.sources import find_sources
+from artsim.textures import TEXTURES, noise
+from tests.conftest import backend, rigid, solid
+
+MATT = Material((0.6, 0.4, 0.2), roughness=1.0, specular=0.0)
+NONE = (0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def sapien() -> Iterator[Renderer]:
+    renderer = backend("sapien")
+    yield renderer
+    renderer.close()
+
+
+@pytest.mark.parametrize("name", sorted(TEXTURES))
+def test_textures_are_pictures_of_about_their_tone_and_the_same_for_the_same_chance(name: str) -> None:
+    tone = np.array([0.6, 0.5, 0.4])
+    first, again, other = (TEXTURES[name](np.random.default_rng(seed), tone) for seed in (1, 1, 2))
+    assert first.dtype == np.uint8
+    assert first.shape == (512, 512, 3)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    if name != "screen":
+        assert np.abs(first.mean(axis=(0, 1)) / 255.0 - tone).max() < 0.12
+
+
+@pytest.mark.parametrize("name", sorted(set(TEXTURES) - {"screen"}))
+def test_textures_repeat_without_a_seam(name: str) -> None:
+    picture = TEXTURES[name](np.random.default_rng(0), (0.6, 0.5, 0.4)).astype(float)
+    for axis in (0, 1):
+        steps = np.abs(picture - np.roll(picture, 1, axis)).mean(axis=(1 - axis, 2))
+        assert steps[0] <= 1.5 * np.sort(steps)[-8:].mean()
+
+
+def test_noise_has_no_mean_unit_deviation_and_the_stretch_that_was_asked_for() -> None:
+    values = noise(np.random.default_rng(0), 256, 1.0, (20.0, 1.0))
+    assert values.mean() == pytest.approx(0.0, abs=1e-9)
+    assert values.std() == pytest.approx(1.0)
+    across, down = (np.abs(np.diff(values, axis=axis)).mean() for axis in (1, 0))
+    assert down > 3 * across
+
+
+def test_spheres_look_round_and_boxes_have_edges() -> None:
+    ball, cube = trimesh.creation.icosphere(3), trimesh.creation.box((1, 2, 3))
+    normals = corner_normals(np.asarray(ball.vertices), np.asarray(ball.faces, np.int32))
+    assert np.abs(normals - ball.vertices[ball.faces].reshape(-1, 3)).max() < 0.02
+    normals = corner_normals(np.asarray(cube.vertices), np.asarray(cube.faces, np.int32))
+    assert normals.reshape(-1, 3, 3) == pytest.approx(np.repeat(cube.face_normals[:, None], 3, axis=1), abs=1e-6)
+
+
+def test_textures_have_their_size_in_metres_whatever_the_scale_of_the_object() -> None:
+    part = solid("box", trimesh.creation.box((0.4, 0.3, 0.2)))
+    coat = plain_coat(part, replace(MATT, tile=0.25))
+    for scale in (1.0, 3.0):
+        (patch,) = patches(part, coat, scale)
+        corners, uv = patch.vertices.reshape(-1, 3, 3) * scale, patch.uv.reshape(-1, 3, 2)
+        lengths = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+        assert np.linalg.norm(uv[:, 1] - uv[:, 0], axis=1) * 0.25 == pytest.approx(lengths, rel=1e-5)
+
+
+def test_patches_are_the_whole_surface_split_by_material() -> None:
+    obj = make("laptop", 3)
+    for part, coat in zip(obj.parts, draw_coats(obj, np.random.default_rng(0)), strict=True):
+        area = 0.0
+        for patch in patches(part, coat):
+            a, b, c = patch.vertices.reshape(-1, 3, 3).astype(float).transpose(1, 0, 2)
+            area += 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+        whole = trimesh.Trimesh(part.vertices, two_sided_faces(part), process=False)
+        assert area == pytest.approx(whole.area, rel=1e-5)
+
+
+def test_every_face_knows_the_piece_that_it_lies_on() -> None:
+    body, knob = box((0, 0, 0), (1, 1, 1)), cylinder((0.5, 0.5, 0.9), (0.5, 0.5, 1.2), 0.1)
+    vertices, faces = (body + knob).union()
+    number = piece_of_face(vertices, faces, (body + knob).piece_meshes())
+    middles = vertices[faces].mean(axis=1)
+    assert (number == ((middles[:, 2] > 1.0 + 1e-9) | (np.hypot(*(middles[:, :2] - 0.5).T) < 0.1) & (
+        middles[:, 2] > 0.5))).mean() == 1.0  # fmt: skip
+
+
+def test_laptops_have_dark_keys_and_a_lit_screen() -> None:
+    obj = make("laptop", 0)
+    base, lid = draw_coats(obj, np.random.default_rng(0))
+    assert max(base.materials[1].colour) < 0.15
+    keys = base.material_of_face == 1
+    assert 0.2 < keys.mean() < 1.0
+    assert (obj.parts[0].vertices[obj.parts[0].faces[keys]][..., 2] > obj.parts[0].bounds[0, 2]).all()
+    shown = lid.material_of_face == 2
+    assert lid.materials[2].emission > 0
+    assert lid.uv is not None
+    assert np.isfinite(lid.uv[shown]).all()
+    assert lid.uv[shown].min() == pytest.approx(0.0)
+    assert lid.uv[shown].max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("category", ["drawer", "scissors", "globe", "random_tree", "kitchen_pot"])
+def test_coats_fit_their_parts_and_come_from_chance_alone(category: str) -> None:
+    obj = make(category, 1)
+    first, again, other = (draw_coats(obj, np.random.default_rng(seed)) for seed in (0, 0, 9))
+    for part, coat, same in zip(obj.parts, first, again, strict=True):
+        assert len(coat.material_of_face) == len(part.faces)
+        assert coat.material_of_face.max(initial=0) < len(coat.materials)
+        assert [m.colour for m in coat.materials] == [m.colour for m in same.materials]
+    assert [m.colour for c in first for m in c.materials] != [m.colour for c in other for m in c.materials]
+
+
+def test_every_finish_makes_a_material() -> None:
+    for name in FINISHES:
+        material = draw_material(name, np.random.default_rng(0))
+        assert all(0.0 <= value <= 1.0 for value in (*material.colour, material.roughness, material.metallic))
+    coats = (Coat((MATT, MATT), np.zeros(1, np.int64)),)
+    (new,) = repainted(coats, np.random.default_rng(0))
+    assert new.materials[0] is new.materials[1]
+    assert new.materials[0].colour != MATT.colour
+
+
+# --- colours of files ------------------------------------------------------------------------------------------------
+
+OBJ = """mtllib look.mtl
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
+usemtl red\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4
+usemtl picture\nf 1/1 2/2 5/3
+"""
+URDF = """<robot name="thing"><link name="base">
+<visual><geometry><mesh filename="thing.obj"/></geometry></visual>
+</link></robot>"""
+
+
+def painted(folder: Path, materials: str) -> tuple[Coat, ...] | None:
+    (folder / "thing.obj").write_text(OBJ)
+    (folder / "look.mtl").write_text(materials)
+    (folder / "thing.urdf").write_text(URDF)
+    return painted_coats(artsim.load(folder / "thing.urdf"))
+
+
+def test_colours_and_pictures_of_wavefront_files_are_shown(tmp_path: Path) -> None:
+    Image.fromarray(np.full((4, 4, 3), (10, 200, 30), np.uint8)).save(tmp_path / "green.png")
+    coats = painted(tmp_path, "newmtl red\nKd 1 0 0\nnewmtl picture\nKd 1 1 1\nmap_Kd green.png\n")
+    assert coats is not None
+    (coat,) = coats
+    looks = [coat.materials[number] for number in coat.material_of_face]
+    assert sorted(look.texture is not None for look in looks) == [False, False, True]
+    assert [look.colour for look in looks if look.texture is None] == [(1.0, 0.0, 0.0)] * 2
+    textured = next(i for i, look in enumerate(looks) if look.texture is not None)
+    texture = looks[textured].texture
+    assert texture is not None
+    assert (texture == (10, 200, 30)).all()
+    assert coat.uv is not None
+    assert coat.uv[textured] == pytest.approx(np.array([(0, 0), (1, 0), (1, 1)]))
+
+
+@pytest.mark.parametrize("name", ["nowhere.png", "../../secret.png", "/etc/passwd", "broken.png"])
+def test_pictures_that_are_missing_broken_or_outside_leave_the_plain_colour(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "secret.png")
+    (folder / "broken.png").write_bytes(b"\x89PNG no picture")
+    coats = painted(folder, f"newmtl red\nKd 1 0 0\nnewmtl picture\nKd 0 0 1\nmap_Kd {name}\n")
+    assert coats is not None
+    assert {material.colour for material in coats[0].materials} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
+    assert all(material.texture is None for material in coats[0].materials)
+
+
+def test_objects_without_colours_of_their_own_say_so(tmp_path: Path, box_laptop: Path) -> None:
+    assert painted_coats(artsim.load(box_laptop)) is None
+    assert painted_coats(make("laptop", 0)) is None
+
+
+@pytest.mark.parametrize("category", ["Laptop", "Box", "StorageFurniture", "Faucet"])
+def test_real_objects_bring_their_own_looks(category: str, partnet_dir: Path) -> None:
+    obj = find_sources([partnet_dir / category])[0].load()
+    coats = painted_coats(obj)
+    assert coats is not None
+    for part, coat in zip(obj.parts, coats, strict=True):
+        assert len(coat.material_of_face) == len(part.faces)
+        assert coat.uv is not None
+        assert coat.uv.shape == (len(part.faces), 3, 2)
+
+
+# --- light -----------------------------------------------------------------------------------------------------------
+
+
+def seen_from_above(things: tuple[Thing, ...], lights: Lights, renderer: Renderer, samples: int = 1) -> np.ndarray:
+    """Colours 0 to 1 of a level place around the origin, 1 m wide, seen from 2 m above."""
+    camera = Camera.look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), 64, 64, 2 * np.arctan(0.25), up=(1.0, 0.0, 0.0))
+    rgb = render_scene(Scene(things, (), (), lights), [camera], renderer, samples)[0].rgb
+    assert rgb is not None
+    return rgb / 255.0
+
+
+def floor(size: float = 2.0) -> Thing:
+    return placed("floor", box((-size, -size, -0.1), (size, size, 0.0)), MATT)
+
+
+def test_a_sun_of_strength_1_shows_a_surface_in_its_own_colour(sapien: Renderer) -> None:
+    straight = Lights(Sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)), NONE, NONE)
+    assert seen_from_above((floor(),), straight, sapien)[32, 32] == pytest.approx(MATT.colour, abs=0.012)
+    slanting = replace(straight, sun=Sun((np.sqrt(3.0), 0.0, -1.0), (1.0, 1.0, 1.0)))
+    half = np.array(MATT.colour) * 0.5 ** (1 / 2.2)
+    assert seen_from_above((floor(),), slanting, sapien)[32, 32] == pytest.approx(half, abs=0.012)
+
+
+def test_a_sky_of_strength_1_shows_a_level_surface_in_its_own_colour(sapien: Renderer) -> None:
+    sky = Lights(Sun((0.0, 0.0, -1.0), NONE), (1.0, 1.0, 1.0), NONE)
+    open_air = seen_from_above((floor(),), sky, sapien, samples=8)[32, 32]
+    assert open_air == pytest.approx(MATT.colour, abs=0.02)
+    walls = [((-0.3, -0.3, 0.0), (0.3, -0.2, 0.5)), ((-0.3, 0.2, 0.0), (0.3, 0.3, 0.5)),
+             ((-0.3, -0.2, 0.0), (-0.2, 0.2, 0.5)), ((0.2, -0.2, 0.0), (0.3, 0.2, 0.5))]  # fmt: skip
+    shaft = tuple(placed("wall", box(*corners), MATT) for corners in walls)
+    assert (seen_from_above((floor(), *shaft), sky, sapien, samples=8)[32, 32] < 0.75 * open_air).all()
+
+
+def test_things_cast_shadows_where_geometry_says(sapien: Renderer) -> None:
+    sun = Lights(Sun((1.0, 0.0, -1.0), (1.0, 1.0, 1.0)), NONE, NONE)
+    plate = placed("plate", box((-0.3, -0.1, 0.199), (-0.1, 0.1, 0.2)), MATT)
+    picture = seen_from_above((floor(), plate), sun, sapien)[..., 0]
+    # Up in the image is +x, 64 pixels a metre on the ground: the shadow lies at x from -0.1 to 0.1.
+    row = {x: round(32 - 64 * x - 0.5) for x in (-0.42, 0.02, 0.3)}
+    assert picture[row[0.02], 32] < 0.02
+    assert picture[row[0.3], 32] > 0.3
+    assert picture[row[-0.42], 32] > 0.3
+    assert picture[row[0.02], 4] > 0.3
+
+
+def test_wide_suns_soften_the_edges_of_shadows(sapien: Renderer) -> None:
+    plate = placed("plate", box((-0.9, -0.5, 0.499), (-0.5, 0.5, 0.5)), MATT)
+
+    def penumbra(radius: float) -> int:
+        sun = Lights(Sun((1.0, 0.0, -1.0), (1.0, 1.0, 1.0), radius), NONE, NONE)
+        column = seen_from_above((floor(), plate), sun, sapien, samples=16)[:, 32, 0]
+        return int(((column > 0.1) & (column < 0.4)).sum())
+
+    # 1.4 m x 0.2 rad, seen at 64 pixels a metre on a slope of 45 degrees
+    assert penumbra(0.0) <= 2
+    assert 8 <= penumbra(0.2) <= 30
+
+
+@pytest.mark.parametrize("name", ["sapien", "pybullet"])
+def test_textures_lie_the_right_way_up(name: str) -> None:
+    renderer = backend(name)
+    texture = np.zeros((64, 64, 3), np.uint8)
+    texture[:32, :32], texture[32:, 32:] = (255, 0, 0), (0, 255, 0)  # red above left, green below right
+    sheet = Part("sheet", "sheet", np.array([[0, 0.5, -0.5], [0, -0.5, -0.5], [0, -0.5, 0.5], [0, 0.5, 0.5]], float),
+                 np.array([[0, 1, 2], [0, 2, 3]], np.int32))  # fmt: skip
+    uv = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], float)
+    obj = replace(rigid(trimesh.creation.box()), parts=(sheet,))
+    coat = Coat((replace(MATT, texture=texture),), np.zeros(2, np.int64), uv)
+    lights = Lights(Sun((1.0, 0.0, 0.0), (0.5, 0.5, 0.5)), NONE, (0.5, 0.5, 0.5))
+    scene = Scene((Thing(obj, np.zeros(1), np.eye(4), (coat,)),), (), (), lights)
+    rgb = render_scene(scene, [Camera.look_at((-2, 0, 0), (0, 0, 0), 64, 64)], renderer)[0].rgb
+    renderer.close()
+    assert rgb is not None
+    assert rgb[24, 24].argmax() == 0
+    assert rgb[40, 40].argmax() == 1
+    assert rgb[24, 24].max() > 80
+    assert rgb[40, 40].max() > 80
+    assert rgb[24, 40].max() < 60
+
+
+def test_several_cameras_see_a_scene_that_was_loaded_once(sapien: Renderer) -> None:
+    assert isinstance(sapien, SapienRenderer)
+    scene = Scene((floor(),), (), (), Lights(Sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)), NONE, NONE))
+    cameras = [Camera.look_at((-1, 0.3, z), (0, 0, 0), *size) for z in (0.5, 1.0) for size in ((64, 48), (48, 64))]
+    first = sapien.render_scene(scene, cameras)
+    stage = sapien._stages[scene]
+    again = [sapien.render_scene(scene, [camera])[0] for camera in cameras]
+    assert sapien._stages[scene] is stage
+    for one, two in zip(first, again, strict=True):
+        assert np.array_equal(one.depth, two.depth)
+        assert np.array_equal(one.rgb, two.rgb)
+
+
+def test_samples_of_a_picture_lie_within_their_pixel_around_its_middle() -> None:
+    offsets = np.array([subpixel(index) for index in range(65)])
+    assert (offsets[0] == 0.0).all()
+    assert (np.abs(offsets) <= 0.5).all()
+    assert np.abs(offsets.mean(axis=0)).max() < 0.02
+    assert len(np.unique(offsets, axis=0)) == 65
