@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from artsim import make_renderer
+from artsim.errors import RenderError
 from artsim.families import FAMILIES
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer
@@ -146,14 +147,18 @@ def _in_turn(lists: list[list[Source]], count: int) -> list[Source]:
 def main(options: Options) -> None:
     """Compare and print."""
     sources = choose(options.partnet, options.objects) + choose_procedural(options.procedural)
-    result = {}
+    result: dict[str, Any] = {}
     for name in options.renderers:
-        renderer = make_renderer(name)
-        total, rows = Agreement(), []
+        try:
+            renderer = make_renderer(name)
+        except RenderError as error:
+            print(f"{name}: not compared: {error}")
+            result[name] = None
+            continue
+        rows, total = [], Agreement()
         for number, source in enumerate(tqdm(sources, desc=name, leave=False)):
-            obj = source.load()
-            one = compare(draw_scenes(obj, options.states, options.views, seed=number), renderer)
-            rows.append((f"{obj.category} {obj.object_id}", one))
+            one = compare(draw_scenes(source.load(), options.states, options.views, seed=number), renderer)
+            rows.append((source.name, one))
             total.merge(one)
         renderer.close()
         print(f"{name} against raycast: {options.objects} real and {options.procedural} procedural objects", end="")
