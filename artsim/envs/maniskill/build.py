@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,16 @@ from numpy.typing import NDArray
 from sapien.wrapper.articulation_builder import LinkBuilder
 from scipy.spatial.transform import Rotation
 
+from artsim.appearance import Coat
 from artsim.embodied import embodied
 from artsim.envs.maniskill.places import T_world_object
 from artsim.export.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
-from artsim.renderers.sapien import flat_shaded
-from artsim.view import PALETTE
+from artsim.renderers.sapien_stage import render_body
 
 OBJECT_BIT = 28
 """Bit of collision group 2 that parts of an object share with each other, and with the ground: those do not collide."""
-
-_PALE = 0.55  # of the palette's colours
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +53,7 @@ class Built:
     inertia: Array
 
 
-def build(scene: ManiSkillScene, obj: ArticulatedObject, number: int, gravity: bool) -> Built:
+def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], number: int, gravity: bool) -> Built:
     """Put an object on the ground of a sub-scene, its base fixed.
 
     Damping, friction and masses are those of :func:`artsim.export.robot.as_robot`, as in :mod:`artsim.physics`; a
@@ -64,6 +63,8 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, number: int, gravity: b
     ----------
     scene : ManiSkillScene
     obj : ArticulatedObject
+    coats : sequence of Coat, length K
+        Not looked at where nothing is drawn.
     number : int
         Sub-scene.
     gravity : bool
@@ -83,7 +84,7 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, number: int, gravity: b
     for i, link in enumerate(robot.links):
         joint = joint_of.get(i)
         parent = None if joint is None else builder.link_builders[joint.parent]
-        made = _LinkBuilder(i, parent, link, obj)
+        made = _LinkBuilder(i, parent, link, obj, coats)
         if joint is None:
             made.set_joint_properties("fixed", [], sapien.Pose(), sapien.Pose())
         else:
@@ -117,25 +118,22 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, number: int, gravity: b
 class _LinkBuilder(LinkBuilder):  # type: ignore[misc]  # SAPIEN has no types
     """Builds a link from arrays instead of files."""
 
-    def __init__(self, index: int, parent: LinkBuilder | None, link: Link, obj: ArticulatedObject):
+    def __init__(
+        self, index: int, parent: LinkBuilder | None, link: Link, obj: ArticulatedObject, coats: Sequence[Coat]
+    ):
         super().__init__(index, parent)
         self.set_name(link.name)
-        self._link, self._obj = link, obj
+        self._link, self._obj, self._coats = link, obj, coats
         self.collision_groups = [1, 1, 1 << OBJECT_BIT, 0]
         if link.part >= 0 and len(obj.parts[link.part].faces):
             self.visual_records = [link.part]  # told that there are some, the builder asks for the component
 
     def build_render_component(self) -> Any:
-        """The part's own surface, in a colour of its own."""
-        k, obj = self._link.part, self._obj
-        vertices, faces, normals = flat_shaded(obj.parts[k])
-        red, green, blue = (1.0 - _PALE * (1.0 - PALETTE[k % len(PALETTE)] / 255.0)).tolist()
-        material = sapien.render.RenderMaterial(base_color=[red, green, blue, 1.0], specular=0.2, roughness=0.7)
-        component = sapien.render.RenderBodyComponent()
-        local = (vertices * obj.scale - self._link.origin).astype(np.float32)
-        component.attach(
-            sapien.render.RenderShapeTriangleMesh(local, faces, normals, np.zeros((0, 2), np.float32), material)
-        )
+        """The part's own surface under its coat."""
+        k, scale = self._link.part, self._obj.scale
+        part = self._obj.parts[k]
+        local = replace(part, vertices=part.vertices - self._link.origin / scale, body=None)
+        component = render_body(sapien, local, self._coats[k], scale, {})
         component.name = self.name
         return component
 

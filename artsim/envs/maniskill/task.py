@@ -2,79 +2,39 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
-from typing import Any, get_args
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import sapien
 import torch
 from mani_skill.envs.sapien_env import BaseEnv
-from mani_skill.envs.utils.observations import parse_obs_mode_to_struct
 from mani_skill.sensors.camera import CameraConfig
 from mani_skill.utils.building.ground import build_ground
 from mani_skill.utils.registration import REGISTERED_ENVS, register
 from mani_skill.utils.structs import Pose
-from scipy.spatial.transform import Rotation
+from mani_skill.utils.structs.types import GPUMemoryConfig, SimConfig
 from torch import Tensor
 
-from artsim.camera import Camera
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
 from artsim.envs.maniskill.build import OBJECT_BIT, build
-from artsim.envs.maniskill.goal import BEST, LEAST_OPEN, Goal, dense_reward, start_and_goal
+from artsim.envs.maniskill.eyes import camera_record, look, poses
+from artsim.envs.maniskill.goal import BEST, dense_reward, start_and_goal
 from artsim.envs.maniskill.mechanism import Mechanism
-from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, T_world_object, onlooker, robot_stand
+from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
+from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_stand
 from artsim.envs.maniskill.truth import Record, Truth, truth_of
-from artsim.episode import Episode, EpisodeOptions, widest_state
+from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError
-from artsim.kinematics import Array
+from artsim.finishes import draw_coats
 from artsim.objects import ArticulatedObject
+from artsim.painted import painted_coats
 from artsim.renderers.sapien import import_sapien
-from artsim.sampling import Scale, ViewOptions, sample_view
 
 CAMERA = "base_camera"
 """The camera of the observations."""
 _SEEDS = 2**31
 _TRIES = 100  # objects drawn until one fits
-# SAPIEN's camera looks along x with z up.
-SAPIEN_FROM_CV = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-CV_FROM_SAPIEN = SAPIEN_FROM_CV.T
-
-
-@dataclass(frozen=True)
-class TaskOptions:
-    """What an episode is about; ManiSkill's own options besides."""
-
-    categories: tuple[str, ...] = ("drawer",)
-    """Procedural categories, such as drawer: every sub-scene has a new object of one, unless objects are named."""
-    objects: tuple[Path, ...] = ()
-    """URDF files, object folders, or folders of them: every sub-scene has one of these."""
-    obj: ArticulatedObject | None = None
-    """The one object of all."""
-    scale: Scale = "native"
-    """Size of the object: native (as in its file), unit (diagonal of 1 m), or a range of diagonals in metres."""
-    goal: Goal = "open"
-    """open: from rest to half open or more; close: the other way; random: from anywhere to anywhere."""
-    tolerance: float = 0.1
-    """Share of its range within which a joint is at its goal."""
-    gravity: bool = False
-    """Whether gravity pulls on the object's parts; without it, lids stay where they are left."""
-    views: ViewOptions = field(
-        default_factory=lambda: ViewOptions(width=128, height=128, azimuth=(30.0, 75.0), elevation=(25.0, 55.0))
-    )
-    """Where the camera of the observations is."""
-    max_joints: int = 16
-    """Objects with more joints are passed over. Observations have as many rows, infos one more, for the root."""
-
-    def __post_init__(self) -> None:
-        if self.goal not in get_args(Goal):
-            raise ConfigError(f"there is no goal {self.goal!r}", "goal", "use open, close or random")
-        if not 0.0 < self.tolerance < LEAST_OPEN:
-            raise ConfigError(f"{self.tolerance} is not within 0..{LEAST_OPEN}", "tolerance", "use 0.1")
-        if self.max_joints < 1:
-            raise ConfigError(f"{self.max_joints} is not a count", "max_joints", "use 1 or more")
 
 
 class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
@@ -83,6 +43,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     **Objects** are drawn when ManiSkill reconfigures: one for each sub-scene, procedural or of files. Alone
     (``num_envs=1``), that is at every reset; in batches only at the first, unless ``reconfiguration_freq`` says
     otherwise. An object stands on the ground, its front towards -x and towards the robot.
+    Files tell how it looks; the looks of procedural objects are drawn.
 
     **Observations** are those of ManiSkill's modes. ``state`` holds, for each of ``max_joints`` joints: where it is and
     how far it has to go (shares of its range), its speed, where its handle is from the gripper, in which direction it
@@ -123,7 +84,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     """
 
     SUPPORTED_ROBOTS = tuple(ROBOTS)
-    SUPPORTED_REWARD_MODES = ("normalized_dense", "dense", "sparse", "none")
+    SUPPORTED_REWARD_MODES = REWARD_MODES
 
     truth: Truth
     objects: tuple[ArticulatedObject, ...]
@@ -151,7 +112,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
                 scale=self.options.scale,
             )
         )
-        _check(robot_uids, num_envs, obs_mode, options)
+        check(robot_uids, num_envs, obs_mode, options)
         if render_backend == "auto":
             seen = obs_mode not in ("state", "state_dict", "none") or options.get("render_mode") is not None
             render_backend = "none" if not seen else "gpu" if torch.cuda.is_available() else "cpu"
@@ -167,6 +128,11 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             **options,
         )
 
+    @property
+    def _default_sim_config(self) -> SimConfig:
+        # Objects have many convex pieces.
+        return SimConfig(gpu_memory_config=GPUMemoryConfig(max_rigid_contact_count=2**21, max_rigid_patch_count=2**19))
+
     def _load_agent(self, options: dict[str, Any]) -> None:
         super()._load_agent(options, sapien.Pose([-3.0, 0.0, 0.0]))
 
@@ -174,10 +140,13 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         rngs = [np.random.default_rng(int(seed)) for seed in self._batched_episode_rng.randint(_SEEDS)]
         self.objects = tuple(self._draw_object(rng) for rng in rngs)
         self.truth = truth_of(self.objects, self.options.max_joints, self.device)
-        self._cameras = [_look(obj, self.options.views, rng) for obj, rng in zip(self.objects, rngs, strict=True)]
+        self._cameras = [look(obj, self.options.views, rng) for obj, rng in zip(self.objects, rngs, strict=True)]
         ground = build_ground(self.scene)
         ground.set_collision_group_bit(group=2, bit_idx=OBJECT_BIT, bit=1)
-        built = [build(self.scene, obj, number, self.options.gravity) for number, obj in enumerate(self.objects)]
+        built = []
+        for number, (obj, rng) in enumerate(zip(self.objects, rngs, strict=True)):
+            coats = (painted_coats(obj) or draw_coats(obj, rng)) if self.scene.can_render() else ()
+            built.append(build(self.scene, obj, coats, number, self.options.gravity))
         for each in built:
             self.remove_from_state_dict_registry(each.articulation)
         self.mechanism = Mechanism(self.scene, built, self.truth)
@@ -208,12 +177,12 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         lens: dict[str, Any] = {"fov": float(np.deg2rad(views.fov))}
         if views.custom is not None:
             lens = {"intrinsic": np.stack([camera.K for camera in self._cameras])}
-        pose = _poses([camera.T_world_camera for camera in self._cameras])
+        pose = poses([camera.T_world_camera for camera in self._cameras])
         return [CameraConfig(CAMERA, pose, first.width, first.height, near=0.01, far=100.0, **lens)]
 
     @property
     def _default_human_render_camera_configs(self) -> CameraConfig:
-        pose = _poses(
+        pose = poses(
             [onlooker(obj, stand) for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)]
         )
         return CameraConfig(
@@ -223,20 +192,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     def _after_reconfigure(self, options: dict[str, Any]) -> None:
         """What the camera of the observations is in the end: users may have changed it."""
         config = self._sensor_configs[CAMERA] if self.scene.can_render() else self._default_sensor_configs[0]
-        count = self.num_envs
-        T_world_camera = config.pose.to_transformation_matrix().to(self.device) @ _tensor(SAPIEN_FROM_CV, self.device)
-        if config.intrinsic is not None:
-            K = _tensor(config.intrinsic, self.device).reshape(-1, 3, 3)
-        else:
-            focal = 0.5 * config.height / np.tan(0.5 * config.fov)
-            K = _tensor([[focal, 0, 0.5 * config.width], [0, focal, 0.5 * config.height], [0, 0, 1]], self.device)[None]
-        size = torch.tensor([[config.width, config.height]], device=self.device).expand(count, 2)
-        self._camera = {
-            "K": K.expand(count, 3, 3),
-            "T_world_camera": T_world_camera.expand(count, 4, 4),
-            "width": size[:, 0],
-            "height": size[:, 1],
-        }
+        self._camera = camera_record(config, self.num_envs, self.device)
         self._T_camera_world = torch.linalg.inv(self._camera["T_world_camera"])
 
     def _initialize_episode(self, env_idx: Tensor, options: dict[str, Any]) -> None:
@@ -327,50 +283,6 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
                     f"pass one of shape {whole}: control mode {self.control_mode} of {self.robot_uids}",
                 )
         return super().step(action)
-
-
-def _check(robot_uids: Any, num_envs: int, obs_mode: str, options: dict[str, Any]) -> None:
-    """Refuse what ManiSkill would stumble on."""
-    theirs = set(inspect.signature(BaseEnv.__init__).parameters) - {"self"}
-    unknown = options.keys() - theirs
-    if unknown:
-        ours = ", ".join(f.name for f in fields(TaskOptions))
-        raise ConfigError(f"there is no option {', '.join(sorted(unknown))}", ENV_ID, f"use {ours}, or ManiSkill's own")
-    if robot_uids not in ROBOTS:
-        raise ConfigError(f"{robot_uids!r} does not do this task", "robot_uids", f"use {', '.join(ROBOTS)}")
-    try:
-        if not isinstance(obs_mode, str):
-            raise AssertionError("an observation mode is a word")
-        parse_obs_mode_to_struct(obs_mode)
-    except AssertionError as error:
-        raise ConfigError(
-            str(error), "obs_mode", "use state, state_dict, pointcloud, rgb+depth+segmentation or other textures"
-        ) from error
-    reward_mode = options.get("reward_mode")
-    if reward_mode not in (None, *ArticulatedTask.SUPPORTED_REWARD_MODES):
-        raise ConfigError(
-            f"there is no {reward_mode!r}", "reward_mode", f"use {', '.join(ArticulatedTask.SUPPORTED_REWARD_MODES)}"
-        )
-    on_cpu = options.get("sim_backend", "auto") in ("cpu", "physx_cpu") or not torch.cuda.is_available()
-    if num_envs > 1 and on_cpu:
-        raise ConfigError(
-            f"PhysX simulates {num_envs} sub-scenes on a CUDA device only",
-            "num_envs",
-            "use 1 here, and processes for more: gymnasium.vector.AsyncVectorEnv over ManiSkill's CPUGymWrapper",
-        )
-
-
-def _look(obj: ArticulatedObject, views: ViewOptions, rng: np.random.Generator) -> Camera:
-    """A camera that sees the object wherever its joints are, in the world's frame."""
-    camera = sample_view(obj, widest_state(obj), views, rng)
-    return replace(camera, T_world_camera=T_world_object(obj) @ camera.T_world_camera)
-
-
-def _poses(T_world_camera: Sequence[Array]) -> Pose:
-    """ManiSkill's (B,) poses of cameras with OpenCV's axes."""
-    T = np.stack(T_world_camera) @ CV_FROM_SAPIEN
-    quaternion = Rotation.from_matrix(T[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
-    return Pose.create(torch.from_numpy(np.concatenate([T[:, :3, 3], quaternion], axis=1)).float())
 
 
 def _tensor(values: Any, device: Any) -> Tensor:

@@ -1,0 +1,97 @@
+"""What users choose of the ManiSkill task, and what they are told when it makes no sense."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, get_args
+
+import torch
+from mani_skill.envs.sapien_env import BaseEnv
+from mani_skill.envs.utils.observations import parse_obs_mode_to_struct
+
+from artsim.envs.maniskill import ENV_ID
+from artsim.envs.maniskill.goal import LEAST_OPEN, Goal
+from artsim.envs.maniskill.places import ROBOTS
+from artsim.errors import ConfigError
+from artsim.objects import ArticulatedObject
+from artsim.sampling import Scale, ViewOptions
+
+REWARD_MODES = ("normalized_dense", "dense", "sparse", "none")
+
+
+@dataclass(frozen=True)
+class TaskOptions:
+    """What an episode is about; ManiSkill's own options besides."""
+
+    categories: tuple[str, ...] = ("drawer",)
+    """Procedural categories, such as drawer: every sub-scene has a new object of one, unless objects are named."""
+    objects: tuple[Path, ...] = ()
+    """URDF files, object folders, or folders of them: every sub-scene has one of these."""
+    obj: ArticulatedObject | None = None
+    """The one object of all."""
+    scale: Scale = "native"
+    """Size of the object: native (as in its file), unit (diagonal of 1 m), or a range of diagonals in metres."""
+    goal: Goal = "open"
+    """open: from rest to half open or more; close: the other way; random: from anywhere to anywhere."""
+    tolerance: float = 0.1
+    """Share of its range within which a joint is at its goal."""
+    gravity: bool = False
+    """Whether gravity pulls on the object's parts; without it, lids stay where they are left."""
+    views: ViewOptions = field(
+        default_factory=lambda: ViewOptions(width=128, height=128, azimuth=(30.0, 75.0), elevation=(25.0, 55.0))
+    )
+    """Where the camera of the observations is."""
+    max_joints: int = 16
+    """Objects with more joints are passed over. Observations have as many rows, infos one more, for the root."""
+
+    def __post_init__(self) -> None:
+        if self.goal not in get_args(Goal):
+            raise ConfigError(f"there is no goal {self.goal!r}", "goal", "use open, close or random")
+        if not 0.0 < self.tolerance < LEAST_OPEN:
+            raise ConfigError(f"{self.tolerance} is not within 0..{LEAST_OPEN}", "tolerance", "use 0.1")
+        if self.max_joints < 1:
+            raise ConfigError(f"{self.max_joints} is not a count", "max_joints", "use 1 or more")
+
+
+def check(robot_uids: Any, num_envs: int, obs_mode: str, options: dict[str, Any]) -> None:
+    """Refuse what ManiSkill would stumble on.
+
+    Parameters
+    ----------
+    robot_uids : str
+    num_envs : int
+    obs_mode : str
+    options : dict
+        What is left for ManiSkill.
+
+    Raises
+    ------
+    ConfigError
+    """
+    theirs = set(inspect.signature(BaseEnv.__init__).parameters)
+    unknown = options.keys() - theirs
+    if unknown:
+        ours = ", ".join(f.name for f in fields(TaskOptions))
+        raise ConfigError(f"there is no option {', '.join(sorted(unknown))}", ENV_ID, f"use {ours}, or ManiSkill's own")
+    if robot_uids not in ROBOTS:
+        raise ConfigError(f"{robot_uids!r} does not do this task", "robot_uids", f"use {', '.join(ROBOTS)}")
+    try:
+        if not isinstance(obs_mode, str):
+            raise AssertionError("an observation mode is a word")
+        parse_obs_mode_to_struct(obs_mode)
+    except AssertionError as error:
+        raise ConfigError(
+            str(error), "obs_mode", "use state, state_dict, pointcloud, rgb+depth+segmentation or other textures"
+        ) from error
+    reward_mode = options.get("reward_mode")
+    if reward_mode not in (None, *REWARD_MODES):
+        raise ConfigError(f"there is no {reward_mode!r}", "reward_mode", f"use {', '.join(REWARD_MODES)}")
+    on_cpu = options.get("sim_backend", "auto") in ("cpu", "physx_cpu") or not torch.cuda.is_available()
+    if num_envs > 1 and on_cpu:
+        raise ConfigError(
+            f"PhysX simulates {num_envs} sub-scenes on a CUDA device only",
+            "num_envs",
+            "use 1 here, and processes for more: gymnasium.vector.AsyncVectorEnv over ManiSkill's CPUGymWrapper",
+        )
