@@ -45,6 +45,8 @@ class Train:
     """Batches that perception learns from; by default the preset's."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
+    learning: Literal["both", "cloning", "reinforcement"] = "both"
+    """How the agent learns: behaviour cloning and PPO, or one of them alone."""
     real: bool = False
     """Learn from real objects, too: every other one, of the half of ArtImage's frozen split that is not for testing."""
     start_from: Path | None = None
@@ -74,6 +76,10 @@ class Train:
             sample=SampleOptions(noise=self.noise),
             perception_steps=preset.perception_steps if steps is None else steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
+            ppo=replace(
+                preset.ppo, behaviour_cloning=self.learning != "reinforcement",
+                reinforcement=self.learning != "cloning",
+            ),
         )  # fmt: skip
         out = self.out or Path("out/train") / f"{'-'.join(self.category)}-{self.preset}"
         training = Training(options, out, self.workers, progress=sys.stderr.isatty())
@@ -99,6 +105,12 @@ class Evaluate:
     estimators by category; by default those that come with the package."""
     benchmark: Literal["artimage"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
+    ablation: bool = False
+    """Test the estimator with one stage after the other left out or changed."""
+    cloned: Path | None = None
+    """For the ablation: estimator whose agent learnt by behaviour cloning alone."""
+    reinforced: Path | None = None
+    """For the ablation: estimator whose agent learnt by PPO alone."""
     rows: tuple[Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"], ...] = ()
     """Rows of the benchmark; by default all that there are objects and weights for."""
     real_weights: Path | None = None
@@ -160,6 +172,12 @@ class Evaluate:
         else:
             categories = self.category or tuple(learnt["categories"])
             samples = frozen_samples(categories, self.objects, views, options, parts=learnt["parts"])
+        if self.ablation:
+            from artperl.benchmarks.ablation import run_ablation, variants
+
+            agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
+            say = lambda line: print(line, flush=True)  # noqa: E731
+            return run_ablation(variants(estimator, *agents), samples, say, sys.stderr.isatty())
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
         print(table(figures))
         return figures

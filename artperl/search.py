@@ -45,6 +45,8 @@ class EstimatorOptions:
     """References that are tried, the nearest first."""
     early_iterations: int = 6
     """Iterations of every start, before the best one is kept."""
+    perceived_start: bool = True
+    """Start from where perception places the points in the rest frame; without, from views all round alone."""
     retry_residual: float = 0.006
     """Estimates with a larger residual are looked for again, from other starts; infinite for never, 0 for always."""
     azimuths: tuple[float, ...] = (-50.0, 0.0, 50.0)
@@ -110,19 +112,24 @@ def find(
         rows = base.nearest(query, min(options.references, len(base)))[0][0]
         shapes, theta = start(clouds, perceived, base.shapes[rows], len(rows))
         observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
-    found = _settle(shapes, observed, perceived, [theta], rows.tolist(), options, clock)
-    if found.residual <= options.retry_residual:
-        return found
+    found = None
+    if options.perceived_start:
+        found = _settle(shapes, observed, perceived, [theta], rows.tolist(), options, clock)
+        if found.residual <= options.retry_residual:
+            return found
     with clock("start"):
-        shapes = concatenate([shapes[:1].repeat(len(options.azimuths)), shapes[:1]])
-        theta = concatenate([facing(shapes[:-1], clouds.center, options.azimuths, options.elevation), theta[:1]])
+        first, shapes = shapes[:1], shapes[:1].repeat(len(options.azimuths))
+        around = facing(shapes, clouds.center, options.azimuths, options.elevation)
+        if options.perceived_start:
+            shapes, around = concatenate([shapes, first]), concatenate([around, theta[:1]])
+        theta = around
     path = [theta]
     with clock("agent"):
         if agent is not None and options.agent_steps:
             few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
             path += greedy_steps(agent, shapes, few, theta, options.agent_steps)
     again = _settle(shapes, observed, perceived, path, [int(rows[0])] * len(shapes), options, clock)
-    return again if again.residual < found.residual else found
+    return again if found is None or again.residual < found.residual else found
 
 
 def _settle(
