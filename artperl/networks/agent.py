@@ -1,8 +1,8 @@
 """The fitting agent: one policy for every tree (ArtPERL, section 4.3).
 
-A shared encoder describes each part by its observed points and by the reference's, with the offsets between them. The
-policy of a part reads these, what is known of its joint, and the whole object; its weights are shared by all parts,
-with one head for each type of joint, so that the number of parts is not built in.
+A shared encoder describes each part by its observed points and by the reference's, with the offsets between them and
+their moments. The policy of a part reads these, what is known of its joint, and the whole object; its weights are
+shared by all parts, with one head for each type of joint, so that the number of parts is not built in.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from torch.nn import functional
 
 from artperl.actions import NUM_AXES, NUM_BINS
 from artperl.fitting import View
+from artperl.networks.moments import NUM_MOMENTS, moments
 from artperl.pose import KINDS
 
 _HEADS = {"free": 0, "revolute": 1, "continuous": 1, "prismatic": 2, "screw": 1, "fixed": 3}
@@ -37,7 +38,7 @@ class Agent(nn.Module):
         self.observed = _encoder(6, width, features)
         self.reference = _encoder(6, width, features)
         self.kind = nn.Embedding(len(KINDS), 16)
-        described = 4 * features + 16 + 6 + 2 + 1
+        described = 4 * features + 16 + 6 + 2 + 1 + NUM_MOMENTS
         self.part = nn.Sequential(nn.Linear(described, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU())
         self.whole = nn.Sequential(nn.Linear(128, 128), nn.ReLU())
         self.parent = nn.Sequential(nn.Linear(256, 128), nn.ReLU())
@@ -52,7 +53,17 @@ class Agent(nn.Module):
         B, P = view.valid.shape
         mean, top, share = _pool_parts(seen, view.part, P)
         described = torch.cat(
-            [mean, top, have.mean(2), have.amax(2), self.kind(view.kind), view.joint.clamp(-4, 4), view.state, share],
+            [
+                mean,
+                top,
+                have.mean(2),
+                have.amax(2),
+                self.kind(view.kind),
+                view.joint.clamp(-4, 4),
+                view.state,
+                share,
+                moments(view),
+            ],
             -1,
         )
         part = self.part(described)
