@@ -45,6 +45,8 @@ FINISHES: dict[str, Finish] = {
     "steel": textured("brushed", 0.2, 0.38, metallic=0.75),
     "plastic": plain(0.45),
     "gloss": plain(0.2, specular=0.7),
+    "shell": plain(0.4),
+    "smoke": plain(0.12, specular=0.8),
     "rubber": plain(0.85, specular=0.2),
     "enamel": plain(0.28, specular=0.6),
     "chrome": plain(0.22, metallic=0.85),
@@ -62,6 +64,8 @@ _TONES: dict[str, tuple[Colour, ...]] = {
     "steel": ((0.74, 0.74, 0.76), (0.62, 0.63, 0.65), (0.70, 0.68, 0.65)),
     "chrome": ((0.80, 0.80, 0.82), (0.84, 0.82, 0.78)),
     "rubber": ((0.08, 0.08, 0.09), (0.14, 0.14, 0.15)),
+    "shell": ((0.13, 0.13, 0.14), (0.32, 0.33, 0.35), (0.86, 0.86, 0.85), (0.66, 0.67, 0.69), (0.16, 0.20, 0.28)),
+    "smoke": ((0.06, 0.06, 0.07), (0.14, 0.10, 0.07), (0.10, 0.13, 0.16)),
     "enamel": ((0.92, 0.92, 0.90), (0.86, 0.84, 0.78), (0.20, 0.21, 0.23), (0.55, 0.17, 0.15), (0.25, 0.36, 0.42)),
 }
 _VIVID: tuple[Colour, ...] = (
@@ -74,21 +78,21 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "box": (("card", "card", "wood", "plastic"), ("steel", "chrome")),
     "bucket": (("plastic", "steel", "enamel"), ("steel", "plastic")),
     "carton": (("card",), ("card",)),
-    "coffee_machine": (("plastic", "gloss", "steel"), ("plastic", "chrome")),
+    "coffee_machine": (("shell", "gloss", "steel"), ("plastic", "chrome")),
     "cutter": (("plastic",), ("steel",)),
-    "desk_lamp": (("enamel", "plastic", "steel"), ("chrome", "rubber")),
+    "desk_lamp": (("enamel", "shell", "steel"), ("chrome", "rubber")),
     "dishwasher": (("enamel", "steel"), ("chrome",)),
     "door": (("wood", "enamel"), ("chrome", "steel")),
     "drawer": (("wood",), ("chrome", "steel", "wood")),
-    "eyeglasses": (("gloss",), ("gloss",)),
+    "eyeglasses": (("smoke",), ("gloss", "steel")),
     "fan": (("plastic", "enamel"), ("steel",)),
     "faucet": (("chrome", "steel"), ("chrome",)),
     "folding_knife": (("wood", "plastic", "steel"), ("steel",)),
     "globe": (("wood", "chrome"), ("chrome",)),
     "kitchen_pot": (("steel", "enamel"), ("rubber", "plastic")),
     "knife": (("plastic", "wood"), ("steel",)),
-    "laptop": (("steel", "plastic"), ("plastic",)),
-    "microwave": (("enamel", "steel", "plastic"), ("plastic",)),
+    "laptop": (("steel", "shell"), ("plastic",)),
+    "microwave": (("shell", "steel"), ("shell",)),
     "oven": (("enamel", "steel"), ("chrome",)),
     "pliers": (("steel",), ("rubber",)),
     "refrigerator": (("enamel", "steel"), ("chrome",)),
@@ -100,7 +104,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "suitcase": (("plastic", "fabric"), ("rubber", "chrome")),
     "swivel_chair": (("fabric", "plastic"), ("rubber",)),
     "table": (("wood",), ("chrome",)),
-    "toaster": (("steel", "enamel"), ("plastic",)),
+    "toaster": (("steel", "enamel"), ("shell",)),
     "trash_can": (("plastic", "steel"), ("rubber",)),
     "valve": (("steel", "enamel"), ("steel",)),
     "washing_machine": (("enamel",), ("chrome",)),
@@ -109,7 +113,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
 """Finishes that the bodies, and those that the details, of a category are drawn from."""
 _PART_FINISHES: Mapping[str, str] = {
     "blade": "steel", "button": "rubber", "carafe": "gloss", "handwheel": "enamel", "magazine": "steel",
-    "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "",
+    "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "", "temple_left": "", "temple_right": "", "temple": "",
 }  # fmt: skip
 """Finishes of parts by their label; "" stands for that of the details."""
 

@@ -228,18 +228,18 @@ def _supports(area: Area, on_table: bool, rng: np.random.Generator) -> list[Thin
 
 
 def draw_lights(supports: Sequence[Thing], rng: np.random.Generator) -> Lights:
-    """A sun or lamp that shines past the side wall from the front, and the light of the sky."""
+    """A sun or lamp at the side without a wall, and the light of the sky."""
     sides = [thing.T_world_object[1, 3] for thing in supports if thing.obj.category == "wall"]
     away = -np.sign(max(sides, key=abs, default=1.0))  # the side without a wall
-    azimuth, elevation = np.deg2rad(rng.uniform(25.0, 70.0)), np.deg2rad(rng.uniform(38.0, 60.0))
+    azimuth, elevation = np.deg2rad(rng.uniform(42.0, 78.0)), np.deg2rad(rng.uniform(36.0, 56.0))
     direction = (
         float(np.cos(azimuth) * np.cos(elevation)),
         float(-away * np.sin(azimuth) * np.cos(elevation)),
         float(-np.sin(elevation)),
     )
     warm = rng.uniform(-0.06, 0.1)
-    sun = Sun(direction, _tinted(rng.uniform(0.85, 1.25), warm), float(np.deg2rad(rng.uniform(2.0, 6.0))))
-    return Lights(sun, _tinted(rng.uniform(0.45, 0.65), -0.3 * warm), _tinted(rng.uniform(0.08, 0.14), 0.0))
+    sun = Sun(direction, _tinted(rng.uniform(0.8, 1.1), warm), float(np.deg2rad(rng.uniform(2.0, 6.0))))
+    return Lights(sun, _tinted(rng.uniform(0.46, 0.6), -0.3 * warm), _tinted(rng.uniform(0.08, 0.12), 0.0))
 
 
 def _tinted(strength: float, warm: float) -> Colour:
