@@ -332,6 +332,20 @@ def test_objects_change_as_often_as_asked() -> None:
     assert len({never.reset(seed=seed)[1]["diagonal"].item() for seed in range(3)}) == 1
 
 
+def test_states_can_be_kept_and_restored() -> None:
+    env = new(categories=("drawer",), goal="random")
+    _, info = env.reset(seed=0)
+    kept, flat = env.get_state_dict(), env.get_state()
+    env.action_space.seed(0)
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    assert not torch.equal(env.get_state(), flat)
+    for restore, state in ((env.set_state_dict, kept), (env.set_state, flat)):
+        restore(state)
+        assert torch.allclose(env.get_state(), flat, atol=1e-5)
+        assert torch.allclose(env.evaluate()["T_world_part"], info["T_world_part"], atol=1e-5)
+
+
 def test_numpy_wrappers_take_the_info_apart() -> None:
     from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
 

@@ -261,6 +261,18 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         """(B,) within 0..1."""
         return self.compute_dense_reward(obs, action, info) / BEST
 
+    def get_state_dict(self) -> dict[str, Any]:
+        """ManiSkill's state of the simulation, and the goals."""
+        state: dict[str, Any] = super().get_state_dict()
+        # Flat states are read in this order, actors or not.
+        return {"actors": {}, **state, "goal": self.goal.clone()}
+
+    def set_state_dict(self, state: dict[str, Any], env_idx: Tensor | None = None) -> None:
+        """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do."""
+        super().set_state_dict(state, env_idx)
+        if "goal" in state:
+            self.goal[slice(None) if env_idx is None else env_idx] = state["goal"]
+
     def step(self, action: Any) -> Any:
         """One control step; see ManiSkill.
 
