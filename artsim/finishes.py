@@ -113,7 +113,8 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
 """Finishes that the bodies, and those that the details, of a category are drawn from."""
 _PART_FINISHES: Mapping[str, str] = {
     "blade": "steel", "button": "rubber", "carafe": "gloss", "handwheel": "enamel", "magazine": "steel",
-    "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "", "temple_left": "", "temple_right": "", "temple": "",
+    "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "",
+    "temple": "", "temple_left": "", "temple_right": "",
 }  # fmt: skip
 """Finishes of parts by their label; "" stands for that of the details."""
 

@@ -80,7 +80,7 @@ class SceneOptions:
     """table or floor; auto: on the floor if any object is too large for a table."""
     distractors: int = 3
     """Everyday things besides: books, cans, mugs, fruit."""
-    states: StateOptions = field(default_factory=lambda: StateOptions(fraction_open=(0.15, 0.75)))
+    states: StateOptions = field(default_factory=lambda: StateOptions(fraction_open=(0.3, 0.7)))
     obj: Annotated[tuple[ArticulatedObject, ...], tyro.conf.Suppress] = ()
     """Objects as they are, besides."""
 

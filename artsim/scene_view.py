@@ -54,10 +54,12 @@ _RAMP = np.array([(253, 231, 37), (122, 209, 81), (34, 168, 132), (42, 120, 142)
 
 
 def _share(view: SceneView) -> NDArray[np.float64]:
-    """(H, W) where the depth lies between its 1st and 99th percentile, 0 to 1."""
-    seen = view.depth[view.depth > 0]
-    low, high = np.percentile(seen, [1.0, 99.0]) if len(seen) else (0.0, 1.0)
-    return ((view.depth - low) / max(high - low, 1e-9)).clip(0.0, 1.0).astype(np.float64)
+    """(H, W) from near to far, 0 to 1: even in 1 / depth, between its 1st and 99th percentile."""
+    inverse = 1.0 / np.where(view.depth > 0, view.depth, np.inf).astype(np.float64)
+    seen = inverse[view.depth > 0]
+    far, near = np.percentile(seen, [1.0, 99.0]) if len(seen) else (0.0, 1.0)
+    share: NDArray[np.float64] = ((near - inverse) / max(near - far, 1e-9)).clip(0.0, 1.0)
+    return share
 
 
 def parts_picture(view: SceneView) -> NDArray[np.uint8]:
