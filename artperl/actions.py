@@ -104,6 +104,25 @@ def expert(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor, greedy: bo
     return NOTHING + torch.where(missing < 0, -bin_of, bin_of)
 
 
+def expected_action(logits: Tensor) -> Tensor:
+    """The action whose steps are nearest to the policy's mean.
+
+    The most likely bin is nearly always that of no step while the policy is not sure: the steps that it takes for
+    possible are many, and nothing is one.
+
+    Parameters
+    ----------
+    logits : (..., 11) float
+
+    Returns
+    -------
+    (...) int64
+    """
+    steps = STEPS.to(logits)
+    mean = (logits.softmax(-1) * steps).sum(-1)
+    return (mean[..., None] - steps).abs().argmin(-1)
+
+
 def rotation_vector(rotation: Tensor) -> Tensor:
     """(B, 3) axis times angle of rotations (B, 3, 3)."""
     twist = torch.stack(

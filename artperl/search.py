@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import torch
 from torch import Tensor
 
+from artperl.actions import expected_action
 from artperl.batch import concatenate
 from artperl.data import Clouds
 from artperl.embedding import box_embedding
@@ -127,7 +128,7 @@ def find(
     with clock("agent"):
         if agent is not None and options.agent_steps:
             few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
-            path += greedy_steps(agent, shapes, few, theta, options.agent_steps)
+            path += agent_steps(agent, shapes, few, theta, options.agent_steps)
     again = _settle(shapes, observed, perceived, path, [int(rows[0])] * len(shapes), options, clock)
     return again if found is None or again.residual < found.residual else found
 
@@ -154,12 +155,12 @@ def _settle(
     return Found(own, observed, refined, [*(step[row : row + 1] for step in steps), refined.theta], rows[row])
 
 
-def greedy_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
-    """States after each of the agent's most likely actions."""
+def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
+    """States after each of the agent's actions."""
     fitting = Fitting(shapes, observed, theta, FittingOptions(steps=steps))
     path = []
     while not fitting.done:
-        fitting.step(agent(fitting.view())[0].argmax(-1))
+        fitting.step(expected_action(agent(fitting.view())[0]))
         path.append(fitting.theta)
     return path
 

@@ -13,11 +13,13 @@ from artperl.actions import (
     MOVE,
     NOTHING,
     NUM_AXES,
+    NUM_BINS,
     SCALE,
     STATE,
     TURN,
     action_mask,
     apply,
+    expected_action,
     expert,
     move,
     residual,
@@ -145,3 +147,16 @@ def test_moves_are_along_the_cameras_axes(shapes: Shapes, radius: torch.Tensor) 
     away = (after - before)[shapes.trees.valid]
     depth = (0.5 * radius)[:, None].expand_as(shapes.trees.valid)[shapes.trees.valid]
     torch.testing.assert_close(away, torch.stack([torch.zeros_like(depth), torch.zeros_like(depth), depth], dim=-1))
+
+
+def test_the_expected_action_weighs_small_steps_against_none() -> None:
+    sure = torch.full((NUM_BINS,), -20.0)
+    for bin_of in range(NUM_BINS):
+        logits = sure.clone()
+        logits[bin_of] = 20.0
+        assert expected_action(logits) == bin_of
+    torn = torch.zeros(NUM_BINS)
+    assert expected_action(torn) == NOTHING  # any direction is as likely as its opposite
+    torn[NUM_BINS - 2 :] = 2.0
+    torn[NOTHING] = 2.1  # nothing is the most likely one of all
+    assert expected_action(torn) > NOTHING + 2
