@@ -171,7 +171,7 @@ class Evaluate:
             samples = samples_of((source.load() for source in find_sources(self.files)), views, options)
         else:
             categories = self.category or tuple(learnt["categories"])
-            samples = frozen_samples(categories, self.objects, views, options, parts=learnt["parts"])
+            samples = frozen_samples(categories, self.objects, views, options, parts=learnt.get("parts", "artimage"))
         if self.ablation:
             from artperl.benchmarks.ablation import run_ablation, variants
 

@@ -33,6 +33,7 @@ _RIGHT = (10.0, 0.05)
 """An estimate is right when every part is within that many degrees and diagonals: what confidence speaks of."""
 
 _FAR_OFF = 10.0
+_FITS_WELL = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,6 +258,12 @@ def headline(scored: Sequence[Scored]) -> float:
                 clipped = np.minimum([e[k] for e in errors if len(e) > k], _FAR_OFF)
                 terms += [np.median(clipped), np.mean(clipped)]
     return float(np.mean(terms))
+
+
+def retry_residual(scored: Sequence[Scored]) -> float:
+    """Residual above which an estimate is looked for again: that of the quarter that fits worst."""
+    residuals = [s.residual for s in scored if np.isfinite(s.residual)]
+    return float(np.quantile(residuals, _FITS_WELL)) if residuals else 0.0
 
 
 def calibrate(scored: Sequence[Scored], rounds: int = 20) -> Calibration:

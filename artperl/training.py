@@ -38,6 +38,7 @@ from artperl.evaluation import (
     frozen_samples,
     headline,
     mistake,
+    retry_residual,
     summary,
     table,
 )
@@ -223,6 +224,7 @@ class Training:
             self.best = score
             foreign = mistake(self.estimator(), self._foreign())
             best = replace(self.estimator(), calibration=calibrate([*scored, *foreign]))
+            best.options = replace(best.options, retry_residual=retry_residual(scored))
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()
         tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")

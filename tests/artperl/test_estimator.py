@@ -23,6 +23,7 @@ from artperl.evaluation import (
     frozen_samples,
     headline,
     mistake,
+    retry_residual,
     summary,
     table,
     true_poses,
@@ -222,6 +223,13 @@ def test_the_table_holds_medians_and_means(estimator: Estimator, sample: Sample)
     translation = parts[0]["translation_percent_diagonal"]["median"]
     assert parts[0]["translation_partnet"]["median"] == pytest.approx(0.02 * translation)
     assert f"{'laptop 1':14s}     4.00   6.00" in table(summary(scored))
+
+
+def test_a_quarter_is_looked_for_again(estimator: Estimator, sample: Sample) -> None:
+    one = evaluate(estimator, [sample])[0]
+    scored = [replace(one, residual=r) for r in np.linspace(0.0, 0.1, 101)] + [replace(one, residual=np.inf)]
+    assert retry_residual(scored) == pytest.approx(0.075)
+    assert retry_residual([]) == 0.0
 
 
 def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:
