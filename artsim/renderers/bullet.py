@@ -103,6 +103,9 @@ class BulletRenderer:
             far = max(1.01 * float(z.max()), 0.1)
             near = max(0.9 * float(z[z > 0].min(initial=far)), 0.01 * far)
             T_camera_solid = camera.T_camera_world @ T_world_solid
+            if self._egl:  # depth buffers have 24 bits: a first picture says between which planes everything lies
+                depth, _, _ = world.draw(camera, T_camera_solid, near, far)
+                near, far = 0.99 * float(depth[depth > 0].min(initial=far)), 1.01 * max(float(depth.max()), near)
             depth, solid, rgb = world.draw(camera, T_camera_solid, near, far, scene.lights, samples)
             frames.append(SceneFrame(depth.astype(np.float32), *split_ids(scene, solid), rgb))
         return frames
