@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.camera import look_at_transform
+from artsim.envs.maniskill.goal import LEAST_OPEN, MOST_OPEN, Goal
 from artsim.episode import widest_state
 from artsim.kinematics import ROTATING, Array
 from artsim.objects import ArticulatedObject
@@ -16,7 +17,8 @@ ROBOTS = {
     "panda_wristcam": _READY,
     "floating_panda_gripper": (0.0, 0.0, 0.0, 0.0, np.pi / 2, 0.0, 0.04, 0.04),
 }
-"""Robots that do the task, and the state in which each of them begins; fingers come last."""
+"""Robots that do the task, and the state in which each of them begins, facing the object; fingers come last."""
+_FACING_DOWN = (0.0, 0.0, 0.0, 0.0, np.pi, 0.0, 0.04, 0.04)  # of a floating hand
 SLICE = 0.1
 """Share of a part's reach that its handle lies in."""
 ONLOOKER_FOV = 0.8
@@ -24,6 +26,7 @@ ONLOOKER_FOV = 0.8
 _NEAR, _FAR = 0.55, 0.75  # metres between an arm's base and the handles
 _CLEARANCE = 0.12  # metres between an object and what stands before it at first
 _FINGERS = 0.11  # metres from a hand to the tips of its fingers
+_RUN_UP = 0.15  # metres between a hand that is to push and what it pushes
 _READY_REACH = 0.37  # metres from an arm's base to the far side of its hand as it begins
 _ARM = np.array([0.2, 0.3, 0.8])  # half the room that an arm takes around its base in x and y, and its height
 
@@ -70,18 +73,47 @@ def handle(obj: ArticulatedObject, k: int) -> Array:
     return middle
 
 
-def robot_stand(obj: ArticulatedObject, robot: str, goal: str) -> Array:
-    """(3,) where the robot's base stands: an arm on the ground before the object, a hand before its handles."""
+def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, Array]:
+    """Where a robot begins: an arm on the ground before the object; a floating hand before the handles, or, where
+    there is one joint to close, on that side of its handle from which it pushes.
+
+    Returns
+    -------
+    position : (3,) float
+        Of its base, world frame.
+    qpos : (D,) float
+    """
     up = T_world_object(obj)[:3, 3]
-    moving = obj.tree.free_joints if len(obj.tree.free_joints) else np.arange(len(obj))
-    handles = np.mean([handle(obj, int(k)) for k in moving], axis=0) + up
+    free = [int(k) for k in obj.tree.free_joints]
+    handles = np.mean([handle(obj, k) for k in free], axis=0) + up
     closed = float(obj.bounds[0, 0])
     opened = min(closed, _front(obj, widest_state(obj)))
-    if robot == "floating_panda_gripper":
-        front = closed if goal == "open" else opened
-        return np.array([front - _CLEARANCE - _FINGERS, handles[1], max(handles[2], 0.1)])
-    x = np.clip(opened - _CLEARANCE - _READY_REACH, handles[0] - _FAR, handles[0] - _NEAR)
-    return np.array([min(x, closed - _CLEARANCE - _READY_REACH), handles[1], 0.0])
+    if robot != "floating_panda_gripper":
+        x = np.clip(opened - _CLEARANCE - _READY_REACH, handles[0] - _FAR, handles[0] - _NEAR)
+        return np.array([min(x, closed - _CLEARANCE - _READY_REACH), handles[1], 0.0]), np.array(ROBOTS[robot])
+    if goal == "close" and len(free) == 1:
+        at, way = _push(obj, free[0])
+        tip = np.maximum(at - _RUN_UP * way + up, [-np.inf, -np.inf, 0.05])
+    else:
+        tip = np.array([(closed if goal == "open" else opened) - _CLEARANCE, handles[1], max(handles[2], 0.1)])
+        way = np.eye(3)[0]
+    if way[0] > 0.5:
+        return tip - [_FINGERS, 0.0, 0.0], np.array(ROBOTS[robot])
+    return tip + [0.0, 0.0, _FINGERS], np.array(_FACING_DOWN)
+
+
+def _push(obj: ArticulatedObject, k: int) -> tuple[Array, Array]:
+    """(3,) where part k's handle is when all joints are open as far as they are at first, on average, and (3,) the unit
+    direction in which it moves when its joint closes; rest frame."""
+    rest, intervals = obj.tree.rest, joint_intervals(obj)
+    low, high = intervals.T
+    far = np.where(high - rest >= rest - low, high, low)
+    q = obj.tree.complete_state(rest + 0.5 * (LEAST_OPEN + MOST_OPEN) * (far - rest))
+    less = q.copy()
+    less[k] -= 1e-3 * (far[k] - rest[k])
+    point = np.append(handle(obj, k), 1.0)
+    at, then = (obj.tree.forward_kinematics(state)[k, :3] @ point for state in (q, less))
+    return at, (then - at) / max(float(np.linalg.norm(then - at)), 1e-12)
 
 
 def onlooker(obj: ArticulatedObject, stand: Array) -> Array:

@@ -22,7 +22,7 @@ from artsim.envs.maniskill.eyes import camera_record, look, poses
 from artsim.envs.maniskill.goal import BEST, dense_reward, start_and_goal
 from artsim.envs.maniskill.mechanism import Mechanism
 from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
-from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_stand
+from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_start
 from artsim.envs.maniskill.truth import Record, Truth, truth_of
 from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError
@@ -151,11 +151,8 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             self.remove_from_state_dict_registry(each.articulation)
         self.mechanism = Mechanism(self.scene, built, self.truth)
         self.add_to_state_dict_registry(self.mechanism.articulation)
-        self._stands = torch.tensor(
-            np.array([robot_stand(obj, self.robot_uids, self.options.goal) for obj in self.objects]),
-            dtype=torch.float32,
-            device=self.device,
-        )
+        starts = [robot_start(obj, self.robot_uids, self.options.goal) for obj in self.objects]
+        self._stands, self._begins = (_tensor(np.stack(column), self.device) for column in zip(*starts, strict=True))
         self.goal = torch.zeros_like(self.truth.low)
 
     def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
@@ -203,10 +200,9 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         self.goal[env_idx] = goal[env_idx]
         self.mechanism.set_state(start, env_idx)
         robot = self.agent.robot
-        qpos = _tensor(ROBOTS[self.robot_uids], self.device)
-        noise = rng.normal(0.0, self.robot_init_qpos_noise, len(qpos))
+        noise = rng.normal(0.0, self.robot_init_qpos_noise, self._begins.shape[1])
         noise[:, -2:] = 0.0  # fingers
-        robot.set_qpos(qpos + _tensor(noise, self.device))
+        robot.set_qpos(self._begins[env_idx] + _tensor(noise, self.device))
         robot.set_pose(Pose.create_from_pq(self._stands[env_idx]))
 
     def _after_simulation_step(self) -> None:
