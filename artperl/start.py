@@ -11,7 +11,7 @@ from torch import Tensor
 
 from artperl.data import Clouds
 from artperl.networks.perception import Perceived
-from artperl.pose import Theta, clamp_state, pose_parts, reach, theta_from_parts
+from artperl.pose import Theta, clamp_state, parent_pose, pose_parts, theta_from_parts
 from artperl.rotations import rotate
 from artperl.shapes import Shapes
 from artsim.camera import look_at_transform
@@ -19,6 +19,8 @@ from artsim.camera import look_at_transform
 _ROUNDS = 4
 _LEAST = 8.0
 """Points from which a part's own pose is trusted; with fewer it stands as at rest against the root."""
+_FEW = 3
+"""Points that tell the state of a joint."""
 
 
 def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Tensor]:
@@ -37,16 +39,15 @@ def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Te
     """
     unit = perceived.log_diagonal.exp()[:, None, None]
     goal = perceived.canonical * unit
-    member = torch.nn.functional.one_hot(perceived.part, perceived.part_logits.shape[2]).to(goal.dtype)
-    trust = member.transpose(1, 2) * (-perceived.spread.clamp(-4.0, 2.0)).exp()[:, None]
-    weight = trust
+    trusted = trust(perceived)
+    weight = trusted
     for _ in range(_ROUNDS):
         rotation, translation = procrustes(goal, clouds.points, weight)
         off = rotate(rotation[:, :, None], goal[:, None]) + translation[:, :, None] - clouds.points[:, None]
         distance = off.square().sum(-1)
         typical = (distance * weight).sum(2, keepdim=True) / weight.sum(2, keepdim=True).clamp(min=1e-9)
-        weight = trust / (1.0 + distance / typical.clamp(min=1e-6)) ** 2
-    unseen = member.sum(1) < _LEAST
+        weight = trusted / (1.0 + distance / typical.clamp(min=1e-6)) ** 2
+    unseen = (trusted > 0).sum(2) < _LEAST
     rotation = torch.where(unseen[..., None, None], rotation[:, :1], rotation)
     translation = torch.where(unseen[..., None], translation[:, :1], translation)
     center = rotate(rotation, perceived.box_center * unit) + translation
@@ -54,8 +55,17 @@ def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Te
     return rotation, center * metres + clouds.center[:, None], perceived.box_size * unit * metres
 
 
+def trust(perceived: Perceived) -> Tensor:
+    """(B, P, N) weight of each point for each part: 0 unless it is labelled so, less where its place is unsure."""
+    member = torch.nn.functional.one_hot(perceived.part, perceived.part_logits.shape[2]).transpose(1, 2)
+    return member * (-perceived.spread.clamp(-4.0, 2.0)).exp()[:, None]
+
+
 def start(clouds: Clouds, perceived: Perceived, references: Shapes, count: int) -> tuple[Shapes, Theta]:
-    """References adapted to what is perceived, and the states that bring them nearest to :func:`part_poses`.
+    """References adapted to what is perceived, and the states that bring them nearest to the points.
+
+    The root is where :func:`part_poses` has it. The other parts follow down the tree: each joint takes the one state
+    that suits its part's points best, so that a thin or hardly visible part cannot turn as no joint of it could.
 
     Parameters
     ----------
@@ -69,15 +79,62 @@ def start(clouds: Clouds, perceived: Perceived, references: Shapes, count: int) 
     Returns
     -------
     Shapes, Theta
-        B * count rows. The shapes have the perceived size, so that the states carry no scale.
+        B * count rows. The shapes have the perceived boxes, so that the states carry no scale.
     """
-    rows = references.trees.num_rows
+    trees = references.trees
+    rows = trees.num_rows
     rotation, center, size = (pose[:, :rows].repeat_interleave(count, dim=0) for pose in part_poses(clouds, perceived))
-    fitted = theta_from_parts(references.trees, references.box_center, references.box_size, rotation, center, size)
-    plain = torch.zeros_like(fitted.stretch)
-    shapes = adapted(references, replace(fitted, shift=plain))
-    theta = replace(fitted, log_scale=plain[:, 0], stretch=plain, shift=plain)
-    return shapes, replace(theta, state=clamp_state(shapes.trees, _rescaled(references, fitted)))
+    fitted = theta_from_parts(trees, references.box_center, references.box_size, rotation, center, size)
+    metres = (perceived.log_diagonal.exp() * clouds.radius).repeat_interleave(count, dim=0)[:, None, None]
+    whole = fitted.log_scale.exp()[:, None]
+    # From where the reference's boxes are to where they are perceived; the root's lie on each other.
+    missing = perceived.box_center[:, :rows].repeat_interleave(count, dim=0) * metres - whole * references.box_center
+    origin, known = missing[:, :1], perceived.valid[:, :rows].repeat_interleave(count, dim=0) & trees.valid
+    missing = torch.where(known[..., None], missing - origin, 0.0)
+    shift = missing - missing.gather(1, trees.parent[..., None].expand(-1, -1, 3))
+    shapes = adapted(references, replace(fitted, shift=shift))
+    plain = torch.zeros_like(shift)
+    theta = replace(fitted, log_scale=plain[:, 0], stretch=plain, shift=plain, state=shapes.trees.rest)
+    own = perceived[torch.arange(len(clouds)).repeat_interleave(count)]
+    source = own.canonical * metres - origin
+    target = (clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]).repeat_interleave(count, dim=0)
+    return shapes, _follow(shapes, theta, source, target, trust(own)[:, :rows])
+
+
+def _follow(shapes: Shapes, theta: Theta, source: Tensor, target: Tensor, weight: Tensor) -> Theta:
+    """Joint states, from the root down, that bring points nearest to their partners; others stay at rest.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    theta : Theta
+        Of B objects, with the root in place.
+    source, target : (B, N, 3) float
+        Points in the rest frame, and in the camera frame.
+    weight : (B, P, N) float
+        Of each point for each part.
+    """
+    trees = shapes.trees
+    told = trees.free & ((weight > 0).sum(2) >= _FEW)
+    for depth in range(1, int(trees.depth.max()) + 1):
+        posed = pose_parts(trees, theta, shapes.box_center)
+        rotation, translation = parent_pose(trees, posed)
+        axis, origin = trees.axis[:, :, None], posed.origin_rest[:, :, None]
+        here = (target[:, None] - translation[:, :, None]) @ rotation - origin
+        there = source[:, None] - origin
+        across = there - (there * axis).sum(-1, keepdim=True) * axis
+        sine = (weight * (axis * torch.linalg.cross(across, here)).sum(-1)).sum(2)
+        cosine = (weight * (across * here).sum(-1)).sum(2)
+        slid = (weight * ((here - there) * axis).sum(-1)).sum(2) / weight.sum(2).clamp(min=1e-9)
+        step = torch.where(trees.turn != 0, torch.atan2(sine, cosine), slid)
+        turn_more = torch.where(trees.rest + step < trees.lower, 2.0 * torch.pi, 0.0) * (trees.turn != 0)
+        turn_less = torch.where(trees.rest + step > trees.upper, 2.0 * torch.pi, 0.0) * (trees.turn != 0)
+        options = torch.stack([step, step + turn_more, step - turn_less]) + trees.rest
+        off = (options - torch.maximum(torch.minimum(options, trees.upper), trees.lower)).abs()
+        state = options.gather(0, off.argmin(0)[None])[0]
+        state = torch.where(told & (trees.depth == depth), clamp_state(trees, state), theta.state)
+        theta = replace(theta, state=state)
+    return theta
 
 
 def facing(shapes: Shapes, center: Tensor, azimuths: Sequence[float], elevation: float) -> Theta:
@@ -137,12 +194,6 @@ def sized(shapes: Shapes, diagonal: Tensor) -> Shapes:
     plain = Theta.at_rest(shapes.trees)
     log_scale = (diagonal.to(plain.state.dtype) / shapes.diagonal).log()[:, None].expand(-1, 3)
     return adapted(shapes, replace(plain, log_scale=log_scale))
-
-
-def _rescaled(shapes: Shapes, theta: Theta) -> Tensor:
-    """States in the units of the adapted references."""
-    slides = (shapes.trees.slide != 0) & (shapes.trees.turn == 0)
-    return torch.where(slides, theta.state * reach(shapes.trees, theta.log_scale), theta.state)
 
 
 def procrustes(source: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
