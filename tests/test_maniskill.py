@@ -161,6 +161,17 @@ def test_a_gripper_near_the_handle_is_worth_more() -> None:
     assert float(near) < BEST
 
 
+@pytest.mark.parametrize("goal", ["open", "close", "random"])
+@pytest.mark.parametrize("robot", ["panda", GRIPPER])
+def test_robots_begin_clear_of_the_object(robot: str, goal: str) -> None:
+    for category in ("drawer", "laptop"):
+        env = new(robot_uids=robot, categories=(category,), goal=goal, max_joints=1)
+        _, before = env.reset(seed=0)
+        for _ in range(3):
+            *_, after = env.step(np.zeros(env.single_action_space.shape, np.float32))
+        assert torch.allclose(before["joint_state"], after["joint_state"], atol=1e-4)
+
+
 def test_success_ends_an_episode() -> None:
     env = new(categories=("drawer",), goal="close")
     env.reset(seed=0)
