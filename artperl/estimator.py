@@ -16,7 +16,7 @@ from torch import Tensor
 
 from artperl.data import Clouds
 from artperl.networks.agent import Agent
-from artperl.networks.perception import Perceived, Perception
+from artperl.networks.perception import Perception
 from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts
 from artperl.retrieval import ShapeBase
 from artperl.search import Clock, EstimatorOptions, Found, find
@@ -159,11 +159,9 @@ class Estimator:
             perceived = self.perception(clouds.points)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock)
         with clock("report"):
-            return self._report(points, good, found, clouds, perceived, clock)
+            return self._report(points, good, found, clock)
 
-    def _report(
-        self, points: Array, good: NDArray[np.int64], found: Found, clouds: Clouds, perceived: Perceived, clock: Clock
-    ) -> Estimate:
+    def _report(self, points: Array, good: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
         """Everything about one fitted reference, as arrays."""
         shapes, observed, theta = found.shapes, found.observed, found.refined.theta
         trees, reference = shapes.trees, found.reference
@@ -173,7 +171,6 @@ class Estimator:
         part = np.full(len(points), -1)
         nearest = cKDTree(observed.points[0].numpy()).query(points[good], workers=1)[1]
         part[good] = observed.part[0].numpy()[nearest]
-        disagreement = _disagreement(shapes, observed, posed, theta, clouds, perceived)
         poses = [_transforms(shapes, step)[:K] for step in found.path]
         return Estimate(
             rotation=_numpy(posed.rotation)[:K],
@@ -188,9 +185,9 @@ class Estimator:
             part=part,
             reference=f"{self.base.categories[reference]}:{self.base.object_ids[reference]}",
             residual=found.residual,
-            disagreement=disagreement,
+            disagreement=found.disagreement,
             visibility=visibility(shapes, observed, posed)[:K],
-            confidence=self.calibration(found.residual, disagreement),
+            confidence=self.calibration(found.residual, found.disagreement),
             trajectory=np.stack(poses),
             milliseconds=clock.milliseconds,
         )
@@ -235,17 +232,6 @@ def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
         near = cKDTree(cloud[part == k]).query(points[k], distance_upper_bound=_SEEN * float(shapes.diagonal[0]))[0]
         seen[k] = np.isfinite(near).mean()
     return seen
-
-
-def _disagreement(
-    shapes: Shapes, observed: Observed, posed: Posed, theta: Theta, clouds: Clouds, perceived: Perceived
-) -> float:
-    N = observed.part.shape[1]
-    rotation = posed.rotation[0, observed.part[0]]
-    fitted = ((observed.points[0] - posed.translation[0, observed.part[0]])[:, None] @ rotation)[:, 0]
-    unit = shapes.diagonal[0] * theta.log_scale[0].mean().exp()
-    apart = torch.linalg.vector_norm(fitted / unit - perceived.canonical[0, :N], dim=-1)
-    return float(apart.median())
 
 
 def _transforms(shapes: Shapes, theta: Theta) -> Array:

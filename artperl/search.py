@@ -28,6 +28,8 @@ from artperl.retrieval import ShapeBase
 from artperl.shapes import Observed, Shapes
 from artperl.start import facing, start
 
+_DISAGREEMENT = 0.3
+"""Weight of the disagreement with perception against the residual."""
 _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
@@ -74,6 +76,8 @@ class Found:
         The start, the agent's steps, and the end.
     reference : int
         Row of the base.
+    disagreement : float
+        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
     """
 
     shapes: Shapes
@@ -81,6 +85,8 @@ class Found:
     refined: Refined
     path: list[Theta]
     reference: int
+
+    disagreement: float
 
     @property
     def residual(self) -> float:
@@ -130,7 +136,14 @@ def find(
             few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
             path += agent_steps(agent, shapes, few, theta, options.agent_steps)
     again = _settle(shapes, observed, perceived, path, [int(rows[0])] * len(shapes), options, clock)
-    return again if found is None or again.residual < found.residual else found
+    if found is None:
+        return again
+    return again if _doubt(again) < _doubt(found) else found
+
+
+def _doubt(found: Found) -> float:
+    """What is to be low: a flat part fits a wrong pose just as well, but perception does not agree with that."""
+    return found.residual + _DISAGREEMENT * found.disagreement
 
 
 def _settle(
@@ -152,7 +165,18 @@ def _settle(
         refined = refine(own, observed, theta, replace(options.refine, rigid_iterations=2))
     row = best % len(shapes)
     steps = path[:1] if best < len(shapes) else path
-    return Found(own, observed, refined, [*(step[row : row + 1] for step in steps), refined.theta], rows[row])
+    way = [*(step[row : row + 1] for step in steps), refined.theta]
+    return Found(own, observed, refined, way, rows[row], disagreement(own, observed, refined.theta, perceived))
+
+
+def disagreement(shapes: Shapes, observed: Observed, theta: Theta, perceived: Perceived) -> float:
+    """See :attr:`Found.disagreement`."""
+    posed = pose_parts(shapes.trees, theta, shapes.box_center)
+    part = observed.part[0]
+    fitted = ((observed.points[0] - posed.translation[0, part])[:, None] @ posed.rotation[0, part])[:, 0]
+    unit = shapes.diagonal[0] * theta.log_scale[0].mean().exp()
+    apart = torch.linalg.vector_norm(fitted / unit - perceived.canonical[0, : len(part)], dim=-1)
+    return float(apart.median())
 
 
 def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
