@@ -195,6 +195,8 @@ class Scene:
         from artsim.scene_sample import observe_scene
         from artsim.scene_view import write_overview
 
+        if min(self.scenes, self.views) < 1:
+            raise ConfigError("there is nothing to make", "scenes, views", "use 1 or more of each")
         for seed in range(self.seed, self.seed + self.scenes):
             made = make_scene(self.scene, seed)
             cameras = [scene_camera(made, self.camera, seed, view) for view in range(self.views)]

@@ -98,7 +98,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "refrigerator": (("enamel", "steel"), ("chrome",)),
     "robot_arm": (("enamel", "plastic"), ("rubber",)),
     "safe": (("enamel", "steel"), ("chrome",)),
-    "scissors": (("plastic", "steel"), ("plastic",)),
+    "scissors": (("steel",), ("plastic", "gloss")),
     "stapler": (("plastic", "gloss"), ("steel",)),
     "storage_furniture": (("wood", "wood", "enamel"), ("chrome", "steel", "wood")),
     "suitcase": (("plastic", "fabric"), ("rubber", "chrome")),
@@ -136,10 +136,9 @@ def draw_coats(obj: ArticulatedObject, rng: np.random.Generator) -> tuple[Coat, 
     if obj.category == "laptop":
         detail = Material((0.09, 0.09, 0.1), 0.5)
     coats = []
-    for k, part in enumerate(obj.parts):
+    for part in obj.parts:
         finish = _PART_FINISHES.get(part.label)
-        whole = finish is not None and k > 0
-        if whole:
+        if finish is not None and part.label != obj.parts[0].label:
             coats.append(Coat((named[finish] if finish else detail,), np.zeros(len(part.faces), np.int64)))
         else:
             coats.append(Coat((body, detail), _detail_faces(part).astype(np.int64)))
@@ -204,7 +203,11 @@ def _with_screen(lid: Part, coat: Coat, rng: np.random.Generator) -> Coat:
     corners = lid.vertices[lid.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     downwards = normal[:, 2] < -0.99 * np.linalg.norm(normal, axis=1)
-    shown = downwards & (coat.material_of_face == 0)
+    shown, bezel = downwards & (coat.material_of_face == 0), downwards & (coat.material_of_face == 1)
+    if bezel.any():  # what lies outside of it is the shell's rim
+        first, last = corners[bezel][..., :2].min(axis=(0, 1)), corners[bezel][..., :2].max(axis=(0, 1))
+        middle = corners.mean(axis=1)[:, :2]
+        shown &= ((middle > first) & (middle < last)).all(axis=1)
     if not shown.any():
         return coat
     low, high = corners[shown].min(axis=(0, 1)), corners[shown].max(axis=(0, 1))

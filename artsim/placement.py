@@ -23,8 +23,9 @@ _STEADY = np.deg2rad(2.5)
 _YIELD = 0.02  # of the height of its centre of mass: how deep a thing may sink in to find its footing
 _LEVEL = 1e-6  # of an object's size: corners that touch the ground together
 _TRIES = 200
-_CHOICE = 8  # places that are compared for each thing
+_CHOICE = 12  # places that are compared for each thing
 _TALL = 0.15  # metres: what is higher stands rather at the back, what is lower at the front
+_HIDDEN = 0.4  # of its width and height: what covers more of a thing hides it
 _UPRIGHT = np.cos(np.deg2rad(30.0))  # what leans less is turned like what stands upright
 
 
@@ -49,7 +50,7 @@ class Area:
 class Arrangement:
     """Things put down one after another.
 
-    Tall things tend to stand at the back (+X), and everything close together.
+    Tall things tend to stand at the back (+X), none before another where that can be, and everything close together.
 
     Attributes
     ----------
@@ -109,6 +110,7 @@ class Arrangement:
             found += 1
             off = (place - 0.5 * (np.add(self.area.low, self.area.high))) / np.subtract(self.area.high, self.area.low)
             cost = float(abs(off[0] - 0.4 * np.clip((tall - _TALL) / _TALL, -1.0, 1.0)) + 0.5 * abs(off[1]))
+            cost += sum(_hides(thing, other) + _hides(other, thing) for other in self.things)
             if cost < least:
                 best, least = thing, cost
             if found == _CHOICE:
@@ -116,6 +118,14 @@ class Arrangement:
         if best is not None:
             self.things.append(best)
         return best
+
+
+def _hides(front: Thing, back: Thing) -> bool:
+    """Whether one thing may hide a good part of another from who looks towards +X."""
+    (low, high), (far_low, far_high) = ((t.part_boxes[:, 0].min(0), t.part_boxes[:, 1].max(0)) for t in (front, back))
+    overlap = min(high[1], far_high[1]) - max(low[1], far_low[1])
+    beside = overlap < _HIDDEN * (far_high[1] - far_low[1])
+    return bool(low[0] + high[0] < far_low[0] + far_high[0] and high[2] > _HIDDEN * far_high[2] and not beside)
 
 
 def resting_rotation(obj: ArticulatedObject) -> Array:

@@ -22,7 +22,7 @@ from artsim.placement import Area, Arrangement
 from artsim.props import TABLE_HEIGHT, distractor, room, table
 from artsim.sampling import StateOptions, sample_state
 from artsim.scene import Scene, Thing
-from artsim.sources import family_sources, find_sources
+from artsim.sources import find_sources
 
 _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""
@@ -163,7 +163,6 @@ def with_appearance(scene: Scene, seed: int) -> Scene:
 
 def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
     """The objects of a scene, files in a usual size."""
-    family_sources(options.categories, 1)  # says which category is unknown
     rng = np.random.default_rng([seed, 0])
     made = [_drawn(category, options.place != "floor", rng) for category in options.categories]
     loaded = [source.load() for source in find_sources(options.objects)] if options.objects else []
@@ -193,7 +192,8 @@ _Placeable = tuple[ArticulatedObject, Array, tuple[Coat, ...]]
 def _area(solids: list[_Placeable], on_table: bool, attempt: int) -> Area:
     """Room for some things, more of it with each attempt; a table has its limits."""
     sizes = np.array([np.sort(obj.bounds[1] - obj.bounds[0])[1:] for obj, _, _ in solids])
-    total = _CROWD * (1.0 + 0.3 * attempt) * float((sizes + 0.06).prod(axis=1).sum())
+    crowd = _CROWD if on_table else 2.0 * _CROWD  # so that what is small need not stand behind furniture
+    total = crowd * (1.0 + 0.3 * attempt) * float((sizes + 0.06).prod(axis=1).sum())
     longest = float(np.linalg.norm(sizes, axis=1).max()) + 0.1
     width = max(np.sqrt(1.6 * total), longest)
     depth = max(total / width, 0.8 * longest)

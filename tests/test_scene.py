@@ -313,6 +313,8 @@ def test_scenes_that_cannot_be_made_say_why(options: SceneOptions, mend: str) ->
 def test_options_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ConfigError, match="negative"):
         make_scene(SceneOptions(), -1)
+    with pytest.raises(ConfigError, match="rgb_samples"):
+        render_scene(Scene((), (), (), DAYLIGHT), [], "raycast", 0)
     with pytest.raises(ConfigError, match="needs an object"):
         SceneOptions(categories=())
     with pytest.raises(ConfigError, match="distractors"):

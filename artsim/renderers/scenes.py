@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from artsim.camera import Camera
+from artsim.errors import ConfigError
 from artsim.renderers import Renderer, shared_renderer
 from artsim.renderers.base import BACKGROUND
 from artsim.scene import Scene, SceneFrame
@@ -44,9 +45,13 @@ def render_scene(
 
     Raises
     ------
+    ConfigError
+        When the number of samples is not positive.
     RenderError
         When the renderer is missing or does not start.
     """
+    if samples < 1:
+        raise ConfigError(f"a mean of {samples} pictures is none", "rgb_samples", "use 1 or more")
     drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
     if isinstance(drawer, SceneRenderer):
         return drawer.render_scene(scene, cameras, samples)

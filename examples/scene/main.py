@@ -9,7 +9,7 @@ from artsim.scene_maker import SceneCameraOptions, SceneOptions, make_scene, sce
 from artsim.scene_sample import observe_scene
 from artsim.scene_view import write_overview
 
-SEED = 31
+SEED = 17
 
 
 def main(out: Path, samples: int = 32) -> None:
