@@ -11,7 +11,7 @@ import pytest
 import torch
 
 import artsim
-from artperl.retrieval import ShapeBase
+from artperl.retrieval import ShapeBase, widened
 from artsim.errors import ConfigError, DatasetError
 
 
@@ -79,3 +79,19 @@ def test_what_cannot_be_searched_or_read_is_refused(base: ShapeBase, tmp_path: P
     for name in ("broken.npz", "missing.npz"):
         with pytest.raises(DatasetError, match="shape base"):
             ShapeBase.load(tmp_path / name)
+
+
+def test_references_go_as_far_as_any_of_their_kind() -> None:
+    objects = [artsim.make("laptop", seed) for seed in range(4)] + [artsim.make("drawer", seed) for seed in range(6)]
+    wide = widened([obj.with_diagonal(1.0) for obj in objects])
+    for obj, other in zip(objects, wide, strict=True):
+        own = obj.with_diagonal(1.0).tree
+        assert other.tree.types == own.types
+        np.testing.assert_allclose(other.tree.axes, own.axes)
+        np.testing.assert_allclose(other.tree.origins, own.origins, atol=1e-9)
+        assert (other.tree.limits[:, 0] <= own.limits[:, 0] + 1e-9).all()
+        assert (other.tree.limits[:, 1] >= own.limits[:, 1] - 1e-9).all()
+    laptops = np.stack([obj.tree.limits for obj in wide[:4]])
+    np.testing.assert_allclose(laptops, laptops[:1].repeat(4, axis=0))
+    farthest = max(obj.tree.limits[1, 1] for obj in objects[:4])
+    assert laptops[0, 1, 1] == pytest.approx(farthest)

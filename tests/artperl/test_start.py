@@ -139,3 +139,26 @@ def test_a_reference_gets_the_size_asked_for() -> None:
     slides = (shapes.trees.slide != 0) & (shapes.trees.turn == 0)
     torch.testing.assert_close(doubled.trees.upper[slides], 2.0 * shapes.trees.upper[slides])
     torch.testing.assert_close(doubled.trees.upper[~slides], shapes.trees.upper[~slides])
+
+
+@pytest.mark.parametrize("category", ["drawer", "eyeglasses"])
+def test_hardly_visible_parts_start_where_their_joints_let_them(category: str) -> None:
+    """With a handful of points left of each moving part, a pose of its own would be anywhere."""
+    samples, clouds, truth = scene(category, 4)
+    rows = len(samples[0].joint_type)
+    few = [
+        torch.cat([(truth.part[b] == k).nonzero()[: 400 if k == 0 else 5, 0] for k in range(rows)])
+        for b in range(len(samples))
+    ]
+    base = ShapeBase.of([artsim.make(category, seed) for seed in range(30)], 32)
+    for b, kept in enumerate(few):
+        alone = Clouds(clouds.points[b : b + 1, kept], clouds.center[b : b + 1], clouds.radius[b : b + 1])
+        own = truth[b : b + 1]
+        known = replace(own, part=own.part[:, kept], canonical=own.canonical[:, kept])
+        row = next(n for n, tree in enumerate(base.trees) if tree.types == samples[b].joint_type)
+        shapes, theta = start(alone, knowing(known), base.shapes[[row]], 1)
+        posed = pose_parts(shapes.trees, theta, shapes.box_center)
+        _, rotation, center, *_ = part_truth(samples[b], rows)
+        seen = torch.bincount(known.part[0], minlength=rows) >= 3
+        assert metrics.rotation_error(posed.rotation[0, :rows], rotation)[seen].max() < 12.0
+        assert metrics.translation_error(posed.center[0, :rows], center, samples[b].diagonal)[seen].max() < 0.06
