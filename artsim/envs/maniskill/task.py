@@ -42,15 +42,15 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
 
     **Objects** are drawn when ManiSkill reconfigures: one for each sub-scene, procedural or of files. Alone
     (``num_envs=1``), that is at every reset; in batches only at the first, unless ``reconfiguration_freq`` says
-    otherwise. An object stands on the ground, its front towards -x and towards the robot.
-    Files tell how it looks; the looks of procedural objects are drawn.
+    otherwise. An object stands on the ground, its front towards -x and towards the robot. Its files tell how it looks;
+    the looks of procedural objects are drawn.
 
     **Observations** are those of ManiSkill's modes. ``state`` holds, for each of ``max_joints`` joints: where it is and
     how far it has to go (shares of its range), its speed, where its handle is from the gripper, in which direction it
-    moves, and whether it counts. The other modes tell of joints only how far each has to go at first.
+    moves, and whether it counts. The other modes tell only where each is to go (``goal``, shares of its range).
 
-    The **info** is the ground truth, batched: the record of ``artsim/Articulated-v0`` (without what belongs to its
-    cloud) with P = ``max_joints + 1`` rows, seen from ``base_camera``, and
+    The **info** is the ground truth, batched: the record of ``artsim/Articulated-v0`` (without its cloud and
+    visible fractions) with P = ``max_joints + 1`` rows, seen from ``base_camera``, and
 
     - ``T_world_object`` (B, 4, 4), ``T_world_part`` (B, P, 4, 4): ManiSkill's world; points of the mode ``pointcloud``
       are in it,
