@@ -11,7 +11,7 @@ from itertools import count, islice
 from typing import Literal
 
 from artsim.errors import AssetError, ConfigError
-from artsim.objects import ArticulatedObject
+from artsim.objects import MAX_PARTS, ArticulatedObject
 from artsim.sources import FamilySource, family_sources
 
 ARTIMAGE: dict[str, tuple[str, ...]] = {
@@ -35,9 +35,19 @@ def has_parts(category: str, joint_types: Sequence[str], parts: Parts = "artimag
 
 
 def objects_of(
-    categories: Sequence[str], number: int, first_seed: int, parts: Parts = "artimage"
+    categories: Sequence[str], number: int, first_seed: int, parts: Parts = "artimage", max_parts: int | None = None
 ) -> list[ArticulatedObject]:
     """Procedural objects with the parts asked for: for each category, those of the first seeds that have them.
+
+    Parameters
+    ----------
+    categories : sequence of str
+    number : int
+        Objects of each category.
+    first_seed : int
+    parts : Parts
+    max_parts : int, optional
+        The most parts that an object may have.
 
     Raises
     ------
@@ -45,18 +55,18 @@ def objects_of(
         When a category is unknown, or hardly any object of it has these parts.
     """
     sources = family_sources(categories, 1, first_seed)
-    return [obj for source in sources for obj in islice(_objects(source, parts), number)]
+    return [obj for source in sources for obj in islice(_objects(source, parts, max_parts or MAX_PARTS), number)]
 
 
-def _objects(first: FamilySource, parts: Parts) -> Iterator[ArticulatedObject]:
+def _objects(first: FamilySource, parts: Parts, max_parts: int) -> Iterator[ArticulatedObject]:
     missed = 0
     for seed in count(first.seed):
         try:
             obj = FamilySource(first.category, seed).load()
         except AssetError:
             continue  # a rare fault of the family, which artsim's audit reports
-        if has_parts(first.category, obj.tree.types, parts):
+        if len(obj) <= max_parts and has_parts(first.category, obj.tree.types, parts):
             missed = 0
             yield obj
         elif (missed := missed + 1) > _ATTEMPTS:
-            raise ConfigError(f"no object has the parts of {parts}", first.category, "use parts 'any'")
+            raise ConfigError(f"no object of at most {max_parts} parts has those of {parts}", first.category)

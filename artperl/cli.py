@@ -33,11 +33,12 @@ class Train:
 
     category: tuple[str, ...] = ("laptop",)
     """Procedural categories, or 'all'; several share one estimator."""
-    parts: Literal["artimage", "any"] = "artimage"
+    parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
-    objects of the families."""
-    preset: Literal["quick", "full"] = "quick"
-    """quick: under five minutes on two cores, to see it learn; full: within the hour."""
+    objects of the families. By default the preset's."""
+    preset: Literal["quick", "full", "joint"] = "quick"
+    """quick: under five minutes on two cores, to see it learn; full: within the hour; joint: one
+    estimator for many categories, with any parts."""
     out: Path | None = None
     """Folder of the run; by default out/train/CATEGORY-PRESET."""
     seed: int = 0
@@ -71,7 +72,7 @@ class Train:
         preset = PRESETS[self.preset]
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
-            preset, categories=categories, parts=self.parts, real=self.real, seed=self.seed,
+            preset, categories=categories, parts=self.parts or preset.parts, real=self.real, seed=self.seed,
             start_from=None if self.start_from is None else str(self.start_from),
             sample=SampleOptions(noise=self.noise),
             perception_steps=preset.perception_steps if steps is None else steps,

@@ -87,13 +87,14 @@ def frozen_samples(
     options: SampleOptions | None = None,
     first_seed: int = TEST_SEEDS,
     parts: Parts = "artimage",
+    max_parts: int | None = None,
 ) -> list[Sample]:
     """Samples of unseen procedural objects: always the same ones for the same arguments."""
     return [
         sample
         for category in categories
         for sample in samples_of(
-            objects_of([category], objects, first_seed, parts), views_per_object, options, first_seed
+            objects_of([category], objects, first_seed, parts, max_parts), views_per_object, options, first_seed
         )
     ]
 

@@ -20,6 +20,8 @@ class TrainOptions:
     parts: Parts = "artimage"
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families."""
+    max_parts: int | None = None
+    """The most parts that an object may have; all others' rows are empty."""
     real: bool = False
     """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
     start_from: str | None = None
@@ -70,5 +72,10 @@ PRESETS = {
         validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
+    "joint": TrainOptions(
+        parts="any", max_parts=10, base_objects=8, reference_points=96, width=64, perception_steps=12000,
+        agent_rollouts=400, test_objects=4, validation_views=1, foreign_categories=0,
+    ),
 }  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour."""
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour;
+joint: one estimator for many categories, with any parts."""

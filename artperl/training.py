@@ -87,7 +87,7 @@ class Training:
 
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
-        objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts)
+        objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts)
         self.real = real_train_objects(options.categories) if options.real else []
         self.base = by_boxes(ShapeBase.of([*objects, *self.real], options.reference_points))
         torch.manual_seed(options.seed)
@@ -238,7 +238,9 @@ class Training:
     def _unseen(self, views: int, first_seed: int) -> list[Sample]:
         sample = replace(self.options.sample, num_points=_TEST_POINTS)
         options = self.options
-        return frozen_samples(options.categories, options.test_objects, views, sample, first_seed, options.parts)
+        return frozen_samples(
+            options.categories, options.test_objects, views, sample, first_seed, options.parts, options.max_parts
+        )
 
     def _finish(self) -> dict[str, Any]:
         """Test the best estimator on objects that had no say in which one that is."""

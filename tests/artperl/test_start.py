@@ -141,8 +141,10 @@ def test_a_reference_gets_the_size_asked_for() -> None:
     torch.testing.assert_close(doubled.trees.upper[~slides], shapes.trees.upper[~slides])
 
 
-@pytest.mark.parametrize("category", ["drawer", "eyeglasses"])
-def test_hardly_visible_parts_start_where_their_joints_let_them(category: str) -> None:
+@pytest.mark.parametrize(("category", "degrees", "diagonals"), [("drawer", 1.0, 0.05), ("eyeglasses", 30.0, 0.1)])
+def test_hardly_visible_parts_start_where_their_joints_let_them(
+    category: str, degrees: float, diagonals: float
+) -> None:
     """With a handful of points left of each moving part, a pose of its own would be anywhere."""
     samples, clouds, truth = scene(category, 4)
     rows = len(samples[0].joint_type)
@@ -160,5 +162,5 @@ def test_hardly_visible_parts_start_where_their_joints_let_them(category: str) -
         posed = pose_parts(shapes.trees, theta, shapes.box_center)
         _, rotation, center, *_ = part_truth(samples[b], rows)
         seen = torch.bincount(known.part[0], minlength=rows) >= 3
-        assert metrics.rotation_error(posed.rotation[0, :rows], rotation)[seen].max() < 12.0
-        assert metrics.translation_error(posed.center[0, :rows], center, samples[b].diagonal)[seen].max() < 0.06
+        assert metrics.rotation_error(posed.rotation[0, :rows], rotation)[seen].max() < degrees
+        assert metrics.translation_error(posed.center[0, :rows], center, samples[b].diagonal)[seen].max() < diagonals
