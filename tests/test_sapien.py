@@ -17,11 +17,10 @@ import artsim
 from artsim import Camera, make_renderer, observe
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer
-from artsim.renderers.sapien import flat_shaded
 from artsim.sources import find_sources
 from artsim.verify import sample_problems
 from benchmarks.agreement import LIMITS, compare, draw_scenes
-from tests.conftest import ASSETS, DEMO, backend, rigid, solid
+from tests.conftest import ASSETS, DEMO, backend, rigid
 
 
 @pytest.fixture(scope="module")
@@ -108,16 +107,6 @@ def test_more_objects_than_are_kept_and_cameras_of_two_sizes_give_the_same_pictu
     first, again = pictures(), pictures()
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
     assert len(sapien._stages) <= 16  # type: ignore[attr-defined]
-
-
-def test_flat_shading_gives_each_corner_the_normal_of_its_triangle() -> None:
-    part = solid("box", trimesh.creation.box((1.0, 2.0, 3.0)))
-    vertices, faces, normals = flat_shaded(part)
-    corners = vertices[faces].astype(np.float64)
-    outwards = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
-    assert np.allclose(normals[faces], outwards[:, None], atol=1e-6)
-    assert (np.einsum("fc,fc->f", outwards, corners.mean(axis=1)) > 0).all()
 
 
 @pytest.mark.parametrize("missing", ["driver", "package"])

@@ -10,14 +10,14 @@ from functools import cache
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.camera import Camera
 from artsim.errors import RenderError
-from artsim.objects import ArticulatedObject, Part
+from artsim.objects import ArticulatedObject
 from artsim.painted import painted_coats
-from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
+from artsim.renderers.base import BACKGROUND, Frame, depth_range
 from artsim.renderers.raycast import pose
 from artsim.renderers.sapien_stage import Shadows, Stage
 from artsim.scene import Scene, SceneFrame, split_ids
@@ -144,24 +144,6 @@ def _shadows(scene: Scene) -> Shadows:
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     near, lit = (float(np.linalg.norm(p - center, axis=1).max()) for p in (points, everything))
     return Shadows(center, 1.3 * near + 0.1, lit + 0.1)
-
-
-def flat_shaded(part: Part) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]:
-    """Triangles that share no corner, and the normal at each corner.
-
-    Returns
-    -------
-    vertices : (3 F, 3) float32
-        Native units.
-    faces : (F, 3) uint32
-    normals : (3 F, 3) float32
-    """
-    corners = part.vertices[two_sided_faces(part)]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.where(length > 0, normals / np.where(length > 0, length, 1.0), (0.0, 0.0, 1.0))
-    faces = np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
-    return corners.reshape(-1, 3).astype(np.float32), faces, np.repeat(normals, 3, axis=0).astype(np.float32)
 
 
 @cache
