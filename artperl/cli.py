@@ -167,18 +167,22 @@ class Evaluate:
         folder = self.estimator if self.estimator.is_dir() else WEIGHTS / self.estimator
         learnt = read_settings(folder)["about"]["options"]
         options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
-        views = self.views or 4
+        views, parts = self.views or 4, learnt.get("parts", "artimage")
+        categories = self.category or tuple(learnt["categories"])
         if self.files:
             samples = samples_of((source.load() for source in find_sources(self.files)), views, options)
         else:
-            categories = self.category or tuple(learnt["categories"])
-            samples = frozen_samples(categories, self.objects, views, options, parts=learnt.get("parts", "artimage"))
+            samples = frozen_samples(categories, self.objects, views, options, parts=parts)
         if self.ablation:
             from artperl.benchmarks.ablation import run_ablation, variants
+            from artperl.benchmarks.basin import run_basin
 
             agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
             say = lambda line: print(line, flush=True)  # noqa: E731
-            return run_ablation(variants(estimator, *agents), samples, say, sys.stderr.isatty())
+            result = run_ablation(variants(estimator, *agents), samples, say, sys.stderr.isatty())
+            if estimator.agent is not None and not self.files:
+                result["start"] = run_basin(estimator, categories, parts, say=say)
+            return result
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
         print(table(figures))
         return figures

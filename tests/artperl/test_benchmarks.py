@@ -13,6 +13,7 @@ import artsim
 from artperl import metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
 from artperl.benchmarks.artimage import SPLIT, real_objects, reduced, row_samples
+from artperl.benchmarks.basin import ANGLES, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
 from artperl.categories import ARTIMAGE
 from artperl.checkpoint import save_estimator
@@ -20,9 +21,10 @@ from artperl.estimator import Estimator
 from artperl.evaluation import TEST_SEEDS, frozen_samples, true_poses
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception
+from artperl.search import EstimatorOptions
 from artsim.errors import AssetError
 from tests.artperl.test_estimator import Oracle
-from tests.artperl.worlds import small_base
+from tests.artperl.worlds import small_base, small_problem
 
 
 def test_no_real_object_is_both_learnt_from_and_tested_on() -> None:
@@ -131,3 +133,16 @@ def test_parts_are_registered_on_their_own() -> None:
     rotation, center = true_poses(sample)
     assert metrics.rotation_error(estimate.rotation, rotation).max() < 8.0
     assert metrics.translation_error(estimate.translation, center, sample.diagonal).max() < 0.1
+
+
+def test_starts_are_as_far_off_as_they_are_said_to_be() -> None:
+    problem = small_problem("laptop")
+    start = turned(problem, 0.5)
+    off = metrics.rotation_error(start.rotation.double().numpy(), problem.goal.rotation.double().numpy())
+    np.testing.assert_allclose(off, np.rad2deg(0.5), atol=1e-2)
+    torch.manual_seed(0)
+    estimator = Estimator(Perception(2, 16), small_base("laptop"), Agent(16), EstimatorOptions(num_points=128))
+    lines: list[str] = []
+    found = run_basin(estimator, ["laptop"], count=2, say=lines.append)
+    assert [row["start_deg"] for row in found] == list(ANGLES)
+    assert all(0.0 <= row["agent and refinement"] <= 1.0 for row in found)
