@@ -105,7 +105,7 @@ class Stage:
         common: dict[str, Any] = {"shadow": True, "shadow_map_size": _SHADOW_PIXELS}
         radius, lit = self._shadows.radius, self._shadows.lit
         if light == "sun":
-            return {"shadow_scale": radius, "shadow_near": -4.0 * radius, "shadow_far": 4.0 * radius, **common}
+            return {"shadow_scale": radius, "shadow_near": -lit, "shadow_far": lit, **common}  # beyond, all is dark
         away = _SKY_DISTANCE * lit
         return {"shadow_near": away - lit, "shadow_far": away + lit, **common}
 
