@@ -191,10 +191,14 @@ def drawn() -> None:
 
 
 @pytest.mark.usefixtures("drawn")
-@pytest.mark.parametrize("category", ["storage_furniture", "faucet"])
-def test_images_are_those_of_the_ray_caster(category: str) -> None:
+def test_images_are_those_of_the_ray_caster() -> None:
     # Robots stand in the way of rays: what they hide is left out.
-    env = new(categories=(category,), goal="random", obs_mode="rgb+depth+segmentation", sensor_configs=FINE)
+    env = new(
+        categories=("storage_furniture",),
+        goal="random",
+        obs_mode="rgb+depth+segmentation",
+        sensor_configs={"shader_pack": "default"},
+    )
     observation, info = env.reset(seed=1)
     obj, images = env.objects[0], observation["sensor_data"]["base_camera"]
     frame = render(obj, of(info, "joint_state", len(obj)), camera_of(info), of(info, "T_world_object"))
@@ -209,9 +213,6 @@ def test_images_are_those_of_the_ray_caster(category: str) -> None:
     rgb = images["rgb"][0].numpy()
     assert rgb.shape == (*seen.shape, 3)
     assert rgb[both].std() > 0
-
-
-FINE = {"shader_pack": "default"}
 
 
 def part_ids(segmentation: Any, info: dict[str, Any]) -> Any:
