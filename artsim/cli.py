@@ -14,7 +14,7 @@ import tyro
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
 from artsim.plan import SampleOptions
-from artsim.scene_maker import SceneCameraOptions, SceneOptions
+from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
 
 def _cores() -> int:
@@ -191,9 +191,9 @@ class Scene:
     """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
 
     def run(self) -> None:
-        from artsim.scene_maker import make_scene, scene_camera
-        from artsim.scene_sample import observe_scene
-        from artsim.scene_view import write_overview
+        from artsim.scenes.maker import make_scene, scene_camera
+        from artsim.scenes.sample import observe_scene
+        from artsim.scenes.view import write_overview
 
         if min(self.scenes, self.views) < 1:
             raise ConfigError("there is nothing to make", "scenes, views", "use 1 or more of each")

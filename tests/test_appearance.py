@@ -14,18 +14,18 @@ from PIL import Image
 import artsim
 from artsim import Camera, make
 from artsim.appearance import Coat, Lights, Material, Sun, corner_normals, patches, plain_coat, subpixel
-from artsim.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repainted
+from artsim.appearance.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repainted
+from artsim.appearance.painted import painted_coats
+from artsim.appearance.textures import TEXTURES, noise
 from artsim.objects import Part
-from artsim.painted import painted_coats
-from artsim.props import placed
 from artsim.renderers import Renderer
 from artsim.renderers.base import two_sided_faces
 from artsim.renderers.sapien import SapienRenderer
 from artsim.renderers.scenes import render_scene
-from artsim.scene import Scene, Thing
+from artsim.scenes.props import placed
+from artsim.scenes.scene import Scene, Thing
 from artsim.solids import box, cylinder
 from artsim.sources import find_sources
-from artsim.textures import TEXTURES, noise
 from tests.conftest import backend, rigid, solid
 
 MATT = Material((0.6, 0.4, 0.2), roughness=1.0, specular=0.0)

@@ -27,7 +27,7 @@ from artsim.kinematics import Array, transform_points
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
 from artsim.renderers.raycast import pose
-from artsim.scene import Scene, SceneFrame, split_ids
+from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 # As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
 _MAX_WORLDS = {"pybullet": 16, "pybullet-egl": 1}

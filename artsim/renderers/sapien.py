@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
+from artsim.appearance.painted import painted_coats
 from artsim.camera import Camera
 from artsim.errors import RenderError
 from artsim.objects import ArticulatedObject
-from artsim.painted import painted_coats
 from artsim.renderers.base import BACKGROUND, Frame, depth_range
 from artsim.renderers.raycast import pose
 from artsim.renderers.sapien_stage import Shadows, Stage
-from artsim.scene import Scene, SceneFrame, split_ids
+from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 _MAX_STAGES = 16  # as many objects as take turns in a plan
 _MAX_FACES = 1_500_000  # triangles kept loaded

@@ -11,7 +11,7 @@ from artsim.camera import Camera
 from artsim.errors import ConfigError
 from artsim.renderers import Renderer, shared_renderer
 from artsim.renderers.base import BACKGROUND
-from artsim.scene import Scene, SceneFrame
+from artsim.scenes.scene import Scene, SceneFrame
 
 
 @runtime_checkable

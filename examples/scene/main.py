@@ -5,9 +5,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from artsim.scene_maker import SceneCameraOptions, SceneOptions, make_scene, scene_camera
-from artsim.scene_sample import observe_scene
-from artsim.scene_view import write_overview
+from artsim.scenes.maker import SceneCameraOptions, SceneOptions, make_scene, scene_camera
+from artsim.scenes.sample import observe_scene
+from artsim.scenes.view import write_overview
 
 SEED = 17
 

@@ -16,6 +16,8 @@ from mani_skill.utils.structs import Pose
 from mani_skill.utils.structs.types import GPUMemoryConfig, SimConfig
 from torch import Tensor
 
+from artsim.appearance.finishes import draw_coats
+from artsim.appearance.painted import painted_coats
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
 from artsim.envs.maniskill.build import OBJECT_BIT, build
 from artsim.envs.maniskill.eyes import camera_record, look, poses
@@ -26,9 +28,7 @@ from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_s
 from artsim.envs.maniskill.truth import Record, Truth, truth_of
 from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError
-from artsim.finishes import draw_coats
 from artsim.objects import ArticulatedObject
-from artsim.painted import painted_coats
 from artsim.renderers.sapien import import_sapien
 
 CAMERA = "base_camera"

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from artsim.appearance import Coat, Material, plain_coat
-from artsim.finishes import draw_material, piece_of_face
+from artsim.appearance.finishes import draw_material, piece_of_face
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
-from artsim.scene import Thing, rigid
+from artsim.scenes.scene import Thing, rigid
 from artsim.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
 
 _THICKNESS = 0.06  # of floors and walls

@@ -13,7 +13,7 @@ from artsim.appearance import Coat
 from artsim.errors import ConfigError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
-from artsim.scene import Thing, used_vertices
+from artsim.scenes.scene import Thing, used_vertices
 from artsim.solids import rotation_about
 
 GAP = 0.004

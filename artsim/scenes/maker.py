@@ -11,17 +11,17 @@ import numpy as np
 import tyro
 
 from artsim.appearance import Coat, Colour, Lights, Sun
+from artsim.appearance.finishes import draw_coats, repainted
+from artsim.appearance.painted import painted_coats
 from artsim.camera import Camera
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
-from artsim.finishes import draw_coats, repainted
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
-from artsim.painted import painted_coats
-from artsim.placement import Area, Arrangement
-from artsim.props import TABLE_HEIGHT, distractor, room, table
 from artsim.sampling import StateOptions, sample_state
-from artsim.scene import Scene, Thing
+from artsim.scenes.placement import Area, Arrangement
+from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
+from artsim.scenes.scene import Scene, Thing
 from artsim.sources import find_sources
 
 _TABLE_DIAGONAL = 0.6

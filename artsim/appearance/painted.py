@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image as Pictures
 
 from artsim.appearance import Coat, Colour, Material
+from artsim.appearance.textures import Image
 from artsim.bodies import merge_fixed_links
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.objects import ArticulatedObject
 from artsim.partnet import read_side_files
-from artsim.textures import Image
 from artsim.urdf_xml import parse_robot
 
 _MAX_PICTURE_BYTES = 50_000_000

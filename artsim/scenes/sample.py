@@ -22,7 +22,7 @@ from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.renderers.raycast import pose, render_posed
 from artsim.renderers.scenes import render_scene
 from artsim.sample import ARTSIM_VERSION, Sample, observe
-from artsim.scene import Scene, SceneFrame, Thing
+from artsim.scenes.scene import Scene, SceneFrame, Thing
 from artsim.sensor import Sensor, find_sensor
 from artsim.shards import npy_bytes, sample_members
 

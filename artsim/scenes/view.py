@@ -12,7 +12,7 @@ from artsim.camera import Camera
 from artsim.files import write_atomic
 from artsim.renderers import BACKGROUND
 from artsim.sample import Sample
-from artsim.scene_sample import SceneView, png_bytes, write_view
+from artsim.scenes.sample import SceneView, png_bytes, write_view
 from artsim.view import BOX_EDGES, PALETTE, axis_segment, box_corners
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
@@ -28,7 +28,7 @@ def overview(view: SceneView) -> NDArray[np.uint8]:
 
 
 def write_overview(view: SceneView, folder: Path) -> None:
-    """Write a view's files (see :func:`artsim.scene_sample.write_view`), and ``overview.png``."""
+    """Write a view's files (see :func:`artsim.scenes.sample.write_view`), and ``overview.png``."""
     write_view(view, folder)
     write_atomic(folder / "overview.png", png_bytes(overview(view)))
 

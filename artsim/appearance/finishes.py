@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.appearance import Coat, Colour, Material
+from artsim.appearance.textures import TEXTURES
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Mesh, Part
-from artsim.textures import TEXTURES
 
 Finish = Callable[[np.random.Generator, Colour], Material]
 """Makes a material of a tone."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.appearance.textures import Image
 from artsim.kinematics import Array
 from artsim.objects import Part
 from artsim.renderers.base import two_sided_faces
-from artsim.textures import Image
 
 Colour = tuple[float, float, float]
 

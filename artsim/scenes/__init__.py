@@ -1,0 +1,1 @@
+"""Several objects among other things: how they are placed, drawn, observed and shown."""
