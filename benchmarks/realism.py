@@ -113,23 +113,32 @@ def _to_real(task: tuple[str, Sequence[int], list[Likeness]]) -> Array:
 
 def table(category: str, names: Sequence[str], realism: Realism) -> list[str]:
     """Lines of text."""
-    near, ratio = realism.near, realism.neighbour / np.maximum(realism.yardstick, 1e-12)
+    near = realism.near
     lines = [
         f"{category}: {len(realism.to_real)} procedural, {len(names)} real, "
         f"{realism.near_at_once.sum()} of them with a neighbour that is near by every measure at once",
         f"  {'':9}{'real':>8}{'COV':>8}{'MMD':>8}{'near':>8}   farthest real object",
     ]
     for m, measure in enumerate(MEASURES):
-        worst = int(realism.neighbour[:, m].argmax())
+        comparable, worst = bool(np.isfinite(realism.yardstick[m])), int(realism.neighbour[:, m].argmax())
         lines.append(
             f"  {measure:9}{realism.yardstick[m]:8.4f}{realism.coverage[m]:8.2f}"
-            f"{realism.minimum_matching_distance[m]:8.4f}{near[:, m].sum():5d}/{len(names)}"
-            f"   {names[worst]} at {ratio[worst, m]:.2f} of the median"
+            f"{realism.minimum_matching_distance[m]:8.4f}{near[:, m].sum() if comparable else '-':>5}/{len(names)}"
+            f"   {names[worst]} at {_share(realism, worst, m)}"
         )
-    for r in map(int, np.flatnonzero(~near.all(axis=1) | ~realism.near_at_once)):
-        far = [f"{MEASURES[m]} {ratio[r, m]:.2f}" for m in np.flatnonzero(~near[r])]
+    measurable = np.isfinite(realism.yardstick).any()
+    for r in map(int, np.flatnonzero(measurable & (~near.all(axis=1) | ~realism.near_at_once))):
+        far = [f"{MEASURES[m]} {_share(realism, r, int(m))}" for m in np.flatnonzero(~near[r])]
         lines.append(f"  far off: {names[r]} ({', '.join(far) or 'no neighbour near by every measure at once'})")
     return lines
+
+
+def _share(realism: Realism, r: int, m: int) -> str:
+    """Distance from a real object to its nearest procedural one, over the median distance between two real ones."""
+    distance, median = realism.neighbour[r, m], realism.yardstick[m]
+    if np.isnan(median):
+        return f"{distance:.4f}, no two real ones"
+    return f"{distance / median:.2f} of the median" if median > 1e-9 else f"{distance:.4f}, real ones do not differ"
 
 
 def summary(names: Sequence[str], realism: Realism) -> dict[str, Any]:
