@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +110,7 @@ def read_intrinsics(path: Path) -> Array:
         name = next(name for name in ("K", "cam_K", "intrinsic_matrix") if name in data)
         K = np.asarray(data[name], dtype=np.float64).reshape(3, 3)
         return K.T if abs(K[2, 0]) > 1.0 else K  # Open3D writes columns
-    except (ValueError, KeyError, TypeError, StopIteration) as error:
+    except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
         raise ConfigError("no intrinsics can be read", path, "write {fx, fy, cx, cy}, or K of nine numbers") from error
 
 
@@ -125,8 +124,8 @@ def _read_cloud(path: Path) -> Array:
         import trimesh
 
         return np.asarray(trimesh.load(path).vertices)
-    except (ValueError, KeyError, AttributeError, EOFError, TypeError, zipfile.BadZipFile) as error:
-        raise ConfigError(f"no cloud can be read: {error}", path, _MEND) from error
+    except Exception as error:  # NumPy and trimesh fail in many ways on bytes that are not theirs
+        raise ConfigError(f"no cloud can be read ({error})", path, _MEND) from error
 
 
 def _read_array(path: Path) -> NDArray[Any]:
@@ -137,5 +136,5 @@ def _read_array(path: Path) -> NDArray[Any]:
 
         with Image.open(path) as image:
             return np.asarray(image)
-    except (ValueError, EOFError, SyntaxError) as error:
-        raise ConfigError(f"no image can be read: {error}", path, _MEND) from error
+    except Exception as error:  # so do NumPy and Pillow
+        raise ConfigError(f"no image can be read ({error})", path, _MEND) from error

@@ -86,8 +86,29 @@ def test_images_that_make_no_cloud_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="intrinsics"):
         read_points(tmp_path / "depth.png")
     (tmp_path / "camera.json").write_text('{"fx": 1, "fy": 1, "cx": 0, "cy": 0}')
-    with pytest.raises((ConfigError, OSError)):
+    with pytest.raises(ConfigError, match="no image"):
         read_points(tmp_path / "depth.png", intrinsics=tmp_path / "camera.json")
+    with pytest.raises(ConfigError, match="no intrinsics"):
+        read_intrinsics(tmp_path / "lost.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("cloud.md", b"# words"),
+        ("cloud.ply", b""),
+        ("cloud.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 9\nproperty float x\nend_header\n12"),
+        ("cloud.npy", b"\x93NUMPY\x01\x00"),
+        ("cloud.npz", b"PK\x03\x04"),
+        ("cloud.stl", b"solid"),
+    ],
+)
+def test_files_that_hold_no_cloud_are_named(name: str, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ConfigError, match=name):
+        read_points(tmp_path / name)
+    with pytest.raises(ConfigError, match="lost"):
+        read_points(tmp_path / f"lost{Path(name).suffix}")
 
 
 def test_a_page_holds_the_cloud_and_every_box_of_the_way(sample: Sample) -> None:
