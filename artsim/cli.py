@@ -181,7 +181,7 @@ class Scene:
     """Seed of the first scene: the same seed and options make the same files."""
     scene: Annotated[SceneOptions, tyro.conf.arg(name="")] = field(default_factory=SceneOptions)
     camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
-    renderer: Literal["sapien", "pybullet", "pybullet-egl", "raycast"] = "sapien"
+    renderer: Literal["sapien", "pybullet", "pybullet-egl", "raycast", "warp"] = "sapien"
     """Only the first three make colour images."""
     rgb_samples: int = 8
     """Pictures that each colour image is the mean of: more give softer shadows and smoother edges."""
