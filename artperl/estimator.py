@@ -30,6 +30,8 @@ _OUTLIER = 6.0
 """A point whose neighbours are that many times as far away as is usual is an outlier."""
 _CLEANED = 4096
 """Points that are looked at for outliers."""
+_ENOUGH_TO_WIDEN = 32
+"""Points of a part from which they say how large it is."""
 _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
 _FEWEST = 8
@@ -172,10 +174,12 @@ class Estimator:
         nearest = cKDTree(observed.points[0].numpy()).query(points[good], workers=1)[1]
         part[good] = observed.part[0].numpy()[nearest]
         poses = [_transforms(shapes, step)[:K] for step in found.path]
+        rotation, center = _numpy(posed.rotation)[:K], _numpy(posed.center)[:K]
+        translation, size = widen(rotation, center, _numpy(shapes.box_size * posed.scale)[:K], points, part)
         return Estimate(
-            rotation=_numpy(posed.rotation)[:K],
-            translation=_numpy(posed.center)[:K],
-            size=_numpy(shapes.box_size * posed.scale)[:K],
+            rotation=rotation,
+            translation=translation,
+            size=size,
             T_camera_part=poses[-1],
             state=_numpy(joint_states(trees, theta))[:K],
             joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),
@@ -221,6 +225,34 @@ def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int
     """``count`` of ``available`` indices in random order, every one before any comes twice."""
     rounds = [rng.permutation(available) for _ in range(-(-count // available))]
     return np.concatenate(rounds)[:count]
+
+
+def widen(rotation: Array, center: Array, size: Array, points: Array, part: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Boxes that hold the points of their parts, but for the outermost percent on each side.
+
+    What is fitted is a reference's shape, which real parts stick out of; points never make a box smaller, since a part
+    is seen from one side only.
+
+    Parameters
+    ----------
+    rotation, center, size : (K, 3, 3), (K, 3), (K, 3) float
+    points : (N, 3) float
+    part : (N,) int
+        -1 for points of no part.
+
+    Returns
+    -------
+    center, size : (K, 3) float
+    """
+    center, size = center.copy(), size.copy()
+    for k in range(len(size)):
+        own = points[part == k]
+        if len(own) >= _ENOUGH_TO_WIDEN:
+            across = np.percentile((own - center[k]) @ rotation[k], (1.0, 99.0), axis=0)
+            low, high = np.minimum(-0.5 * size[k], across[0]), np.maximum(0.5 * size[k], across[1])
+            center[k] += rotation[k] @ (0.5 * (low + high))
+            size[k] = high - low
+    return center, size
 
 
 def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:

@@ -14,7 +14,7 @@ from artperl import metrics
 from artperl.checkpoint import load_estimator, save_estimator
 from artperl.data import Clouds, to_batch, training_rows
 from artperl.embedding import by_boxes
-from artperl.estimator import Calibration, Estimator, clean, draw
+from artperl.estimator import Calibration, Estimator, clean, draw, widen
 from artperl.evaluation import (
     Scored,
     calibrate,
@@ -269,3 +269,19 @@ def test_clouds_know_where_they_were(sample: Sample) -> None:
     clouds = Clouds.of(points)
     back = clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]
     torch.testing.assert_close(back, points)
+
+
+def test_points_widen_boxes_and_never_narrow_them() -> None:
+    rng = np.random.default_rng(0)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    inside = rng.uniform([-0.5, -0.5, 0.0], [0.5, 1.5, 0.2], (20_000, 3))  # on one side, and farther along y
+    points = np.concatenate([inside @ turn.T + [1.0, 2.0, 3.0], rng.normal(size=(20, 3))])
+    part = np.repeat([0, 1], [20_000, 20])
+    rotation, center = np.stack([turn, np.eye(3)]), np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])
+    size = np.ones((2, 3))
+    moved, grown = widen(rotation, center, size, points, part)
+    np.testing.assert_allclose(grown[0], [1.0, 1.98, 1.0], atol=0.01)  # a percent of 2 is left out at the far end
+    np.testing.assert_allclose((moved[0] - center[0]) @ turn, [0.0, 0.49, 0.0], atol=0.01)
+    np.testing.assert_array_equal(moved[1], center[1])  # twenty points say nothing
+    np.testing.assert_array_equal(grown[1], size[1])
