@@ -9,8 +9,7 @@ import os
 import sys
 import tempfile
 import weakref
-from collections import OrderedDict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -26,12 +25,12 @@ from artsim.errors import RenderError
 from artsim.kinematics import Array, transform_points
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
+from artsim.renderers.kept import Kept
 from artsim.renderers.raycast import pose
 from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 # As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
 _MAX_WORLDS = {"pybullet": 16, "pybullet-egl": 1}
-_MAX_FACES = 1_500_000  # triangles kept loaded
 _EGL_MEND = "install libegl1 libegl-mesa0 libgl1-mesa-dri (Debian/Ubuntu), or use --renderer raycast"
 # OpenGL's camera looks along -z with y up.
 _GL_FROM_CV = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -56,7 +55,7 @@ class BulletRenderer:
     def __init__(self, egl: bool = False):
         self.name = "pybullet-egl" if egl else "pybullet"
         self._egl = egl
-        self._worlds: OrderedDict[Hashable, _World] = OrderedDict()
+        self._worlds: Kept[_World] = Kept(_MAX_WORLDS[self.name])
         _World((), egl).close()  # says now, rather than at the first frame, that the backend is missing
 
     def render(
@@ -65,9 +64,9 @@ class BulletRenderer:
         """Render one posed object; see :class:`artsim.renderers.base.Renderer`."""
         T_camera_part = pose(obj, q, camera, T_world_object).T_camera_part
         T_camera_part[:, :3, 3] /= obj.scale  # drawn in native units
-        world = self._kept(obj.parts, obj.num_faces)
-        if world is None:
-            world = self._worlds[obj.parts] = _World([_Solid(part) for part in obj.parts], self._egl)
+        world = self._worlds.get(
+            obj.parts, obj.num_faces, lambda: _World([_Solid(part) for part in obj.parts], self._egl)
+        )
         depth, solid, rgb = world.draw(camera, T_camera_part, *depth_range(obj, T_camera_part))
         part_ids = np.where(solid < 0, BACKGROUND, solid).astype(np.uint8)
         return Frame((depth * obj.scale).astype(np.float32), part_ids, rgb=rgb)
@@ -87,22 +86,15 @@ class BulletRenderer:
         list of SceneFrame
             One for each camera.
         """
-        world = self._kept(scene, sum(thing.obj.num_faces for thing in scene.things))
-        if world is None:
-            solids = [
-                _Solid(part, coat, thing.obj.scale)
-                for thing in scene.things
-                for part, coat in zip(thing.obj.parts, thing.coats, strict=True)
-            ]
-            world = self._worlds[scene] = _World(solids, self._egl)
-        T_world_solid = np.concatenate([thing.T_world_part for thing in scene.things])
-        points = np.concatenate([thing.vertices for thing in scene.things])
+        world = self._worlds.get(
+            scene, scene.num_faces, lambda: _World([_Solid(*solid) for solid in scene.solids], self._egl)
+        )
         frames = []
         for camera in cameras:
-            z = transform_points(camera.T_camera_world, points)[:, 2]
+            z = transform_points(camera.T_camera_world, scene.vertices)[:, 2]
             far = max(1.01 * float(z.max()), 0.1)
             near = max(0.9 * float(z[z > 0].min(initial=far)), 0.01 * far)
-            T_camera_solid = camera.T_camera_world @ T_world_solid
+            T_camera_solid = camera.T_camera_world @ scene.T_world_solid
             if self._egl:  # depth buffers have 24 bits: a first picture says between which planes everything lies
                 depth, _, _ = world.draw(camera, T_camera_solid, near, far)
                 near, far = 0.99 * float(depth[depth > 0].min(initial=far)), 1.01 * max(float(depth.max()), near)
@@ -110,22 +102,9 @@ class BulletRenderer:
             frames.append(SceneFrame(depth.astype(np.float32), *split_ids(scene, solid), rgb))
         return frames
 
-    def _kept(self, key: Hashable, num_faces: int) -> _World | None:
-        """What was loaded under this key; if nothing was, there is room for it now."""
-        if key in self._worlds:
-            self._worlds.move_to_end(key)
-            return self._worlds[key]
-        while self._worlds and (
-            len(self._worlds) >= _MAX_WORLDS[self.name]
-            or sum(w.num_faces for w in self._worlds.values()) + num_faces > _MAX_FACES
-        ):
-            self._worlds.popitem(last=False)[1].close()
-        return None
-
     def close(self) -> None:
         """Drop every world."""
-        while self._worlds:
-            self._worlds.popitem()[1].close()
+        self._worlds.close()
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections import OrderedDict
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
 
@@ -18,12 +17,12 @@ from artsim.camera import Camera
 from artsim.errors import RenderError
 from artsim.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND, Frame, depth_range
+from artsim.renderers.kept import Kept
 from artsim.renderers.raycast import pose
 from artsim.renderers.sapien_stage import Shadows, Stage
 from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 _MAX_STAGES = 16  # as many objects as take turns in a plan
-_MAX_FACES = 1_500_000  # triangles kept loaded
 _PROBE_TIMEOUT = 120.0  # seconds
 _EXTRA_MEND = "pip install 'artsim[sapien]'"
 _DRIVER_MEND = (
@@ -62,7 +61,7 @@ class SapienRenderer:
 
     def __init__(self) -> None:
         self._sapien = import_sapien()
-        self._stages: OrderedDict[Hashable, Stage] = OrderedDict()
+        self._stages: Kept[Stage] = Kept(_MAX_STAGES)
 
     def render(
         self, obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None
@@ -70,10 +69,12 @@ class SapienRenderer:
         """Render one posed object; see :class:`artsim.renderers.base.Renderer`."""
         T_camera_part = pose(obj, q, camera, T_world_object).T_camera_part
         T_camera_part[:, :3, 3] /= obj.scale  # drawn in native units, in the camera's own frame
-        stage = self._kept(obj.parts, obj.num_faces)
-        if stage is None:
+
+        def load() -> Stage:
             solids = [(part, coat, 1.0) for part, coat in zip(obj.parts, _coats(obj), strict=True)]
-            stage = self._stages[obj.parts] = Stage(self._sapien, solids, _HEADLIGHT)
+            return Stage(self._sapien, solids, _HEADLIGHT)
+
+        stage = self._stages.get(obj.parts, obj.num_faces, load)
         stage.place(T_camera_part)
         depth, solid, rgb = stage.picture(camera, np.eye(4), *depth_range(obj, T_camera_part))
         part_ids = np.where(solid < 0, BACKGROUND, solid).astype(np.uint8)
@@ -95,40 +96,25 @@ class SapienRenderer:
         list of SceneFrame
             One for each camera.
         """
-        stage = self._kept(scene, sum(thing.obj.num_faces for thing in scene.things))
-        if stage is None:
-            solids = [
-                (part, coat, thing.obj.scale)
-                for thing in scene.things
-                for part, coat in zip(thing.obj.parts, thing.coats, strict=True)
-            ]
-            stage = self._stages[scene] = Stage(self._sapien, solids, scene.lights, _shadows(scene))
-            stage.place(np.concatenate([thing.T_world_part for thing in scene.things]))
-        points = np.concatenate([thing.vertices for thing in scene.things])
+
+        def load() -> Stage:
+            stage = Stage(self._sapien, scene.solids, scene.lights, _shadows(scene))
+            stage.place(scene.T_world_solid)
+            return stage
+
+        stage = self._stages.get(scene, scene.num_faces, load)
         frames = []
         for camera in cameras:
-            far = float((points @ camera.T_camera_world[2, :3] + camera.T_camera_world[2, 3]).max())
+            far = float((scene.vertices @ camera.T_camera_world[2, :3] + camera.T_camera_world[2, 3]).max())
             depth, solid, rgb = stage.picture(
                 camera, camera.T_world_camera, _NEAREST, max(1.01 * far, 2.0 * _NEAREST), samples
             )
             frames.append(SceneFrame(depth, *split_ids(scene, solid), rgb))
         return frames
 
-    def _kept(self, key: Hashable, num_faces: int) -> Stage | None:
-        """What was loaded under this key; if nothing was, there is room for it now."""
-        if key in self._stages:
-            self._stages.move_to_end(key)
-            return self._stages[key]
-        while self._stages and (
-            len(self._stages) >= _MAX_STAGES or sum(s.num_faces for s in self._stages.values()) + num_faces > _MAX_FACES
-        ):
-            self._stages.popitem(last=False)[1].close()
-        return None
-
     def close(self) -> None:
         """Drop everything loaded."""
-        while self._stages:
-            self._stages.popitem()[1].close()
+        self._stages.close()
 
 
 def _coats(obj: ArticulatedObject) -> Sequence[Coat]:

@@ -93,6 +93,30 @@ class Scene:
         """Everything there is: the place in this list is the instance id."""
         return (*self.instances, *self.distractors, *self.supports)
 
+    @cached_property
+    def solids(self) -> list[tuple[Part, Coat, float]]:
+        """Every part of every thing in order, with its looks and its scale."""
+        return [
+            (part, coat, thing.obj.scale)
+            for thing in self.things
+            for part, coat in zip(thing.obj.parts, thing.coats, strict=True)
+        ]
+
+    @cached_property
+    def T_world_solid(self) -> Array:
+        """(S, 4, 4) pose of the rest frame, as carried by each solid, in the world."""
+        return np.concatenate([thing.T_world_part for thing in self.things])
+
+    @cached_property
+    def vertices(self) -> Array:
+        """(V, 3) vertices of all things as posed, world frame."""
+        return np.concatenate([thing.vertices for thing in self.things])
+
+    @cached_property
+    def num_faces(self) -> int:
+        """Triangles of all things."""
+        return sum(thing.obj.num_faces for thing in self.things)
+
 
 @dataclass(frozen=True, eq=False)
 class SceneFrame:
