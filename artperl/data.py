@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import signal
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
@@ -23,6 +25,10 @@ from artsim.sample import Sample
 from artsim.stream import FamilyStream
 
 _ATTEMPTS = 200
+_USES = 4
+"""Batches that a cloud is seen in, on average. Making one takes as long as learning from one."""
+_WINDOW = 64
+"""Batches, after which a cloud is not seen again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +214,9 @@ def batches(
 ) -> Iterator[tuple[Clouds, Truth]]:
     """Endless batches of fresh procedural objects.
 
-    Batch ``n`` is always the same, whatever the number of workers and wherever the run was begun.
+    A quarter of each batch is views of one object that was never seen before; the others are drawn from the last
+    batches' and shuffled anew. Batch ``n`` is always the same, whatever the number of workers and wherever the run was
+    begun.
 
     Parameters
     ----------
@@ -228,9 +236,27 @@ def batches(
         See :class:`Samples`.
     """
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-    samples = Samples(categories, options, seed, max(1, batch_size // 4), num_rows, parts, real)
-    rows = _Rows(samples, num_points, batch_size, first_batch * batch_size)
+    fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
+    samples = Samples(categories, options, seed, fresh, num_rows, parts, real)
+    rows = _Rows(samples, num_points, fresh, begin * fresh)
     loader = DataLoader(
-        rows, batch_size, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on
+        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on
     )
-    yield from map(to_batch, loader)
+    window: deque[dict[str, Tensor]] = deque(maxlen=_WINDOW)
+    for n, made in enumerate(loader, begin):
+        window.append({name: values.clone() for name, values in made.items()})  # out of the workers' shared memory
+        if n >= first_batch:
+            yield to_batch(_mixed(window, batch_size, np.random.default_rng([seed, n])))
+
+
+def _mixed(window: Sequence[dict[str, Tensor]], batch_size: int, rng: np.random.Generator) -> dict[str, Tensor]:
+    """All of the newest rows, and any of the window's, each with its points in a new order."""
+    fresh, num_points = window[-1]["part"].shape
+    total = len(window) * fresh
+    chosen = [*range(total - fresh, total), *rng.integers(total, size=batch_size - fresh).tolist()]
+    rows = {name: torch.stack([window[i // fresh][name][i % fresh] for i in chosen]) for name in window[-1]}
+    order = torch.from_numpy(rng.permuted(np.tile(np.arange(num_points), (batch_size, 1)), axis=1))
+    for name in ("points", "part", "canonical"):
+        values = rows[name]
+        rows[name] = values.gather(1, order.reshape(*order.shape, *[1] * (values.ndim - 2)).expand(values.shape))
+    return rows

@@ -75,6 +75,8 @@ class Problems:
     parts : Parts
     real : sequence of ArticulatedObject
         See :class:`artperl.data.Samples`.
+    views_per_object : int
+        Problems in a row of the same object.
     """
 
     def __init__(
@@ -90,9 +92,10 @@ class Problems:
         perception: Perception | None = None,
         parts: Parts = "artimage",
         real: Sequence[ArticulatedObject] = (),
+        views_per_object: int = 2,
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-        self.samples = Samples(categories, options, seed, 2, base.shapes.trees.num_rows, parts, real)
+        self.samples = Samples(categories, options, seed, views_per_object, base.shapes.trees.num_rows, parts, real)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
         self.start, self.perception = start or StartOptions(), perception
 

@@ -33,7 +33,7 @@ class TrainOptions:
     """Points of each part of a reference."""
     width: int = 48
     """Channels of perception's finest level."""
-    perception_steps: int = 6000
+    perception_steps: int = 4000
     """Batches of stage 1."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
@@ -73,7 +73,7 @@ PRESETS = {
     ),
     "full": TrainOptions(),
     "joint": TrainOptions(
-        parts="any", max_parts=10, base_objects=8, reference_points=96, width=64, perception_steps=12000,
+        parts="any", max_parts=10, base_objects=8, reference_points=96, width=64, perception_steps=6000,
         agent_rollouts=400, test_objects=4, validation_views=1, foreign_categories=0,
     ),
 }  # fmt: skip

@@ -61,6 +61,8 @@ BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
 _TEST_POINTS = 2048
+_VIEWS = 8
+"""Episodes of a rollout that fit the same object: most of the time goes into making objects."""
 _SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
 """Steps and rollouts after which a run is written down, for when it is not asked before it ends."""
 
@@ -181,7 +183,7 @@ class Training:
         problems = Problems(
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
             options.sample, perception=self.perception, parts=options.parts,
-            real=self.real,
+            real=self.real, views_per_object=_VIEWS,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
         for n in range(first, total):

@@ -61,8 +61,8 @@ def test_place_and_size_of_a_cloud_do_not_matter(batch: tuple[Clouds, Truth]) ->
 
 def test_truth_is_what_the_sample_says() -> None:
     options = SampleOptions(num_points=64)
-    clouds, truth = next(batches(["laptop"], 3, 64, 4, seed=5, workers=0))
-    samples = Samples(["laptop"], options, 5, 1, 3)
+    clouds, truth = next(batches(["laptop"], 3, 64, 16, seed=5, workers=0))
+    samples = Samples(["laptop"], options, 5, 4, 3)
     for b in range(4):
         sample = samples[b]
         unit = float(clouds.radius[b])
@@ -86,6 +86,17 @@ def test_batch_n_is_always_the_same() -> None:
         assert torch.equal(batch_list[i][0].points, parallel[i][0].points)
     assert torch.equal(batch_list[2][1].canonical, later[1].canonical)
     assert not torch.equal(batch_list[0][0].points, batch_list[1][0].points)
+
+
+def test_clouds_are_seen_in_several_batches_and_then_never_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("artperl.data._WINDOW", 3)
+    stream = batches(["laptop"], 2, 32, 8, workers=0)
+    centers = [set(next(stream)[0].center[:, 0].round(decimals=5).tolist()) for _ in range(12)]
+    fresh = [now.difference(*centers[:n]) for n, now in enumerate(centers)]
+    assert [len(views) for views in fresh] == [2] * 12
+    for n, views in enumerate(fresh):
+        assert not views & set().union(*centers[n + 3 :])
+    assert any(views & centers[n + 2] for n, views in enumerate(fresh[:-2]))
 
 
 def test_objects_with_too_many_parts_give_way_to_others() -> None:
