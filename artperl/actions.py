@@ -54,7 +54,7 @@ def apply(shapes: Shapes, theta: Theta, action: Tensor, radius: Tensor) -> Theta
     radius : (B,) float
         Of the observed cloud, metres.
     """
-    return move(shapes, theta, STEPS.to(radius.dtype)[action] * action_mask(shapes.trees), radius)
+    return move(shapes, theta, STEPS.to(radius)[action] * action_mask(shapes.trees), radius)
 
 
 def move(shapes: Shapes, theta: Theta, step: Tensor, radius: Tensor) -> Theta:
@@ -99,7 +99,7 @@ def expert(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor, greedy: bo
     """
     missing = residual(shapes, theta, goal, radius)
     size = missing.abs()[..., None]
-    magnitudes = STEPS[NOTHING:].to(missing.dtype)
+    magnitudes = STEPS[NOTHING:].to(missing)
     bin_of = (size - magnitudes).abs().argmin(-1) if greedy else (size >= magnitudes).sum(-1) - 1
     return NOTHING + torch.where(missing < 0, -bin_of, bin_of)
 

@@ -1,6 +1,6 @@
 """Trained estimators on disk: a folder with weights (safetensors), settings (JSON) and the base of references (npz).
 
-Nothing in it is executed when it is read.
+Weights are kept in half precision. Nothing in the folder is executed when it is read.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
@@ -46,7 +47,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
     if estimator.agent is not None:
         networks["agent"] = estimator.agent
-    tensors = {f"{name}.{key}": t for name, net in networks.items() for key, t in net.state_dict().items()}
+    tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
     save_tensors(tensors, folder / _TENSORS)
     part = folder / f".{_BASE}"
     estimator.base.save(part)
@@ -62,8 +63,14 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
     write_atomic(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
 
 
-def load_estimator(name: str | Path) -> Estimator:
+def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Estimator:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
+
+    Parameters
+    ----------
+    name : str or Path
+    device : torch.device or str
+        Where it works, such as "cuda".
 
     Raises
     ------
@@ -79,10 +86,11 @@ def load_estimator(name: str | Path) -> Estimator:
         agent = None if settings["agent"] is None else Agent(**settings["agent"])
         if agent is not None:
             agent.load_state_dict(_under(tensors, "agent."))
+            agent.to(device)
         options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings["options"].items()}
         options["refine"] = RefineOptions(**options["refine"])
         return Estimator(
-            perception, ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**options),
+            perception.to(device), ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**options),
             Calibration(**settings["calibration"]),
         )  # fmt: skip
     except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
@@ -112,7 +120,7 @@ def read_settings(folder: Path) -> dict[str, Any]:
 def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
     """Write tensors so that a stop halfway leaves the old file."""
     part = path.with_name(f".{path.name}")
-    save_file({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, part)
+    save_file({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, part)
     part.replace(path)
 
 

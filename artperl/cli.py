@@ -36,9 +36,9 @@ class Train:
     parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families. By default the preset's."""
-    preset: Literal["quick", "full", "joint"] = "quick"
-    """quick: under five minutes on two cores, to see it learn; full: within the hour; joint: one
-    estimator for many categories, with any parts."""
+    preset: Literal["quick", "full", "gpu", "joint"] = "quick"
+    """quick: under five minutes on two cores, to see it learn; full: within the hour; gpu: longer, on a
+    GPU; joint: one estimator for many categories, with any parts."""
     out: Path | None = None
     """Folder of the run; by default out/train/CATEGORY-PRESET."""
     seed: int = 0
@@ -54,6 +54,8 @@ class Train:
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
+    device: Literal["cpu", "cuda"] | None = None
+    """Where the networks learn; by default the preset's."""
     workers: int = 1
     """Processes that make clouds while the network learns; the result does not depend on it."""
     threads: int | None = None
@@ -73,6 +75,7 @@ class Train:
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
             preset, categories=categories, parts=self.parts or preset.parts, real=self.real, seed=self.seed,
+            device=self.device or preset.device,
             start_from=None if self.start_from is None else str(self.start_from),
             sample=SampleOptions(noise=self.noise),
             perception_steps=preset.perception_steps if steps is None else steps,

@@ -135,6 +135,7 @@ class Estimator:
 
     def __post_init__(self) -> None:
         self.perception.eval()
+        self.base = self.base.to(self.perception.device)
 
     @torch.inference_mode()
     def __call__(self, points: ArrayLike) -> Estimate:
@@ -155,13 +156,13 @@ class Estimator:
         with clock("clean"):
             good = clean(points)
             chosen = draw(len(good), options.num_points, np.random.default_rng(0))
-            cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None]
+            cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None].to(self.perception.device)
         with clock("perception"):
             clouds = Clouds.of(cloud)
             perceived = self.perception(clouds.points)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock)
         with clock("report"):
-            return self._report(points, good, found, clock)
+            return self._report(points, good, found.to("cpu"), clock)
 
     def _report(self, points: Array, good: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
         """Everything about one fitted reference, as arrays."""

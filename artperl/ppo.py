@@ -78,7 +78,7 @@ def collect(agent: Agent, fitting: Fitting, goal: Theta, options: PPOOptions, ge
         action = torch.multinomial(flat, 1, generator=generator).view(mask.shape)
         expert = fitting.expert(goal)
         if not options.reinforcement:
-            guided = torch.rand(len(action), generator=generator) < options.guided
+            guided = torch.rand(len(action), generator=generator, device=action.device) < options.guided
             action = torch.where(guided[:, None, None], expert, action)
         views.append(view)
         actions.append(action)
@@ -127,12 +127,12 @@ def update(
     total = len(rollout.log_prob)
     advantage = (rollout.advantage - rollout.advantage.mean()) / (rollout.advantage.std() + 1e-8)
     for _ in range(options.epochs):
-        for rows in torch.randperm(total, generator=generator).split(options.minibatch):
+        for rows in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
             logits, value = agent(rollout.view[rows])
             mask = rollout.mask[rows]
             losses = ppo_losses(logits, value, rollout, advantage, rows, options)
             cloning = cloning_loss(logits, rollout.expert[rows], mask, rollout.view.kind[rows], options)
-            loss = torch.zeros(())
+            loss = value.new_zeros(())
             if options.reinforcement:
                 loss = loss + losses["policy"] + options.lambda_value * losses["value"]
                 loss = loss - options.lambda_entropy * losses["entropy"]

@@ -120,7 +120,7 @@ class Problems:
     @torch.inference_mode()
     def _labels(self, points: Tensor) -> Tensor:
         assert self.perception is not None
-        return self.perception.eval()(Clouds.of(points).points).part.clone()
+        return self.perception.eval()(Clouds.of(points.to(self.perception.device)).points).part.to("cpu", copy=True)
 
 
 def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:

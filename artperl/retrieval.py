@@ -63,6 +63,11 @@ class ShapeBase:
             raise ConfigError(f"{len(embeddings)} embeddings do not fit {len(self)} objects", "embeddings")
         return replace(self, embeddings=embeddings.detach())
 
+    def to(self, device: torch.device | str) -> ShapeBase:
+        """The base on another device."""
+        embeddings = None if self.embeddings is None else self.embeddings.to(device)
+        return replace(self, shapes=self.shapes.to(device), embeddings=embeddings)
+
     def of_category(self, category: str) -> Tensor:
         """(B,) bool: objects of a category."""
         return torch.tensor([name == category for name in self.categories])

@@ -88,6 +88,13 @@ class Found:
 
     disagreement: float
 
+    def to(self, device: torch.device | str) -> Found:
+        """The fit on another device."""
+        return replace(
+            self, shapes=self.shapes.to(device), observed=self.observed.to(device), refined=self.refined.to(device),
+            path=[theta.to(device) for theta in self.path],
+        )  # fmt: skip
+
     @property
     def residual(self) -> float:
         """Root of the mean robust squared distance from the reference, in diagonals."""

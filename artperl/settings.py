@@ -27,6 +27,8 @@ class TrainOptions:
     start_from: str | None = None
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     seed: int = 0
+    device: str = "cpu"
+    """Where the networks learn: cpu, cuda."""
     base_objects: int = 64
     """Reference objects of each category."""
     reference_points: int = 192
@@ -72,10 +74,13 @@ PRESETS = {
         validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
+    "gpu": TrainOptions(
+        device="cuda", width=64, perception_steps=20000, batch_size=64, agent_rollouts=1000, episodes=256,
+    ),
     "joint": TrainOptions(
-        parts="any", max_parts=10, base_objects=8, reference_points=96, width=64, perception_steps=6000,
+        parts="any", max_parts=10, base_objects=8, reference_points=96, width=40, perception_steps=6000,
         agent_rollouts=400, test_objects=4, validation_views=1, foreign_categories=0,
     ),
 }  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour;
-joint: one estimator for many categories, with any parts."""
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one
+category, on a GPU; joint: one estimator for many categories, with any parts."""

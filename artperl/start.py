@@ -215,7 +215,7 @@ def procrustes(source: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, 
     covariance = torch.einsum("bpn,bni,bnj->bpij", share, target, source)
     covariance = covariance - target_mean[..., :, None] * source_mean[..., None, :]
     u, _, vt = torch.linalg.svd(covariance.double())
-    turn = torch.eye(3, dtype=u.dtype).expand(u.shape).clone()
+    turn = torch.eye(3, dtype=u.dtype, device=u.device).expand(u.shape).clone()
     turn[..., 2, 2] = torch.linalg.det(u @ vt).sign()
     rotation = (u @ turn @ vt).to(source.dtype)
     return rotation, target_mean - rotate(rotation, source_mean)

@@ -36,11 +36,11 @@ class Stop:
         return threading.current_thread() is threading.main_thread()
 
 
-def autocast(wanted: bool = True) -> torch.autocast:
+def autocast(device: torch.device, wanted: bool = True) -> torch.autocast:
     """Matrix products in bfloat16, where they are wanted and the processor has them."""
-    known = torch.ops.mkldnn._is_mkldnn_bf16_supported()
+    known = device.type != "cpu" or torch.ops.mkldnn._is_mkldnn_bf16_supported()
     # Weights that are kept in bfloat16 would outlive the steps that change them.
-    return torch.autocast("cpu", torch.bfloat16, enabled=wanted and known, cache_enabled=False)
+    return torch.autocast(device.type, torch.bfloat16, enabled=wanted and known, cache_enabled=False)
 
 
 def one_cycle(step: int, total: int) -> float:

@@ -92,9 +92,10 @@ class Training:
         objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts)
         self.real = real_train_objects(options.categories) if options.real else []
         self.base = by_boxes(ShapeBase.of([*objects, *self.real], options.reference_points))
+        self.device = _device(options.device)
         torch.manual_seed(options.seed)
-        self.perception = Perception(self.base.shapes.trees.num_rows, options.width)
-        self.agent, self._agent_known = Agent(), False
+        self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
+        self.agent, self._agent_known = Agent().to(self.device), False
         if options.start_from is not None:
             self._take_over(load_estimator(options.start_from))
         self.optimizers = {
@@ -151,9 +152,10 @@ class Training:
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
             clouds, truth = next(data)
+            clouds, truth = clouds.to(self.device), truth.to(self.device)
             set_rate(optimizer, options.perception_rate * one_cycle(step, total))
             self.perception.train()
-            with autocast(options.mixed_precision):
+            with autocast(self.device, options.mixed_precision):
                 perceived = self.perception(clouds.points)
             losses = perception_losses(perceived, truth)
             loss = torch.stack(list(losses.values())).sum()
@@ -187,14 +189,14 @@ class Training:
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
         for n in range(first, total):
-            generator = torch.Generator().manual_seed((options.seed << 32) + n)
+            generator = torch.Generator(self.device).manual_seed((options.seed << 32) + n)
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
-            problem = problems[n]
+            problem = problems[n].to(self.device)
             fitting = Fitting(problem.shapes, problem.observed, problem.start, options.fitting)
             updates: list[dict[str, float]] = []
             cloning = options.ppo.behaviour_cloning and n < options.cloning_share * total
             ppo = replace(options.ppo, reinforcement=False) if cloning else options.ppo
-            with autocast(options.mixed_precision):
+            with autocast(self.device, options.mixed_precision):
                 rollout = collect(self.agent, fitting, problem.goal, ppo, generator)
                 update(self.agent, optimizer, rollout, ppo, generator, updates.append)
             self.done["agent"] = n + 1
@@ -293,6 +295,13 @@ class Training:
                     moments.setdefault(int(number), {})[moment] = value
             optimizer = self.optimizers[name]
             optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+
+
+def _device(name: str) -> torch.device:
+    device = torch.device(name)
+    if device.type == "cuda" and not torch.cuda.is_available():
+        raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
+    return device
 
 
 def _write(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:

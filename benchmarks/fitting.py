@@ -118,7 +118,7 @@ def learning_to_perceive(rows: int, options: Options, batch_size: int = 32) -> t
         with shares("data"):
             clouds, truth = next(data)
         with shares("network"):
-            with autocast():
+            with autocast(torch.device("cpu")):
                 perceived = network(clouds.points)
             loss = torch.stack(list(perception_losses(perceived, truth).values())).sum()
             optimizer.zero_grad()

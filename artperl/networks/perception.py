@@ -50,7 +50,7 @@ class Perceived(Batch):
     @property
     def valid(self) -> Tensor:
         """(B, P) bool: parts that the object has; the root always."""
-        return (self.valid_logits > 0).index_fill(1, torch.zeros(1, dtype=torch.int64), True)
+        return (self.valid_logits > 0).index_fill(1, self.valid_logits.new_zeros(1, dtype=torch.int64), True)
 
     @property
     def part(self) -> Tensor:
@@ -77,6 +77,11 @@ class Perception(nn.Module):
         self.point_head = nn.Sequential(nn.Linear(channels, 128), nn.ReLU(), nn.Linear(128, num_rows + 4))
         self.context = nn.Linear(whole, channels)
         self.cloud_head = nn.Sequential(nn.Linear(whole, 256), nn.ReLU(), nn.Linear(256, 7 * num_rows + 1))
+
+    @property
+    def device(self) -> torch.device:
+        """Where the network is."""
+        return self.context.weight.device
 
     def forward(self, points: Tensor) -> Perceived:
         """(B, N, 3) points as in :class:`artperl.data.Clouds`."""
