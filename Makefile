@@ -42,7 +42,7 @@ system:
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view]'
+	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view,train]'
 	touch $@
 
 $(VENV)/.ready-dev: pyproject.toml constraints.txt

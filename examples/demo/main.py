@@ -1,4 +1,4 @@
-"""From objects, made and loaded, to labelled partial clouds, and a look at them: the whole of artsim in one page."""
+"""From objects, made and loaded, to labelled partial clouds, and on to an estimator of poses: all in one page."""
 
 import importlib.util
 import os
@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 
 import artsim
+from artperl.settings import PRESETS
+from artperl.training import Training
 from artsim.families import FAMILIES
 from artsim.gallery import gallery
 from artsim.plan import SampleOptions
@@ -47,8 +49,16 @@ def main(out: Path) -> None:
 
     # 5. Pictures.
     sheet, recording = view_path(made.folder, rerun=made.folder / "recording.rrd")
-    print(f"\nlook at   {out / 'gallery.png'}: every procedural category in three joint states")
+
+    # 6. ArtPERL: learn the poses of a laptop's parts from fresh objects, and test on unseen ones.
+    training = Training(PRESETS["quick"], out / "training", progress=sys.stderr.isatty())
+    print("\nlearning the poses of a laptop's parts, a few minutes ...", flush=True)
+    training.run()
+    print((training.out / "table.txt").read_text())
+
+    print(f"look at   {out / 'gallery.png'}: every procedural category in three joint states")
     print(f"and at    {sheet}: samples with their ground truth\nor with   rerun {recording}")
+    print(f"and at    {training.out / 'overlays.png'}: estimated and true parts of unseen laptops")
 
 
 if __name__ == "__main__":
