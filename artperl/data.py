@@ -117,10 +117,16 @@ class Samples:
     def __getitem__(self, i: int) -> Sample:
         n, view = divmod(i, self.stream.views_per_object)
         if self.real and n % 2:
-            chosen = self.real[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.real)))]
             renderer = make_renderer(self.stream.options.renderer)
-            return draw_sample(chosen, self.stream.options, self.stream.seed, i, renderer)
+            return draw_sample(self.object(i), self.stream.options, self.stream.seed, i, renderer)
         return self.stream[self._right(n) * self.stream.views_per_object + view]
+
+    def object(self, i: int) -> ArticulatedObject:
+        """The object that sample ``i`` shows."""
+        n = i // self.stream.views_per_object
+        if self.real and n % 2:
+            return self.real[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.real)))]
+        return self.stream.object(self._right(n))
 
     def _find_right(self, n: int) -> int:
         """Number of the object that stands for object ``n``."""

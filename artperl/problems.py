@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import torch
@@ -18,10 +19,19 @@ from artperl.networks.perception import Perception
 from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
 from artperl.shapes import Observed, Shapes
-from artperl.start import sized
+from artperl.start import adapted, sized
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
+
+References = Literal["retrieved", "deformed"]
+"""What is fitted: one of the objects of the base that are most like the observed one; or the observed object itself,
+stretched at random, which has the right tree where no base could hold all that there are."""
+
+_STRETCH = (0.25, 0.1)
+"""Half-widths of the logarithms by which deformed references are stretched: as a whole, and each part on its own."""
+_SHIFT = 0.03
+"""Half-width, in diagonals, of what joints of deformed references are off by."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +87,7 @@ class Problems:
         See :class:`artperl.data.Samples`.
     views_per_object : int
         Problems in a row of the same object.
+    references : References
     """
 
     def __init__(
@@ -93,11 +104,12 @@ class Problems:
         parts: Parts = "artimage",
         real: Sequence[ArticulatedObject] = (),
         views_per_object: int = 2,
+        references: References = "retrieved",
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
         self.samples = Samples(categories, options, seed, views_per_object, base.shapes.trees.num_rows, parts, real)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
-        self.start, self.perception = start or StartOptions(), perception
+        self.start, self.perception, self.references = start or StartOptions(), perception, references
 
     def __getitem__(self, n: int) -> Problem:
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + n)
@@ -105,10 +117,15 @@ class Problems:
         rows = self.base.shapes.trees.num_rows
         truth = [part_truth(sample, rows) for sample in samples]
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
-        query = box_embedding(valid, box_center, box_size)
-        nearest, _ = self.base.nearest(query, min(self.choices, len(self.base)))
-        pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
-        shapes = sized(self.base.shapes[nearest.gather(1, pick)[:, 0]], torch.tensor([s.diagonal for s in samples]))
+        if self.references == "deformed":
+            objects = [self.samples.object(i) for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
+            shapes = deformed(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
+        else:
+            query = box_embedding(valid, box_center, box_size)
+            nearest, _ = self.base.nearest(query, min(self.choices, len(self.base)))
+            pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
+            shapes = self.base.shapes[nearest.gather(1, pick)[:, 0]]
+        shapes = sized(shapes, torch.tensor([sample.diagonal for sample in samples]))
         goal = theta_from_parts(shapes.trees, shapes.box_center, shapes.box_size, rotation, center, size)
         goal = Theta(**{**vars(goal), "state": clamp_state(shapes.trees, goal.state)})
         points = torch.from_numpy(np.stack([s.points for s in samples]))
@@ -141,6 +158,21 @@ def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
     )
     boxes = pad(sample.box_center / sample.diagonal), pad(sample.box_size / sample.diagonal)
     return torch.arange(rows) < K, rotation, pad(center), pad(sample.box_size), *boxes
+
+
+def deformed(shapes: Shapes, generator: torch.Generator) -> Shapes:
+    """Other objects with the same trees: stretched as a whole and part by part, their joints somewhere else."""
+    B, P = shapes.trees.valid.shape
+
+    def drawn(*size: int) -> Tensor:
+        return 2.0 * torch.rand(*size, generator=generator) - 1.0
+
+    whole, own = _STRETCH
+    shift = _SHIFT * shapes.diagonal[:, None, None] * drawn(B, P, 3)
+    return adapted(
+        shapes,
+        replace(Theta.at_rest(shapes.trees), log_scale=whole * drawn(B, 3), stretch=own * drawn(B, P, 3), shift=shift),
+    )
 
 
 def perturbed(shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator) -> Theta:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from artperl.categories import Parts
 from artperl.fitting import FittingOptions
 from artperl.ppo import PPOOptions
-from artperl.problems import StartOptions
+from artperl.problems import References, StartOptions
 from artsim.plan import SampleOptions
 
 
@@ -47,6 +47,8 @@ class TrainOptions:
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
+    references: References = "retrieved"
+    """What the agent learns to fit."""
     agent_rate: float = 1e-3
     episodes: int = 64
     """Episodes of a rollout."""
@@ -78,8 +80,8 @@ PRESETS = {
         device="cuda", width=64, perception_steps=20000, batch_size=64, agent_rollouts=1000, episodes=256,
     ),
     "joint": TrainOptions(
-        parts="any", max_parts=10, base_objects=8, reference_points=96, width=40, perception_steps=6000,
-        agent_rollouts=400, test_objects=4, validation_views=1, foreign_categories=0,
+        parts="any", max_parts=10, base_objects=4, references="deformed", reference_points=96, width=40,
+        perception_steps=6000, agent_rollouts=400, test_objects=4, validation_views=1, foreign_categories=0,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one

@@ -185,7 +185,7 @@ class Training:
         problems = Problems(
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
             options.sample, perception=self.perception, parts=options.parts,
-            real=self.real, views_per_object=_VIEWS,
+            real=self.real, views_per_object=_VIEWS, references=options.references,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
         for n in range(first, total):

@@ -15,7 +15,7 @@ from artperl.categories import Parts
 from artperl.estimator import Estimator
 from artperl.metrics import rotation_error
 from artperl.pose import Theta, pose_parts
-from artperl.problems import Problem, Problems
+from artperl.problems import Problem, Problems, References
 from artperl.refine import refine
 from artperl.search import agent_steps
 
@@ -31,6 +31,7 @@ def run_basin(
     categories: Sequence[str],
     parts: Parts = "artimage",
     count: int = 96,
+    references: References = "retrieved",
     say: Callable[[str], None] = print,
 ) -> list[dict[str, Any]]:
     """Shares of fresh objects of which every part ends within 10 degrees of the pose that a reference can best have.
@@ -45,6 +46,7 @@ def run_basin(
     categories : sequence of str
     parts : Parts
     count : int
+    references : References
     say : callable
         Gets the lines.
 
@@ -56,7 +58,7 @@ def run_basin(
     assert estimator.agent is not None
     problem = Problems(
         categories, estimator.base, count, estimator.options.num_points, _SEED, perception=estimator.perception,
-        parts=parts,
+        parts=parts, references=references,
     )[0]  # fmt: skip
     few = problem.observed.map(lambda tensor: tensor[:, :_POINTS])
     result = []

@@ -86,3 +86,24 @@ def test_an_object_with_as_many_parts_is_nearer_than_one_with_the_same_boxes() -
     rows, _ = base.nearest(query, 3)
     parts = shapes.trees.valid.sum(1)
     assert (parts[rows] == parts[:, None]).all()
+
+
+def test_deformed_references_have_the_objects_own_trees_and_lead_to_the_truth() -> None:
+    categories = ["storage_furniture", "robot_arm"]
+    problems = Problems(
+        categories, small_base(*categories), 4, 64, seed=4, parts="any", views_per_object=1, references="deformed"
+    )
+    problem = problems[0]
+    trees = problem.shapes.trees
+    posed = pose_parts(trees, problem.goal, problem.shapes.box_center)
+    for b in range(4):
+        obj, sample = problems.samples.object(b), problems.samples[b]
+        K = len(obj)
+        assert int(trees.valid[b].sum()) == K
+        assert trees.parent[b, 1:K].tolist() == list(obj.tree.parents[1:])
+        _, rotation, _, size, *_ = part_truth(sample, K)
+        torch.testing.assert_close((problem.shapes.box_size * posed.scale)[b, :K], size, atol=1e-5, rtol=1e-4)
+        assert metrics.rotation_error(posed.rotation[b, :K], rotation).max() < 0.5
+        own = obj.box_size / obj.diagonal
+        other = problem.shapes.box_size[b, :K].numpy() / sample.diagonal
+        assert not (abs(own - other) < 1e-3).all()
