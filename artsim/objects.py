@@ -225,11 +225,6 @@ class ArticulatedObject:
         return trimesh.Trimesh(part.vertices * self.scale, part.faces, process=False)
 
 
-def joint_labels(obj: ArticulatedObject) -> list[str]:
-    """Readable name of each joint: the part's label with its index."""
-    return [f"{k}:{part.label}" for k, part in enumerate(obj.parts)]
-
-
 def content_sha256(chunks: Sequence[bytes]) -> str:
     """Hex digest of byte strings, each with its length so that boundaries count."""
     digest = hashlib.sha256()
