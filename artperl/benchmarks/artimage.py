@@ -31,7 +31,7 @@ from artsim.sample import Sample
 from artsim.sampling import ViewOptions
 from artsim.urdf import load
 
-SPLIT = Path(__file__).parents[2] / "benchmarks" / "splits" / "artimage.json"
+SPLIT = Path(__file__).with_suffix(".json")
 """Real objects: ``{category: {"train" or "test": {"Folder/id": SHA-256 of the URDF file}}}``."""
 
 Row = Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"]

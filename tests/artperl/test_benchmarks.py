@@ -26,13 +26,15 @@ from artsim.errors import AssetError
 from tests.artperl.test_estimator import Oracle
 from tests.artperl.worlds import small_base, small_problem
 
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
 
 def test_no_real_object_is_both_learnt_from_and_tested_on() -> None:
     split = json.loads(SPLIT.read_text())
     assert split.keys() == ARTIMAGE.keys()
     for halves in split.values():
         assert not halves["train"].keys() & halves["test"].keys()
-    families = json.loads((SPLIT.parent / "partnet_dev.json").read_text())
+    families = json.loads((BENCHMARKS / "splits" / "partnet_dev.json").read_text())
     tuned_on = {f"{folder}/{name}" for folder, halves in families.items() for name in halves["dev"]}
     tested = {name for halves in split.values() for name in halves["test"]}
     # The only real drawers with the parts of ArtImage's are in the half that families were tuned on.
