@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject
 
 FORMAT = 1
+_ALIKE = 0.02
+"""Radians: axes that differ by less are alike."""
 _CLOUDS = ("box_center", "box_size", "points", "normals", "spacing", "diagonal")
 
 
@@ -43,6 +46,30 @@ class ShapeBase:
 
     def __len__(self) -> int:
         return len(self.object_ids)
+
+    @cached_property
+    def axis_spread(self) -> Tensor:
+        """(B, P) angle, radians, root mean square, between the axes of each joint of each object and their mean among
+        all objects of the same category and kinematic tree.
+        """
+        axis, spread = self.shapes.trees.axis, torch.zeros_like(self.shapes.trees.axis[..., 0])
+        for kind in range(int(self.kind.max()) + 1):
+            own = self.kind == kind
+            mean = torch.nn.functional.normalize(axis[own].mean(0), dim=-1)
+            spread[own] = _angle(axis[own], mean).square().mean(0).sqrt()
+        return spread
+
+    @cached_property
+    def kind(self) -> Tensor:
+        """(B,) int64 number that objects of one category with the same kinematic tree share."""
+        kinds = [(c, t.types, tuple(t.parents)) for c, t in zip(self.categories, self.trees, strict=True)]
+        numbers = {kind: number for number, kind in enumerate(dict.fromkeys(kinds))}
+        return torch.tensor([numbers[kind] for kind in kinds], device=self.shapes.diagonal.device)
+
+    def leaning_otherwise(self, row: int) -> Tensor:
+        """(B,) bool: objects of an object's kind of which some axis leans otherwise, by more than is usual."""
+        apart = _angle(self.shapes.trees.axis, self.shapes.trees.axis[row])
+        return (self.kind == self.kind[row]) & (apart > self.axis_spread[row].clamp(min=_ALIKE)).any(1)
 
     @staticmethod
     def of(objects: Sequence[ArticulatedObject], points_per_part: int = 512) -> ShapeBase:
@@ -153,6 +180,11 @@ class ShapeBase:
             Shapes(trees=stacked, **tensors),
             None if embeddings is None else torch.from_numpy(embeddings),
         )
+
+
+def _angle(axis: Tensor, other: Tensor) -> Tensor:
+    """Radians between unit vectors."""
+    return torch.linalg.vector_norm(torch.linalg.cross(axis, other.expand_as(axis)), dim=-1).clamp(max=1.0).asin()
 
 
 def widened(objects: Sequence[ArticulatedObject]) -> list[ArticulatedObject]:

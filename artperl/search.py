@@ -123,7 +123,7 @@ def find(
     """The best fit to a cloud (1, N, 3) that has been perceived."""
     with clock("start"):
         query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-        rows = base.nearest(query, min(options.references, len(base)))[0][0]
+        rows = references(base, query, min(options.references, len(base)))
         shapes, theta = start(clouds, perceived, base.shapes[rows], len(rows))
         observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
     found = None
@@ -146,6 +146,18 @@ def find(
     if found is None:
         return again
     return again if _doubt(again) < _doubt(found) else found
+
+
+def references(base: ShapeBase, query: Tensor, count: int) -> Tensor:
+    """(count,) rows of the nearest objects; the last of them is the nearest one whose axes lean otherwise, if any does.
+
+    Boxes do not tell how axes lean, and no hinge turns a part to where another one's would.
+    """
+    rows = base.nearest(query, count)[0][0]
+    otherwise = base.leaning_otherwise(int(rows[0]))
+    if count > 1 and not bool(otherwise[rows].any()) and bool(otherwise.any()):
+        rows = torch.cat([rows[:-1], base.nearest(query, 1, otherwise)[0][0]])
+    return rows
 
 
 def _doubt(found: Found) -> float:

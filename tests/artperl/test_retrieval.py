@@ -11,7 +11,9 @@ import pytest
 import torch
 
 import artsim
+from artperl.embedding import by_boxes
 from artperl.retrieval import ShapeBase, widened
+from artperl.search import references
 from artsim.errors import ConfigError, DatasetError
 
 
@@ -95,3 +97,21 @@ def test_references_go_as_far_as_any_of_their_kind() -> None:
     np.testing.assert_allclose(laptops, laptops[:1].repeat(4, axis=0))
     farthest = max(obj.tree.limits[1, 1] for obj in objects[:4])
     assert laptops[0, 1, 1] == pytest.approx(farthest)
+
+
+def test_references_have_axes_of_every_lean() -> None:
+    base = by_boxes(ShapeBase.of([artsim.make("eyeglasses", seed) for seed in range(12)], 32))
+    axis = base.shapes.trees.axis[:, 1]
+    leans = torch.sign(axis[:, 1])
+    assert set(leans.tolist()) == {-1.0, 1.0}
+    for row in range(len(base)):
+        assert base.embeddings is not None
+        rows = references(base, base.embeddings[row : row + 1], 3)
+        assert int(rows[0]) == row
+        assert set(leans[rows].tolist()) == {-1.0, 1.0}
+        assert base.leaning_otherwise(row).tolist() == (leans != leans[row]).tolist()
+    laptops = by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(6)], 32))
+    assert laptops.axis_spread.max() < 0.01
+    assert laptops.embeddings is not None
+    nearest = laptops.nearest(laptops.embeddings[:1], 3)[0][0]
+    assert torch.equal(references(laptops, laptops.embeddings[:1], 3), nearest)
