@@ -30,6 +30,8 @@ from artperl.start import facing, start
 
 _DISAGREEMENT = 0.3
 """Weight of the disagreement with perception against the residual."""
+_CLEARLY = 0.8
+"""Share of the first estimate's doubt below which a second one takes its place: most others that fit are wrong."""
 _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
@@ -145,7 +147,7 @@ def find(
     again = _settle(shapes, observed, perceived, path, [int(rows[0])] * len(shapes), options, clock)
     if found is None:
         return again
-    return again if _doubt(again) < _doubt(found) else found
+    return again if _doubt(again) < _CLEARLY * _doubt(found) else found
 
 
 def references(base: ShapeBase, query: Tensor, count: int) -> Tensor:
