@@ -24,7 +24,7 @@ import numpy as np
 from artperl.categories import ARTIMAGE, objects_of
 from artperl.evaluation import TEST_SEEDS, samples_of
 from artsim.errors import AssetError, ConfigError
-from artsim.kinematics import KinematicTree
+from artsim.kinematics import Array, KinematicTree
 from artsim.objects import ArticulatedObject, Part
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
@@ -109,6 +109,9 @@ def real_train_objects(categories: Sequence[str]) -> list[ArticulatedObject]:
 def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:
     """The object as one of another category: parts that move otherwise, such as a dishwasher's buttons, stay at rest.
 
+    Which of two temples or of three drawers comes first differs from file to file. Here they come as in procedural
+    objects: from the top down, and from -y to +y where they are side by side.
+
     Parameters
     ----------
     obj : ArticulatedObject
@@ -123,6 +126,8 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
         if tree.types[k] not in joint_types:
             owner[k] = owner[int(tree.parents[k])]
     kept = [k for k, own in enumerate(owner) if own == k]
+    if all(tree.parents[k] == 0 for k in kept[1:]):
+        kept = [0, *in_reading_order(kept[1:], obj.box_center, obj.box_size)]
     number = {k: n for n, k in enumerate(kept)}
     joints = []
     for k in kept:
@@ -133,6 +138,24 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     parts = tuple(_joined([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
     # What the file calls its joints no longer fits.
     return replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={})
+
+
+def in_reading_order(parts: Sequence[int], center: Array, size: Array) -> list[int]:
+    """Parts row by row, from the top (+z) down, each row from -y to +y.
+
+    Parameters
+    ----------
+    parts : sequence of int
+    center, size : (K, 3) float
+        Boxes in the rest frame. What is lower than the first of a row by half a height is in the next one.
+    """
+    rows: list[list[int]] = []
+    for k in sorted(parts, key=lambda part: -float(center[part, 2])):
+        if rows and center[rows[-1][0], 2] - center[k, 2] <= 0.5 * min(size[k, 2], size[rows[-1][0], 2]):
+            rows[-1].append(k)
+        else:
+            rows.append([k])
+    return [k for row in rows for k in sorted(row, key=lambda part: float(center[part, 1]))]
 
 
 def _joined(parts: Sequence[Part]) -> Part:
