@@ -109,8 +109,9 @@ def real_train_objects(categories: Sequence[str]) -> list[ArticulatedObject]:
 def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:
     """The object as one of another category: parts that move otherwise, such as a dishwasher's buttons, stay at rest.
 
-    Which of two temples or of three drawers comes first differs from file to file. Here they come as in procedural
-    objects: from the top down, and from -y to +y where they are side by side.
+    Which of two temples or of three drawers comes first differs from file to file, and a file's table may have its
+    drawers at the back. Here they come as in procedural objects: they open to the front (-x), from the top down, and
+    from -y to +y where they are side by side.
 
     Parameters
     ----------
@@ -120,6 +121,8 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     category : str
         That the object is to have.
     """
+    if sum(joint.axis[0] for joint in obj.native_tree.joints if joint.type == "prismatic") > 0.5:
+        obj = turned_round(obj)
     tree = obj.native_tree
     owner = list(range(len(tree)))
     for k in range(1, len(tree)):
@@ -138,6 +141,18 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     parts = tuple(_joined([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
     # What the file calls its joints no longer fits.
     return replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={})
+
+
+def turned_round(obj: ArticulatedObject) -> ArticulatedObject:
+    """The object turned by half a turn about the vertical, without what is known of its parts but their surfaces."""
+    half = np.array([-1.0, -1.0, 1.0])
+    parts = tuple(replace(part, vertices=part.vertices * half, body=None) for part in obj.parts)
+    joints = [
+        replace(joint, axis=tuple(half * joint.axis), origin=tuple(half * joint.origin))
+        for joint in obj.native_tree.joints
+    ]
+    T_base_rest = obj.T_base_rest @ np.diag([*half, 1.0])
+    return replace(obj, parts=parts, native_tree=KinematicTree(joints), T_base_rest=T_base_rest)
 
 
 def in_reading_order(parts: Sequence[int], center: Array, size: Array) -> list[int]:

@@ -12,7 +12,7 @@ import torch
 import artsim
 from artperl import metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
-from artperl.benchmarks.artimage import SPLIT, in_reading_order, real_objects, reduced, row_samples
+from artperl.benchmarks.artimage import SPLIT, in_reading_order, real_objects, reduced, row_samples, turned_round
 from artperl.benchmarks.basin import ANGLES, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
 from artperl.categories import ARTIMAGE, objects_of
@@ -164,3 +164,17 @@ def test_parts_of_real_objects_come_in_the_order_of_procedural_ones(partnet_dir:
                 side_by_side = np.abs(np.diff(z)) < 0.5 * height
                 assert (np.diff(z)[~side_by_side] < 0).all()
                 assert (np.diff(y)[side_by_side] > 0).all()
+                if category == "drawer":
+                    assert all(joint.axis[0] < -0.9 for joint in obj.tree.joints[1:])
+
+
+def test_an_object_turned_round_moves_alike() -> None:
+    obj = artsim.make("drawer", 4)
+    other = turned_round(obj)
+    half = np.diag([-1.0, -1.0, 1.0, 1.0])
+    q = artsim.sample_state(obj, artsim.StateOptions(), np.random.default_rng(0))
+    np.testing.assert_allclose(
+        other.tree.forward_kinematics(q), half @ obj.tree.forward_kinematics(q) @ half, atol=1e-12
+    )
+    np.testing.assert_allclose(other.parts[1].vertices @ half[:3, :3], obj.parts[1].vertices)
+    np.testing.assert_allclose(other.T_base_rest @ half, obj.T_base_rest, atol=1e-12)
