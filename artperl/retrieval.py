@@ -48,16 +48,11 @@ class ShapeBase:
         return len(self.object_ids)
 
     @cached_property
-    def axis_spread(self) -> Tensor:
-        """(B, P) angle, radians, root mean square, between the axes of each joint of each object and their mean among
-        all objects of the same category and kinematic tree.
-        """
-        axis, spread = self.shapes.trees.axis, torch.zeros_like(self.shapes.trees.axis[..., 0])
-        for kind in range(int(self.kind.max()) + 1):
-            own = self.kind == kind
-            mean = torch.nn.functional.normalize(axis[own].mean(0), dim=-1)
-            spread[own] = _angle(axis[own], mean).square().mean(0).sqrt()
-        return spread
+    def mean_axis(self) -> Tensor:
+        """(B, P, 3) mean axis of each joint among all objects of the same kind."""
+        axis = self.shapes.trees.axis
+        means = [axis[self.kind == kind].mean(0) for kind in range(int(self.kind.max()) + 1)]
+        return torch.nn.functional.normalize(torch.stack(means), dim=-1)[self.kind]
 
     @cached_property
     def kind(self) -> Tensor:
@@ -67,9 +62,10 @@ class ShapeBase:
         return torch.tensor([numbers[kind] for kind in kinds], device=self.shapes.diagonal.device)
 
     def leaning_otherwise(self, row: int) -> Tensor:
-        """(B,) bool: objects of an object's kind of which some axis leans otherwise, by more than is usual."""
-        apart = _angle(self.shapes.trees.axis, self.shapes.trees.axis[row])
-        return (self.kind == self.kind[row]) & (apart > self.axis_spread[row].clamp(min=_ALIKE)).any(1)
+        """(B,) bool: objects of an object's kind of which some axis leans away from it beyond the mean."""
+        axis, mean = self.shapes.trees.axis, self.mean_axis[row]
+        apart, usual = _angle(axis, axis[row]), _angle(axis[row], mean)
+        return (self.kind == self.kind[row]) & (apart > usual.clamp(min=_ALIKE)).any(1)
 
     @staticmethod
     def of(objects: Sequence[ArticulatedObject], points_per_part: int = 512) -> ShapeBase:

@@ -125,8 +125,8 @@ def find(
     """The best fit to a cloud (1, N, 3) that has been perceived."""
     with clock("start"):
         query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-        rows = references(base, query, min(options.references, len(base)))
-        shapes, theta = start(clouds, perceived, base.shapes[rows], len(rows))
+        rows, chosen = references(base, query, min(options.references, len(base)))
+        shapes, theta = start(clouds, perceived, chosen, len(rows))
         observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
     found = None
     if options.perceived_start:
@@ -150,16 +150,20 @@ def find(
     return again if _doubt(again) < _CLEARLY * _doubt(found) else found
 
 
-def references(base: ShapeBase, query: Tensor, count: int) -> Tensor:
-    """(count,) rows of the nearest objects; the last of them is the nearest one whose axes lean otherwise, if any does.
+def references(base: ShapeBase, query: Tensor, count: int) -> tuple[Tensor, Shapes]:
+    """(count,) rows of the nearest objects, and their shapes.
 
-    Boxes do not tell how axes lean, and no hinge turns a part to where another one's would.
+    Boxes do not tell how axes lean, and no hinge turns a part to where another one's would. Where axes differ, there is
+    an object among them whose axes lean otherwise than those of the nearest, and one with the mean axes.
     """
     rows = base.nearest(query, count)[0][0]
     otherwise = base.leaning_otherwise(int(rows[0]))
-    if count > 1 and not bool(otherwise[rows].any()) and bool(otherwise.any()):
-        rows = torch.cat([rows[:-1], base.nearest(query, 1, otherwise)[0][0]])
-    return rows
+    if count < 3 or not bool(otherwise.any()):
+        return rows, base.shapes[rows]
+    rows = torch.cat([rows[:1], base.nearest(query, 1, otherwise)[0][0], rows[1:-1]])
+    shapes = base.shapes[rows]
+    axis = torch.cat([shapes.trees.axis[:-1], base.mean_axis[rows[-1:]]])
+    return rows, replace(shapes, trees=replace(shapes.trees, axis=axis))
 
 
 def _doubt(found: Found) -> float:

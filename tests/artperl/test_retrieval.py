@@ -104,14 +104,16 @@ def test_references_have_axes_of_every_lean() -> None:
     axis = base.shapes.trees.axis[:, 1]
     leans = torch.sign(axis[:, 1])
     assert set(leans.tolist()) == {-1.0, 1.0}
+    assert base.embeddings is not None
     for row in range(len(base)):
-        assert base.embeddings is not None
-        rows = references(base, base.embeddings[row : row + 1], 3)
+        rows, shapes = references(base, base.embeddings[row : row + 1], 3)
         assert int(rows[0]) == row
-        assert set(leans[rows].tolist()) == {-1.0, 1.0}
         assert base.leaning_otherwise(row).tolist() == (leans != leans[row]).tolist()
+        assert torch.sign(shapes.trees.axis[:2, 1, 1]).tolist() == [leans[row], -leans[row]]
+        torch.testing.assert_close(shapes.trees.axis[2, 1], torch.nn.functional.normalize(axis.mean(0), dim=0))
     laptops = by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(6)], 32))
-    assert laptops.axis_spread.max() < 0.01
     assert laptops.embeddings is not None
     nearest = laptops.nearest(laptops.embeddings[:1], 3)[0][0]
-    assert torch.equal(references(laptops, laptops.embeddings[:1], 3), nearest)
+    rows, shapes = references(laptops, laptops.embeddings[:1], 3)
+    assert torch.equal(rows, nearest)
+    assert torch.equal(shapes.points, laptops.shapes.points[nearest])
