@@ -27,6 +27,9 @@ bench: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.simulators
 	$(PY) -m benchmarks.realism
 	$(PY) -m benchmarks.fitting
+	$(PY) -m benchmarks.inference
+	$(PY) -m benchmarks.retrieval
+	$(PY) -m benchmarks.joint
 
 # Sim-readiness of 10,000 procedural objects, and of the real ones in ARTSIM_PARTNET_DIR.
 audit: $(VENV)/.ready-dev

@@ -1,0 +1,159 @@
+"""How near the retrieved reference is to the observed object: ``python -m benchmarks.retrieval``.
+
+By the boxes that perception says, as estimators search; by a Siamese network with contrastive loss (equations 1 and 2),
+trained here on fresh objects; beside the best object of the base, the median and a random one. Measured on unseen
+objects: chamfer distance between the parts, and difference of the parts' boxes, both at rest and in diagonals. The last
+line is one JSON object.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import tyro
+from torch import Tensor
+from tqdm import trange
+
+from artperl.benchmarks.artimage import row_samples
+from artperl.benchmarks.rows import find_estimator
+from artperl.categories import ARTIMAGE, objects_of
+from artperl.data import Clouds, Samples
+from artperl.embedding import box_embedding
+from artperl.estimator import Estimator
+from artperl.evaluation import TEST_SEEDS
+from artperl.networks.siamese import Siamese, contrastive_loss
+from artperl.shapes import Shapes
+from artperl.steps import one_cycle, set_rate
+from artsim.plan import SampleOptions
+
+POINTS = 512
+VIEWS = 4
+BATCH = 16
+RATE = 1e-3
+
+
+@dataclass(frozen=True)
+class Options:
+    """Which references are found."""
+
+    weights: Path | None = None
+    """Folder of estimators (or of training runs) by category; by default those that come with the package."""
+    categories: tuple[str, ...] = tuple(ARTIMAGE)
+    steps: int = 400
+    """Batches that the Siamese network learns from."""
+    objects: int = 40
+    """Unseen objects of each category, two views of each."""
+    threads: int = 2
+    """Processor threads."""
+
+
+def main(options: Options) -> None:
+    """Measure and print."""
+    torch.set_num_threads(options.threads)
+    result = {}
+    for category in options.categories:
+        estimator = find_estimator(options.weights, category)
+        network = learn(category, estimator, options.steps)
+        result[category] = quality(category, estimator, network, options.objects)
+        for name, (chamfer, boxes) in result[category].items():
+            print(f"{category:12} {name:12} chamfer {100 * chamfer:5.2f} %, boxes {100 * boxes:5.2f} %", flush=True)
+    print(json.dumps({"chamfer_and_boxes_in_diagonals": result, "siamese_steps": options.steps}))
+
+
+def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
+    """A network for which a partial cloud is near to its own object at rest, and far from others."""
+    torch.manual_seed(0)
+    rows = estimator.base.shapes.trees.num_rows
+    network = Siamese(rows)
+    optimizer = torch.optim.AdamW(network.parameters(), weight_decay=1e-2)
+    samples = Samples([category], SampleOptions(num_points=POINTS), 5, VIEWS, rows)
+    generator = torch.Generator().manual_seed(0)
+    for step in trange(steps, desc=category, disable=None, leave=False):
+        numbers = range(step * BATCH, (step + 1) * BATCH)
+        batch = [samples[i] for i in numbers]
+        own = Shapes.from_objects(
+            [samples.object(i).with_diagonal(1.0) for i in numbers[::VIEWS]], POINTS // rows, rows
+        )
+        observed = torch.from_numpy(np.stack([sample.points for sample in batch])).float()
+        part = torch.from_numpy(np.stack([sample.part for sample in batch]).astype(np.int64))
+        negative = torch.rand(BATCH, generator=generator) < 0.5
+        others = torch.randint(len(estimator.base), (BATCH,), generator=generator)
+        wanted = own.repeat(VIEWS)
+        thinned = estimator.base.shapes[others]
+        same, different = canonical(wanted, generator), canonical(thinned, generator)
+        points = torch.where(negative[:, None, None], different[0], same[0])
+        labels = torch.where(negative[:, None], different[1], same[1])
+        set_rate(optimizer, RATE * one_cycle(step, steps))
+        loss = contrastive_loss(
+            network(Clouds.of(observed).points, part), network(Clouds.of(points).points, labels), negative
+        )
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    return network.eval()
+
+
+def canonical(shapes: Shapes, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+    """Clouds (B, POINTS, 3) of whole objects at rest, in random order, and the parts of their points."""
+    B, P, M, _ = shapes.points.shape
+    known = shapes.has_surface[..., None].expand(B, P, M).flatten(1).float()
+    index = torch.multinomial(known, POINTS, replacement=True, generator=generator)
+    points = shapes.points.flatten(1, 2).gather(1, index[..., None].expand(-1, -1, 3))
+    return points, index // M
+
+
+@torch.inference_mode()
+def quality(category: str, estimator: Estimator, network: Siamese, objects: int) -> dict[str, tuple[float, float]]:
+    """Means over unseen objects of chamfer distance and box difference, by how the reference is chosen."""
+    base, perception = estimator.base, estimator.perception
+    P = base.shapes.trees.num_rows
+    tested = objects_of([category], objects, TEST_SEEDS)
+    samples = row_samples("procedural", category, objects=objects, views=2 * objects)
+    true = Shapes.from_objects([obj.with_diagonal(1.0) for obj in tested], base.shapes.points.shape[2], P)
+    generator = torch.Generator().manual_seed(1)
+    vectors = network(*_normalised(canonical(base.shapes, generator)))
+    chamfer, boxes = differences(true, base.shapes)
+    chosen: dict[str, list[int]] = {"boxes": [], "contrastive": []}
+    for sample in samples:
+        cloud = torch.from_numpy(sample.points[None, : estimator.options.num_points]).float()
+        perceived = perception(Clouds.of(cloud).points)
+        query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
+        chosen["boxes"].append(int(base.nearest(query)[0]))
+        vector = network(Clouds.of(cloud[:, :POINTS]).points, perceived.part[:, :POINTS])
+        chosen["contrastive"].append(int(torch.cdist(vector, vectors).argmin()))
+    row = torch.arange(objects).repeat_interleave(2)
+    result = {
+        name: (float(chamfer[row, torch.tensor(rows)].mean()), float(boxes[row, torch.tensor(rows)].mean()))
+        for name, rows in chosen.items()
+    }
+    best = chamfer.argmin(1)
+    each = torch.arange(objects)
+    result["best in base"] = float(chamfer[each, best].mean()), float(boxes[each, best].mean())
+    result["median"] = float(chamfer.median(1).values.mean()), float(boxes.median(1).values.mean())
+    result["random"] = float(chamfer.mean()), float(boxes.mean())
+    return result
+
+
+def _normalised(cloud: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+    return Clouds.of(cloud[0]).points, cloud[1]
+
+
+def differences(true: Shapes, base: Shapes) -> tuple[Tensor, Tensor]:
+    """(T, B) chamfer distances, two-sided, means over parts, and (T, B) mean differences of the boxes' faces."""
+    valid = true.trees.valid[:, None] & base.trees.valid[None]
+    faces = [torch.cat([s.box_center - 0.5 * s.box_size, s.box_center + 0.5 * s.box_size], -1) for s in (true, base)]
+    apart = (faces[0][:, None] - faces[1][None]).abs().mean(-1)
+    chamfer = torch.zeros(len(true), len(base))
+    for t in range(len(true)):
+        distance = torch.cdist(true.points[t][None].expand(len(base), -1, -1, -1), base.points)
+        both = 0.5 * (distance.amin(-1).mean(-1) + distance.amin(-2).mean(-1))
+        chamfer[t] = (both * valid[t]).sum(-1) / valid[t].sum(-1)
+    return chamfer, (apart * valid).sum(-1) / valid.sum(-1)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options, description=__doc__))

@@ -1,0 +1,46 @@
+"""The paper's retrieval loss is what it prints, and vectors depend on parts."""
+
+from __future__ import annotations
+
+import torch
+
+from artperl.networks.siamese import Siamese, contrastive_loss
+
+
+def test_the_loss_is_that_of_equation_2() -> None:
+    vectors = torch.zeros(4, 3)
+    others = torch.tensor([[0.3, 0.0, 0.4], [0.0, 0.0, 0.2], [0.6, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    negative = torch.tensor([False, False, True, True])
+    expected = (0.5 * 0.5**2 + 0.5 * 0.2**2 + 0.5 * (1.0 - 0.6) ** 2 + 0.0) / 4
+    torch.testing.assert_close(contrastive_loss(vectors, others, negative), torch.tensor(expected))
+    same = contrastive_loss(vectors, vectors, torch.zeros(4, dtype=torch.bool))
+    assert same < 1e-12
+
+
+def test_vectors_depend_on_which_part_a_point_belongs_to() -> None:
+    torch.manual_seed(0)
+    network, cloud = Siamese(3, 8, 16), torch.randn(2, 160, 3)
+    part = torch.randint(3, (2, 160))
+    vector = network(cloud, part)
+    assert vector.shape == (2, 16)
+    torch.testing.assert_close(network(cloud, part), vector)
+    assert not torch.allclose(network(cloud, (part + 1) % 3), vector)
+    assert torch.isfinite(network(cloud, torch.zeros_like(part))).all()
+
+
+def test_learning_draws_clouds_of_the_same_object_together() -> None:
+    torch.manual_seed(1)
+    shapes = torch.randn(6, 160, 3) * torch.linspace(0.3, 1.5, 6)[:, None, None]
+    part = torch.randint(2, (6, 160))
+    network = Siamese(2, 8, 8)
+    optimizer = torch.optim.Adam(network.parameters(), 3e-3)
+    for _ in range(60):
+        other = torch.randint(6, (6,))
+        noisy = shapes + 0.02 * torch.randn_like(shapes)
+        loss = contrastive_loss(network(noisy, part), network(shapes[other], part[other]), other != torch.arange(6))
+        own = contrastive_loss(network(noisy, part), network(shapes, part), torch.zeros(6, dtype=torch.bool))
+        optimizer.zero_grad()
+        (loss + own).backward()
+        optimizer.step()
+    apart = torch.cdist(network(shapes + 0.02 * torch.randn_like(shapes), part), network(shapes, part))
+    assert apart.argmin(1).tolist() == list(range(6))
