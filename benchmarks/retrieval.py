@@ -75,16 +75,13 @@ def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
     for step in trange(steps, desc=category, disable=None, leave=False):
         numbers = range(step * BATCH, (step + 1) * BATCH)
         batch = [samples[i] for i in numbers]
-        own = Shapes.from_objects(
-            [samples.object(i).with_diagonal(1.0) for i in numbers[::VIEWS]], POINTS // rows, rows
-        )
+        objects = [samples.object(i).with_diagonal(1.0) for i in numbers[::VIEWS]]
+        own = Shapes.from_objects(objects, POINTS // rows, rows).repeat(VIEWS)
         observed = torch.from_numpy(np.stack([sample.points for sample in batch])).float()
         part = torch.from_numpy(np.stack([sample.part for sample in batch]).astype(np.int64))
         negative = torch.rand(BATCH, generator=generator) < 0.5
         others = torch.randint(len(estimator.base), (BATCH,), generator=generator)
-        wanted = own.repeat(VIEWS)
-        thinned = estimator.base.shapes[others]
-        same, different = canonical(wanted, generator), canonical(thinned, generator)
+        same, different = canonical(own, generator), canonical(estimator.base.shapes[others], generator)
         points = torch.where(negative[:, None, None], different[0], same[0])
         labels = torch.where(negative[:, None], different[1], same[1])
         set_rate(optimizer, RATE * one_cycle(step, steps))
