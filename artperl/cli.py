@@ -50,6 +50,8 @@ class Train:
     """How the agent learns: behaviour cloning and PPO, or one of them alone."""
     real: bool = False
     """Learn from real objects, too: every other one, of the half of ArtImage's frozen split that is not for testing."""
+    dataset: Path | None = None
+    """Learn from the train split of a dataset that generate.py wrote, instead of from fresh objects."""
     start_from: Path | None = None
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
@@ -76,6 +78,7 @@ class Train:
         options = replace(
             preset, categories=categories, parts=self.parts or preset.parts, real=self.real, seed=self.seed,
             device=self.device or preset.device,
+            dataset=None if self.dataset is None else str(self.dataset),
             start_from=None if self.start_from is None else str(self.start_from),
             sample=SampleOptions(noise=self.noise),
             perception_steps=preset.perception_steps if steps is None else steps,

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from artperl.batch import Batch
 from artperl.categories import Parts, has_parts
-from artsim.errors import AssetError, ConfigError
+from artsim.dataset import open_dataset
+from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
@@ -153,6 +155,78 @@ class Samples:
         self._right = lru_cache(maxsize=64)(self._find_right)
 
 
+class Recorded:
+    """Samples of a dataset by number: the train split of what ``generate.py`` wrote, in another order on each pass.
+
+    Parameters
+    ----------
+    folder : str or Path
+    categories : sequence of str
+        Of the objects to learn from.
+    seed : int
+        Of the order.
+    num_rows : int
+        The most parts that an object may have.
+    num_points : int
+        The least points that a cloud must have.
+    parts : Parts
+
+    Raises
+    ------
+    DatasetError
+        When no sample of the dataset is of these categories and has these parts, or clouds have too few points.
+    """
+
+    def __init__(
+        self, folder: str | Path, categories: Sequence[str], seed: int, num_rows: int, num_points: int,
+        parts: Parts = "artimage",
+    ):  # fmt: skip
+        self.dataset, self.seed, self.num_rows = open_dataset(folder, "train"), seed, num_rows
+        self.categories, self.parts = tuple(categories), parts
+        self._usable: list[int] = []
+        wanted: dict[str, bool] = {}
+        for place in range(len(self.dataset)):
+            key = self.dataset.object_key(place)
+            if key not in wanted:
+                wanted[key] = self._is_right(self.dataset[place])
+            if wanted[key]:
+                self._usable.append(place)
+        if not self._usable:
+            raise DatasetError(
+                f"its train split has no {' or '.join(categories)} with the right parts", folder,
+                "generate one with these categories, or use --parts any",
+            )  # fmt: skip
+        if len(self.dataset[self._usable[0]].points) < num_points:
+            raise DatasetError(f"its clouds have fewer than {num_points} points", folder, "generate larger ones")
+        self._turn, self._order = -1, np.empty(0, dtype=np.int64)
+
+    def __getitem__(self, i: int) -> Sample:
+        turn, place = divmod(i, len(self._usable))
+        if turn != self._turn:
+            self._turn, self._order = turn, np.random.default_rng([self.seed, turn]).permutation(self._usable)
+        return self.dataset[int(self._order[place])]
+
+    def object(self, i: int) -> ArticulatedObject:
+        """The object that sample ``i`` shows."""
+        return self.dataset.object_of(self[i])
+
+    def _is_right(self, sample: Sample) -> bool:
+        few_enough = len(sample.joint_type) <= self.num_rows
+        return sample.category in self.categories and few_enough and has_parts(
+            sample.category, sample.joint_type, self.parts
+        )  # fmt: skip
+
+
+def samples_from(
+    dataset: str | Path | None, categories: Sequence[str], options: SampleOptions, seed: int, views_per_object: int,
+    num_rows: int, parts: Parts, real: Sequence[ArticulatedObject],
+) -> Samples | Recorded:  # fmt: skip
+    """Samples of a dataset, or of fresh objects if there is none: see :class:`Recorded` and :class:`Samples`."""
+    if dataset is not None:
+        return Recorded(dataset, categories, seed, num_rows, options.num_points, parts)
+    return Samples(categories, options, seed, views_per_object, num_rows, parts, real)
+
+
 def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
     """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
     K = len(sample.joint_type)
@@ -187,7 +261,7 @@ def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch."""
 
-    def __init__(self, samples: Samples, num_points: int, batch_size: int, first: int):
+    def __init__(self, samples: Samples | Recorded, num_points: int, batch_size: int, first: int):
         self.samples, self.num_points = samples, num_points
         self.batch_size, self.first = batch_size, first
 
@@ -217,8 +291,9 @@ def batches(
     sample: SampleOptions | None = None,
     parts: Parts = "artimage",
     real: Sequence[ArticulatedObject] = (),
+    dataset: str | Path | None = None,
 ) -> Iterator[tuple[Clouds, Truth]]:
-    """Endless batches of fresh procedural objects.
+    """Endless batches of fresh procedural objects, or of a dataset.
 
     A quarter of each batch is views of one object that was never seen before; the others are drawn from the last
     batches' and shuffled anew. Batch ``n`` is always the same, whatever the number of workers and wherever the run was
@@ -240,10 +315,12 @@ def batches(
     parts : Parts
     real : sequence of ArticulatedObject
         See :class:`Samples`.
+    dataset : str or Path, optional
+        See :class:`Recorded`.
     """
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
-    samples = Samples(categories, options, seed, fresh, num_rows, parts, real)
+    samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, real)
     rows = _Rows(samples, num_points, fresh, begin * fresh)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on

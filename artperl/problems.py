@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from torch import Tensor
 from artperl.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.batch import Batch
 from artperl.categories import Parts
-from artperl.data import Clouds, Samples
+from artperl.data import Clouds, samples_from
 from artperl.embedding import box_embedding
 from artperl.networks.perception import Perception
 from artperl.pose import Theta, clamp_state, theta_from_parts
@@ -88,6 +89,8 @@ class Problems:
     views_per_object : int
         Problems in a row of the same object.
     references : References
+    dataset : str or Path, optional
+        See :class:`artperl.data.Recorded`.
     """
 
     def __init__(
@@ -105,9 +108,11 @@ class Problems:
         real: Sequence[ArticulatedObject] = (),
         views_per_object: int = 2,
         references: References = "retrieved",
+        dataset: str | Path | None = None,
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-        self.samples = Samples(categories, options, seed, views_per_object, base.shapes.trees.num_rows, parts, real)
+        rows = base.shapes.trees.num_rows
+        self.samples = samples_from(dataset, categories, options, seed, views_per_object, rows, parts, real)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
         self.start, self.perception, self.references = start or StartOptions(), perception, references
 

@@ -24,6 +24,8 @@ class TrainOptions:
     """The most parts that an object may have; all others' rows are empty."""
     real: bool = False
     """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
+    dataset: str | None = None
+    """Folder of a dataset to learn from, its train split, instead of fresh objects."""
     start_from: str | None = None
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     seed: int = 0

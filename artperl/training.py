@@ -90,6 +90,8 @@ class Training:
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
         objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts)
+        if options.real and options.dataset is not None:
+            raise ConfigError("real objects are not mixed with a dataset's", "real", "generate one with them in it")
         self.real = real_train_objects(options.categories) if options.real else []
         self.base = by_boxes(ShapeBase.of([*objects, *self.real], options.reference_points))
         self.device = _device(options.device)
@@ -147,7 +149,7 @@ class Training:
             return
         data = batches(
             options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
-            self.workers, options.sample, options.parts, self.real,
+            self.workers, options.sample, options.parts, self.real, options.dataset,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
@@ -186,6 +188,7 @@ class Training:
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
             options.sample, perception=self.perception, parts=options.parts,
             real=self.real, views_per_object=_VIEWS, references=options.references,
+            dataset=options.dataset,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
         for n in range(first, total):

@@ -63,11 +63,13 @@ class Dataset:
     def __getitem__(self, i: int) -> Sample:
         if not -len(self) <= i < len(self):
             raise IndexError(f"sample {i} of {len(self)}")
-        i = int(i) % len(self)
-        s = bisect.bisect_right(self._ends, i)
-        shard = self.shards[s]
-        index = shard.end - (self._ends[s] - i)
+        shard, index = self._place(int(i) % len(self))
         return self._reader(shard.name).read(sample_key(index))
+
+    def _place(self, i: int) -> tuple[ShardRecord, int]:
+        """Shard and number in the whole dataset of sample ``i``."""
+        s = bisect.bisect_right(self._ends, i)
+        return self.shards[s], self.shards[s].end - (self._ends[s] - i)
 
     def __iter__(self) -> Iterator[Sample]:
         return (self[i] for i in range(len(self)))
@@ -87,6 +89,10 @@ class Dataset:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(state["folder"], state["split"])  # type: ignore[misc]
+
+    def object_key(self, i: int) -> str:
+        """Name, unique in the dataset, of the object that sample ``i`` shows, without reading it."""
+        return self.plan.object_of(self._place(i)[1]).key
 
     def object_of(self, sample: Sample) -> ArticulatedObject:
         """The object that a sample shows, at the sample's scale."""

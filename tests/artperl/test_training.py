@@ -16,14 +16,19 @@ import torch
 from safetensors.torch import load_file
 
 from artperl import cli
-from artperl.checkpoint import load_estimator
+from artperl.checkpoint import load_estimator, read_settings
+from artperl.data import Recorded, batches
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
 from artperl.ppo import PPOOptions
 from artperl.settings import PRESETS, TrainOptions
 from artperl.steps import one_cycle
 from artperl.training import BASE_SEEDS, Training
+from artsim import generate
+from artsim.dataset import open_dataset
 from artsim.errors import DatasetError
+from artsim.plan import SampleOptions
+from artsim.sources import family_sources
 from artsim.stream import STREAM_SEEDS
 
 TINY = TrainOptions(
@@ -157,3 +162,32 @@ def test_the_program_says_what_is_wrong(
             cli.main()
         assert stopped.value.code == 2
         assert "mend" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset of laptops and eyeglasses."""
+    sources = family_sources(["laptop", "eyeglasses"], 3)
+    options = SampleOptions(num_points=96)
+    return generate(sources, tmp_path_factory.mktemp("recorded"), num_samples=24, sample=options).folder
+
+
+def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
+    samples = Recorded(recorded, ["laptop"], 3, 2, 96)
+    train = [sample for sample in open_dataset(recorded, "train") if sample.category == "laptop"]
+    first, second = ([samples[i].index for i in range(n, n + len(train))] for n in (0, len(train)))
+    assert sorted(first) == sorted(second) == [sample.index for sample in train]
+    assert first != second
+    assert len(samples.object(0)) == 2
+    rows, _ = next(batches(["laptop"], 2, 96, 4, workers=0, seed=3, dataset=recorded))
+    assert rows.points.shape == (4, 96, 3)
+    with pytest.raises(DatasetError, match="no scissors"):
+        Recorded(recorded, ["scissors"], 0, 2, 96)
+    with pytest.raises(DatasetError, match="fewer than 1024"):
+        Recorded(recorded, ["laptop"], 0, 2, 1024)
+
+
+def test_a_run_on_a_dataset_ends_like_any_other(recorded: Path, tmp_path: Path) -> None:
+    Training(replace(TINY, dataset=str(recorded)), tmp_path, workers=0, progress=False).run()
+    assert "laptop 1" in (tmp_path / "table.txt").read_text()
+    assert read_settings(tmp_path / "best")["about"]["options"]["dataset"] == str(recorded)
