@@ -162,7 +162,11 @@ def test_an_estimator_comes_back_from_its_folder(base: ShapeBase, sample: Sample
     save_estimator(made, tmp_path / "made", {"note": "untrained"})
     back = load_estimator(tmp_path / "made")
     assert (back.options, back.calibration) == (options, made.calibration)
-    np.testing.assert_allclose(back(sample.points).trajectory[0], made(sample.points).trajectory[0], atol=1e-3)
+    for name, tensor in made.perception.state_dict().items():  # half precision
+        torch.testing.assert_close(back.perception.state_dict()[name], tensor, rtol=5e-4, atol=1e-7)
+    save_estimator(back, tmp_path / "again", {})
+    again = load_estimator(tmp_path / "again")
+    np.testing.assert_array_equal(again(sample.points).T_camera_part, back(sample.points).T_camera_part)
 
 
 @pytest.mark.parametrize("spoiled", ["estimator.json", "weights.safetensors", "base.npz"])
