@@ -46,6 +46,10 @@ class PPOOptions:
     minibatch: int = 256
     """States of an update."""
     max_gradient: float = 0.5
+    sharpness: float = 3.0
+    """The policy that acts has that many times the logits of the one that is cloned. Cloning leaves each axis as unsure
+    as the expert's next step is; one axis of many would then take a long step astray at every turn, to states of which
+    the agent knows less and less."""
     guided: float = 0.5
     """Share of the steps that the expert takes while the agent learns by cloning alone: left to itself, an agent that
     knows nothing yet strays so far that what it learns there is of no use."""
@@ -74,7 +78,7 @@ def collect(agent: Agent, fitting: Fitting, goal: Theta, options: PPOOptions, ge
     while not fitting.done:
         view = fitting.view()
         logits, value = agent(view)
-        flat = logits.softmax(-1).flatten(0, 2)
+        flat = acting(logits, options).softmax(-1).flatten(0, 2)
         action = torch.multinomial(flat, 1, generator=generator).view(mask.shape)
         expert = fitting.expert(goal)
         if not options.reinforcement:
@@ -83,7 +87,7 @@ def collect(agent: Agent, fitting: Fitting, goal: Theta, options: PPOOptions, ge
         views.append(view)
         actions.append(action)
         experts.append(expert)
-        log_probs.append(log_probability(logits, action, mask))
+        log_probs.append(log_probability(acting(logits, options), action, mask))
         values.append(value)
         rewards.append(fitting.step(action))
     values.append(agent(fitting.view())[1])
@@ -109,6 +113,11 @@ def advantages(rewards: Tensor, values: Tensor, options: PPOOptions) -> Tensor:
     return result
 
 
+def acting(logits: Tensor, options: PPOOptions) -> Tensor:
+    """Logits of the policy that acts, from the agent's."""
+    return options.sharpness * logits
+
+
 def log_probability(logits: Tensor, action: Tensor, mask: Tensor) -> Tensor:
     """(B,) logarithm of the probability of an action: the axes are independent given the state."""
     chosen = logits.log_softmax(-1).gather(-1, action[..., None])[..., 0]
@@ -130,7 +139,7 @@ def update(
         for rows in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
             logits, value = agent(rollout.view[rows])
             mask = rollout.mask[rows]
-            losses = ppo_losses(logits, value, rollout, advantage, rows, options)
+            losses = ppo_losses(acting(logits, options), value, rollout, advantage, rows, options)
             cloning = cloning_loss(logits, rollout.expert[rows], mask, rollout.view.kind[rows], options)
             loss = value.new_zeros(())
             if options.reinforcement:

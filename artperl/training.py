@@ -63,6 +63,8 @@ _STATE = "state"
 _TEST_POINTS = 2048
 _VIEWS = 8
 """Episodes of a rollout that fit the same object: most of the time goes into making objects."""
+_AS_GOOD = 1.01
+"""Of two estimators whose scores differ by less, the one that learnt longer is kept."""
 _SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
 """Steps and rollouts after which a run is written down, for when it is not asked before it ends."""
 
@@ -227,8 +229,8 @@ class Training:
         figures, score = summary(scored), headline(scored)
         self.history.append({"step": step, "score": score, "done": dict(self.done)})
         _write(board, "validation", _curves(figures) | {"score": score}, step)
-        if score < self.best:
-            self.best = score
+        if score < _AS_GOOD * self.best:
+            self.best = min(score, self.best)
             foreign = mistake(self.estimator(), self._foreign())
             best = replace(self.estimator(), calibration=calibrate([*scored, *foreign]))
             best.options = replace(best.options, retry_residual=retry_residual(scored))

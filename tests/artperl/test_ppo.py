@@ -15,6 +15,7 @@ from artperl.pose import KINDS
 from artperl.ppo import (
     PPOOptions,
     Rollout,
+    acting,
     advantages,
     cloning_loss,
     collect,
@@ -59,6 +60,7 @@ def test_losses_are_those_of_stable_baselines() -> None:
     rollout = a_rollout(an_agent(), options)
     moved = an_agent(1)
     logits, value = moved(rollout.view)
+    logits = acting(logits, options)
     rows = torch.arange(len(rollout.log_prob))
     advantage = rollout.advantage - rollout.advantage.mean()
     ours = ppo_losses(logits, value, rollout, advantage, rows, options)
@@ -84,7 +86,7 @@ def test_a_policy_has_not_yet_diverged_from_itself() -> None:
     rollout = a_rollout(agent, options)
     rows = torch.arange(len(rollout.log_prob))
     logits, value = agent(rollout.view)
-    losses = ppo_losses(logits, value, rollout, rollout.advantage, rows, options)
+    losses = ppo_losses(acting(logits, options), value, rollout, rollout.advantage, rows, options)
     assert losses["divergence"].item() == pytest.approx(0.0, abs=1e-5)
     assert losses["policy"].item() == pytest.approx(-rollout.advantage.mean().item(), abs=1e-5)
 
@@ -141,7 +143,7 @@ def test_rewarded_actions_become_likelier() -> None:
     optimizer = torch.optim.Adam(agent.parameters(), 1e-3)
     update(agent, optimizer, rollout, options, torch.Generator().manual_seed(0))
     logits, _ = agent(rollout.view)
-    gain = log_probability(logits, rollout.action, rollout.mask) - rollout.log_prob
+    gain = log_probability(acting(logits, options), rollout.action, rollout.mask) - rollout.log_prob
     assert gain[1::2].mean() > gain[0::2].mean()
 
 
