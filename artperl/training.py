@@ -284,7 +284,7 @@ class Training:
     def _load(self) -> None:
         state = json.loads((self.out / f"{_STATE}.json").read_text())
         # An option that was not known yet when the run was begun has its default.
-        begun_with = json.loads(json.dumps(_plain(TrainOptions()))) | state["options"]
+        begun_with = _completed(json.loads(json.dumps(_plain(TrainOptions()))), state["options"])
         if begun_with != json.loads(json.dumps(_plain(self.options))):
             raise DatasetError("a run with other options is here", self.out, "give the same options, or another folder")
         self.best, self.history = state["best"], state["history"]
@@ -300,6 +300,14 @@ class Training:
                     moments.setdefault(int(number), {})[moment] = value
             optimizer = self.optimizers[name]
             optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+
+
+def _completed(defaults: dict[str, Any], known: dict[str, Any]) -> dict[str, Any]:
+    """What is known, with defaults for all else, at every depth."""
+    return defaults | {
+        name: _completed(defaults[name], value) if isinstance(value, dict) and name in defaults else value
+        for name, value in known.items()
+    }
 
 
 def _device(name: str) -> torch.device:

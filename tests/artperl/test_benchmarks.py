@@ -178,3 +178,9 @@ def test_an_object_turned_round_moves_alike() -> None:
     )
     np.testing.assert_allclose(other.parts[1].vertices @ half[:3, :3], obj.parts[1].vertices)
     np.testing.assert_allclose(other.T_base_rest @ half, obj.T_base_rest, atol=1e-12)
+
+
+def test_buttons_do_not_turn_a_dishwasher_round(partnet_dir: Path) -> None:
+    for half in ("train", "test"):
+        for obj in real_objects("dishwasher", half, partnet_dir):  # type: ignore[arg-type]
+            assert obj.box_center[1, 0] < -0.2 * obj.box_size[0, 0]  # the door is at the front
