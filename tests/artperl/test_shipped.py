@@ -1,0 +1,47 @@
+"""The estimators that come with the package are small, never saw a real object, and are right about unseen ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from artperl.benchmarks.artimage import real_objects
+from artperl.categories import ARTIMAGE
+from artperl.checkpoint import WEIGHTS, load_estimator, read_settings
+from artperl.evaluation import evaluate, frozen_samples, samples_of
+from artsim.families import FAMILIES
+
+_SEEDS = 1_200_000
+"""Neither of streams and bases, nor of the test and validation sets."""
+SHIPPED = (*ARTIMAGE, "any")
+
+
+def test_all_together_take_less_than_15_megabytes() -> None:
+    assert sum(path.stat().st_size for path in WEIGHTS.rglob("*") if path.is_file()) < 15e6
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_none_has_seen_a_real_object(name: str) -> None:
+    options = read_settings(WEIGHTS / name)["about"]["options"]
+    assert options["real"] is False
+    assert options["start_from"] is None
+    assert tuple(options["categories"]) == (tuple(FAMILIES) if name == "any" else (name,))
+    assert {key.split("_")[0] for key in load_estimator(name).base.categories} <= {c.split("_")[0] for c in FAMILIES}
+
+
+@pytest.mark.parametrize("category", ARTIMAGE)
+def test_unseen_procedural_objects_are_found(category: str) -> None:
+    scored = evaluate(load_estimator(category), frozen_samples([category], 4, 2, first_seed=_SEEDS))
+    assert not any(one.failed for one in scored)
+    assert np.median([one.rotation.max() for one in scored]) < 4.0
+    assert np.median([one.translation.max() for one in scored]) < 0.1
+    assert np.mean([one.segmentation for one in scored]) > 0.85
+
+
+@pytest.mark.parametrize("category", [name for name in ARTIMAGE if name != "scissors"])
+def test_unseen_real_objects_are_found(category: str, partnet_dir: Path) -> None:
+    scored = evaluate(load_estimator(category), samples_of(real_objects(category, "test", partnet_dir)[:2], 4))
+    assert np.median([one.rotation.max() for one in scored]) < 8.0
+    assert np.mean([one.segmentation for one in scored]) > 0.7
