@@ -77,7 +77,7 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Esti
     DatasetError
         When there is none, or its files are damaged.
     """
-    folder = Path(name) if Path(name).is_dir() else WEIGHTS / name
+    folder = folder_of(name)
     settings = read_settings(folder)
     try:
         tensors = load_file(folder / _TENSORS)
@@ -95,6 +95,12 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Esti
         )  # fmt: skip
     except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
         raise DatasetError(f"the estimator does not load: {error}", folder, "train it again") from error
+
+
+def folder_of(name: str | Path) -> Path:
+    """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
+    own = Path(name)
+    return WEIGHTS / name if (WEIGHTS / name).is_dir() and not (own / _SETTINGS).is_file() else own
 
 
 def read_settings(folder: Path) -> dict[str, Any]:

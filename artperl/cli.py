@@ -56,6 +56,8 @@ class Train:
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
+    views: Literal["artimage", "sphere"] = "artimage"
+    """From where objects are seen: from the front, as in ArtImage, or from all round."""
     device: Literal["cpu", "cuda"] | None = None
     """Where the networks learn; by default the preset's."""
     workers: int = 1
@@ -80,7 +82,7 @@ class Train:
             device=self.device or preset.device,
             dataset=None if self.dataset is None else str(self.dataset),
             start_from=None if self.start_from is None else str(self.start_from),
-            sample=SampleOptions(noise=self.noise),
+            sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
             perception_steps=preset.perception_steps if steps is None else steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             ppo=replace(
@@ -163,15 +165,14 @@ class Evaluate:
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
-        from artperl.checkpoint import WEIGHTS, load_estimator, read_settings
+        from artperl.checkpoint import folder_of, load_estimator, read_settings
         from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
         from artsim.sources import find_sources
 
         if self.estimator is None:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
         estimator = load_estimator(self.estimator)
-        folder = self.estimator if self.estimator.is_dir() else WEIGHTS / self.estimator
-        learnt = read_settings(folder)["about"]["options"]
+        learnt = read_settings(folder_of(self.estimator))["about"]["options"]
         options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from tqdm import tqdm
 
 from artperl import metrics
@@ -267,27 +268,37 @@ def retry_residual(scored: Sequence[Scored]) -> float:
     return float(np.quantile(residuals, _FITS_WELL)) if residuals else 0.0
 
 
-def calibrate(scored: Sequence[Scored], rounds: int = 20) -> Calibration:
+def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calibration:
     """Confidence such that, of estimates with confidence p, a share p is right: regularised logistic regression.
+
+    Clouds of other things count as much, all together, as those of the category.
 
     Weights of the residual and of the disagreement are kept from rising above 0, so that nothing that fits badly is
     ever trusted more for it, however far it lies from what was seen here.
     """
-    known = [s for s in scored if not s.failed]
+    known = [s for s in [*scored, *foreign] if not s.failed]
     default = Calibration()
     if not known:
         return default
     prior = np.array([default.bias, default.residual, default.disagreement])
     features = np.array([[1.0, s.residual, s.disagreement] for s in known])
     right = np.array([s.right for s in known], dtype=np.float64)
-    loose = np.array([0.3, 0.03, 0.1]) ** 2  # precision of the prior
-    weights = prior.copy()
-    for _ in range(rounds):
-        chance = 1.0 / (1.0 + np.exp(-features @ weights))
-        slope = features.T @ (chance - right) + loose * (weights - prior)
-        curvature = (features * (chance * (1.0 - chance))[:, None]).T @ features + np.diag(loose)
-        weights = weights - np.linalg.solve(curvature, slope)
-        weights[1:] = np.minimum(weights[1:], 0.1 * prior[1:])
+    count = np.ones(len(known))
+    if foreign:
+        count[-len(foreign) :] = (len(known) - len(foreign)) / len(foreign)
+    loose = np.array([0.1, 0.01, 0.03]) ** 2  # precision of the prior
+
+    def cost(scaled: Array) -> tuple[float, Array]:
+        weights = scaled * np.abs(prior)
+        score = features @ weights
+        chance = 1.0 / (1.0 + np.exp(-score.clip(-60.0, 60.0)))
+        off = weights - prior
+        value = count @ (np.logaddexp(0.0, score) - right * score) + 0.5 * loose @ off**2
+        slope = features.T @ (count * (chance - right)) + loose * off
+        return float(value), slope * np.abs(prior)
+
+    bounds = [(None, None), (None, -0.1), (None, -0.1)]
+    weights = minimize(cost, np.sign(prior), jac=True, bounds=bounds).x * np.abs(prior)
     return Calibration(*(float(w) for w in weights))
 
 

@@ -232,7 +232,7 @@ class Training:
         if score < _AS_GOOD * self.best:
             self.best = min(score, self.best)
             foreign = mistake(self.estimator(), self._foreign())
-            best = replace(self.estimator(), calibration=calibrate([*scored, *foreign]))
+            best = replace(self.estimator(), calibration=calibrate(scored, foreign))
             best.options = replace(best.options, retry_residual=retry_residual(scored))
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()

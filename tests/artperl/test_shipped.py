@@ -9,7 +9,7 @@ import pytest
 
 from artperl.benchmarks.artimage import real_objects
 from artperl.categories import ARTIMAGE
-from artperl.checkpoint import WEIGHTS, load_estimator, read_settings
+from artperl.checkpoint import WEIGHTS, folder_of, load_estimator, read_settings
 from artperl.evaluation import evaluate, frozen_samples, samples_of
 from artsim.families import FAMILIES
 
@@ -45,3 +45,12 @@ def test_unseen_real_objects_are_found(category: str, partnet_dir: Path) -> None
     scored = evaluate(load_estimator(category), samples_of(real_objects(category, "test", partnet_dir)[:2], 4))
     assert np.median([one.rotation.max() for one in scored]) < 8.0
     assert np.mean([one.segmentation for one in scored]) > 0.7
+
+
+def test_a_folder_of_the_same_name_does_not_hide_an_estimator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "laptop").mkdir()
+    assert load_estimator("laptop").base.categories[0] == "laptop"
+    for name in ("any", "laptop"):
+        assert folder_of(name) == WEIGHTS / name
+    assert folder_of("out/mine") == Path("out/mine")
