@@ -45,7 +45,8 @@ def main(options: Options) -> None:
     for category in options.categories:
         times = milliseconds(category, options)
         median[category] = round(float(np.median([sum(one.values()) for one in times])), 1)
-        stages[category] = {stage: round(float(np.median([one[stage] for one in times])), 1) for stage in times[0]}
+        every = dict.fromkeys(stage for one in times for stage in one)
+        stages[category] = {s: round(float(np.median([one.get(s, 0.0) for one in times])), 1) for s in every}
         by_stage = ", ".join(f"{stage} {value}" for stage, value in stages[category].items())
         print(f"{category:12} {median[category]:6.1f} ms ({by_stage}), {len(times)} instances", flush=True)
     print(json.dumps({"median_ms": median, "stages_ms": stages, "threads": options.threads}))
