@@ -182,13 +182,13 @@ class Evaluate:
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
         if self.ablation:
             from artperl.benchmarks.ablation import run_ablation, variants
-            from artperl.benchmarks.basin import run_basin
+            from artperl.benchmarks.basin import basin_problem, run_basin
 
             agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
             say = lambda line: print(line, flush=True)  # noqa: E731
             result = run_ablation(variants(estimator, *agents), samples, say, sys.stderr.isatty())
             if estimator.agent is not None and not self.files:
-                result["start"] = run_basin(estimator, categories, parts, say=say)
+                result["start"] = run_basin(estimator, basin_problem(estimator, categories, parts), say)
             return result
         figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
         print(table(figures))

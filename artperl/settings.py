@@ -83,7 +83,8 @@ PRESETS = {
     ),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=4, references="deformed", reference_points=96, width=40,
-        perception_steps=3000, agent_rollouts=60, test_objects=4, validation_views=1, foreign_categories=0,
+        perception_steps=3000, agent_rollouts=40, cloning_share=1.0, test_objects=4, validation_views=1,
+        foreign_categories=0,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one

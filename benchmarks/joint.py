@@ -1,7 +1,7 @@
 """One agent, any tree: ``python -m benchmarks.joint``.
 
-The joint agent fits cabinets with any mix of doors and drawers, and robot arms, whose trees it shares with no other
-category: from starts that are off by more and more, beside refinement alone. References are the objects themselves,
+How far off cabinets with any mix of doors and drawers, and robot arms, may begin for the joint agent to find them, and
+for refinement alone. References are the objects themselves,
 stretched at random; points carry the labels of its own perception. The last line is one JSON object.
 """
 
@@ -15,12 +15,9 @@ from pathlib import Path
 import torch
 import tyro
 
-from artperl.benchmarks.basin import run_basin
+from artperl.benchmarks.basin import basin_problem, run_basin
 from artperl.checkpoint import load_estimator
 from artperl.pose import KINDS
-from artperl.problems import Problems
-
-SEED = 777
 
 
 @dataclass(frozen=True)
@@ -42,15 +39,14 @@ def main(options: Options) -> None:
     estimator = load_estimator(options.weights)
     result = {}
     for category in options.categories:
-        problem = Problems([category], estimator.base, options.objects, 64, SEED, parts="any", references="deformed")[0]
+        problem = basin_problem(estimator, [category], "any", options.objects, "deformed")
         trees = problem.shapes.trees
         kinds = Counter(
             " ".join(KINDS[kind] for kind in row[valid].tolist()[1:])
             for row, valid in zip(trees.kind, trees.valid, strict=True)
         )
         print(f"{category}: {len(kinds)} mixes of joints, of 1 to {int(trees.valid.sum(1).max()) - 1}")
-        found = run_basin(estimator, [category], "any", options.objects, "deformed")
-        result[category] = {"mixes": len(kinds), "start": found}
+        result[category] = {"mixes": len(kinds), "start": run_basin(estimator, problem)}
     print(json.dumps(result))
 
 

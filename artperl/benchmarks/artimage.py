@@ -121,8 +121,8 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     category : str
         That the object is to have.
     """
-    slides = [joint for joint in obj.native_tree.joints if joint.type == "prismatic" and joint.type in joint_types]
-    if sum(joint.axis[0] for joint in slides) > 0.5:
+    slides = [joint for joint in obj.native_tree.joints if joint.type == "prismatic"]
+    if "prismatic" in joint_types and sum(joint.axis[0] for joint in slides) > 0.5:
         obj = turned_round(obj)
     tree = obj.native_tree
     owner = list(range(len(tree)))

@@ -26,27 +26,32 @@ _POINTS = 256
 _SEED = 777
 
 
-def run_basin(
+def basin_problem(
     estimator: Estimator,
     categories: Sequence[str],
     parts: Parts = "artimage",
     count: int = 96,
     references: References = "retrieved",
-    say: Callable[[str], None] = print,
-) -> list[dict[str, Any]]:
-    """Shares of fresh objects of which every part ends within 10 degrees of the pose that a reference can best have.
+) -> Problem:
+    """``count`` fresh objects whose points carry the labels that the estimator's perception gives them."""
+    return Problems(
+        categories, estimator.base, count, estimator.options.num_points, _SEED, perception=estimator.perception,
+        parts=parts, references=references,
+    )[0]  # fmt: skip
+
+
+def run_basin(estimator: Estimator, problem: Problem, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
+    """Shares of objects of which every part ends within 10 degrees of the pose that a reference can best have.
 
     References begin turned about a random axis and moved by up to a fifth of the cloud's radius, with their joints
-    half-way; points carry the labels that perception gives them, and nothing else of it is used.
+    half-way; of perception, only the labels of points are used.
 
     Parameters
     ----------
     estimator : Estimator
         With an agent.
-    categories : sequence of str
-    parts : Parts
-    count : int
-    references : References
+    problem : Problem
+        See :func:`basin_problem`.
     say : callable
         Gets the lines.
 
@@ -56,10 +61,7 @@ def run_basin(
         For each angle of the start.
     """
     assert estimator.agent is not None
-    problem = Problems(
-        categories, estimator.base, count, estimator.options.num_points, _SEED, perception=estimator.perception,
-        parts=parts, references=references,
-    )[0]  # fmt: skip
+    count = len(problem)
     few = problem.observed.map(lambda tensor: tensor[:, :_POINTS])
     result = []
     for angle in ANGLES:

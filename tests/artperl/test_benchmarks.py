@@ -13,7 +13,7 @@ import artsim
 from artperl import metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
 from artperl.benchmarks.artimage import SPLIT, in_reading_order, real_objects, reduced, row_samples, turned_round
-from artperl.benchmarks.basin import ANGLES, run_basin, turned
+from artperl.benchmarks.basin import ANGLES, basin_problem, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
 from artperl.categories import ARTIMAGE, objects_of
 from artperl.checkpoint import save_estimator
@@ -145,7 +145,7 @@ def test_starts_are_as_far_off_as_they_are_said_to_be() -> None:
     torch.manual_seed(0)
     estimator = Estimator(Perception(2, 16), small_base("laptop"), Agent(16), EstimatorOptions(num_points=128))
     lines: list[str] = []
-    found = run_basin(estimator, ["laptop"], count=2, say=lines.append)
+    found = run_basin(estimator, basin_problem(estimator, ["laptop"], count=2), lines.append)
     assert [row["start_deg"] for row in found] == list(ANGLES)
     assert all(0.0 <= row["agent and refinement"] <= 1.0 for row in found)
 
