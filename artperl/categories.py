@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import count, islice
 from typing import Literal
 
+from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
 from artsim.objects import MAX_PARTS, ArticulatedObject
 from artsim.sources import FamilySource, family_sources
@@ -24,7 +25,8 @@ ARTIMAGE: dict[str, tuple[str, ...]] = {
 """Joints of the moving parts of each category of ArtImage."""
 
 Parts = Literal["artimage", "any"]
-"""artimage: objects with the joints that their category has in ArtImage (any, for other categories); any: all."""
+"""artimage: objects with the joints that their category has in ArtImage (any, for other categories); any: all, with
+their parts in the order in which they are seen."""
 
 _ATTEMPTS = 200
 
@@ -32,6 +34,11 @@ _ATTEMPTS = 200
 def has_parts(category: str, joint_types: Sequence[str], parts: Parts = "artimage") -> bool:
     """Whether an object with these joints, the root's among them, is one to learn from and to be tested on."""
     return parts == "any" or category not in ARTIMAGE or tuple(joint_types[1:]) == ARTIMAGE[category]
+
+
+def arranged(obj: ArticulatedObject, parts: Parts) -> ArticulatedObject:
+    """The object with its parts in the order that an estimator for such objects knows them in."""
+    return as_seen(obj) if parts == "any" else obj
 
 
 def objects_of(
@@ -67,6 +74,6 @@ def _objects(first: FamilySource, parts: Parts, max_parts: int) -> Iterator[Arti
             continue  # a rare fault of the family, which artsim's audit reports
         if len(obj) <= max_parts and has_parts(first.category, obj.tree.types, parts):
             missed = 0
-            yield obj
+            yield arranged(obj, parts)
         elif (missed := missed + 1) > _ATTEMPTS:
             raise ConfigError(f"no object of at most {max_parts} parts has those of {parts}", first.category)

@@ -16,13 +16,14 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from artperl.batch import Batch
-from artperl.categories import Parts, has_parts
+from artperl.categories import Parts, arranged, has_parts
+from artperl.order import reordered_sample, visible_order
 from artsim.dataset import open_dataset
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
-from artsim.renderers import make_renderer
+from artsim.renderers import shared_renderer
 from artsim.sample import Sample
 from artsim.stream import FamilyStream
 
@@ -114,21 +115,25 @@ class Samples:
     ):
         self.stream = FamilyStream(categories, options, seed, views_per_object)
         self.num_rows, self.parts, self.real = num_rows, parts, real
-        self._right = lru_cache(maxsize=64)(self._find_right)
+        self._keep()
 
     def __getitem__(self, i: int) -> Sample:
         n, view = divmod(i, self.stream.views_per_object)
-        if self.real and n % 2:
-            renderer = make_renderer(self.stream.options.renderer)
-            return draw_sample(self.object(i), self.stream.options, self.stream.seed, i, renderer)
-        return self.stream[self._right(n) * self.stream.views_per_object + view]
+        index = i if self._is_real(n) else self._right(n) * self.stream.views_per_object + view
+        renderer = shared_renderer(self.stream.options.renderer)
+        return draw_sample(self.object(i), self.stream.options, self.stream.seed, index, renderer)
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
-        n = i // self.stream.views_per_object
-        if self.real and n % 2:
+        return self._object(i // self.stream.views_per_object)
+
+    def _is_real(self, n: int) -> bool:
+        return bool(self.real) and n % 2 == 1
+
+    def _find_object(self, n: int) -> ArticulatedObject:
+        if self._is_real(n):
             return self.real[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.real)))]
-        return self.stream.object(self._right(n))
+        return arranged(self.stream.object(self._right(n)), self.parts)
 
     def _find_right(self, n: int) -> int:
         """Number of the object that stands for object ``n``."""
@@ -147,12 +152,17 @@ class Samples:
             "allow more parts, or mend the family",
         )
 
+    def _keep(self) -> None:
+        """Begin to remember what was looked up."""
+        self._right = lru_cache(maxsize=64)(self._find_right)
+        self._object = lru_cache(maxsize=8)(self._find_object)
+
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_right"}
+        return {name: value for name, value in vars(self).items() if name not in ("_right", "_object")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._right = lru_cache(maxsize=64)(self._find_right)
+        self._keep()
 
 
 class Recorded:
@@ -204,11 +214,14 @@ class Recorded:
         turn, place = divmod(i, len(self._usable))
         if turn != self._turn:
             self._turn, self._order = turn, np.random.default_rng([self.seed, turn]).permutation(self._usable)
-        return self.dataset[int(self._order[place])]
+        sample = self.dataset[int(self._order[place])]
+        if self.parts != "any":
+            return sample
+        return reordered_sample(sample, visible_order(sample.joint_parent, sample.box_center, sample.box_size))
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
-        return self.dataset.object_of(self[i])
+        return arranged(self.dataset.object_of(self[i]), self.parts)
 
     def _is_right(self, sample: Sample) -> bool:
         few_enough = len(sample.joint_type) <= self.num_rows

@@ -29,6 +29,10 @@ References = Literal["retrieved", "deformed"]
 """What is fitted: one of the objects of the base that are most like the observed one; or the observed object itself,
 stretched at random, which has the right tree where no base could hold all that there are."""
 
+Labels = Literal["perceived", "true"]
+"""Which part each point is said to be of: what perception says; or the truth, for an agent that is to learn more trees
+than its perception can tell apart yet."""
+
 _STRETCH = (0.25, 0.1)
 """Half-widths of the logarithms by which deformed references are stretched: as a whole, and each part on its own."""
 _SHIFT = 0.03

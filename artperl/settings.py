@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from artperl.categories import Parts
 from artperl.fitting import FittingOptions
 from artperl.ppo import PPOOptions
-from artperl.problems import References, StartOptions
+from artperl.problems import Labels, References, StartOptions
 from artsim.plan import SampleOptions
 
 
@@ -51,6 +51,8 @@ class TrainOptions:
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
     references: References = "retrieved"
     """What the agent learns to fit."""
+    labels: Labels = "perceived"
+    """Which part the agent is told that each point is of."""
     agent_rate: float = 1e-3
     episodes: int = 64
     """Episodes of a rollout."""
@@ -82,9 +84,8 @@ PRESETS = {
         device="cuda", width=64, perception_steps=20000, batch_size=64, agent_rollouts=1000, episodes=256,
     ),
     "joint": TrainOptions(
-        parts="any", max_parts=10, base_objects=4, references="deformed", reference_points=96, width=40,
-        perception_steps=3000, agent_rollouts=40, cloning_share=1.0, test_objects=4, validation_views=1,
-        foreign_categories=0,
+        parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
+        perception_steps=9000, agent_rollouts=200, cloning_share=1.0, test_objects=8, validation_views=1,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one

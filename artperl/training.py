@@ -188,7 +188,7 @@ class Training:
             return
         problems = Problems(
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
-            options.sample, perception=self.perception, parts=options.parts,
+            options.sample, perception=self.perception if options.labels == "perceived" else None, parts=options.parts,
             real=self.real, views_per_object=_VIEWS, references=options.references,
             dataset=options.dataset,
         )  # fmt: skip

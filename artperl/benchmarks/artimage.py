@@ -23,8 +23,9 @@ import numpy as np
 
 from artperl.categories import ARTIMAGE, objects_of
 from artperl.evaluation import TEST_SEEDS, samples_of
+from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
-from artsim.kinematics import Array, KinematicTree
+from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject, Part
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
@@ -130,8 +131,6 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
         if tree.types[k] not in joint_types:
             owner[k] = owner[int(tree.parents[k])]
     kept = [k for k, own in enumerate(owner) if own == k]
-    if all(tree.parents[k] == 0 for k in kept[1:]):
-        kept = [0, *in_reading_order(kept[1:], obj.box_center, obj.box_size)]
     number = {k: n for n, k in enumerate(kept)}
     joints = []
     for k in kept:
@@ -141,7 +140,7 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
         joints.append(replace(joint, parent=-1 if k == 0 else number[owner[joint.parent]], mimic=mimic))
     parts = tuple(_joined([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
     # What the file calls its joints no longer fits.
-    return replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={})
+    return as_seen(replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={}))
 
 
 def turned_round(obj: ArticulatedObject) -> ArticulatedObject:
@@ -154,24 +153,6 @@ def turned_round(obj: ArticulatedObject) -> ArticulatedObject:
     ]
     T_base_rest = obj.T_base_rest @ np.diag([*half, 1.0])
     return replace(obj, parts=parts, native_tree=KinematicTree(joints), T_base_rest=T_base_rest)
-
-
-def in_reading_order(parts: Sequence[int], center: Array, size: Array) -> list[int]:
-    """Parts row by row, from the top (+z) down, each row from -y to +y.
-
-    Parameters
-    ----------
-    parts : sequence of int
-    center, size : (K, 3) float
-        Boxes in the rest frame. What is lower than the first of a row by half a height is in the next one.
-    """
-    rows: list[list[int]] = []
-    for k in sorted(parts, key=lambda part: -float(center[part, 2])):
-        if rows and center[rows[-1][0], 2] - center[k, 2] <= 0.5 * min(size[k, 2], size[rows[-1][0], 2]):
-            rows[-1].append(k)
-        else:
-            rows.append([k])
-    return [k for row in rows for k in sorted(row, key=lambda part: float(center[part, 1]))]
 
 
 def _joined(parts: Sequence[Part]) -> Part:

@@ -201,15 +201,17 @@ def _spans(
 
 def _corners(obj: ArticulatedObject) -> Array:
     """(K, C, 3) corners around each part, native units; the last is repeated where a part has fewer."""
-    corners = _corners_of.get(obj.parts[0])
-    if corners is None:
+    root, others = obj.parts[0], obj.parts[1:]
+    known = _corners_of.get(root)
+    if known is None or known[0] != others:  # other objects may have the same root
         own = [surface(p).corners if len(p.faces) else np.zeros((1, 3)) for p in obj.parts]
         most = max(map(len, own))
-        corners = _corners_of[obj.parts[0]] = np.stack([np.pad(c, ((0, most - len(c)), (0, 0)), "edge") for c in own])
-    return corners
+        padded = np.stack([np.pad(c, ((0, most - len(c)), (0, 0)), "edge") for c in own])
+        known = _corners_of[root] = (others, padded)
+    return known[1]
 
 
-_corners_of: weakref.WeakKeyDictionary[Part, Array] = weakref.WeakKeyDictionary()
+_corners_of: weakref.WeakKeyDictionary[Part, tuple[tuple[Part, ...], Array]] = weakref.WeakKeyDictionary()
 
 
 def cast(

@@ -12,7 +12,7 @@ import torch
 import artsim
 from artperl import metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
-from artperl.benchmarks.artimage import SPLIT, in_reading_order, real_objects, reduced, row_samples, turned_round
+from artperl.benchmarks.artimage import SPLIT, real_objects, reduced, row_samples, turned_round
 from artperl.benchmarks.basin import ANGLES, basin_problem, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
 from artperl.categories import ARTIMAGE, objects_of
@@ -21,6 +21,7 @@ from artperl.estimator import Estimator
 from artperl.evaluation import TEST_SEEDS, frozen_samples, true_poses
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception
+from artperl.order import in_reading_order
 from artperl.search import EstimatorOptions
 from artsim.errors import AssetError
 from tests.artperl.test_estimator import Oracle
