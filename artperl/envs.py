@@ -59,6 +59,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
                 "back": _anything(P, M, 3),
                 "joint": _anything(P, 6),
                 "kind": spaces.MultiDiscrete(np.full(P, len(KINDS)), dtype=np.int64),
+                "parent": spaces.MultiDiscrete(np.full(P, P), dtype=np.int64),
                 "valid": spaces.MultiBinary(P),
                 "state": _anything(P, 2),
             }

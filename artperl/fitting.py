@@ -60,6 +60,7 @@ class View(Batch):
         Axis, and anchor of each part's joint.
     kind : (B, P) int64
         Index into ``artperl.pose.KINDS``.
+    parent : (B, P) int64
     valid : (B, P) bool
     state : (B, P, 2) float
         Where each joint stands in its range, 0 to 1, and the range itself, in radians or radii (both 0 where it has
@@ -73,6 +74,7 @@ class View(Batch):
     back: Tensor
     joint: Tensor
     kind: Tensor
+    parent: Tensor
     valid: Tensor
     state: Tensor
 
@@ -152,7 +154,7 @@ class Fitting:
         reference = torch.where(self.shapes.has_surface[..., None, None], self.reference, 0.0)
         return View(
             self._local, self.observed.part, offset.clamp(-2.0, 2.0), reference, back, self._joints(self.posed),
-            self.shapes.trees.kind, self.shapes.trees.valid, self._ranges(),
+            self.shapes.trees.kind, self.shapes.trees.parent, self.shapes.trees.valid, self._ranges(),
         )  # fmt: skip
 
     def _joints(self, posed: Posed) -> Tensor:

@@ -41,16 +41,17 @@ class PPOOptions:
     gamma: float = 0.99
     gae_lambda: float = 0.95
     clip: float = 0.2
-    epochs: int = 2
+    epochs: int = 1
     """Passes over the buffer."""
-    minibatch: int = 256
-    """States of an update."""
+    minibatch: int = 64
+    """States of an update: few, since the states of an episode are much alike, and updates are what learning needs."""
     max_gradient: float = 0.5
     sharpness: float = 3.0
-    """The policy that acts has that many times the logits of the one that is cloned. Cloning leaves each axis as unsure
-    as the expert's next step is; one axis of many would then take a long step astray at every turn, to states of which
-    the agent knows less and less."""
-    guided: float = 0.5
+    """While it learns from rewards, the policy that acts has that many times the logits of the one that is cloned.
+    Cloning leaves each axis as unsure as the expert's next step is; one axis of many would then take a long step astray
+    at every turn, to states of which the agent knows less and less. Cloning alone wants such states: the expert says
+    what to do there."""
+    guided: float = 0.3
     """Share of the steps that the expert takes while the agent learns by cloning alone: left to itself, an agent that
     knows nothing yet strays so far that what it learns there is of no use."""
 
@@ -115,7 +116,7 @@ def advantages(rewards: Tensor, values: Tensor, options: PPOOptions) -> Tensor:
 
 def acting(logits: Tensor, options: PPOOptions) -> Tensor:
     """Logits of the policy that acts, from the agent's."""
-    return options.sharpness * logits
+    return options.sharpness * logits if options.reinforcement else logits
 
 
 def log_probability(logits: Tensor, action: Tensor, mask: Tensor) -> Tensor:

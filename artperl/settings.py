@@ -45,7 +45,7 @@ class TrainOptions:
     batch_size: int = 32
     num_points: int = 1024
     """Points of a cloud."""
-    agent_rollouts: int = 100
+    agent_rollouts: int = 200
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
@@ -85,7 +85,7 @@ PRESETS = {
     ),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
-        perception_steps=9000, agent_rollouts=200, cloning_share=1.0, test_objects=8, validation_views=1,
+        perception_steps=9000, agent_rollouts=300, cloning_share=1.0, test_objects=8, validation_views=1,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one

@@ -1,8 +1,9 @@
 """The fitting agent: one policy for every tree (ArtPERL, section 4.3).
 
 A shared encoder describes each part by its observed points and by the reference's, with the offsets between them and
-their moments. The policy of a part reads these, what is known of its joint, and the whole object; its weights are
-shared by all parts, with one head for each type of joint, so that the number of parts is not built in.
+their moments. The policy of a part reads these, what is known of its joint, the same of its parent, whose own error
+its joint is not to make up for, and the whole object. Its weights are shared by all parts, with one head for each type
+of joint, so that the number of parts is not built in.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Agent(nn.Module):
         described = 4 * features + 16 + 6 + 2 + 1 + NUM_MOMENTS
         self.part = nn.Sequential(nn.Linear(described, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU())
         self.whole = nn.Sequential(nn.Linear(128, 128), nn.ReLU())
-        self.parent = nn.Sequential(nn.Linear(256, 128), nn.ReLU())
+        self.local = nn.Sequential(nn.Linear(384, 128), nn.ReLU())
         self.heads = nn.Linear(128, (max(_HEADS.values()) + 1) * NUM_AXES * NUM_BINS)
         self.value = nn.Sequential(nn.Linear(128, 64), nn.ReLU(), nn.Linear(64, 1))
         self.register_buffer("head_of", torch.tensor([_HEADS[kind] for kind in KINDS]), persistent=False)
@@ -69,7 +70,8 @@ class Agent(nn.Module):
         part = self.part(described)
         valid = view.valid[..., None]
         whole = self.whole(part.masked_fill(~valid, -torch.inf).amax(1))
-        local = self.parent(torch.cat([part, whole[:, None].expand(-1, P, -1)], dim=-1))
+        above = part.gather(1, view.parent[..., None].expand(-1, -1, part.shape[-1]))
+        local = self.local(torch.cat([part, above, whole[:, None].expand(-1, P, -1)], dim=-1))
         logits = self.heads(local).reshape(B, P, -1, NUM_AXES, NUM_BINS)
         head = self.head_of[view.kind][..., None, None, None].expand(-1, -1, 1, NUM_AXES, NUM_BINS)
         return logits.gather(2, head)[:, :, 0].float(), self.value(whole)[:, 0].float()

@@ -32,7 +32,7 @@ def test_a_base_comes_back_from_its_file(base: ShapeBase, tmp_path: Path) -> Non
     assert back.embeddings is not None
     torch.testing.assert_close(back.embeddings, base.embeddings)
     torch.testing.assert_close(back.shapes.points, base.shapes.points, atol=2.5e-4, rtol=0.0)
-    torch.testing.assert_close(back.shapes.normals, base.shapes.normals, atol=1e-3, rtol=0.0)
+    torch.testing.assert_close(back.shapes.normals, base.shapes.normals, atol=8e-3, rtol=0.0)
     for field in fields(base.shapes.trees):
         torch.testing.assert_close(getattr(back.shapes.trees, field.name), getattr(base.shapes.trees, field.name))
 
