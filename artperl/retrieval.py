@@ -126,6 +126,49 @@ class ShapeBase:
         distance, rows = apart.topk(count, largest=False)
         return rows, distance
 
+    def composed(self, row: int, center: Tensor, size: Tensor) -> Shapes:
+        """An object whose parts are those of any objects of its category that lie most like the ones asked for.
+
+        No base holds every mix of doors and drawers, but a few objects have a door and a drawer of every kind.
+
+        Parameters
+        ----------
+        row : int
+            Object whose root is taken.
+        center, size : (K, 3) float
+            Boxes of the parts, in diagonals, the root's first.
+
+        Returns
+        -------
+        Shapes
+            One row, of K parts; fewer where the category has none that could be the next.
+        """
+        own = torch.nonzero(self.of_category(self.categories[row]))[:, 0].tolist()
+        joints, sources = [self.trees[row].joints[0]], [(row, 0)]
+        for k in range(1, len(center)):
+            # Parts of the root may have any number; those further down a chain keep theirs.
+            same = [(b, k) for b in own if k < len(self.trees[b])]
+            fit = [(b, m) for b in own for m in range(1, len(self.trees[b])) if self.trees[b].parents[m] == 0]
+            if not any(self.trees[b].parents[k] == 0 for b, k in same):
+                fit = same
+            if not fit:
+                break
+            rows, parts = torch.tensor(fit, device=size.device).T
+            boxes = torch.cat([self.shapes.box_center[rows, parts], self.shapes.box_size[rows, parts]], dim=-1)
+            apart = torch.linalg.vector_norm(boxes - torch.cat([center[k], size[k]]), dim=-1)
+            b, m = fit[int(apart.argmin())]
+            joints.append(replace(self.trees[b].joints[m], name=f"{k}", mimic=None))
+            sources.append((b, m))
+        rows, parts = torch.tensor(sources, device=size.device).T
+        chosen = self.shapes[row : row + 1]
+        fields = {}
+        for name in ("box_center", "box_size", "points", "normals", "spacing"):
+            values = getattr(self.shapes, name)
+            fields[name] = torch.full_like(values[:1], torch.inf if name == "spacing" else 0.0)
+            fields[name][0, : len(joints)] = values[rows, parts]
+        tree = Trees.stack([KinematicTree(joints)], chosen.trees.num_rows, size.dtype).to(size.device)
+        return replace(chosen, trees=tree, **fields)
+
     def references(self, rows: Tensor) -> Shapes:
         """Shapes of the chosen objects, with no more rows for parts than they need."""
         return self.shapes[rows].trimmed()

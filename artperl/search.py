@@ -124,8 +124,7 @@ def find(
 ) -> Found:  # fmt: skip
     """The best fit to a cloud (1, N, 3) that has been perceived."""
     with clock("start"):
-        query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-        rows, chosen = references(base, query, min(options.references, len(base)))
+        rows, chosen = references(base, perceived, min(options.references, len(base)))
         shapes, theta = start(clouds, perceived, chosen, len(rows))
         observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
     found = None
@@ -150,16 +149,27 @@ def find(
     return again if _doubt(again) < _CLEARLY * _doubt(found) else found
 
 
-def references(base: ShapeBase, query: Tensor, count: int) -> tuple[Tensor, Shapes]:
-    """(count,) rows of the nearest objects, and their shapes.
+def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tensor, Shapes]:
+    """(count,) rows of the objects nearest to what is perceived of one cloud, and their shapes.
 
-    Boxes do not tell how axes lean, and no hinge turns a part to where another one's would. Where axes differ, there is
-    an object among them whose axes lean otherwise than those of the nearest, and one with the mean axes.
+    Where objects of the category have other trees than the nearest, there is one among them composed of the parts
+    of several, with as many as are perceived; its row is that of the nearest. Boxes do not tell how axes lean, and no
+    hinge turns a part to where another one's would: where axes differ, there is an object whose axes lean otherwise
+    than those of the nearest, and one with the mean axes.
     """
+    query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
     rows = base.nearest(query, count)[0][0]
-    otherwise = base.leaning_otherwise(int(rows[0]))
+    shapes, first = base.shapes[rows], int(rows[0])
+    if count > 1 and bool(
+        (base.of_category(base.categories[first]) & (base.kind.cpu() != base.kind[first].cpu())).any()
+    ):
+        parts = int(perceived.valid[0].sum())
+        own = base.composed(first, perceived.box_center[0, :parts], perceived.box_size[0, :parts])
+        order = [own, shapes[:1]] if parts != len(base.trees[first]) else [shapes[:1], own]
+        return torch.cat([rows[:1], rows[:-1]]), concatenate([*order, shapes[1:-1]])
+    otherwise = base.leaning_otherwise(first)
     if count < 3 or not bool(otherwise.any()):
-        return rows, base.shapes[rows]
+        return rows, shapes
     rows = torch.cat([rows[:1], base.nearest(query, 1, otherwise)[0][0], rows[1:-1]])
     shapes = base.shapes[rows]
     axis = torch.cat([shapes.trees.axis[:-1], base.mean_axis[rows[-1:]]])

@@ -45,7 +45,7 @@ class TrainOptions:
     batch_size: int = 32
     num_points: int = 1024
     """Points of a cloud."""
-    agent_rollouts: int = 200
+    agent_rollouts: int = 150
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -14,8 +14,8 @@ from artperl.actions import MOVE, NUM_AXES, TURN, move
 from artperl.categories import Parts
 from artperl.estimator import Estimator
 from artperl.metrics import rotation_error
-from artperl.pose import Theta, pose_parts
-from artperl.problems import Problem, Problems, References
+from artperl.pose import Theta, clamp_state, pose_parts
+from artperl.problems import Labels, Problem, Problems, References
 from artperl.refine import refine
 from artperl.search import agent_steps
 
@@ -32,19 +32,27 @@ def basin_problem(
     parts: Parts = "artimage",
     count: int = 96,
     references: References = "retrieved",
+    labels: Labels = "perceived",
 ) -> Problem:
-    """``count`` fresh objects whose points carry the labels that the estimator's perception gives them."""
+    """``count`` fresh objects, their points labelled by the estimator's perception or by the truth."""
     return Problems(
-        categories, estimator.base, count, estimator.options.num_points, _SEED, perception=estimator.perception,
-        parts=parts, references=references,
+        categories, estimator.base, count, estimator.options.num_points, _SEED,
+        perception=estimator.perception if labels == "perceived" else None, parts=parts, references=references,
     )[0]  # fmt: skip
 
 
-def run_basin(estimator: Estimator, problem: Problem, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
-    """Shares of objects of which every part ends within 10 degrees of the pose that a reference can best have.
+Joints = Literal["halfway", "near"]
+"""Where joints begin: in the middle of their range; or off by up to the angle that the whole is turned by, slides by the
+same share of their range as that is of half a turn."""
 
-    References begin turned about a random axis and moved by up to a fifth of the cloud's radius, with their joints
-    half-way; of perception, only the labels of points are used.
+
+def run_basin(
+    estimator: Estimator, problem: Problem, say: Callable[[str], None] = print, joints: Joints = "halfway"
+) -> list[dict[str, Any]]:
+    """Shares of objects of which every part, and of parts that, end within 10 degrees of the best pose of a reference.
+
+    References begin turned about a random axis and moved by up to a fifth of the cloud's radius; of perception, only
+    the labels of points are used.
 
     Parameters
     ----------
@@ -54,18 +62,19 @@ def run_basin(estimator: Estimator, problem: Problem, say: Callable[[str], None]
         See :func:`basin_problem`.
     say : callable
         Gets the lines.
+    joints : Joints
 
     Returns
     -------
     list of dict
-        For each angle of the start.
+        For each angle of the start; shares of parts under ``parts``.
     """
     assert estimator.agent is not None
     count = len(problem)
     few = problem.observed.map(lambda tensor: tensor[:, :_POINTS])
     result = []
     for angle in ANGLES:
-        start = turned(problem, np.deg2rad(angle))
+        start = turned(problem, np.deg2rad(angle), joints)
         with torch.inference_mode():
             led = agent_steps(estimator.agent, problem.shapes, few, start, estimator.options.agent_steps)[-1]
             ends = {
@@ -73,15 +82,18 @@ def run_basin(estimator: Estimator, problem: Problem, say: Callable[[str], None]
                 "agent": led,
                 "agent and refinement": refine(problem.shapes, few, led, estimator.options.refine).theta,
             }
-        found = {name: round(float((_off(problem, end) < _FOUND).mean()), 3) for name, end in ends.items()}
-        shares = ", ".join(f"{name} {100 * share:.0f} %" for name, share in found.items())
+        valid = problem.shapes.trees.valid.numpy()
+        near = {name: (_off(problem, end) < _FOUND) | ~valid for name, end in ends.items()}
+        found = {name: round(float(right.all(1).mean()), 3) for name, right in near.items()}
+        parts = {name: round(float(right[valid].mean()), 3) for name, right in near.items()}
+        shares = ", ".join(f"{name} {100 * found[name]:.0f} % (parts {100 * parts[name]:.0f} %)" for name in ends)
         say(f"start {angle:.0f} deg off: found by {shares} of {count}")
-        result.append({"start_deg": angle, **found})
+        result.append({"start_deg": angle, **found, "parts": parts})
     return result
 
 
-def turned(problem: Problem, angle: float) -> Theta:
-    """Starts that are turned by an angle from the goals."""
+def turned(problem: Problem, angle: float, joints: Joints = "halfway") -> Theta:
+    """Starts that are turned by an angle, in radians, from the goals."""
     shapes, goal = problem.shapes, problem.goal
     trees, generator = shapes.trees, torch.Generator().manual_seed(_SEED)
     B, P = trees.valid.shape
@@ -93,16 +105,20 @@ def turned(problem: Problem, angle: float) -> Theta:
     points = problem.observed.points
     radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
     moved = move(shapes, plain, step, radius)
-    middle = torch.where(torch.isfinite(trees.upper - trees.lower), 0.5 * (trees.lower + trees.upper), trees.rest)
-    return replace(moved, state=torch.where(trees.free, middle, moved.state))
+    span = trees.upper - trees.lower
+    if joints == "halfway":
+        state = torch.where(torch.isfinite(span), 0.5 * (trees.lower + trees.upper), trees.rest)
+    else:
+        reach = torch.where(trees.turn != 0, angle, span * angle / torch.pi)
+        state = moved.state + reach * (2.0 * torch.rand(B, P, generator=generator) - 1.0)
+    return replace(moved, state=torch.where(trees.free, clamp_state(trees, state), moved.state))
 
 
 def _off(problem: Problem, theta: Theta) -> np.ndarray:
-    """(B,) largest rotation error of any part, degrees."""
+    """(B, P) rotation errors, degrees."""
     trees, center = problem.shapes.trees, problem.shapes.box_center
 
     def rotation(state: Theta) -> Tensor:
         return pose_parts(trees, state, center).rotation.double()
 
-    error = rotation_error(rotation(theta).numpy(), rotation(problem.goal).numpy())
-    return np.where(trees.valid.numpy(), error, 0.0).max(axis=1)
+    return rotation_error(rotation(theta).numpy(), rotation(problem.goal).numpy())

@@ -49,8 +49,9 @@ class Perceived(Batch):
 
     @property
     def valid(self) -> Tensor:
-        """(B, P) bool: parts that the object has; the root always."""
-        return (self.valid_logits > 0).index_fill(1, self.valid_logits.new_zeros(1, dtype=torch.int64), True)
+        """(B, P) bool: as many first rows as the object most likely has parts, the root always."""
+        last = self.valid_logits.cumsum(1).argmax(1, keepdim=True)
+        return torch.arange(self.valid_logits.shape[1], device=last.device) <= last
 
     @property
     def part(self) -> Tensor:

@@ -143,6 +143,9 @@ def test_starts_are_as_far_off_as_they_are_said_to_be() -> None:
     start = turned(problem, 0.5)
     off = metrics.rotation_error(start.rotation.double().numpy(), problem.goal.rotation.double().numpy())
     np.testing.assert_allclose(off, np.rad2deg(0.5), atol=1e-2)
+    near = turned(problem, 0.5, "near")
+    assert (near.state - problem.goal.state).abs().max() <= 0.5
+    assert not torch.equal(near.state, start.state)
     torch.manual_seed(0)
     estimator = Estimator(Perception(2, 16), small_base("laptop"), Agent(16), EstimatorOptions(num_points=128))
     lines: list[str] = []

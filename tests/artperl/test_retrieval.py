@@ -11,7 +11,9 @@ import pytest
 import torch
 
 import artsim
+from artperl.categories import objects_of
 from artperl.embedding import by_boxes
+from artperl.networks.perception import Perceived
 from artperl.retrieval import ShapeBase, widened
 from artperl.search import references
 from artsim.errors import ConfigError, DatasetError
@@ -99,6 +101,17 @@ def test_references_go_as_far_as_any_of_their_kind() -> None:
     assert laptops[0, 1, 1] == pytest.approx(farthest)
 
 
+def _perceived(base: ShapeBase, row: int) -> Perceived:
+    """What a network would say that knows an object of the base."""
+    shapes = base.shapes[row : row + 1]
+    one = torch.zeros(1, 1)
+    return Perceived(
+        part_logits=one[..., None], canonical=one[..., None].expand(-1, -1, 3), spread=one,
+        valid_logits=2.0 * shapes.trees.valid.float() - 1.0, box_center=shapes.box_center, box_size=shapes.box_size,
+        log_diagonal=one[0],
+    )  # fmt: skip
+
+
 def test_references_have_axes_of_every_lean() -> None:
     base = by_boxes(ShapeBase.of([artsim.make("eyeglasses", seed) for seed in range(12)], 32))
     axis = base.shapes.trees.axis[:, 1]
@@ -106,7 +119,7 @@ def test_references_have_axes_of_every_lean() -> None:
     assert set(leans.tolist()) == {-1.0, 1.0}
     assert base.embeddings is not None
     for row in range(len(base)):
-        rows, shapes = references(base, base.embeddings[row : row + 1], 3)
+        rows, shapes = references(base, _perceived(base, row), 3)
         assert int(rows[0]) == row
         assert base.leaning_otherwise(row).tolist() == (leans != leans[row]).tolist()
         assert torch.sign(shapes.trees.axis[:2, 1, 1]).tolist() == [leans[row], -leans[row]]
@@ -114,6 +127,48 @@ def test_references_have_axes_of_every_lean() -> None:
     laptops = by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(6)], 32))
     assert laptops.embeddings is not None
     nearest = laptops.nearest(laptops.embeddings[:1], 3)[0][0]
-    rows, shapes = references(laptops, laptops.embeddings[:1], 3)
+    rows, shapes = references(laptops, _perceived(laptops, 0), 3)
     assert torch.equal(rows, nearest)
     assert torch.equal(shapes.points, laptops.shapes.points[nearest])
+
+
+def test_an_object_is_composed_of_its_own_parts() -> None:
+    base = ShapeBase.of(objects_of(["storage_furniture"], 4, 30, "any", 8), 16)
+    for row in range(len(base)):
+        own, parts = base.shapes[row : row + 1], len(base.trees[row])
+        made = base.composed(row, own.box_center[0, :parts], own.box_size[0, :parts])
+        for name in ("box_center", "box_size", "points", "normals", "spacing", "diagonal"):
+            assert torch.equal(getattr(made, name), getattr(own, name)), name
+        for name in ("valid", "kind", "parent", "axis", "origin", "lower", "upper", "carries", "free"):
+            assert torch.equal(getattr(made.trees, name), getattr(own.trees, name)), name
+
+
+def test_a_mix_that_no_object_has_is_composed_of_several() -> None:
+    base = ShapeBase.of(objects_of(["storage_furniture"], 6, 30, "any", 8), 16)
+    other = ShapeBase.of(objects_of(["storage_furniture"], 12, 60, "any", 6), 16)
+    right = []
+    for row in range(len(other)):
+        parts = len(other.trees[row])
+        made = base.composed(0, other.shapes.box_center[row, :parts], other.shapes.box_size[row, :parts])
+        assert int(made.trees.valid.sum()) == parts
+        right += (made.trees.kind[0, :parts] == other.shapes.trees.kind[row, :parts])[1:].tolist()
+    assert np.mean(right) > 0.8
+
+
+def test_robot_arms_are_composed_along_their_chain() -> None:
+    base = ShapeBase.of(objects_of(["robot_arm"], 6, 30, "any", 10), 16)
+    arms = objects_of(["robot_arm"], 6, 60, "any", 6)
+    for arm in ShapeBase.of(arms, 16).trees:
+        made = base.composed(0, torch.zeros(len(arm), 3), torch.ones(len(arm), 3))
+        assert (made.trees.parent[0, 1 : len(arm)] < torch.arange(1, len(arm))).all()
+        assert int(made.trees.depth.max()) >= len(arm) - 2  # a gripper's two fingers are side by side
+
+
+def test_a_mix_of_its_own_is_tried_beside_the_nearest_object() -> None:
+    objects = objects_of(["storage_furniture"], 6, 30, "any", 8)
+    base, whole = by_boxes(ShapeBase.of(objects[:-1], 16)), ShapeBase.of(objects, 16)
+    rows, shapes = references(base, _perceived(whole, 5), 3)
+    parts = [int(count) for count in shapes.trees.valid.sum(1)]
+    assert len(rows) == len(shapes) == 3
+    assert rows[0] == rows[1]
+    assert len(objects[5]) in parts[:2]
