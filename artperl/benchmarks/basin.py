@@ -42,8 +42,8 @@ def basin_problem(
 
 
 Joints = Literal["halfway", "near"]
-"""Where joints begin: in the middle of their range; or off by up to the angle that the whole is turned by, slides by the
-same share of their range as that is of half a turn."""
+"""Where joints begin: in the middle of their range; or off by up to the angle that the whole is turned by (slides: by
+the same share of their range as that is of half a turn)."""
 
 
 def run_basin(
