@@ -133,17 +133,18 @@ def find(
         if found.residual <= options.retry_residual:
             return found
     with clock("start"):
-        first, shapes = shapes[:1], shapes[:1].repeat(len(options.azimuths))
+        first, row = (shapes[:1], int(rows[0])) if found is None else (found.shapes, found.reference)
+        shapes = first.repeat(len(options.azimuths))
         around = facing(shapes, clouds.center, options.azimuths, options.elevation)
-        if options.perceived_start:
-            shapes, around = concatenate([shapes, first]), concatenate([around, theta[:1]])
+        if found is not None:
+            shapes, around = concatenate([shapes, first]), concatenate([around, found.path[0]])
         theta = around
     path = [theta]
     with clock("agent"):
         if agent is not None and options.agent_steps:
             few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
             path += agent_steps(agent, shapes, few, theta, options.agent_steps)
-    again = _settle(shapes, observed, perceived, path, [int(rows[0])] * len(shapes), options, clock)
+    again = _settle(shapes, observed, perceived, path, [row] * len(shapes), options, clock)
     if found is None:
         return again
     return again if _doubt(again) < _CLEARLY * _doubt(found) else found
