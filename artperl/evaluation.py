@@ -276,16 +276,15 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
     Weights of the residual and of the disagreement are kept from rising above 0, so that nothing that fits badly is
     ever trusted more for it, however far it lies from what was seen here.
     """
-    known = [s for s in [*scored, *foreign] if not s.failed]
+    own, others = ([s for s in some if not s.failed] for some in (scored, foreign))
+    known = own + others
     default = Calibration()
     if not known:
         return default
     prior = np.array([default.bias, default.residual, default.disagreement])
     features = np.array([[1.0, s.residual, s.disagreement] for s in known])
     right = np.array([s.right for s in known], dtype=np.float64)
-    count = np.ones(len(known))
-    if foreign:
-        count[-len(foreign) :] = (len(known) - len(foreign)) / len(foreign)
+    count = np.array([1.0] * len(own) + [len(own) / len(others) for _ in others])
     loose = np.array([0.1, 0.01, 0.03]) ** 2  # precision of the prior
 
     def cost(scaled: Array) -> tuple[float, Array]:

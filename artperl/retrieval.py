@@ -93,7 +93,7 @@ class ShapeBase:
 
     def of_category(self, category: str) -> Tensor:
         """(B,) bool: objects of a category."""
-        return torch.tensor([name == category for name in self.categories])
+        return torch.tensor([name == category for name in self.categories], device=self.shapes.diagonal.device)
 
     def nearest(self, queries: Tensor, count: int = 1, allowed: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """The objects whose embeddings are nearest (section 4.2: Euclidean distance), nearest first.
@@ -144,13 +144,12 @@ class ShapeBase:
             One row, of K parts; fewer where the category has none that could be the next.
         """
         own = torch.nonzero(self.of_category(self.categories[row]))[:, 0].tolist()
+        of_root = [(b, m) for b in own for m, parent in enumerate(self.trees[b].parents) if parent == 0]
         joints, sources = [self.trees[row].joints[0]], [(row, 0)]
         for k in range(1, len(center)):
             # Parts of the root may have any number; those further down a chain keep theirs.
             same = [(b, k) for b in own if k < len(self.trees[b])]
-            fit = [(b, m) for b in own for m in range(1, len(self.trees[b])) if self.trees[b].parents[m] == 0]
-            if not any(self.trees[b].parents[k] == 0 for b, k in same):
-                fit = same
+            fit = of_root if any(self.trees[b].parents[k] == 0 for b, _ in same) else same
             if not fit:
                 break
             rows, parts = torch.tensor(fit, device=size.device).T

@@ -161,9 +161,8 @@ def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tenso
     query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
     rows = base.nearest(query, count)[0][0]
     shapes, first = base.shapes[rows], int(rows[0])
-    if count > 1 and bool(
-        (base.of_category(base.categories[first]) & (base.kind.cpu() != base.kind[first].cpu())).any()
-    ):
+    other_trees = base.of_category(base.categories[first]) & (base.kind != base.kind[first])
+    if count > 1 and bool(other_trees.any()):
         parts = int(perceived.valid[0].sum())
         own = base.composed(first, perceived.box_center[0, :parts], perceived.box_size[0, :parts])
         order = [own, shapes[:1]] if parts != len(base.trees[first]) else [shapes[:1], own]

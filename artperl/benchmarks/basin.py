@@ -19,6 +19,10 @@ from artperl.problems import Labels, Problem, Problems, References
 from artperl.refine import refine
 from artperl.search import agent_steps
 
+Joints = Literal["halfway", "near"]
+"""Where joints begin: in the middle of their range; or off by up to the angle that the whole is turned by (slides: by
+the same share of their range as that is of half a turn)."""
+
 ANGLES = (20.0, 40.0, 60.0, 90.0)
 _FOUND = 10.0
 _MOVED = 0.2
@@ -39,11 +43,6 @@ def basin_problem(
         categories, estimator.base, count, estimator.options.num_points, _SEED,
         perception=estimator.perception if labels == "perceived" else None, parts=parts, references=references,
     )[0]  # fmt: skip
-
-
-Joints = Literal["halfway", "near"]
-"""Where joints begin: in the middle of their range; or off by up to the angle that the whole is turned by (slides: by
-the same share of their range as that is of half a turn)."""
 
 
 def run_basin(

@@ -20,6 +20,7 @@ from artperl.checkpoint import load_estimator, read_settings
 from artperl.data import Recorded, batches
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
+from artperl.order import visible_order
 from artperl.ppo import PPOOptions
 from artperl.settings import PRESETS, TrainOptions
 from artperl.steps import one_cycle
@@ -185,6 +186,17 @@ def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
         Recorded(recorded, ["scissors"], 0, 2, 96)
     with pytest.raises(DatasetError, match="fewer than 1024"):
         Recorded(recorded, ["laptop"], 0, 2, 1024)
+
+
+def test_an_estimator_for_any_parts_reads_a_dataset_in_the_order_that_it_knows(tmp_path: Path) -> None:
+    sources = family_sources(["storage_furniture"], 3)
+    folder = generate(sources, tmp_path / "data", num_samples=12, sample=SampleOptions(num_points=64)).folder
+    samples = Recorded(folder, ["storage_furniture"], 0, 10, 64, "any")
+    for i in range(4):
+        sample, obj = samples[i], samples.object(i)
+        np.testing.assert_allclose(sample.box_center, obj.box_center, atol=1e-6)
+        order = visible_order(sample.joint_parent, sample.box_center, sample.box_size)
+        assert order == list(range(len(obj)))
 
 
 def test_a_run_on_a_dataset_ends_like_any_other(recorded: Path, tmp_path: Path) -> None:
