@@ -18,10 +18,13 @@ from artsim.files import atomic_file, write_atomic
 from artsim.plan import SampleOptions
 from artsim.sampling import ViewOptions
 
+_FILE_VIEWS = 40
+"""Views of files, at least, that an estimator is tested with."""
+
 
 @dataclass(frozen=True)
 class Train:
-    """Train an estimator on fresh procedural objects, and test it on unseen ones as it learns.
+    """Train an estimator on fresh procedural objects, or on objects of your own, and test it as it learns.
 
     Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
     the same command goes on where it stopped, with the same result. Curves: tensorboard --logdir OUT.
@@ -29,10 +32,16 @@ class Train:
     To see it learn: python train.py --category laptop --preset quick
 
     To train well: python train.py --category eyeglasses --preset full --out out/eyeglasses
+
+    For a robot of your own, from the estimator for any tree:
+    python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000 --agent-rollouts 0
     """
 
-    category: tuple[str, ...] = ("laptop",)
-    """Procedural categories, or 'all'; several share one estimator."""
+    category: tuple[str, ...] = ()
+    """Procedural categories, or 'all'; several share one estimator. By default laptop."""
+    files: tuple[Path, ...] = ()
+    """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
+    and from other sides; for objects that were not learnt from use artperl evaluate --files."""
     parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families. By default the preset's."""
@@ -74,14 +83,20 @@ class Train:
 
         if self.threads is not None:
             torch.set_num_threads(self.threads)
-        categories = tuple(FAMILIES) if self.category == ("all",) else self.category
         preset = PRESETS[self.preset]
+        if self.files and (self.category or self.real or self.parts == "artimage"):
+            raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")
+        category = self.category or (() if self.files else ("laptop",))
+        categories = tuple(FAMILIES) if category == ("all",) else category
+        parts = "any" if self.files else self.parts or preset.parts
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
-            preset, categories=categories, parts=self.parts or preset.parts, real=self.real, seed=self.seed,
+            preset, categories=categories, files=tuple(map(str, self.files)), parts=parts, real=self.real,
+            seed=self.seed,
             device=self.device or preset.device,
             dataset=None if self.dataset is None else str(self.dataset),
             start_from=None if self.start_from is None else str(self.start_from),
+            test_objects=max(preset.test_objects, _FILE_VIEWS) if self.files else preset.test_objects,
             sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
             perception_steps=preset.perception_steps if steps is None else steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
@@ -90,7 +105,8 @@ class Train:
                 reinforcement=self.learning != "cloning",
             ),
         )  # fmt: skip
-        out = self.out or Path("out/train") / f"{'-'.join(self.category)}-{self.preset}"
+        name = "-".join(category) or self.files[0].stem
+        out = self.out or Path("out/train") / f"{name}-{self.preset}"
         training = Training(options, out, self.workers, progress=sys.stderr.isatty())
         try:
             training.run()
@@ -167,6 +183,7 @@ class Evaluate:
     def _single(self) -> dict[str, Any]:
         from artperl.checkpoint import folder_of, load_estimator, read_settings
         from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
+        from artperl.order import as_seen
         from artsim.sources import find_sources
 
         if self.estimator is None:
@@ -177,7 +194,10 @@ class Evaluate:
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:
-            samples = samples_of((source.load() for source in find_sources(self.files)), views, options)
+            # Files number their parts in any order; estimators know them by where they are.
+            samples = samples_of((as_seen(source.load()) for source in find_sources(self.files)), views, options)
+        elif not categories:
+            raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")
         else:
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
         if self.ablation:

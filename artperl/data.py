@@ -99,7 +99,7 @@ class Samples:
     views_per_object : int
     num_rows : int
     parts : Parts
-    real : sequence of ArticulatedObject
+    given : sequence of ArticulatedObject
         Every other object is one of these, if there are any.
     """
 
@@ -111,15 +111,15 @@ class Samples:
         views_per_object: int,
         num_rows: int,
         parts: Parts = "artimage",
-        real: Sequence[ArticulatedObject] = (),
+        given: Sequence[ArticulatedObject] = (),
     ):
         self.stream = FamilyStream(categories, options, seed, views_per_object)
-        self.num_rows, self.parts, self.real = num_rows, parts, real
+        self.num_rows, self.parts, self.given = num_rows, parts, given
         self._keep()
 
     def __getitem__(self, i: int) -> Sample:
         n, view = divmod(i, self.stream.views_per_object)
-        index = i if self._is_real(n) else self._right(n) * self.stream.views_per_object + view
+        index = i if self._is_given(n) else self._right(n) * self.stream.views_per_object + view
         renderer = shared_renderer(self.stream.options.renderer)
         return draw_sample(self.object(i), self.stream.options, self.stream.seed, index, renderer)
 
@@ -127,12 +127,12 @@ class Samples:
         """The object that sample ``i`` shows."""
         return self._object(i // self.stream.views_per_object)
 
-    def _is_real(self, n: int) -> bool:
-        return bool(self.real) and n % 2 == 1
+    def _is_given(self, n: int) -> bool:
+        return bool(self.given) and n % 2 == 1
 
     def _find_object(self, n: int) -> ArticulatedObject:
-        if self._is_real(n):
-            return self.real[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.real)))]
+        if self._is_given(n):
+            return self.given[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.given)))]
         return arranged(self.stream.object(self._right(n)), self.parts)
 
     def _find_right(self, n: int) -> int:
@@ -230,14 +230,49 @@ class Recorded:
         )  # fmt: skip
 
 
+class Given:
+    """Samples of a few objects by number: fresh states and views of the same ones for ever.
+
+    Parameters
+    ----------
+    objects : sequence of ArticulatedObject
+    options : SampleOptions
+    seed : int
+    views_per_object : int
+        Samples in a row of the same object.
+    num_rows : int
+        The most parts that an object has.
+    """
+
+    def __init__(
+        self, objects: Sequence[ArticulatedObject], options: SampleOptions, seed: int, views_per_object: int,
+        num_rows: int,
+    ):  # fmt: skip
+        self.objects, self.options, self.seed = objects, options, seed
+        self.views_per_object, self.num_rows = views_per_object, num_rows
+
+    def __getitem__(self, i: int) -> Sample:
+        return draw_sample(self.object(i), self.options, self.seed, i, shared_renderer(self.options.renderer))
+
+    def object(self, i: int) -> ArticulatedObject:
+        """The object that sample ``i`` shows."""
+        number = i // self.views_per_object
+        return self.objects[int(np.random.default_rng([self.seed, number]).integers(len(self.objects)))]
+
+
+Source = Samples | Recorded | Given
+
+
 def samples_from(
     dataset: str | Path | None, categories: Sequence[str], options: SampleOptions, seed: int, views_per_object: int,
-    num_rows: int, parts: Parts, real: Sequence[ArticulatedObject],
-) -> Samples | Recorded:  # fmt: skip
-    """Samples of a dataset, or of fresh objects if there is none: see :class:`Recorded` and :class:`Samples`."""
+    num_rows: int, parts: Parts, given: Sequence[ArticulatedObject],
+) -> Source:  # fmt: skip
+    """What there is to learn from: a dataset; or fresh objects of some categories; or, without those, given ones."""
     if dataset is not None:
         return Recorded(dataset, categories, seed, num_rows, options.num_points, parts)
-    return Samples(categories, options, seed, views_per_object, num_rows, parts, real)
+    if not categories:
+        return Given(given, options, seed, views_per_object, num_rows)
+    return Samples(categories, options, seed, views_per_object, num_rows, parts, given)
 
 
 def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
@@ -274,7 +309,7 @@ def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch."""
 
-    def __init__(self, samples: Samples | Recorded, num_points: int, batch_size: int, first: int):
+    def __init__(self, samples: Source, num_points: int, batch_size: int, first: int):
         self.samples, self.num_points = samples, num_points
         self.batch_size, self.first = batch_size, first
 
@@ -303,7 +338,7 @@ def batches(
     workers: int = 1,
     sample: SampleOptions | None = None,
     parts: Parts = "artimage",
-    real: Sequence[ArticulatedObject] = (),
+    given: Sequence[ArticulatedObject] = (),
     dataset: str | Path | None = None,
 ) -> Iterator[tuple[Clouds, Truth]]:
     """Endless batches of fresh procedural objects, or of a dataset.
@@ -315,6 +350,7 @@ def batches(
     Parameters
     ----------
     categories : sequence of str
+        None to learn from the given objects alone.
     num_rows : int
         Rows for parts.
     num_points, batch_size : int
@@ -326,14 +362,14 @@ def batches(
     sample : SampleOptions, optional
         View preset, noise and the like; ``num_points`` overrides its own.
     parts : Parts
-    real : sequence of ArticulatedObject
-        See :class:`Samples`.
+    given : sequence of ArticulatedObject
+        See :func:`samples_from`.
     dataset : str or Path, optional
         See :class:`Recorded`.
     """
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
-    samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, real)
+    samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)
     rows = _Rows(samples, num_points, fresh, begin * fresh)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on

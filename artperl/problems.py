@@ -88,8 +88,8 @@ class Problems:
         Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
         it.
     parts : Parts
-    real : sequence of ArticulatedObject
-        See :class:`artperl.data.Samples`.
+    given : sequence of ArticulatedObject
+        See :func:`artperl.data.samples_from`.
     views_per_object : int
         Problems in a row of the same object.
     references : References
@@ -109,14 +109,14 @@ class Problems:
         choices: int = 4,
         perception: Perception | None = None,
         parts: Parts = "artimage",
-        real: Sequence[ArticulatedObject] = (),
+        given: Sequence[ArticulatedObject] = (),
         views_per_object: int = 2,
         references: References = "retrieved",
         dataset: str | Path | None = None,
     ):
         options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
         rows = base.shapes.trees.num_rows
-        self.samples = samples_from(dataset, categories, options, seed, views_per_object, rows, parts, real)
+        self.samples = samples_from(dataset, categories, options, seed, views_per_object, rows, parts, given)
         self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
         self.start, self.perception, self.references = start or StartOptions(), perception, references
 

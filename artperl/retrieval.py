@@ -68,8 +68,11 @@ class ShapeBase:
         return (self.kind == self.kind[row]) & (apart > usual.clamp(min=_ALIKE)).any(1)
 
     @staticmethod
-    def of(objects: Sequence[ArticulatedObject], points_per_part: int = 512) -> ShapeBase:
-        """A base of any set of objects, each brought to diagonal 1, with limits as wide as any object's of its kind."""
+    def of(objects: Sequence[ArticulatedObject], points_per_part: int = 512, num_rows: int | None = None) -> ShapeBase:
+        """A base of any set of objects, each brought to diagonal 1, with limits as wide as any object's of its kind.
+
+        There are ``num_rows`` rows for parts, by default as many as any object has.
+        """
         if not objects:
             raise ConfigError("a shape base needs objects", mend="pass at least one")
         units = widened([obj.with_diagonal(1.0) for obj in objects])
@@ -77,7 +80,7 @@ class ShapeBase:
             tuple(obj.object_id for obj in units),
             tuple(obj.category for obj in units),
             tuple(obj.tree for obj in units),
-            Shapes.from_objects(units, points_per_part),
+            Shapes.from_objects(units, points_per_part, num_rows),
         )
 
     def with_embeddings(self, embeddings: Tensor) -> ShapeBase:

@@ -21,7 +21,10 @@ class TrainOptions:
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families."""
     max_parts: int | None = None
-    """The most parts that an object may have; all others' rows are empty."""
+    """The most parts that an object may have."""
+    files: tuple[str, ...] = ()
+    """URDF files, object folders, or folders of them: objects to learn from instead of categories, which are empty
+    then."""
     real: bool = False
     """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
     dataset: str | None = None
@@ -61,7 +64,7 @@ class TrainOptions:
     validate_rollouts: int = 50
     """Rollouts of stage 2 between tests."""
     test_objects: int = 40
-    """Unseen objects of each category, others for validation than for the test at the end."""
+    """Unseen objects of each category, others for validation than for the test at the end; files share so many."""
     foreign_categories: int = 12
     """Other categories, of which two objects each show what confidence must be low for."""
     validation_views: int = 4

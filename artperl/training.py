@@ -25,7 +25,7 @@ from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
 from artperl.benchmarks.artimage import real_train_objects
-from artperl.categories import objects_of
+from artperl.categories import arranged, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
 from artperl.data import batches
 from artperl.embedding import by_boxes
@@ -39,6 +39,7 @@ from artperl.evaluation import (
     headline,
     mistake,
     retry_residual,
+    samples_of,
     summary,
     table,
 )
@@ -55,7 +56,9 @@ from artperl.steps import Stop, autocast, one_cycle, set_rate
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.families import FAMILIES
 from artsim.files import write_atomic
+from artsim.objects import ArticulatedObject
 from artsim.sample import Sample
+from artsim.sources import find_sources
 
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
@@ -91,11 +94,12 @@ class Training:
 
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
+        if options.dataset is not None and (options.real or options.files):
+            raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
         objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts)
-        if options.real and options.dataset is not None:
-            raise ConfigError("real objects are not mixed with a dataset's", "real", "generate one with them in it")
-        self.real = real_train_objects(options.categories) if options.real else []
-        self.base = by_boxes(ShapeBase.of([*objects, *self.real], options.reference_points))
+        self.given = _given(options)
+        rows = options.max_parts if options.files else None
+        self.base = by_boxes(ShapeBase.of([*objects, *self.given], options.reference_points, rows))
         self.device = _device(options.device)
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
@@ -151,7 +155,7 @@ class Training:
             return
         data = batches(
             options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
-            self.workers, options.sample, options.parts, self.real, options.dataset,
+            self.workers, options.sample, options.parts, self.given, options.dataset,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
@@ -189,7 +193,7 @@ class Training:
         problems = Problems(
             options.categories, self.base, options.episodes, options.num_points, options.seed + 1, options.start,
             options.sample, perception=self.perception if options.labels == "perceived" else None, parts=options.parts,
-            real=self.real, views_per_object=_VIEWS, references=options.references,
+            given=self.given, views_per_object=_VIEWS, references=options.references,
             dataset=options.dataset,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
@@ -241,12 +245,14 @@ class Training:
 
     def _foreign(self) -> list[Sample]:
         """Objects of other categories, for which confidence must be low."""
-        others = [category for category in FAMILIES if category not in self.options.categories]
+        others = [category for category in FAMILIES if category not in self.base.categories]
         return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")
 
     def _unseen(self, views: int, first_seed: int) -> list[Sample]:
         sample = replace(self.options.sample, num_points=_TEST_POINTS)
         options = self.options
+        if not options.categories:
+            return samples_of(self.given, -(-options.test_objects * views // len(self.given)), sample, first_seed)
         return frozen_samples(
             options.categories, options.test_objects, views, sample, first_seed, options.parts, options.max_parts
         )
@@ -300,6 +306,26 @@ class Training:
                     moments.setdefault(int(number), {})[moment] = value
             optimizer = self.optimizers[name]
             optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+
+
+def _given(options: TrainOptions) -> list[ArticulatedObject]:
+    """Objects to learn from that are not of procedural families.
+
+    Raises
+    ------
+    ConfigError
+        When one has too many parts.
+    """
+    if options.real:
+        return real_train_objects(options.categories)
+    objects = [arranged(source.load(), options.parts) for source in find_sources(options.files)]
+    for obj in objects:
+        if options.max_parts is not None and len(obj) > options.max_parts:
+            raise ConfigError(
+                f"{obj.object_id} has {len(obj)} parts, more than {options.max_parts}", obj.source,
+                "use another preset, or lock joints",
+            )  # fmt: skip
+    return objects
 
 
 def _completed(defaults: dict[str, Any], known: dict[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import artsim
 from artperl import metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
 from artperl.benchmarks.artimage import SPLIT, real_objects, reduced, row_samples, turned_round
-from artperl.benchmarks.basin import ANGLES, basin_problem, run_basin, turned
+from artperl.benchmarks.basin import ANGLES, _apart, basin_problem, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
 from artperl.categories import ARTIMAGE, objects_of
 from artperl.checkpoint import save_estimator
@@ -152,6 +153,20 @@ def test_starts_are_as_far_off_as_they_are_said_to_be() -> None:
     found = run_basin(estimator, basin_problem(estimator, ["laptop"], count=2), lines.append)
     assert [row["start_deg"] for row in found] == list(ANGLES)
     assert all(0.0 <= row["agent and refinement"] <= 1.0 for row in found)
+
+
+def test_parts_are_covered_when_their_surfaces_are_near() -> None:
+    problem = small_problem("laptop")
+    goal, shapes = problem.goal, problem.shapes
+    valid = shapes.trees.valid.numpy()
+    assert _apart(problem, goal)[valid].max() < 1e-3
+    diagonal = torch.linalg.vector_norm(shapes.box_size[:, 0], dim=-1)
+    for share in (0.05, 1.0):
+        away = torch.tensor([0.0, 0.0, share]) * diagonal[:, None]
+        apart = _apart(problem, replace(goal, translation=goal.translation + away))[:, 0]
+        # Never farther than it was moved; and by a whole diagonal, no part is where it was.
+        assert (apart <= share + 1e-6).all()
+        assert (apart > 0.1).all() == (share == 1.0)
 
 
 def test_parts_of_real_objects_come_in_the_order_of_procedural_ones(partnet_dir: Path) -> None:

@@ -17,7 +17,7 @@ from safetensors.torch import load_file
 
 from artperl import cli
 from artperl.checkpoint import load_estimator, read_settings
-from artperl.data import Recorded, batches
+from artperl.data import Given, Recorded, batches
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
 from artperl.order import visible_order
@@ -27,10 +27,11 @@ from artperl.steps import one_cycle
 from artperl.training import BASE_SEEDS, Training
 from artsim import generate
 from artsim.dataset import open_dataset
-from artsim.errors import DatasetError
+from artsim.errors import ConfigError, DatasetError
 from artsim.plan import SampleOptions
 from artsim.sources import family_sources
 from artsim.stream import STREAM_SEEDS
+from artsim.urdf import load
 
 TINY = TrainOptions(
     base_objects=3, reference_points=48, width=16, perception_steps=4, batch_size=4, num_points=96, agent_rollouts=3,
@@ -203,3 +204,35 @@ def test_a_run_on_a_dataset_ends_like_any_other(recorded: Path, tmp_path: Path) 
     Training(replace(TINY, dataset=str(recorded)), tmp_path, workers=0, progress=False).run()
     assert "laptop 1" in (tmp_path / "table.txt").read_text()
     assert read_settings(tmp_path / "best")["about"]["options"]["dataset"] == str(recorded)
+
+
+def test_objects_of_files_are_learnt_from_and_tested_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without categories: one estimator for exactly these objects, with rows for parts to spare for larger ones."""
+    urdf = Path("urdf_assets/cabinet/mobility.urdf")
+    options = replace(TINY, categories=(), files=(str(urdf),), parts="any", max_parts=6)
+    training = Training(options, tmp_path, workers=0, progress=False)
+    assert (len(training.base), training.perception.num_rows) == (1, 6)
+    training.run()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    ((category, figure),) = figures.items()
+    assert category == load(urdf).category
+    assert len(figure["parts"]) == len(load(urdf))
+    samples = Given(training.given, SampleOptions(num_points=64), 5, 2, 6)
+    states = [samples[i].joint_state for i in range(3)]
+    assert not np.array_equal(states[0], states[1])
+    np.testing.assert_array_equal(
+        states[0], Given(training.given, SampleOptions(num_points=64), 5, 2, 6)[0].joint_state
+    )
+    with pytest.raises(ConfigError, match="more than 2"):
+        Training(replace(options, max_parts=2), tmp_path / "few", workers=0, progress=False)
+    # What it was learnt from is no family, so that a test needs to be told its objects.
+    with pytest.raises(ConfigError, match="--files"):
+        cli.Evaluate(tmp_path / "best").run()
+    cli.Evaluate(tmp_path / "best", files=(urdf,), views=2).run()
+    assert f"{category} 0" in capsys.readouterr().out
+    monkeypatch.setattr("sys.argv", ["train.py", "--files", str(urdf), "--category", "laptop", "--out", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        cli.train_main()
+    assert "files are learnt from alone" in capsys.readouterr().err
