@@ -32,6 +32,8 @@ _CLEANED = 4096
 """Points that are looked at for outliers."""
 _ENOUGH_TO_WIDEN = 32
 """Points of a part from which they say how large it is."""
+_OUTERMOST = 0.004
+"""Of a cloud's points, that lie too far out on each side of a part to say how large it is."""
 _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
 _FEWEST = 8
@@ -229,10 +231,11 @@ def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int
 
 
 def widen(rotation: Array, center: Array, size: Array, points: Array, part: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Boxes that hold the points of their parts, but for the outermost percent on each side.
+    """Boxes that hold the points of their parts, but for the outermost few on each side.
 
-    What is fitted is a reference's shape, which real parts stick out of; points never make a box smaller, since a part
-    is seen from one side only.
+    As many are left out of a small part as of a large one: they are points of its neighbours, while the feet of a
+    cabinet may be no more than a percent of its points. What is fitted is a reference's shape, which real parts stick
+    out of; points never make a box smaller, since a part is seen from one side only.
 
     Parameters
     ----------
@@ -246,11 +249,13 @@ def widen(rotation: Array, center: Array, size: Array, points: Array, part: NDAr
     center, size : (K, 3) float
     """
     center, size = center.copy(), size.copy()
+    outermost = round(_OUTERMOST * len(points))
     for k in range(len(size)):
         own = points[part == k]
         if len(own) >= _ENOUGH_TO_WIDEN:
-            across = np.percentile((own - center[k]) @ rotation[k], (1.0, 99.0), axis=0)
-            low, high = np.minimum(-0.5 * size[k], across[0]), np.maximum(0.5 * size[k], across[1])
+            across, left_out = np.sort((own - center[k]) @ rotation[k], axis=0), min(outermost, len(own) // 4)
+            low = np.minimum(-0.5 * size[k], across[left_out])
+            high = np.maximum(0.5 * size[k], across[-1 - left_out])
             center[k] += rotation[k] @ (0.5 * (low + high))
             size[k] = high - low
     return center, size
