@@ -29,7 +29,9 @@ bench: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.fitting
 	$(PY) -m benchmarks.inference
 	$(PY) -m benchmarks.retrieval
+	$(PY) -m benchmarks.errors
 	$(PY) -m benchmarks.joint
+	$(PY) -m benchmarks.robot_arm
 
 # Sim-readiness of 10,000 procedural objects, and of the real ones in ARTSIM_PARTNET_DIR.
 audit: $(VENV)/.ready-dev

@@ -1,0 +1,148 @@
+"""Where errors come from: ``python -m benchmarks.errors``.
+
+Moving parts of unseen procedural objects, validation seeds, by how many of a cloud's points show them: rotation, IoU of
+posed boxes, and what that would be if one thing were known: where the box's faces are along each axis of the rest frame
+(x to the back, y to the side, z up), or the parts of all points. Last, IoU at rest, and the same if the root's box were
+known. Errors against points are drawn as a picture. The last line is one JSON object.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import tyro
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from artperl import metrics
+from artperl.benchmarks.rows import find_estimator
+from artperl.categories import ARTIMAGE
+from artperl.estimator import Estimate, Estimator, widen
+from artperl.evaluation import VALIDATION_SEEDS, frozen_samples, true_poses
+from artsim.files import atomic_file
+from artsim.sample import Sample
+
+Array = NDArray[np.float64]
+BINS = (0, 20, 100, 300, 2049)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Which parts are off, and in what."""
+
+    weights: Path | None = None
+    """Folder of estimators (or of training runs) by category; by default those that come with the package."""
+    categories: tuple[str, ...] = tuple(ARTIMAGE)
+    objects: int = 40
+    views: int = 2
+    """Of each object."""
+    picture: Path | None = None
+    """Draw errors against points here (.png)."""
+    threads: int = 2
+    """Processor threads."""
+
+
+def main(options: Options) -> None:
+    """Measure and print."""
+    torch.set_num_threads(options.threads)
+    result: dict[str, dict[str, Any]] = {}
+    every: dict[str, Array] = {}
+    for category in options.categories:
+        estimator = find_estimator(options.weights, category)
+        samples = frozen_samples([category], options.objects, options.views, None, VALIDATION_SEEDS)
+        rows = [row for s in tqdm(samples, category, disable=None, leave=False) for row in moving_parts(estimator, s)]
+        every[category] = table = np.array([list(row.values()) for row in rows])
+        names = list(rows[0])
+        result[category] = {}
+        print(f"{category}\n{'points':>10s}{'parts':>7s}" + "".join(f"{name:>11s}" for name in names[1:]))
+        for low, high in [*pairwise(BINS), (BINS[0], BINS[-1])]:
+            own = table[(table[:, 0] >= low) & (table[:, 0] < high)]
+            if len(own):
+                mean = own[:, 1:].mean(0)
+                label = f"{low}-{high - 1}" if (low, high) != (BINS[0], BINS[-1]) else "all"
+                result[category][label] = {
+                    "parts": len(own),
+                    **dict(zip(names[1:], mean.round(4).tolist(), strict=True)),
+                }
+                shown = "".join(f"{value:11.2f}" if n == 0 else f"{100 * value:11.1f}" for n, value in enumerate(mean))
+                print(f"{label:>10s}{len(own):7d}{shown}", flush=True)
+    print("mean rotation in degrees, and IoU in % if what the column says were known")
+    if options.picture is not None:
+        draw(every, options.picture)
+    print(json.dumps(result))
+
+
+def moving_parts(estimator: Estimator, sample: Sample) -> list[dict[str, float]]:
+    """Figures of each moving part; none where the estimate has other parts."""
+    estimate = estimator(sample.points)
+    if len(estimate.size) != len(sample.box_size):
+        return []
+    rotation, center = true_poses(sample)
+    off = metrics.rotation_error(estimate.rotation, rotation)
+    posed = metrics.iou_exact(estimate.rotation, estimate.translation, estimate.size, rotation, center, sample.box_size)
+    known = known_axes(estimate, sample)
+    told = widen(estimate.rotation, estimate.translation, estimate.size, sample.points, sample.part.astype(np.int64))
+    labelled = metrics.iou_exact(estimate.rotation, *told, rotation, center, sample.box_size)
+    rest, rooted = at_rest(estimate, sample), at_rest(estimate, sample, root_known=True)
+    points = np.bincount(sample.part, minlength=len(off))
+    return [
+        {
+            "points": float(points[k]), "rotation": off[k], "posed": posed[k], "x known": known[0][k],
+            "y known": known[1][k], "z known": known[2][k], "labels": labelled[k], "rest": rest[k],
+            "root known": rooted[k],
+        }
+        for k in range(1, len(off))
+    ]  # fmt: skip
+
+
+def known_axes(estimate: Estimate, sample: Sample) -> list[Array]:
+    """(3, K) IoU of posed boxes, in the true parts' frames, if both faces along an axis were known."""
+    rotation, center = true_poses(sample)
+    apart = np.einsum("kji,kj->ki", rotation, estimate.translation - center)
+    result = []
+    for axis in range(3):
+        offset, size = apart.copy(), estimate.size.copy()
+        offset[:, axis], size[:, axis] = 0.0, sample.box_size[:, axis]
+        result.append(metrics.iou_rest_exact(offset, size, np.zeros_like(offset), sample.box_size))
+    return result
+
+
+def at_rest(estimate: Estimate, sample: Sample, root_known: bool = False) -> Array:
+    """(K,) IoU in the rest frame, whose origin is the middle of all boxes."""
+    T, size = estimate.T_camera_part, estimate.size.copy()
+    center = np.einsum("kji,kj->ki", T[:, :3, :3], estimate.translation - T[:, :3, 3])
+    if root_known:
+        true = true_poses(sample)[1][0]
+        center[0], size[0] = T[0, :3, :3].T @ (true - T[0, :3, 3]), sample.box_size[0]
+    middle = 0.5 * ((center - 0.5 * size).min(0) + (center + 0.5 * size).max(0))
+    return metrics.iou_rest_exact(center - middle, size, sample.box_center, sample.box_size)
+
+
+def draw(every: dict[str, Array], path: Path) -> None:
+    """Rotation and IoU of moving parts against the points that show them."""
+    figure = Figure(figsize=(3.2 * len(every), 6.0))
+    FigureCanvasAgg(figure)
+    for n, (category, table) in enumerate(every.items()):
+        for row, (column, label) in enumerate(((1, "rotation, deg"), (2, "IoU of posed boxes"))):
+            axes = figure.add_subplot(2, len(every), row * len(every) + n + 1)
+            axes.scatter(np.maximum(table[:, 0], 1), table[:, column], s=6, alpha=0.5)
+            axes.set(xscale="log", xlim=(0.8, 2048), title=category if row == 0 else "", xlabel="points of 2,048")
+            axes.set(ylabel=label if n == 0 else "")
+            if row == 0:
+                axes.set(yscale="log", ylim=(0.05, 180))
+            axes.grid(alpha=0.3)
+    figure.tight_layout()
+    with atomic_file(path) as file:
+        figure.savefig(file, format="png", dpi=80)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options, description=__doc__))
