@@ -89,10 +89,11 @@ def moving_parts(estimator: Estimator, sample: Sample) -> list[dict[str, float]]
     off = metrics.rotation_error(estimate.rotation, rotation)
     posed = metrics.iou_exact(estimate.rotation, estimate.translation, estimate.size, rotation, center, sample.box_size)
     known = known_axes(estimate, sample)
-    told = widen(estimate.rotation, estimate.translation, estimate.size, sample.points, sample.part.astype(np.int64))
+    cloud, part = sample.points.astype(np.float64), sample.part.astype(np.int64)
+    told = widen(estimate.rotation, estimate.translation, estimate.size, cloud, part)
     labelled = metrics.iou_exact(estimate.rotation, *told, rotation, center, sample.box_size)
     rest, rooted = at_rest(estimate, sample), at_rest(estimate, sample, root_known=True)
-    points = np.bincount(sample.part, minlength=len(off))
+    points = np.bincount(part, minlength=len(off))
     return [
         {
             "points": float(points[k]), "rotation": off[k], "posed": posed[k], "x known": known[0][k],
