@@ -123,4 +123,4 @@ def refine_by_gradient(
             energy.sum().backward()
             optimizer.step()
             schedule.step()
-    return Refined(best, best_energy, first, steps)
+    return Refined(best, shapes.trees.axis, best_energy, first, steps)

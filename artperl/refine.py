@@ -18,6 +18,9 @@ from artperl.rotations import rotate, rotation_from_vector
 from artperl.shapes import Observed, Shapes
 from artsim.errors import ConfigError
 
+_AXIS_FLOOR = 0.02
+"""Radians by which an axis that leans may do so in any direction."""
+
 
 @dataclass(frozen=True)
 class RefineOptions:
@@ -57,12 +60,30 @@ class RefineOptions:
 
 
 @dataclass(frozen=True, eq=False)
+class AxisPrior(Batch):
+    """How the axes of an object's hinges may lean away from its reference's, of B objects.
+
+    Attributes
+    ----------
+    covariance : (B, 3 P, 3 P) float
+        Of the rotation vectors that take the reference's axes to the object's: axes may well lean together.
+    leans : (B, P) bool
+        Joints whose axes lean at all.
+    """
+
+    covariance: Tensor
+    leans: Tensor
+
+
+@dataclass(frozen=True, eq=False)
 class Refined(Batch):
     """Outcome of a refinement of B objects.
 
     Attributes
     ----------
     theta : Theta
+    axis : (B, P, 3) float
+        The reference's axes as they lean now: those of ``shapes.trees`` unless they were free to.
     energy, start_energy : (B,) float
         Of the result and of the start; the first is never larger.
     iterations : (B,) int64
@@ -70,6 +91,7 @@ class Refined(Batch):
     """
 
     theta: Theta
+    axis: Tensor
     energy: Tensor
     start_energy: Tensor
     iterations: Tensor
@@ -81,6 +103,7 @@ def refine(
     start: Theta,
     options: RefineOptions | None = None,
     expected_size: Tensor | None = None,
+    axis_prior: AxisPrior | None = None,
 ) -> Refined:
     """Fit references to observed clouds by Levenberg-Marquardt on Theta.
 
@@ -96,6 +119,8 @@ def refine(
     options : RefineOptions, optional
     expected_size : (B, P, 3) float, optional
         Sizes of the parts' boxes, metres, that something else predicts; NaN where nothing does.
+    axis_prior : AxisPrior, optional
+        Lets axes lean away from the reference's; without it they stay.
 
     Returns
     -------
@@ -103,11 +128,11 @@ def refine(
     """
     options = options or RefineOptions()
     unit = shapes.diagonal * start.log_scale.mean(-1).exp()
-    prior = _Prior.of(shapes, unit, options, expected_size)
+    prior = _Prior.of(shapes, unit, options, expected_size, axis_prior)
     start = replace(start, state=clamp_state(shapes.trees, start.state))
     target = Target.of(observed, unit)
-    current = match(shapes, target, start, options.outline_weight)
-    current_cost = prior.cost(start)
+    current, lean = match(shapes, target, start, options.outline_weight), torch.zeros_like(start.shift)
+    current_cost = prior.cost(start, lean)
     first = _robust(current, options.robust_end) + current_cost
     damping = torch.full_like(unit, 1e-2)
     steps = torch.zeros_like(unit, dtype=torch.int64)
@@ -115,12 +140,13 @@ def refine(
     width = options.robust_start
     for i in range(options.iterations):
         rigid = i < options.rigid_iterations
-        step = _step(shapes, target, current, prior, width, damping, rigid)
-        theta = _moved(shapes.trees, current.theta, step, target.middle)
-        candidate, cost = match(shapes, target, theta, options.outline_weight), prior.cost(theta)
+        step = _step(leaning(shapes, lean), target, current, lean, prior, width, damping, rigid)
+        theta, leant = _moved(shapes.trees, current.theta, lean, step, target.middle)
+        candidate = match(leaning(shapes, leant), target, theta, options.outline_weight)
+        cost = prior.cost(theta, leant)
         before, after = _robust(current, width) + current_cost, _robust(candidate, width) + cost
         better = after < before
-        current_cost = torch.where(better, cost, current_cost)
+        current_cost, lean = torch.where(better, cost, current_cost), torch.where(better[:, None, None], leant, lean)
         current = candidate if bool(better.all()) else candidate.where(better, current)
         steps += better
         if width == options.robust_end and not rigid:
@@ -132,7 +158,16 @@ def refine(
     final = _robust(current, options.robust_end) + current_cost
     # Steps that paid at a larger width need not have paid at the last one.
     improved = final < first
-    return Refined(current.theta.where(improved, start), torch.where(improved, final, first), first, steps)
+    lean = torch.where(improved[:, None, None], lean, 0.0)
+    energy = torch.where(improved, final, first)
+    return Refined(current.theta.where(improved, start), leaning(shapes, lean).trees.axis, energy, first, steps)
+
+
+def leaning(shapes: Shapes, lean: Tensor) -> Shapes:
+    """References whose axes are turned by rotation vectors (B, P, 3)."""
+    if not bool(lean.any()):
+        return shapes
+    return replace(shapes, trees=replace(shapes.trees, axis=rotate(rotation_from_vector(lean), shapes.trees.axis)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +183,9 @@ class _Prior(Batch):
     constant: Tensor
 
     @staticmethod
-    def of(shapes: Shapes, unit: Tensor, options: RefineOptions, expected_size: Tensor | None) -> _Prior:
+    def of(
+        shapes: Shapes, unit: Tensor, options: RefineOptions, expected_size: Tensor | None, axis_prior: AxisPrior | None
+    ) -> _Prior:
         """The prior of references whose objects have diagonals ``unit (B,)``."""
         trees = shapes.trees
         B, P = trees.valid.shape
@@ -158,38 +195,47 @@ class _Prior(Batch):
         stretched = (trees.valid & shapes.has_surface & (options.sigma_stretch > 0)).repeat_interleave(3, dim=1)
         shifted = (trees.valid & (trees.depth > 0) & (options.sigma_shift > 0)).repeat_interleave(3, dim=1)
         active = torch.cat([always, trees.free, scaled, stretched, shifted], dim=1)
+        if axis_prior is not None:
+            active = torch.cat([active, (axis_prior.leans & (trees.turn != 0)).repeat_interleave(3, dim=1)], dim=1)
         tight = 1e-4  # a sigma of 0 for one of two that share the same parameters
-        whole, own = slice(6 + P, 9 + P), slice(9 + P, 9 + 4 * P)
+        whole, stretches = slice(6 + P, 9 + P), slice(9 + P, 9 + 4 * P)
         precision = unit.new_zeros(B, active.shape[1], active.shape[1])
         precision[:, whole, whole] = (
             mean / 3.0 / max(options.sigma_scale, tight) ** 2 + (eye - mean) / max(options.sigma_aspect, tight) ** 2
         )
         diagonal = precision.diagonal(dim1=1, dim2=2)
-        diagonal[:, own] = max(options.sigma_stretch, tight) ** -2
-        diagonal[:, own.stop :] = (unit[:, None] * max(options.sigma_shift, tight)) ** -2
+        diagonal[:, stretches] = max(options.sigma_stretch, tight) ** -2
+        shifts = slice(stretches.stop, stretches.stop + 3 * P)
+        diagonal[:, shifts] = (unit[:, None] * max(options.sigma_shift, tight)) ** -2
         pull, constant = unit.new_zeros(B, active.shape[1]), torch.zeros_like(unit)
+        if axis_prior is not None:
+            axes = slice(shifts.stop, None)
+            floor = _AXIS_FLOOR**2 * torch.eye(3 * P, device=unit.device)
+            precision[:, axes, axes] = torch.linalg.inv(axis_prior.covariance + floor).to(unit.dtype)
         if expected_size is not None:
             known = torch.isfinite(expected_size) & (expected_size > 0) & (shapes.box_size > 0)
             missing = torch.where(known, (expected_size / shapes.box_size).log(), 0.0) / options.sigma_size
             adds = unit.new_zeros(B, P, 3, active.shape[1])  # log_scale and stretch add up to a part's own scale
             adds[..., whole] = eye
-            adds[..., own] = torch.eye(3 * P, device=unit.device).reshape(P, 3, 3 * P)
+            adds[..., stretches] = torch.eye(3 * P, device=unit.device).reshape(P, 3, 3 * P)
             adds = (adds * known[..., None] / options.sigma_size).flatten(1, 2)
             precision = precision + adds.transpose(1, 2) @ adds
-            pull, constant = (adds * missing.flatten(1)[..., None]).sum(1), missing.square().sum((1, 2))
+            pull = pull + (adds * missing.flatten(1)[..., None]).sum(1)
+            constant = constant + missing.square().sum((1, 2))
         precision = precision * active[:, None] * active[:, :, None]
         weight = options.prior_weight
         return _Prior(active, weight * precision, weight * pull * active, weight * constant)
 
-    def cost(self, theta: Theta) -> Tensor:
+    def cost(self, theta: Theta, lean: Tensor) -> Tensor:
         """(B,)"""
-        values = self.values(theta)
+        values = self.values(theta, lean)
         return (values * ((self.precision @ values[..., None])[..., 0] - 2.0 * self.pull)).sum(-1) + self.constant
 
-    def values(self, theta: Theta) -> Tensor:
+    def values(self, theta: Theta, lean: Tensor) -> Tensor:
         """(B, D) deviations of the reference's shape; the other parameters count as 0."""
         pose = torch.zeros_like(self.active[:, : 6 + theta.state.shape[1]], dtype=theta.state.dtype)
-        return torch.cat([pose, theta.log_scale, theta.stretch.flatten(1), theta.shift.flatten(1)], dim=1)
+        shape = [theta.log_scale, theta.stretch.flatten(1), theta.shift.flatten(1), lean.flatten(1)]
+        return torch.cat([pose, *shape], dim=1)[:, : self.active.shape[1]]
 
 
 def _robust(matches: Matches, width: float) -> Tensor:
@@ -203,13 +249,16 @@ def _robust(matches: Matches, width: float) -> Tensor:
 
 
 def _step(
-    shapes: Shapes, target: Target, matches: Matches, prior: _Prior, width: float, damping: Tensor, rigid: bool
-) -> Tensor:
+    shapes: Shapes, target: Target, matches: Matches, lean: Tensor, prior: _Prior, width: float, damping: Tensor,
+    rigid: bool,
+) -> Tensor:  # fmt: skip
     """(B, D) damped Gauss-Newton step of the reweighted least squares; shape parameters stay when ``rigid``."""
     weight = matches.weight * (width**2 / (width**2 + matches.square)) ** 2
     directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
     residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
-    rows = _columns(shapes, target.middle, matches, directions, rigid).flatten(1, 2) / target.unit[:, None, None]
+    leans = prior.active.shape[1] > 9 + 7 * shapes.trees.num_rows
+    rows = _columns(shapes, target.middle, matches, directions, rigid, leans)
+    rows = rows.flatten(1, 2) / target.unit[:, None, None]
     D = rows.shape[-1]
     active = prior.active[:, :D]
     rows = rows * active[:, None]
@@ -217,7 +266,7 @@ def _step(
     precision = prior.precision[:, :D, :D]
     curvature = (weighted.transpose(1, 2) @ rows + precision).double()
     slope = (weighted.transpose(1, 2) @ residual[..., None])[..., 0]
-    slope = (slope + (precision @ prior.values(matches.theta)[:, :D, None])[..., 0] - prior.pull[:, :D]).double()
+    slope = (slope + (precision @ prior.values(matches.theta, lean)[:, :D, None])[..., 0] - prior.pull[:, :D]).double()
     # A state at its limit stays there while the energy falls beyond it.
     D_states = slice(6, 6 + shapes.trees.num_rows)
     state = matches.theta.state
@@ -234,7 +283,7 @@ def _step(
     return torch.nn.functional.pad(step, (0, prior.active.shape[1] - D))
 
 
-def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tensor, rigid: bool) -> Tensor:
+def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tensor, rigid: bool, leans: bool) -> Tensor:
     """Derivatives of the points' offsets from the reference along given directions.
 
     Parameters
@@ -248,7 +297,7 @@ def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tenso
     -------
     (B, R, 2, D) float
         Columns: turn about the middle (3), motion (3), states (P), and unless ``rigid`` log_scale (3), stretch (3 P),
-        shift (3 P).
+        shift (3 P) and, if axes lean at all, lean (3 P).
     """
     trees, posed = shapes.trees, matches.posed
     P = trees.num_rows
@@ -260,9 +309,8 @@ def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tenso
         [turn * axis, (trees.slide * posed.reach)[..., None] * axis - turn * torch.linalg.cross(axis, origin - middle)],
         dim=-1,
     )
-    effect = (torch.cat([moment, directions], dim=-1).flatten(1, 2) @ lines.transpose(1, 2)).unflatten(
-        1, directions.shape[1:3]
-    )
+    wrench = torch.cat([moment, directions], dim=-1).flatten(1, 2)
+    effect = (wrench @ lines.transpose(1, 2)).unflatten(1, directions.shape[1:3])
     carried = _rows(trees.carries.transpose(1, 2).to(moment.dtype), matches.part)[:, :, None]
     follow = trees.multiplier[..., None] * torch.nn.functional.one_hot(trees.source, P)
     blocks = [moment, directions, (carried * effect) @ follow[:, None]]
@@ -278,6 +326,14 @@ def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tenso
         stretch = torch.nn.functional.one_hot(matches.part, P)[:, :, None, :, None] * own[..., None, :]
         shift = carried[..., None] * torch.einsum("brdi,bpij->brdpj", directions, above)
         blocks += [whole, stretch.flatten(3), shift.flatten(3)]
+        if leans:
+            # An axis that leans by d takes what is turned by R, about the anchor, to exp(d) R exp(-d).
+            turned = above.transpose(-1, -2) @ posed.rotation
+            swing = (turn[..., None] * (above - above @ turned)).transpose(-1, -2)
+            arm = (origin - middle)[:, :, None].expand_as(swing)
+            lines = torch.cat([swing, -torch.linalg.cross(swing, arm)], dim=-1).flatten(1, 2)
+            effect = (wrench @ lines.transpose(1, 2)).unflatten(1, directions.shape[1:3])
+            blocks.append(carried.repeat_interleave(3, dim=-1) * effect)
     return -torch.cat(blocks, dim=-1)
 
 
@@ -295,13 +351,13 @@ def _scale_lever(shapes: Shapes, theta: Theta, posed: Posed, above: Tensor) -> T
     return center + torch.einsum("bjk,bjxi->bkxi", trees.carries.to(center.dtype), anchor + along)
 
 
-def _moved(trees: Trees, theta: Theta, step: Tensor, middle: Tensor) -> Theta:
-    """Theta after a step of the parameters that :func:`_columns` lists; states stay within their limits."""
+def _moved(trees: Trees, theta: Theta, lean: Tensor, step: Tensor, middle: Tensor) -> tuple[Theta, Tensor]:
+    """Theta and lean after a step of the parameters that :func:`_columns` lists; states stay within their limits."""
     P = trees.num_rows
     turn = rotation_from_vector(step[:, :3])
     pivot = middle[:, 0]
-    parts = step[:, 9 + P :].reshape(len(step), 2, P, 3)
-    return Theta(
+    parts = step[:, 9 + P : 9 + 7 * P].reshape(len(step), 2, P, 3)
+    moved = Theta(
         turn @ theta.rotation,
         rotate(turn, theta.translation - pivot) + pivot + step[:, 3:6],
         theta.log_scale + step[:, 6 + P : 9 + P],
@@ -309,6 +365,8 @@ def _moved(trees: Trees, theta: Theta, step: Tensor, middle: Tensor) -> Theta:
         theta.shift + parts[:, 1],
         theta.stretch + parts[:, 0],
     )
+    leant = step[:, 9 + 7 * P :]
+    return moved, lean + leant.reshape(lean.shape) if leant.shape[1] else lean
 
 
 def _rows(values: Tensor, part: Tensor) -> Tensor:

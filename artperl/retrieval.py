@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from artperl.pose import Trees
+from artperl.refine import AxisPrior
 from artperl.shapes import Shapes
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.kinematics import KinematicTree
@@ -21,6 +22,8 @@ from artsim.objects import ArticulatedObject
 FORMAT = 2
 _ALIKE = 0.02
 """Radians: axes that differ by less are alike."""
+_OTHER_SORT = 0.35
+"""Radians: axes that differ by more are no two versions of one another, as those of doors and flaps."""
 _CLOUDS = ("box_center", "box_size", "points", "normals", "spacing", "diagonal")
 
 
@@ -53,6 +56,21 @@ class ShapeBase:
         axis = self.shapes.trees.axis
         means = [axis[self.kind == kind].mean(0) for kind in range(int(self.kind.max()) + 1)]
         return torch.nn.functional.normalize(torch.stack(means), dim=-1)[self.kind]
+
+    def axis_prior(self, row: int) -> AxisPrior | None:
+        """How far the axes of an observed object may lean from those of a reference; None where they hardly lean.
+
+        As those of all objects of the reference's kind do about their mean, and twice as far: retrieved axes are right
+        more often than not, and otherwise they may be those of the other extreme. Axes that differ by so much that
+        they are of another sort, as those of doors and flaps, stay.
+        """
+        lean = torch.linalg.cross(self.mean_axis, self.shapes.trees.axis)[self.kind == self.kind[row]]
+        spread = lean.square().sum(-1).mean(0).sqrt()
+        leans = (spread > _ALIKE) & (spread < _OTHER_SORT)
+        if not bool(leans.any()):
+            return None
+        twice = 2.0 * (lean * leans[:, None]).flatten(1)
+        return AxisPrior((twice.T @ twice / len(twice))[None], leans[None])
 
     @cached_property
     def kind(self) -> Tensor:

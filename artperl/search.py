@@ -129,7 +129,7 @@ def find(
         observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
     found = None
     if options.perceived_start:
-        found = _settle(shapes, observed, perceived, [theta], rows.tolist(), options, clock)
+        found = _settle(shapes, observed, perceived, [theta], rows.tolist(), base, options, clock)
         if found.residual <= options.retry_residual:
             return found
     with clock("start"):
@@ -144,7 +144,7 @@ def find(
         if agent is not None and options.agent_steps:
             few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
             path += agent_steps(agent, shapes, few, theta, options.agent_steps)
-    again = _settle(shapes, observed, perceived, path, [row] * len(shapes), options, clock)
+    again = _settle(shapes, observed, perceived, path, [row] * len(shapes), base, options, clock)
     if found is None:
         return again
     return again if _doubt(again) < _CLEARLY * _doubt(found) else found
@@ -182,10 +182,10 @@ def _doubt(found: Found) -> float:
 
 
 def _settle(
-    shapes: Shapes, observed: Observed, perceived: Perceived, path: list[Theta], rows: list[int],
+    shapes: Shapes, observed: Observed, perceived: Perceived, path: list[Theta], rows: list[int], base: ShapeBase,
     options: EstimatorOptions, clock: Clock,
 ) -> Found:  # fmt: skip
-    """The best of several starts, and of where the agent led from them, refined."""
+    """The best of several starts, and of where the agent led from them, refined; its axes lean as the points say."""
     with clock("refine"):
         ends = [path[0]] if len(path) == 1 else [path[0], path[-1]]
         all_shapes, theta = concatenate([shapes] * len(ends)), concatenate(ends)
@@ -197,8 +197,10 @@ def _settle(
     with clock("relabel"):
         observed = replace(observed, part=relabel(own, observed, theta, perceived.part_logits))
     with clock("last"):
-        refined = refine(own, observed, theta, replace(options.refine, rigid_iterations=2))
-    row = best % len(shapes)
+        row = best % len(shapes)
+        last = replace(options.refine, rigid_iterations=2)
+        refined = refine(own, observed, theta, last, axis_prior=base.axis_prior(rows[row]))
+        own = replace(own, trees=replace(own.trees, axis=refined.axis))
     steps = path[:1] if best < len(shapes) else path
     way = [*(step[row : row + 1] for step in steps), refined.theta]
     return Found(own, observed, refined, way, rows[row], disagreement(own, observed, refined.theta, perceived))

@@ -13,8 +13,8 @@ from artperl import metrics
 from artperl.energy import joint_energy, part_energy, refine_by_gradient
 from artperl.matching import Matches, Target, match
 from artperl.pose import Theta, Trees, clamp_state, pose_parts, theta_from_parts
-from artperl.refine import RefineOptions, _columns, _moved, refine
-from artperl.rotations import rotation_from_vector
+from artperl.refine import AxisPrior, RefineOptions, _columns, _moved, leaning, refine
+from artperl.rotations import rotate, rotation_from_vector
 from artperl.shapes import Observed, Shapes, spread_points
 from artsim.errors import ConfigError
 from artsim.objects import ArticulatedObject
@@ -202,6 +202,32 @@ def test_a_batch_gives_what_its_objects_give_alone(drawers: tuple[Shapes, Observ
         torch.testing.assert_close(single.theta.state[0], together.theta.state[b, :K], atol=2e-3, rtol=0.0)
 
 
+def test_hinges_lean_as_the_points_say_and_as_far_as_they_may() -> None:
+    """References whose hinges lean by six degrees the other way; both hinges of a pair lean together."""
+    objects, samples = views("eyeglasses", 12, first_seed=30)
+    shapes, observed = Shapes.from_objects(objects, dtype=torch.float32), observe(samples)
+    folded = torch.tensor([min(abs(s.joint_state[1:])) > 0.5 for s in samples])
+    lean = torch.zeros_like(shapes.points[:, :, 0])
+    lean[:, 1:, 0] = np.deg2rad(6.0)
+    others, truth = leaning(shapes, lean), true_theta(shapes, samples)
+    start = perturbed(others, truth, 3.0, 0.01)
+    P = shapes.trees.num_rows
+    one = torch.zeros(3 * P)
+    one[3::3] = 0.1
+    prior = AxisPrior(torch.outer(one, one).expand(len(shapes), -1, -1), shapes.trees.depth > 0)
+    fixed = refine(others, observed, start, KNOWN_SHAPE)
+    free = refine(others, observed, start, KNOWN_SHAPE, axis_prior=prior)
+    assert torch.equal(fixed.axis, others.trees.axis)
+    assert (free.energy <= free.start_energy).all()
+    off = [metrics.axis_error(axis[folded, 1:].numpy(), shapes.trees.axis[folded, 1:].numpy()) for axis in
+           (others.trees.axis, free.axis)]  # fmt: skip
+    assert folded.sum() >= 4
+    assert np.median(off[0]) == pytest.approx(6.0, abs=0.01)
+    assert np.median(off[1]) < 2.0
+    shared = torch.linalg.cross(others.trees.axis, free.axis)[:, 1:, 0]
+    torch.testing.assert_close(shared[:, 0], shared[:, 1], atol=0.02, rtol=0.1)  # up to what any axis may lean
+
+
 def test_steps_follow_the_derivatives_of_the_distances() -> None:
     objects = [artsim.make("drawer", 2), artsim.make("laptop", 1), artsim.make("drawer", 3)]
     shapes = Shapes.from_objects(objects, 32, dtype=torch.float64)
@@ -225,7 +251,9 @@ def test_steps_follow_the_derivatives_of_the_distances() -> None:
 
     def distance(step: torch.Tensor) -> torch.Tensor:
         """Offsets from discs that move with their parts."""
-        posed = pose_parts(shapes.trees, _moved(shapes.trees, theta, step, target.middle), shapes.box_center)
+        moved, lean = _moved(shapes.trees, theta, torch.zeros_like(theta.shift), step, target.middle)
+        leant = replace(shapes.trees, axis=rotate(rotation_from_vector(lean), shapes.trees.axis))
+        posed = pose_parts(leant, moved, shapes.box_center)
         rotation = _of_part(matches, posed.rotation)
         adapted = _of_part(matches, posed.center_rest) + _of_part(matches, posed.scale) * (
             matches.local - _of_part(matches, shapes.box_center)
@@ -233,12 +261,14 @@ def test_steps_follow_the_derivatives_of_the_distances() -> None:
         disc = (rotation @ adapted[..., None])[..., 0] + _of_part(matches, posed.translation)
         return torch.einsum("bnij,bndj,bni->bnd", rotation, in_part, matches.point - disc)
 
-    D = 9 + 7 * P
+    D = 9 + 10 * P
     expected = torch.autograd.functional.jacobian(distance, torch.zeros(B, D, dtype=torch.float64))
     expected = torch.stack([expected[b, :, :, b] for b in range(B)])
-    found = _columns(shapes, target.middle, matches, directions, rigid=False)
+    found = _columns(shapes, target.middle, matches, directions, rigid=False, leans=True)
     shift = 9 + 4 * P
     expected[..., shift : shift + 3] = 0.0  # the root's anchor is nobody's
+    slides = (shapes.trees.turn == 0).repeat_interleave(3, dim=1)
+    expected[..., 9 + 7 * P :] *= ~slides[:, None, None]  # rails do not lean
     torch.testing.assert_close(found, expected, atol=1e-9, rtol=1e-9)
 
 

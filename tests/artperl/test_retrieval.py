@@ -17,6 +17,7 @@ from artperl.networks.perception import Perceived
 from artperl.retrieval import ShapeBase, widened
 from artperl.search import references
 from artsim.errors import ConfigError, DatasetError
+from tests.artperl.worlds import small_base
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +173,18 @@ def test_a_mix_of_its_own_is_tried_beside_the_nearest_object() -> None:
     assert len(rows) == len(shapes) == 3
     assert rows[0] == rows[1]
     assert len(objects[5]) in parts[:2]
+
+
+def test_only_axes_of_one_sort_lean() -> None:
+    """Hinges of eyeglasses lean, both by the same angle; those of laptops do not; doors and flaps are of two sorts."""
+    prior = small_base("eyeglasses", "laptop").axis_prior(0)
+    assert prior is not None
+    assert prior.leans[0].tolist() == [False, True, True]
+    spread = torch.linalg.eigvalsh(prior.covariance[0]).clamp(min=0).sqrt()
+    assert 0.05 < float(spread[-1]) < 0.7
+    assert float(spread[:-1].max()) < 0.01
+    assert small_base("eyeglasses", "laptop").axis_prior(6) is None
+    doors = ShapeBase.of([artsim.make("storage_furniture", seed) for seed in range(30)], 16)
+    same = [row for row in range(len(doors)) if int((doors.kind == doors.kind[row]).sum()) > 1]
+    assert same
+    assert all(doors.axis_prior(row) is None for row in same)
