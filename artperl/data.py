@@ -350,7 +350,7 @@ def batches(
     Parameters
     ----------
     categories : sequence of str
-        None to learn from the given objects alone.
+        Empty to learn from the given objects alone.
     num_rows : int
         Rows for parts.
     num_points, batch_size : int
