@@ -9,7 +9,7 @@ demo: $(VENV)/.ready
 	$(PY) examples/demo/main.py out/demo
 
 test: system $(VENV)/.ready-dev lint
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.ready-dev
 	$(VENV)/bin/ruff format --check .
