@@ -153,7 +153,7 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float) -> Scored:
     """Errors of an estimate that has as many parts as the sample."""
     rotation, center = true_poses(sample)
     children = np.array(sample.joint_type) != "free"
-    rest_center = _rest_centers(estimate)
+    rest_center = rest_centers(estimate.translation, estimate.size, estimate.T_camera_part)
     return Scored(
         category=sample.category,
         rotation=metrics.rotation_error(estimate.rotation, rotation),
@@ -301,11 +301,10 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
     return Calibration(*(float(w) for w in weights))
 
 
-def _rest_centers(estimate: Estimate) -> Array:
-    """(K, 3) box centres in the estimated rest frame, about the middle of all boxes, as the true ones are."""
-    rotation, translation = estimate.T_camera_part[:, :3, :3], estimate.T_camera_part[:, :3, 3]
-    center = np.einsum("kji,kj->ki", rotation, estimate.translation - translation)
-    low, high = center - 0.5 * estimate.size, center + 0.5 * estimate.size
+def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array:
+    """(K, 3) posed box centres brought to the estimated rest frame, about the middle of all boxes, as true ones are."""
+    center = np.einsum("kji,kj->ki", T_camera_part[:, :3, :3], translation - T_camera_part[:, :3, 3])
+    low, high = center - 0.5 * size, center + 0.5 * size
     middle: Array = 0.5 * (low.min(axis=0) + high.max(axis=0))
     return center - middle
 

@@ -58,19 +58,26 @@ class ShapeBase:
         return torch.nn.functional.normalize(torch.stack(means), dim=-1)[self.kind]
 
     def axis_prior(self, row: int) -> AxisPrior | None:
-        """How far the axes of an observed object may lean from those of a reference; None where they hardly lean.
+        """How far the axes of an observed object may lean from those of a reference; None where they hardly lean."""
+        return self._axis_priors[int(self.kind[row])]
+
+    @cached_property
+    def _axis_priors(self) -> list[AxisPrior | None]:
+        """One for each kind.
 
         As those of all objects of the reference's kind do about their mean, and twice as far: retrieved axes are right
         more often than not, and otherwise they may be those of the other extreme. Axes that differ by so much that
         they are of another sort, as those of doors and flaps, stay.
         """
-        lean = torch.linalg.cross(self.mean_axis, self.shapes.trees.axis)[self.kind == self.kind[row]]
-        spread = lean.square().sum(-1).mean(0).sqrt()
-        leans = (spread > _ALIKE) & (spread < _OTHER_SORT)
-        if not bool(leans.any()):
-            return None
-        twice = 2.0 * (lean * leans[:, None]).flatten(1)
-        return AxisPrior((twice.T @ twice / len(twice))[None], leans[None])
+        every = torch.linalg.cross(self.mean_axis, self.shapes.trees.axis)
+        priors: list[AxisPrior | None] = []
+        for kind in range(int(self.kind.max()) + 1):
+            lean = every[self.kind == kind]
+            spread = lean.square().sum(-1).mean(0).sqrt()
+            leans = (spread > _ALIKE) & (spread < _OTHER_SORT)
+            twice = 2.0 * (lean * leans[:, None]).flatten(1)
+            priors.append(AxisPrior((twice.T @ twice / len(twice))[None], leans[None]) if bool(leans.any()) else None)
+        return priors
 
     @cached_property
     def kind(self) -> Tensor:

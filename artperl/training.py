@@ -141,8 +141,9 @@ class Training:
         theirs, own = estimator.perception, self.perception
         if (theirs.num_rows, theirs.width) != (own.num_rows, own.width):
             raise ConfigError(
-                "networks of another size are to be learnt on", str(self.options.start_from), "use the same categories"
-            )
+                "networks of another size are to be learnt on", str(self.options.start_from),
+                "use the same categories and preset",
+            )  # fmt: skip
         own.load_state_dict(theirs.state_dict())
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())

@@ -26,7 +26,7 @@ from artperl import metrics
 from artperl.benchmarks.rows import find_estimator
 from artperl.categories import ARTIMAGE
 from artperl.estimator import Estimate, Estimator, widen
-from artperl.evaluation import VALIDATION_SEEDS, frozen_samples, true_poses
+from artperl.evaluation import VALIDATION_SEEDS, frozen_samples, rest_centers, true_poses
 from artsim.files import atomic_file
 from artsim.sample import Sample
 
@@ -118,13 +118,11 @@ def known_axes(estimate: Estimate, sample: Sample) -> list[Array]:
 
 def at_rest(estimate: Estimate, sample: Sample, root_known: bool = False) -> Array:
     """(K,) IoU in the rest frame, whose origin is the middle of all boxes."""
-    T, size = estimate.T_camera_part, estimate.size.copy()
-    center = np.einsum("kji,kj->ki", T[:, :3, :3], estimate.translation - T[:, :3, 3])
+    center, size = estimate.translation.copy(), estimate.size.copy()
     if root_known:
-        true = true_poses(sample)[1][0]
-        center[0], size[0] = T[0, :3, :3].T @ (true - T[0, :3, 3]), sample.box_size[0]
-    middle = 0.5 * ((center - 0.5 * size).min(0) + (center + 0.5 * size).max(0))
-    return metrics.iou_rest_exact(center - middle, size, sample.box_center, sample.box_size)
+        center[0], size[0] = true_poses(sample)[1][0], sample.box_size[0]
+    rest_center = rest_centers(center, size, estimate.T_camera_part)
+    return metrics.iou_rest_exact(rest_center, size, sample.box_center, sample.box_size)
 
 
 def draw(every: dict[str, Array], path: Path) -> None:

@@ -80,8 +80,8 @@ def run_basin(
     options = estimator.options
 
     def refined(theta: Theta) -> Theta:
-        count = min(options.early_iterations, options.refine.iterations)
-        early = replace(options.refine, iterations=count, rigid_iterations=count)
+        iterations = min(options.early_iterations, options.refine.iterations)
+        early = replace(options.refine, iterations=iterations, rigid_iterations=iterations)
         theta = refine(problem.shapes, few, theta, early).theta
         return refine(problem.shapes, problem.observed, theta, replace(options.refine, rigid_iterations=2)).theta
 
