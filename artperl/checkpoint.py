@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from artperl.estimator import Calibration, Estimator
 from artperl.networks.agent import Agent
+from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perception
 from artperl.refine import RefineOptions
 from artperl.retrieval import ShapeBase
@@ -47,6 +48,8 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
     if estimator.agent is not None:
         networks["agent"] = estimator.agent
+    if estimator.boxes is not None:
+        networks["boxes"] = estimator.boxes
     tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
     save_tensors(tensors, folder / _TENSORS)
     part = folder / f".{_BASE}"
@@ -56,6 +59,9 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         "format": _FORMAT,
         "perception": {"num_rows": estimator.perception.num_rows, "width": estimator.perception.width},
         "agent": None if estimator.agent is None else {"width": estimator.agent.width},
+        "boxes": None
+        if estimator.boxes is None
+        else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
         "options": asdict(estimator.options),
         "calibration": asdict(estimator.calibration),
         "about": dict(about),
@@ -87,11 +93,15 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Esti
         if agent is not None:
             agent.load_state_dict(_under(tensors, "agent."))
             agent.to(device)
+        boxes = None if settings.get("boxes") is None else Boxes(**settings["boxes"])
+        if boxes is not None:
+            boxes.load_state_dict(_under(tensors, "boxes."))
+            boxes.to(device)
         options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings["options"].items()}
         options["refine"] = RefineOptions(**options["refine"])
         return Estimator(
             perception.to(device), ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**options),
-            Calibration(**settings["calibration"]),
+            Calibration(**settings["calibration"]), boxes,
         )  # fmt: skip
     except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
         raise DatasetError(f"the estimator does not load: {error}", folder, "train it again") from error

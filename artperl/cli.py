@@ -55,6 +55,8 @@ class Train:
     """Batches that perception learns from; by default the preset's."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
+    box_views: int | None = None
+    """Fresh views whose estimates teach where boxes end, 0 to keep those of the references; by default the preset's."""
     learning: Literal["both", "cloning", "reinforcement"] = "both"
     """How the agent learns: behaviour cloning and PPO, or one of them alone."""
     real: bool = False
@@ -100,6 +102,7 @@ class Train:
             sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
             perception_steps=preset.perception_steps if steps is None else steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
+            box_views=preset.box_views if self.box_views is None else self.box_views,
             ppo=replace(
                 preset.ppo, behaviour_cloning=self.learning != "reinforcement",
                 reinforcement=self.learning != "cloning",

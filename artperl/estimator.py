@@ -1,12 +1,13 @@
 """From a cloud to the 9D pose of every part, in one call (ArtPERL, section 4).
 
 Perception says which part each point belongs to and where it lies in the object's rest frame; :mod:`artperl.search`
-finds the reference and the pose that explain it.
+finds the reference and the pose that explain it; last, a network moves the faces of its boxes to where the cloud, seen
+from there, says that they are.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -15,7 +16,9 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.data import Clouds
+from artperl.evidence import Evidence
 from artperl.networks.agent import Agent
+from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perception
 from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts
 from artperl.retrieval import ShapeBase
@@ -127,6 +130,8 @@ class Estimator:
         Without one, references are refined from where perception puts them.
     options : EstimatorOptions, optional
     calibration : Calibration, optional
+    boxes : Boxes, optional
+        Without one, boxes are the reference's, widened to hold the points.
     """
 
     perception: Perception
@@ -134,6 +139,7 @@ class Estimator:
     agent: Agent | None = None
     options: EstimatorOptions = field(default_factory=EstimatorOptions)
     calibration: Calibration = field(default_factory=Calibration)
+    boxes: Boxes | None = None
 
     def __post_init__(self) -> None:
         self.perception.eval()
@@ -153,7 +159,27 @@ class Estimator:
         ArtsimError
             When there is no object to be seen in the cloud.
         """
-        options, clock = self.options, Clock()
+        clock = Clock()
+        estimate, observed, expected = self._fit(points, clock)
+        if self.boxes is None:
+            return estimate
+        with clock("boxes"):
+            evidence, unit = _evidence(estimate, observed, expected, self.boxes.num_rows)
+            boxes = self.boxes(evidence.to(self.perception.device))
+            center, size = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
+            T = estimate.T_camera_part
+            posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
+        return replace(estimate, translation=posed, size=size)
+
+    @torch.inference_mode()
+    def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
+        """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
+        estimate, observed, expected = self._fit(points, Clock())
+        return estimate, *_evidence(estimate, observed, expected, self.perception.num_rows)
+
+    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, Observed, tuple[Tensor, Tensor]]:
+        """The estimate whose boxes are the reference's, its labelled points, and perceived boxes (P, 3), metres."""
+        options = self.options
         points = np.asarray(points, dtype=np.float64)
         with clock("clean"):
             good = clean(points)
@@ -162,9 +188,11 @@ class Estimator:
         with clock("perception"):
             clouds = Clouds.of(cloud)
             perceived = self.perception(clouds.points)
-        found = find(cloud, clouds, perceived, self.base, self.agent, options, clock)
+        found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
         with clock("report"):
-            return self._report(points, good, found.to("cpu"), clock)
+            metres = (perceived.log_diagonal.exp() * clouds.radius).cpu()
+            expected = perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres
+            return self._report(points, good, found, clock), found.observed, expected
 
     def _report(self, points: Array, good: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
         """Everything about one fitted reference, as arrays."""
@@ -198,6 +226,17 @@ class Estimator:
             trajectory=np.stack(poses),
             milliseconds=clock.milliseconds,
         )
+
+
+def _evidence(
+    estimate: Estimate, observed: Observed, expected: tuple[Tensor, Tensor], rows: int
+) -> tuple[Evidence, float]:
+    """Evidence of one estimate, padded to that many parts, and its unit in metres."""
+    T, K = estimate.T_camera_part, len(estimate.size)
+    center = np.einsum("kji,kj->ki", T[:, :3, :3], estimate.translation - T[:, :3, 3])
+    pose = (torch.from_numpy(values.astype(np.float32)) for values in (T, center, estimate.size))
+    evidence, unit = Evidence.of(observed.points[0], observed.part[0], *pose, *(boxes[:K] for boxes in expected))
+    return evidence.padded(rows), float(unit)
 
 
 def clean(points: Array) -> NDArray[np.int64]:

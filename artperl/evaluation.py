@@ -262,6 +262,11 @@ def headline(scored: Sequence[Scored]) -> float:
     return float(np.mean(terms))
 
 
+def mean_iou(scored: Sequence[Scored]) -> float:
+    """Mean exact intersection over union of all posed boxes."""
+    return float(np.mean(np.concatenate([s.iou_exact for s in scored])))
+
+
 def retry_residual(scored: Sequence[Scored]) -> float:
     """Residual above which an estimate is looked for again: that of the quarter that fits worst."""
     residuals = [s.residual for s in scored if np.isfinite(s.residual)]

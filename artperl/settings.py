@@ -59,6 +59,10 @@ class TrainOptions:
     agent_rate: float = 1e-3
     episodes: int = 64
     """Episodes of a rollout."""
+    box_views: int = 2500
+    """Fresh views of stage 3, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
+    box_steps: int = 2000
+    """Batches that boxes are learnt in."""
     validate_every: int = 1000
     """Steps of stage 1 between tests."""
     validate_rollouts: int = 50
@@ -80,7 +84,7 @@ class TrainOptions:
 PRESETS = {
     "quick": TrainOptions(
         base_objects=32, width=32, perception_steps=500, batch_size=24, num_points=768, agent_rollouts=12, episodes=48,
-        validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
+        box_views=0, validate_every=250, validate_rollouts=12, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
     "gpu": TrainOptions(
@@ -88,7 +92,7 @@ PRESETS = {
     ),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
-        perception_steps=9000, agent_rollouts=300, cloning_share=1.0, test_objects=8, validation_views=1,
+        perception_steps=9000, agent_rollouts=300, cloning_share=1.0, box_views=0, test_objects=8, validation_views=1,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one

@@ -25,9 +25,10 @@ from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
 from artperl.benchmarks.artimage import real_train_objects
+from artperl.boxing import learn, record
 from artperl.categories import arranged, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
-from artperl.data import batches
+from artperl.data import batches, samples_from
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator
 from artperl.evaluation import (
@@ -37,6 +38,7 @@ from artperl.evaluation import (
     evaluate,
     frozen_samples,
     headline,
+    mean_iou,
     mistake,
     retry_residual,
     samples_of,
@@ -45,6 +47,7 @@ from artperl.evaluation import (
 )
 from artperl.fitting import Fitting
 from artperl.networks.agent import Agent
+from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perception, perception_losses
 from artperl.ppo import collect, update
 from artperl.problems import Problems
@@ -104,13 +107,14 @@ class Training:
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
         self.agent, self._agent_known = Agent().to(self.device), False
+        self.boxes: Boxes | None = None
         if options.start_from is not None:
             self._take_over(load_estimator(options.start_from))
         self.optimizers = {
             "perception": torch.optim.AdamW(self.perception.parameters(), weight_decay=1e-2),
             "agent": torch.optim.AdamW(self.agent.parameters(), weight_decay=1e-4),
         }
-        self.done = {"perception": 0, "agent": 0}
+        self.done = {"perception": 0, "agent": 0, "boxes": 0}
         self.best = float("inf")
         self.history: list[dict[str, Any]] = []
         self._validation: list[Sample] = []
@@ -129,12 +133,14 @@ class Training:
         with closing(SummaryWriter(str(self.out / "events"))) as board, Stop() as stop:
             self._learn_to_perceive(board, stop)
             self._learn_to_fit(board, stop)
+            self._learn_boxes(board, stop)
         return self._finish()
 
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
         agent = self.agent if self.done["agent"] or self._agent_known else None
-        return Estimator(self.perception, self.base, agent, EstimatorOptions(num_points=self.options.num_points))
+        options = EstimatorOptions(num_points=self.options.num_points)
+        return Estimator(self.perception, self.base, agent, options, boxes=self.boxes)
 
     def _take_over(self, estimator: Estimator) -> None:
         """Begin with the networks of another estimator."""
@@ -148,6 +154,7 @@ class Training:
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())
             self._agent_known = True
+        self.boxes = estimator.boxes
 
     def _learn_to_perceive(self, board: SummaryWriter, stop: Stop) -> None:
         options, optimizer = self.options, self.optimizers["perception"]
@@ -220,6 +227,36 @@ class Training:
                 self._save()
             self._stop_if(stop)
         bar.close()
+
+    def _learn_boxes(self, board: SummaryWriter, stop: Stop) -> None:
+        """The last stage: the best estimator's boxes learn from its own estimates, and stay if they are better so."""
+        options = self.options
+        if self.done["boxes"] >= options.box_views:
+            return
+        if not (self.out / "best").is_dir():
+            self._validate(board, 0)
+        best = load_estimator(self.out / "best", self.device)
+        sample = replace(options.sample, num_points=options.num_points if options.dataset else _TEST_POINTS)
+        samples = samples_from(
+            options.dataset, options.categories, sample, options.seed + 2, 2, self.perception.num_rows, options.parts,
+            self.given,
+        )  # fmt: skip
+        file = self.out / "boxes.safetensors"
+        records = record(best, samples, options.box_views, file, stop, self.progress)
+        self.done["boxes"] = options.box_views
+        if records is None:
+            tqdm.write("boxes: no estimate fits its view; they stay the references'")
+            return self._save()
+        boxes = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
+        moved = replace(best, boxes=boxes.half().float())
+        validation = self._unseen(options.validation_views, VALIDATION_SEEDS)
+        before, after = (evaluate(est, validation, self.progress) for est in (replace(best, boxes=None), moved))
+        figures = summary(after)
+        if mean_iou(after) > mean_iou(before):
+            save_estimator(moved, self.out / "best", self._about({"validation": figures}))
+        _write(board, "validation", _curves(figures), sum(self.done.values()))
+        tqdm.write(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
+        self._save()
 
     def _stop_if(self, stop: Stop) -> None:
         if stop.asked:
@@ -296,7 +333,7 @@ class Training:
             raise DatasetError("a run with other options is here", self.out, "give the same options, or another folder")
         self.best, self.history = state["best"], state["history"]
         tensors = load_file(self.out / f"{_STATE}.safetensors")
-        self.done = dict(zip(self.done, tensors["done"].tolist(), strict=True))
+        self.done |= dict(zip(self.done, tensors["done"].tolist(), strict=False))  # older runs had fewer stages
         for name, network in (("perception", self.perception), ("agent", self.agent)):
             own = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
             network.load_state_dict(own)

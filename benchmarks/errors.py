@@ -2,8 +2,8 @@
 
 Moving parts of unseen procedural objects, validation seeds, by how many of a cloud's points show them: rotation, IoU of
 posed boxes, and what that would be if one thing were known: where the box's faces are along each axis of the rest frame
-(x to the back, y to the side, z up), or the parts of all points. Last, IoU at rest, and the same if the root's box were
-known. Errors against points are drawn as a picture. The last line is one JSON object.
+(x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known. Errors
+against points are drawn as a picture. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tqdm import tqdm
 from artperl import metrics
 from artperl.benchmarks.rows import find_estimator
 from artperl.categories import ARTIMAGE
-from artperl.estimator import Estimate, Estimator, widen
+from artperl.estimator import Estimate, Estimator
 from artperl.evaluation import VALIDATION_SEEDS, frozen_samples, rest_centers, true_poses
 from artsim.files import atomic_file
 from artsim.sample import Sample
@@ -89,16 +89,12 @@ def moving_parts(estimator: Estimator, sample: Sample) -> list[dict[str, float]]
     off = metrics.rotation_error(estimate.rotation, rotation)
     posed = metrics.iou_exact(estimate.rotation, estimate.translation, estimate.size, rotation, center, sample.box_size)
     known = known_axes(estimate, sample)
-    cloud, part = sample.points.astype(np.float64), sample.part.astype(np.int64)
-    told = widen(estimate.rotation, estimate.translation, estimate.size, cloud, part)
-    labelled = metrics.iou_exact(estimate.rotation, *told, rotation, center, sample.box_size)
     rest, rooted = at_rest(estimate, sample), at_rest(estimate, sample, root_known=True)
-    points = np.bincount(part, minlength=len(off))
+    points = np.bincount(sample.part, minlength=len(off))
     return [
         {
             "points": float(points[k]), "rotation": off[k], "posed": posed[k], "x known": known[0][k],
-            "y known": known[1][k], "z known": known[2][k], "labels": labelled[k], "rest": rest[k],
-            "root known": rooted[k],
+            "y known": known[1][k], "z known": known[2][k], "rest": rest[k], "root known": rooted[k],
         }
         for k in range(1, len(off))
     ]  # fmt: skip

@@ -1,0 +1,119 @@
+"""Learning to say where boxes end: estimates of fresh views, and the network that learns from how their boxes are off.
+
+The network sees what it will see in use: references as they were found and fitted, faults included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from artperl.batch import Batch, concatenate
+from artperl.checkpoint import save_tensors
+from artperl.data import Source
+from artperl.estimator import Estimator
+from artperl.evaluation import true_poses
+from artperl.evidence import Evidence
+from artperl.networks.boxes import Boxes, box_losses
+from artperl.steps import Stop, one_cycle, set_rate
+from artsim.sample import Sample
+
+_SAVE_VIEWS = 200
+"""Views after which records are written down."""
+_FITS = 0.02
+"""Residual up to which an estimate is learnt from: of others there is no saying what their boxes show."""
+_BATCH = 32
+_RATE = 4e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Records(Batch):
+    """B estimates: what was seen, and where the true boxes (B, P, 3) are in the estimated rest frame, in diagonals."""
+
+    evidence: Evidence
+    center: Tensor
+    size: Tensor
+
+
+def record(
+    estimator: Estimator, samples: Source, views: int, file: Path, stop: Stop, progress: bool
+) -> Records | None:  # fmt: skip
+    """Records of the first so many samples, in single precision; those that the file holds are taken from it.
+
+    None when no estimate fits.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When a stop is asked for, and what there is has been written down.
+    """
+    first, records = _load(file) if file.exists() else (0, [])
+    bar = tqdm(total=views, initial=first, desc="boxes", disable=not progress, smoothing=0.02)
+    for n in range(first, views):
+        records += _examined(estimator, samples[n])
+        bar.update()
+        if (n + 1) % _SAVE_VIEWS == 0 or n + 1 == views or stop.asked:
+            _save(records, n + 1, file)
+        if stop.asked:
+            raise KeyboardInterrupt
+    bar.close()
+    every: Records | None = concatenate(records).to(torch.float32) if records else None
+    return every
+
+
+def learn(records: Records, num_rows: int, steps: int, seed: int, progress: bool) -> Boxes:
+    """A network that has learnt from records: always the same one for the same arguments."""
+    torch.manual_seed(seed)
+    boxes = Boxes(num_rows).to(records.center.device)
+    optimizer = torch.optim.AdamW(boxes.parameters(), weight_decay=1e-2)
+    bar = tqdm(range(steps), "moving faces", disable=not progress, smoothing=0.02)
+    for step in bar:
+        set_rate(optimizer, _RATE * one_cycle(step, steps))
+        batch = records[torch.randint(len(records), (_BATCH,))]
+        center, size = boxes(batch.evidence)
+        losses = box_losses(center, size, batch.center, batch.size, batch.evidence.valid)
+        loss = losses.sum() / batch.evidence.valid.sum()
+        optimizer.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(boxes.parameters(), 1.0)
+        optimizer.step()
+        bar.set_postfix_str(f"loss {loss.item():.3f}")
+    return boxes
+
+
+def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
+    """The record of one sample, in half precision as it is kept; none if the estimate does not fit."""
+    estimate, evidence, unit = estimator.examined(sample.points)
+    K = len(sample.box_size)
+    if estimate.residual > _FITS or len(estimate.size) != K:
+        return []
+    T = estimate.T_camera_part
+    center = np.einsum("kji,kj->ki", T[:, :3, :3], true_poses(sample)[1] - T[:, :3, 3])
+    padded = np.zeros((2, 1, evidence.valid.shape[1], 3))
+    padded[:, 0, :K] = center / unit, sample.box_size / unit
+    return [Records(evidence, *torch.from_numpy(padded)).to(torch.float16)]
+
+
+def _save(records: list[Records], views: int, file: Path) -> None:
+    tensors = {"views": torch.tensor(views)}
+    if records:
+        every: Records = concatenate(records)
+        tensors |= {"center": every.center, "size": every.size}
+        tensors |= {f"evidence.{name}": values for name, values in vars(every.evidence).items()}
+    save_tensors(tensors, file)
+
+
+def _load(file: Path) -> tuple[int, list[Records]]:
+    """How many views were looked at, and what they gave."""
+    tensors = load_file(file)
+    views = int(tensors.pop("views"))
+    if not tensors:
+        return views, []
+    evidence = {k.removeprefix("evidence."): v for k, v in tensors.items() if k.startswith("evidence.")}
+    return views, [Records(Evidence(**evidence), tensors["center"], tensors["size"])]
