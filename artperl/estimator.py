@@ -144,6 +144,8 @@ class Estimator:
     def __post_init__(self) -> None:
         self.perception.eval()
         self.base = self.base.to(self.perception.device)
+        if self.boxes is not None:
+            self.boxes.to(self.perception.device)
 
     @torch.inference_mode()
     def __call__(self, points: ArrayLike) -> Estimate:

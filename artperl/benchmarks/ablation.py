@@ -47,6 +47,7 @@ def variants(
         "whole": estimator,
         "random reference": replace(estimator, base=shuffled(estimator.base)),
         "part by part, no kinematics": PartByPart(**vars(estimator)),
+        "boxes of the references": replace(estimator, boxes=None),
         "no refinement": changed(refine=unrefined),
         "refinement only: no agent": without_agent,
         "no second try": changed(retry_residual=float("inf")),
