@@ -133,7 +133,8 @@ def _grid(trees: Trees, joint: int) -> Tensor:
     lower, upper = trees.lower[0, joint], trees.upper[0, joint]
     if not bool(torch.isfinite(upper - lower)):
         lower, upper = trees.rest[0, joint] - torch.pi, trees.rest[0, joint] + torch.pi
-    return lower + (upper - lower) * (torch.arange(_STATES, device=lower.device) + 0.5) / _STATES
+    middle = torch.arange(0.5, _STATES, dtype=lower.dtype, device=lower.device)
+    return lower + (upper - lower) * middle / _STATES
 
 
 def _posed(shapes: Shapes, theta: Theta) -> Posed:

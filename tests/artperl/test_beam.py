@@ -105,7 +105,7 @@ def test_joints_without_limits_are_looked_for_all_round() -> None:
     )
     trees = Trees.stack([tree])
     round_about, along = _grid(trees, 1), _grid(trees, 2)
-    assert torch.allclose(round_about.diff(), torch.tensor(2.0 * torch.pi / len(round_about)).double())
+    torch.testing.assert_close(round_about.diff(), torch.full_like(round_about[1:], 2.0 * torch.pi / len(round_about)))
     assert 0.0 < along.min() < 0.01
     assert 0.23 < along.max() < 0.24
 
