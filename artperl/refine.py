@@ -133,7 +133,7 @@ def refine(
     target = Target.of(observed, unit)
     current, lean = match(shapes, target, start, options.outline_weight), torch.zeros_like(start.shift)
     current_cost = prior.cost(start, lean)
-    first = _robust(current, options.robust_end) + current_cost
+    first = robust(current, options.robust_end) + current_cost
     damping = torch.full_like(unit, 1e-2)
     steps = torch.zeros_like(unit, dtype=torch.int64)
     settled = torch.zeros_like(unit, dtype=torch.bool)
@@ -144,7 +144,7 @@ def refine(
         theta, leant = _moved(shapes.trees, current.theta, lean, step, target.middle)
         candidate = match(leaning(shapes, leant), target, theta, options.outline_weight)
         cost = prior.cost(theta, leant)
-        before, after = _robust(current, width) + current_cost, _robust(candidate, width) + cost
+        before, after = robust(current, width) + current_cost, robust(candidate, width) + cost
         better = after < before
         current_cost, lean = torch.where(better, cost, current_cost), torch.where(better[:, None, None], leant, lean)
         current = candidate if bool(better.all()) else candidate.where(better, current)
@@ -155,7 +155,7 @@ def refine(
         width = max(options.robust_end, options.narrowing * width)
         if bool(settled.all()):
             break
-    final = _robust(current, options.robust_end) + current_cost
+    final = robust(current, options.robust_end) + current_cost
     # Steps that paid at a larger width need not have paid at the last one.
     improved = final < first
     lean = torch.where(improved[:, None, None], lean, 0.0)
@@ -238,7 +238,7 @@ class _Prior(Batch):
         return torch.cat([pose, *shape], dim=1)[:, : self.active.shape[1]]
 
 
-def _robust(matches: Matches, width: float) -> Tensor:
+def robust(matches: Matches, width: float) -> Tensor:
     """(B,) mean robust squared distance in diagonals.
 
     Geman-McClure's ``w^2 e^2 / (w^2 + e^2)``: it falls when the width w shrinks, so that narrowing it on the way never

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from artperl.actions import expected_action
 from artperl.batch import concatenate
+from artperl.beam import beam
 from artperl.data import Clouds
 from artperl.embedding import box_embedding
 from artperl.fitting import Fitting, FittingOptions
@@ -32,6 +33,10 @@ _DISAGREEMENT = 0.3
 """Weight of the disagreement with perception against the residual."""
 _CLEARLY = 0.8
 """Share of the first estimate's doubt below which a second one takes its place: most others that fit are wrong."""
+_CHAIN = 3
+"""Joints one after another from which parts below have to tell how those above have turned."""
+_BEAM_STARTS = 8
+"""Ends of the beam search that are refined."""
 _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
@@ -52,6 +57,8 @@ class EstimatorOptions:
     """Iterations of every start, before the best one is kept."""
     perceived_start: bool = True
     """Start from where perception places the points in the rest frame; without, from views all round alone."""
+    beam: int = 64
+    """Mixes of joint states that are followed down a tree with chains of three joints and more; 0 goes without."""
     retry_residual: float = 0.006
     """Estimates with a larger residual are looked for again, from other starts; infinite for never, 0 for always."""
     azimuths: tuple[float, ...] = (-50.0, 0.0, 50.0)
@@ -127,6 +134,14 @@ def find(
         rows, chosen = references(base, perceived, min(options.references, len(base)))
         shapes, theta = start(clouds, perceived, chosen, len(rows))
         observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
+    if options.perceived_start and options.beam and int(shapes.trees.depth[0].max()) >= _CHAIN:
+        with clock("beam"):
+            ends = beam(
+                shapes[:1], cloud, perceived.part_probability[..., : shapes.trees.num_rows], theta[:1], _BEAM_STARTS,
+                options.beam, options.refine,
+            )  # fmt: skip
+            shapes, theta = concatenate([shapes, shapes[:1].repeat(len(ends))]), concatenate([theta, ends])
+            rows = torch.cat([rows, rows[:1].expand(len(ends))])
     found = None
     if options.perceived_start:
         found = _settle(shapes, observed, perceived, [theta], rows.tolist(), base, options, clock)

@@ -13,7 +13,7 @@ from torch import Tensor
 from artperl.batch import Batch
 from artperl.pose import Trees
 from artsim.errors import ConfigError
-from artsim.kinematics import Array
+from artsim.kinematics import Array, Joint, KinematicTree
 from artsim.objects import ArticulatedObject
 
 
@@ -82,6 +82,13 @@ class Shapes(Batch):
         tensors = {name: torch.from_numpy(array).to(dtype) for name, array in {**boxes, **arrays}.items()}
         diagonal = torch.tensor([obj.diagonal for obj in objects], dtype=dtype)
         return Shapes(trees=trees, **tensors, spacing=torch.from_numpy(spacing).to(dtype), diagonal=diagonal)
+
+    def part(self, row: int) -> Shapes:
+        """One part of every object as an object of its own, in the same rest frame."""
+        alone = Trees.stack([KinematicTree([Joint("root", "free", -1)])] * len(self), dtype=self.points.dtype)
+        fields = ("box_center", "box_size", "points", "normals", "spacing")
+        own = {name: getattr(self, name)[:, row : row + 1] for name in fields}
+        return Shapes(trees=alone.to(self.points.device), diagonal=self.diagonal, **own)
 
     def trimmed(self) -> Shapes:
         """Without rows for parts that no object of the batch has."""

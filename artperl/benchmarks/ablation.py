@@ -10,18 +10,18 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
+from artperl.batch import concatenate
 from artperl.data import Clouds
 from artperl.embedding import box_embedding
 from artperl.estimator import Estimate, Estimator, clean, draw
 from artperl.evaluation import evaluate, summary
 from artperl.networks.agent import Agent
-from artperl.pose import Theta, Trees, pose_parts
+from artperl.pose import Theta, pose_parts
 from artperl.refine import refine
 from artperl.retrieval import ShapeBase
 from artperl.rotations import rotate
-from artperl.shapes import Observed, Shapes
+from artperl.shapes import Observed
 from artperl.start import part_poses, start
-from artsim.kinematics import Joint, KinematicTree
 from artsim.sample import Sample
 
 
@@ -120,11 +120,7 @@ class PartByPart(Estimator):
         query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
         shapes, _ = start(clouds, perceived, self.base.shapes[self.base.nearest(query)[0][0]], 1)
         P = int(shapes.trees.valid.sum())
-        fields = ("box_center", "box_size", "points", "normals", "spacing")
-        alone = Shapes(
-            trees=Trees.stack([KinematicTree([Joint("root", "free", -1)])] * P, dtype=torch.float32),
-            diagonal=shapes.diagonal.expand(P), **{name: getattr(shapes, name)[0, :P, None] for name in fields},
-        )  # fmt: skip
+        alone = concatenate([shapes.part(k) for k in range(P)])
         own = torch.nn.functional.one_hot(perceived.part[0], perceived.part_logits.shape[2])[:, :P].T
         observed = Observed.of(cloud.expand(P, -1, -1), torch.zeros_like(own), own.float())
         rotation, center, _ = (pose[0, :P] for pose in part_poses(clouds, perceived))

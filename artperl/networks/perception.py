@@ -54,6 +54,11 @@ class Perceived(Batch):
         return torch.arange(self.valid_logits.shape[1], device=last.device) <= last
 
     @property
+    def part_probability(self) -> Tensor:
+        """(B, N, P) of each point to belong to each of the parts that the object has."""
+        return self.part_logits.masked_fill(~self.valid[:, None], -torch.inf).softmax(-1)
+
+    @property
     def part(self) -> Tensor:
         """(B, N) most likely part of each point, among those that the object has."""
         return self.part_logits.masked_fill(~self.valid[:, None], -torch.inf).argmax(-1)

@@ -11,11 +11,13 @@ import torch
 
 import artsim
 from artperl import metrics
+from artperl.categories import objects_of
 from artperl.checkpoint import load_estimator, save_estimator
 from artperl.data import Clouds, to_batch, training_rows
 from artperl.embedding import by_boxes
 from artperl.estimator import Calibration, Estimator, clean, draw, widen
 from artperl.evaluation import (
+    TEST_SEEDS,
     Scored,
     calibrate,
     compare,
@@ -138,6 +140,17 @@ def test_what_does_not_fit_is_looked_for_again(base: ShapeBase, sample: Sample) 
     assert again.residual <= once.residual
     rotation, _ = true_poses(sample)
     assert metrics.rotation_error(again.rotation, rotation).max() < 3.0
+
+
+def test_only_chains_of_joints_are_searched_for_down_the_tree(estimator: Estimator, sample: Sample) -> None:
+    assert "beam" not in estimator(sample.points).milliseconds
+    (seen,) = frozen_samples(["robot_arm"], 1, 1, parts="any", max_parts=10)
+    arm = ShapeBase.of(objects_of(["robot_arm"], 1, TEST_SEEDS, "any", 10), 64)
+    knows = Oracle(seen, len(seen.joint_type))
+    with_beam = Estimator(knows, by_boxes(arm))
+    without = Estimator(knows, with_beam.base, options=EstimatorOptions(beam=0))
+    assert with_beam(seen.points).milliseconds["beam"] > 0.0
+    assert "beam" not in without(seen.points).milliseconds
 
 
 def test_outliers_are_left_out_and_the_object_is_not() -> None:
