@@ -2,8 +2,9 @@
 
 Moving parts of unseen procedural objects, validation seeds, by how many of a cloud's points show them: rotation, IoU of
 posed boxes, and what that would be if one thing were known: where the box's faces are along each axis of the rest frame
-(x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known. Errors
-against points are drawn as a picture. The last line is one JSON object.
+(x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known; and the
+root's rotation, with and without the objects that it is worst for. Errors against points are drawn as a picture. The
+last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from tqdm import tqdm
 from artperl import metrics
 from artperl.benchmarks.rows import find_estimator
 from artperl.categories import ARTIMAGE
-from artperl.estimator import Estimate, Estimator
+from artperl.estimator import Estimate
 from artperl.evaluation import VALIDATION_SEEDS, frozen_samples, rest_centers, true_poses
 from artsim.files import atomic_file
 from artsim.sample import Sample
@@ -58,7 +59,14 @@ def main(options: Options) -> None:
     for category in options.categories:
         estimator = find_estimator(options.weights, category)
         samples = frozen_samples([category], options.objects, options.views, None, VALIDATION_SEEDS)
-        rows = [row for s in tqdm(samples, category, disable=None, leave=False) for row in moving_parts(estimator, s)]
+        rows, roots = [], []
+        for sample in tqdm(samples, category, disable=None, leave=False):
+            estimate = estimator(sample.points)
+            if len(estimate.size) == len(sample.box_size):
+                rows += moving_parts(estimate, sample)
+                roots.append(metrics.rotation_error(estimate.rotation[0], true_poses(sample)[0][0]))
+            else:
+                roots.append(np.array(metrics.FAILED["rotation_deg"]))
         every[category] = table = np.array([list(row.values()) for row in rows])
         names = list(rows[0])
         result[category] = {}
@@ -74,17 +82,18 @@ def main(options: Options) -> None:
                 }
                 shown = "".join(f"{value:11.2f}" if n == 0 else f"{100 * value:11.1f}" for n, value in enumerate(mean))
                 print(f"{label:>10s}{len(own):7d}{shown}", flush=True)
+        by_object = np.sort(np.reshape(roots, (options.objects, options.views)).mean(1))
+        best = by_object[: -max(1, options.objects // 10)]
+        result[category]["root"] = {"rotation": round(by_object.mean(), 4), "best nine tenths": round(best.mean(), 4)}
+        print(f"root: rotation {by_object.mean():.2f}, without the tenth of objects it is worst for {best.mean():.2f}")
     print("mean rotation in degrees, and IoU in % if what the column says were known")
     if options.picture is not None:
         draw(every, options.picture)
     print(json.dumps(result))
 
 
-def moving_parts(estimator: Estimator, sample: Sample) -> list[dict[str, float]]:
-    """Figures of each moving part; none where the estimate has other parts."""
-    estimate = estimator(sample.points)
-    if len(estimate.size) != len(sample.box_size):
-        return []
+def moving_parts(estimate: Estimate, sample: Sample) -> list[dict[str, float]]:
+    """Figures of each moving part."""
     rotation, center = true_poses(sample)
     off = metrics.rotation_error(estimate.rotation, rotation)
     posed = metrics.iou_exact(estimate.rotation, estimate.translation, estimate.size, rotation, center, sample.box_size)
