@@ -155,9 +155,16 @@ def _probes(points: Tensor, ray: Tensor, rotation: Tensor, translation: Tensor, 
     posed = (probe @ rotation.transpose(1, 2) + translation[:, None]).flatten(0, 1)
     depth = torch.linalg.vector_norm(posed, dim=-1)
     seen = torch.linalg.vector_norm(points, dim=-1)
-    spacing = torch.cdist(ray[:NUM_POINTS], ray).topk(3, largest=False).values[:, -1].median()
-    apart, nearest = torch.cdist(posed / depth[:, None], ray).min(-1)
+    # Small clouds hold points several times.
+    between = _apart(ray[:NUM_POINTS].unique(dim=0), ray.unique(dim=0))
+    spacing = between.topk(min(3, between.shape[1]), largest=False).values[:, -1].median()
+    apart, nearest = _apart(posed / depth[:, None], ray).min(-1)
     beside = apart > _BESIDE * spacing
     behind = seen[nearest] - depth
     told = torch.stack([~beside & (behind > _ON_SURFACE), beside, ~beside & (behind.abs() <= _ON_SURFACE)], dim=-1)
     return told.to(points.dtype).reshape(K, 6, len(levels), len(places), 3).mean(3)
+
+
+def _apart(first: Tensor, second: Tensor) -> Tensor:
+    """(N, M) distances, exactly 0 between equal points."""
+    return torch.cdist(first, second, compute_mode="donot_use_mm_for_euclid_dist")

@@ -26,7 +26,7 @@ INWARD = [n for n, level in enumerate(LEVELS) if level < -0.01]
 HERE = LEVELS.index(0.0)
 
 
-def wall_and_box(seed: int = 0) -> tuple[Evidence, torch.Tensor]:
+def wall_and_box(seed: int = 0, times: int = 1) -> tuple[Evidence, torch.Tensor]:
     """A box of 20 x 40 x 30 cm, 2 m before the camera, that is seen from its front (-x) alone: 1,000 points of it."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-0.5, 0.5, (1000, 2)) * [0.4, 0.3]
@@ -34,8 +34,8 @@ def wall_and_box(seed: int = 0) -> tuple[Evidence, torch.Tensor]:
     # Rest x is away from the camera, y to the left of the image, z up; the camera looks along its z.
     T = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 2.0], [0, 0, 0, 1]], dtype=float)
     center, size = torch.zeros(1, 3), torch.tensor([[0.2, 0.4, 0.3]])
-    cloud, pose = torch.from_numpy(points).float(), torch.from_numpy(T)[None].float()
-    return Evidence.of(cloud, torch.zeros(1000, dtype=torch.int64), pose, center, size, center + 0.3, size)
+    cloud, pose = torch.from_numpy(np.tile(points, (times, 1))).float(), torch.from_numpy(T)[None].float()
+    return Evidence.of(cloud, torch.zeros(len(cloud), dtype=torch.int64), pose, center, size, center + 0.3, size)
 
 
 def test_the_camera_sees_through_what_is_not_there() -> None:
@@ -49,6 +49,10 @@ def test_the_camera_sees_through_what_is_not_there() -> None:
     assert beside[left, -1] == 1.0
     assert before[left].max() == 0.0
     assert evidence.probes[0, 0, back].max() == 0.0  # all of it is hidden
+
+
+def test_points_that_come_several_times_tell_no_more() -> None:
+    assert torch.equal(wall_and_box()[0].probes, wall_and_box(times=3)[0].probes)
 
 
 def test_points_are_told_in_the_frame_of_their_part_in_diagonals() -> None:
