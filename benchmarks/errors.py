@@ -2,9 +2,9 @@
 
 Moving parts of unseen procedural objects, validation seeds, by how many of a cloud's points show them: rotation, IoU of
 posed boxes, and what that would be if one thing were known: where the box's faces are along each axis of the rest frame
-(x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known; and the
-root's rotation, with and without the objects that it is worst for. Errors against points are drawn as a picture. The
-last line is one JSON object.
+(x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known; and the root's
+rotation, with and without the objects that it is worst for, and how far its faces are off. Errors against points are
+drawn as a picture. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from artsim.sample import Sample
 
 Array = NDArray[np.float64]
 BINS = (0, 20, 100, 300, 2049)
+FACES = ("-x", "-y", "-z", "+x", "+y", "+z")
 
 
 @dataclass(frozen=True)
@@ -59,12 +60,13 @@ def main(options: Options) -> None:
     for category in options.categories:
         estimator = find_estimator(options.weights, category)
         samples = frozen_samples([category], options.objects, options.views, None, VALIDATION_SEEDS)
-        rows, roots = [], []
+        rows, roots, faces = [], [], []
         for sample in tqdm(samples, category, disable=None, leave=False):
             estimate = estimator(sample.points)
             if len(estimate.size) == len(sample.box_size):
                 rows += moving_parts(estimate, sample)
                 roots.append(metrics.rotation_error(estimate.rotation[0], true_poses(sample)[0][0]))
+                faces.append(root_faces(estimate, sample))
             else:
                 roots.append(np.array(metrics.FAILED["rotation_deg"]))
         every[category] = table = np.array([list(row.values()) for row in rows])
@@ -84,8 +86,13 @@ def main(options: Options) -> None:
                 print(f"{label:>10s}{len(own):7d}{shown}", flush=True)
         by_object = np.sort(np.reshape(roots, (options.objects, options.views)).mean(1))
         best = by_object[: -max(1, options.objects // 10)]
-        result[category]["root"] = {"rotation": round(by_object.mean(), 4), "best nine tenths": round(best.mean(), 4)}
+        off = dict(zip(FACES, np.quantile(faces, [0.5, 0.9], axis=0).T.round(2).tolist(), strict=True))
+        result[category]["root"] = {
+            "rotation": round(by_object.mean(), 4), "best nine tenths": round(best.mean(), 4), "faces": off,
+        }  # fmt: skip
         print(f"root: rotation {by_object.mean():.2f}, without the tenth of objects it is worst for {best.mean():.2f}")
+        shown = ", ".join(f"{face} {median:.1f} {most:.1f}" for face, (median, most) in off.items())
+        print(f"root: faces off by, % of the diagonal, median and nine tenths: {shown}")
     print("mean rotation in degrees, and IoU in % if what the column says were known")
     if options.picture is not None:
         draw(every, options.picture)
@@ -107,6 +114,15 @@ def moving_parts(estimate: Estimate, sample: Sample) -> list[dict[str, float]]:
         }
         for k in range(1, len(off))
     ]  # fmt: skip
+
+
+def root_faces(estimate: Estimate, sample: Sample) -> Array:
+    """(6,) how far the faces of the root's box are off, in % of the diagonal: :data:`FACES`."""
+    rotation, center = true_poses(sample)
+    apart = rotation[0].T @ (estimate.translation[0] - center[0])
+    half = 0.5 * (estimate.size[0] - sample.box_size[0])
+    off: Array = 100.0 * np.abs(np.concatenate([apart - half, apart + half])) / sample.diagonal
+    return off
 
 
 def known_axes(estimate: Estimate, sample: Sample) -> list[Array]:
