@@ -96,7 +96,6 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Esti
         boxes = None if settings.get("boxes") is None else Boxes(**settings["boxes"])
         if boxes is not None:
             boxes.load_state_dict(_under(tensors, "boxes."))
-            boxes.to(device)
         options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings["options"].items()}
         options["refine"] = RefineOptions(**options["refine"])
         return Estimator(

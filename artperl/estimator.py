@@ -235,10 +235,16 @@ def _evidence(
 ) -> tuple[Evidence, float]:
     """Evidence of one estimate, padded to that many parts, and its unit in metres."""
     T, K = estimate.T_camera_part, len(estimate.size)
-    center = np.einsum("kji,kj->ki", T[:, :3, :3], estimate.translation - T[:, :3, 3])
-    pose = (torch.from_numpy(values.astype(np.float32)) for values in (T, center, estimate.size))
+    at_rest = T, brought_to_rest(estimate.translation, T), estimate.size
+    pose = (torch.from_numpy(values.astype(np.float32)) for values in at_rest)
     evidence, unit = Evidence.of(observed.points[0], observed.part[0], *pose, *(boxes[:K] for boxes in expected))
     return evidence.padded(rows), float(unit)
+
+
+def brought_to_rest(posed: Array, T_camera_part: Array) -> Array:
+    """(K, 3) one posed point of each part, in the rest frame that its part carries (K, 4, 4)."""
+    rest: Array = np.einsum("kji,kj->ki", T_camera_part[:, :3, :3], posed - T_camera_part[:, :3, 3])
+    return rest
 
 
 def clean(points: Array) -> NDArray[np.int64]:

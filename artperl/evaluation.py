@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from artperl import metrics
 from artperl.categories import Parts, objects_of
-from artperl.estimator import Calibration, Estimate, Estimator
+from artperl.estimator import Calibration, Estimate, Estimator, brought_to_rest
 from artsim.errors import ArtsimError
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
@@ -308,7 +308,7 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
 
 def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array:
     """(K, 3) posed box centres brought to the estimated rest frame, about the middle of all boxes, as true ones are."""
-    center = np.einsum("kji,kj->ki", T_camera_part[:, :3, :3], translation - T_camera_part[:, :3, 3])
+    center = brought_to_rest(translation, T_camera_part)
     low, high = center - 0.5 * size, center + 0.5 * size
     middle: Array = 0.5 * (low.min(axis=0) + high.max(axis=0))
     return center - middle

@@ -36,7 +36,7 @@ class Evidence(Batch):
     Attributes
     ----------
     center, size : (B, P, 3) float
-        Boxes as the fitted reference has them.
+        Boxes as the fitted reference has them, widened to hold the points.
     valid : (B, P) bool
     points : (B, N, 3) float
         Carried to rest by the part that each is of.

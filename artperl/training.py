@@ -25,7 +25,7 @@ from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
 from artperl.benchmarks.artimage import real_train_objects
-from artperl.boxing import learn, record
+from artperl.box_training import learn, record
 from artperl.categories import arranged, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
 from artperl.data import batches, samples_from
@@ -243,20 +243,26 @@ class Training:
         )  # fmt: skip
         file = self.out / "boxes.safetensors"
         records = record(best, samples, options.box_views, file, stop, self.progress)
+        learnt = None
+        if records is not None:
+            learnt = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
+        self._stop_if(stop)
         self.done["boxes"] = options.box_views
-        if records is None:
-            tqdm.write("boxes: no estimate fits its view; they stay the references'")
-            return self._save()
-        boxes = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
-        moved = replace(best, boxes=boxes.half().float())
-        validation = self._unseen(options.validation_views, VALIDATION_SEEDS)
-        before, after = (evaluate(est, validation, self.progress) for est in (replace(best, boxes=None), moved))
+        if learnt is None:
+            tqdm.write("boxes: no estimate fits its view; they stay as they are")
+        else:
+            self._choose_boxes(best, replace(best, boxes=learnt.half().float()), board)  # as precise as files are
+        self._save()
+
+    def _choose_boxes(self, best: Estimator, moved: Estimator, board: SummaryWriter) -> None:
+        """Keep the estimator with other boxes if they are better on the frozen set of unseen objects."""
+        validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
+        before, after = (evaluate(estimator, validation, self.progress) for estimator in (best, moved))
         figures = summary(after)
         if mean_iou(after) > mean_iou(before):
             save_estimator(moved, self.out / "best", self._about({"validation": figures}))
         _write(board, "validation", _curves(figures), sum(self.done.values()))
         tqdm.write(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
-        self._save()
 
     def _stop_if(self, stop: Stop) -> None:
         if stop.asked:

@@ -84,19 +84,22 @@ def main(options: Options) -> None:
                 }
                 shown = "".join(f"{value:11.2f}" if n == 0 else f"{100 * value:11.1f}" for n, value in enumerate(mean))
                 print(f"{label:>10s}{len(own):7d}{shown}", flush=True)
-        by_object = np.sort(np.reshape(roots, (options.objects, options.views)).mean(1))
-        best = by_object[: -max(1, options.objects // 10)]
-        off = dict(zip(FACES, np.quantile(faces, [0.5, 0.9], axis=0).T.round(2).tolist(), strict=True))
-        result[category]["root"] = {
-            "rotation": round(by_object.mean(), 4), "best nine tenths": round(best.mean(), 4), "faces": off,
-        }  # fmt: skip
-        print(f"root: rotation {by_object.mean():.2f}, without the tenth of objects it is worst for {best.mean():.2f}")
-        shown = ", ".join(f"{face} {median:.1f} {most:.1f}" for face, (median, most) in off.items())
-        print(f"root: faces off by, % of the diagonal, median and nine tenths: {shown}")
+        result[category]["root"] = root_figures(np.reshape(roots, (options.objects, options.views)), np.array(faces))
     print("mean rotation in degrees, and IoU in % if what the column says were known")
     if options.picture is not None:
         draw(every, options.picture)
     print(json.dumps(result))
+
+
+def root_figures(rotation: Array, faces: Array) -> dict[str, Any]:
+    """Print and return how far roots are off: rotation (objects, views), degrees, faces (N, 6), % of diagonals."""
+    by_object = np.sort(rotation.mean(1))
+    best = by_object[: -max(1, len(by_object) // 10)]
+    print(f"root: rotation {by_object.mean():.2f}, without the tenth of objects it is worst for {best.mean():.2f}")
+    off = dict(zip(FACES, np.quantile(faces, [0.5, 0.9], axis=0).T.round(2).tolist(), strict=True))
+    shown = ", ".join(f"{face} {median:.1f} {most:.1f}" for face, (median, most) in off.items())
+    print(f"root: faces off by, % of the diagonal, median and nine tenths: {shown}")
+    return {"rotation": round(by_object.mean(), 4), "best nine tenths": round(best.mean(), 4), "faces": off}
 
 
 def moving_parts(estimate: Estimate, sample: Sample) -> list[dict[str, float]]:

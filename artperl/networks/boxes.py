@@ -85,7 +85,7 @@ class Boxes(nn.Module):
             (evidence.perceived_size + _THIN).log() - log_size,
             evidence.count[..., None].sqrt(),
             evidence.eye,
-            torch.eye(self.num_rows, device=size.device)[:P].expand(len(size), -1, -1),
+            torch.eye(self.num_rows, device=size.device).expand(len(size), -1, -1),
         ]
         return torch.cat(described, dim=-1)
 

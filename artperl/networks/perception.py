@@ -56,12 +56,17 @@ class Perceived(Batch):
     @property
     def part_probability(self) -> Tensor:
         """(B, N, P) of each point to belong to each of the parts that the object has."""
-        return self.part_logits.masked_fill(~self.valid[:, None], -torch.inf).softmax(-1)
+        return self._possible_logits.softmax(-1)
 
     @property
     def part(self) -> Tensor:
         """(B, N) most likely part of each point, among those that the object has."""
-        return self.part_logits.masked_fill(~self.valid[:, None], -torch.inf).argmax(-1)
+        return self._possible_logits.argmax(-1)
+
+    @property
+    def _possible_logits(self) -> Tensor:
+        """(B, N, P) without hope for parts that the object does not have."""
+        return self.part_logits.masked_fill(~self.valid[:, None], -torch.inf)
 
 
 class Perception(nn.Module):

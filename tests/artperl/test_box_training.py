@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 
-from artperl import boxing
+from artperl import box_training
 from artperl.batch import concatenate
 from artperl.boxes import iou_aligned
 from artperl.checkpoint import load_estimator
@@ -112,11 +112,11 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
     evidence = [wall_and_box(seed)[0] for seed in range(8)]
     unit = float(np.linalg.norm([0.2, 0.4, 0.3]))
     true_size, true_center = torch.tensor([[[0.22, 0.4, 0.3]]]) / unit, torch.tensor([[[0.01, 0.0, 0.0]]]) / unit
-    records = concatenate([boxing.Records(e, true_center, true_size) for e in evidence])
-    boxes = boxing.learn(records, 1, 150, 0, progress=False)
+    records = concatenate([box_training.Records(e, true_center, true_size) for e in evidence])
+    boxes = box_training.learn(records, 1, 150, 0, progress=False)
     center, size = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
     assert iou_aligned(center, size, true_center, true_size).min() > 0.97
-    again = boxing.learn(records, 1, 150, 0, progress=False)
+    again = box_training.learn(records, 1, 150, 0, progress=False)
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
 
 
@@ -127,7 +127,7 @@ def test_recording_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     )  # fmt: skip
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
     Training(options, whole, workers=0, progress=False).run()
-    examined, calls = boxing._examined, []
+    examined, calls = box_training._examined, []
 
     def interrupted(*arguments: Any) -> Any:
         calls.append(1)
@@ -135,7 +135,7 @@ def test_recording_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
             os.kill(os.getpid(), signal.SIGINT)
         return examined(*arguments)
 
-    monkeypatch.setattr(boxing, "_examined", interrupted)
+    monkeypatch.setattr(box_training, "_examined", interrupted)
     with pytest.raises(KeyboardInterrupt):
         Training(options, stopped, workers=0, progress=False).run()
     Training(options, stopped, workers=0, progress=False).run()

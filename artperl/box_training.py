@@ -17,7 +17,7 @@ from tqdm import tqdm
 from artperl.batch import Batch, concatenate
 from artperl.checkpoint import save_tensors
 from artperl.data import Source
-from artperl.estimator import Estimator
+from artperl.estimator import Estimator, brought_to_rest
 from artperl.evaluation import true_poses
 from artperl.evidence import Evidence
 from artperl.networks.boxes import Boxes, box_losses
@@ -93,8 +93,7 @@ def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
     K = len(sample.box_size)
     if estimate.residual > _FITS or len(estimate.size) != K:
         return []
-    T = estimate.T_camera_part
-    center = np.einsum("kji,kj->ki", T[:, :3, :3], true_poses(sample)[1] - T[:, :3, 3])
+    center = brought_to_rest(true_poses(sample)[1], estimate.T_camera_part)
     padded = np.zeros((2, 1, evidence.valid.shape[1], 3))
     padded[:, 0, :K] = center / unit, sample.box_size / unit
     return [Records(evidence, *torch.from_numpy(padded)).to(torch.float16)]
