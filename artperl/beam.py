@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from artperl.batch import Batch
+from artperl.batch import Batch, concatenate
 from artperl.matching import Target, match
 from artperl.pose import Posed, Theta, Trees, pose_parts
 from artperl.refine import RefineOptions, refine, robust
@@ -32,6 +32,8 @@ _PART_POINTS = 64
 """Points of a part that are compared with it."""
 _OUTLINE_RAYS = 256
 """Points of the cloud that tell its outline."""
+_SAME = 0.1
+"""Radians and diagonals by which what hangs from a chain may lie elsewhere after half turns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +92,41 @@ def beam(
         best = cost.argsort()[:width]
         theta, cost = theta[best], cost[best]
     return theta[:count]
+
+
+def half_turned(shapes: Shapes, theta: Theta) -> Theta | None:
+    """Other states of a reference in which all but two of its parts lie where they do; None if there are none.
+
+    Of three joints in a row, the first and the last turn by half, and the one between bends the other way. Where the
+    axes meet as in a shoulder or a wrist, what hangs from them stays, and only the shape of two round links differs.
+
+    Parameters
+    ----------
+    shapes : Shapes
+        One reference.
+    theta : Theta
+        Of one row.
+    """
+    trees = shapes.trees
+    turns = (trees.free[0] & (trees.turn[0] != 0.0) & (trees.slide[0] == 0.0)).tolist()
+    parent, found, before = trees.parent[0].tolist(), [], _posed(shapes, theta)
+    for last in range(len(parent)):
+        middle, first = parent[last], parent[parent[last]]
+        if not (turns[last] and turns[middle] and turns[first]):
+            continue
+        state = theta.state.clone()
+        state[:, middle] = 2.0 * trees.rest[:, middle] - state[:, middle]
+        for joint in (first, last):
+            back = state[:, joint] + torch.pi > trees.upper[:, joint]
+            state[:, joint] += torch.where(back, -torch.pi, torch.pi)
+        other = replace(theta, state=state)
+        after = _posed(shapes, other)
+        twist = (after.rotation - before.rotation)[:, last].abs().amax()
+        apart = torch.linalg.vector_norm((after.center - before.center)[:, last]) / shapes.diagonal
+        within = ((state >= trees.lower) & (state <= trees.upper))[:, [first, middle, last]].all()
+        if bool(within & (twist < _SAME) & (apart < _SAME)):
+            found.append(other)
+    return concatenate(found) if found else None
 
 
 def _part(shapes: Shapes, part: int, cloud: Tensor, probability: Tensor) -> _Part:

@@ -29,8 +29,10 @@ from artsim.errors import ArtsimError
 Array = NDArray[np.float64]
 
 _NEIGHBOURS = 8
+"""Of a point, that tell how far away neighbours usually are."""
+_FEW_NEIGHBOURS = 3
 _OUTLIER = 6.0
-"""A point whose neighbours are that many times as far away as is usual is an outlier."""
+"""A point with fewer neighbours than that within so many times the usual distance is an outlier: thin legs are not."""
 _CLEANED = 4096
 """Points that are looked at for outliers."""
 _ENOUGH_TO_WIDEN = 32
@@ -39,6 +41,8 @@ _OUTERMOST = 0.004
 """Of a cloud's points, that lie too far out on each side of a part to say how large it is."""
 _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
+_BOX_POINTS = 2048
+"""Points by which faces of boxes are looked for."""
 _FEWEST = 8
 """Points below which there is nothing to fit."""
 
@@ -162,11 +166,11 @@ class Estimator:
             When there is no object to be seen in the cloud.
         """
         clock = Clock()
-        estimate, observed, expected = self._fit(points, clock)
+        estimate, expected = self._fit(points, clock)
         if self.boxes is None:
             return estimate
         with clock("boxes"):
-            evidence, unit = _evidence(estimate, observed, expected, self.boxes.num_rows)
+            evidence, unit = _evidence(points, estimate, expected, self.boxes.num_rows)
             boxes = self.boxes(evidence.to(self.perception.device))
             center, size = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
             T = estimate.T_camera_part
@@ -176,11 +180,11 @@ class Estimator:
     @torch.inference_mode()
     def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
-        estimate, observed, expected = self._fit(points, Clock())
-        return estimate, *_evidence(estimate, observed, expected, self.perception.num_rows)
+        estimate, expected = self._fit(points, Clock())
+        return estimate, *_evidence(points, estimate, expected, self.perception.num_rows)
 
-    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, Observed, tuple[Tensor, Tensor]]:
-        """The estimate whose boxes are the reference's, its labelled points, and perceived boxes (P, 3), metres."""
+    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, tuple[Tensor, Tensor]]:
+        """The estimate whose boxes are the reference's, and perceived boxes (P, 3), metres."""
         options = self.options
         points = np.asarray(points, dtype=np.float64)
         with clock("clean"):
@@ -194,7 +198,7 @@ class Estimator:
         with clock("report"):
             metres = (perceived.log_diagonal.exp() * clouds.radius).cpu()
             expected = perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres
-            return self._report(points, good, found, clock), found.observed, expected
+            return self._report(points, good, found, clock), expected
 
     def _report(self, points: Array, good: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
         """Everything about one fitted reference, as arrays."""
@@ -231,13 +235,16 @@ class Estimator:
 
 
 def _evidence(
-    estimate: Estimate, observed: Observed, expected: tuple[Tensor, Tensor], rows: int
+    points: ArrayLike, estimate: Estimate, expected: tuple[Tensor, Tensor], rows: int
 ) -> tuple[Evidence, float]:
     """Evidence of one estimate, padded to that many parts, and its unit in metres."""
     T, K = estimate.T_camera_part, len(estimate.size)
-    at_rest = T, brought_to_rest(estimate.translation, T), estimate.size
-    pose = (torch.from_numpy(values.astype(np.float32)) for values in at_rest)
-    evidence, unit = Evidence.of(observed.points[0], observed.part[0], *pose, *(boxes[:K] for boxes in expected))
+    good = np.flatnonzero(estimate.part >= 0)
+    good = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+    arrays = np.asarray(points)[good], T, brought_to_rest(estimate.translation, T), estimate.size
+    cloud, *fitted = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
+    part = torch.from_numpy(estimate.part[good])
+    evidence, unit = Evidence.of(cloud, part, *fitted, *(boxes[:K] for boxes in expected))
     return evidence.padded(rows), float(unit)
 
 
@@ -262,7 +269,8 @@ def clean(points: Array) -> NDArray[np.int64]:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = cKDTree(points[known])
         usual = np.median(tree.query(points[known[:1024]], _NEIGHBOURS + 1)[0][:, -1])
-        apart = tree.query(points[good], _NEIGHBOURS + 1, distance_upper_bound=max(_OUTLIER * usual, 1e-9))[0][:, -1]
+        within = max(_OUTLIER * usual, 1e-9)
+        apart = tree.query(points[good], _FEW_NEIGHBOURS + 1, distance_upper_bound=within)[0][:, -1]
         good = good[np.isfinite(apart)]
     if len(good) < _FEWEST or not np.ptp(points[good], axis=0).any():
         raise ArtsimError(

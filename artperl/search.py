@@ -17,7 +17,7 @@ from torch import Tensor
 
 from artperl.actions import expected_action
 from artperl.batch import concatenate
-from artperl.beam import beam
+from artperl.beam import beam, half_turned
 from artperl.data import Clouds
 from artperl.embedding import box_embedding
 from artperl.fitting import Fitting, FittingOptions
@@ -145,6 +145,11 @@ def find(
     found = None
     if options.perceived_start:
         found = _settle(shapes, observed, perceived, [theta], rows.tolist(), base, options, clock)
+        others = half_turned(found.shapes, found.refined.theta) if options.beam else None
+        if others is not None:
+            many, rows_again = found.shapes.repeat(len(others)), [found.reference] * len(others)
+            turned = _settle(many, observed, perceived, [others], rows_again, base, options, clock)
+            found = min(found, turned, key=lambda one: one.residual)
         if found.residual <= options.retry_residual:
             return found
     with clock("start"):

@@ -99,10 +99,11 @@ class Training:
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
         if options.dataset is not None and (options.real or options.files):
             raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
-        objects = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts)
+        self.procedural = objects_of(
+            options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts
+        )
         self.given = _given(options)
-        rows = options.max_parts if options.files else None
-        self.base = by_boxes(ShapeBase.of([*objects, *self.given], options.reference_points, rows))
+        self.base = self._base_of([*self.procedural, *self.given])
         self.device = _device(options.device)
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
@@ -141,6 +142,11 @@ class Training:
         agent = self.agent if self.done["agent"] or self._agent_known else None
         options = EstimatorOptions(num_points=self.options.num_points)
         return Estimator(self.perception, self.base, agent, options, boxes=self.boxes)
+
+    def _base_of(self, objects: list[ArticulatedObject]) -> ShapeBase:
+        options = self.options
+        rows = options.max_parts if options.files else None
+        return by_boxes(ShapeBase.of(objects, options.reference_points, rows))
 
     def _take_over(self, estimator: Estimator) -> None:
         """Begin with the networks of another estimator."""
@@ -236,6 +242,8 @@ class Training:
         if not (self.out / "best").is_dir():
             self._validate(board, 0)
         best = load_estimator(self.out / "best", self.device)
+        if self.procedural and self.given:  # a given object is its own best reference, as none will be in use
+            best = replace(best, base=self._base_of(self.procedural))
         sample = replace(options.sample, num_points=options.num_points if options.dataset else _TEST_POINTS)
         samples = samples_from(
             options.dataset, options.categories, sample, options.seed + 2, 2, self.perception.num_rows, options.parts,
@@ -255,12 +263,17 @@ class Training:
         self._save()
 
     def _choose_boxes(self, best: Estimator, moved: Estimator, board: SummaryWriter) -> None:
-        """Keep the estimator with other boxes if they are better on the frozen set of unseen objects."""
-        validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
+        """Keep the estimator with other boxes if they are better on unseen objects, and on given ones."""
+        options = self.options
+        validation = self._unseen(options.validation_views, VALIDATION_SEEDS)
+        if self.procedural and self.given:
+            sample = replace(options.sample, num_points=_TEST_POINTS)
+            validation += samples_of(self.given, -(-len(validation) // len(self.given)), sample, VALIDATION_SEEDS)
         before, after = (evaluate(estimator, validation, self.progress) for estimator in (best, moved))
         figures = summary(after)
         if mean_iou(after) > mean_iou(before):
-            save_estimator(moved, self.out / "best", self._about({"validation": figures}))
+            kept = replace(load_estimator(self.out / "best", self.device), boxes=moved.boxes)
+            save_estimator(kept, self.out / "best", self._about({"validation": figures}))
         _write(board, "validation", _curves(figures), sum(self.done.values()))
         tqdm.write(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
 

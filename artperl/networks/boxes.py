@@ -5,89 +5,71 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from artperl.evidence import LEVELS, QUANTILES, Evidence
+from artperl.evidence import NUM_CANDIDATES, Evidence
 
-_THIN = 0.002
-"""Half-size below which faces are no longer measured in half-sizes of their part, in diagonals."""
+_THIN = 0.004
+"""Half-size below which places are no longer measured in half-sizes of their part, in diagonals."""
 _FAR = 3.0
-"""Half-sizes beyond which places are all alike."""
-_STEP = 0.2
-"""Half-sizes that an output of 1 moves a face by."""
+"""Half-sizes, or tenths of the diagonal, beyond which places are all alike."""
+_STEP = 0.1
+"""Half-sizes that an output of 1 moves a face by, after candidates were weighed."""
+_TRUST = 2.0
+"""Logarithm of how much more likely than others the reference is at first."""
 
 
 class Boxes(nn.Module):
-    """Moves the six faces of each part's box.
+    """Weighs, for each face of each part's box, the candidates for where it is, and moves their mean a little.
+
+    Every face goes through the same layers, twice: alone; and with its part, its opposite face, the same face of other
+    parts, and of the root.
 
     Parameters
     ----------
     num_rows : int
         Rows for parts.
     width : int
-        Channels for points; parts have twice as many.
+        Channels.
     """
 
-    def __init__(self, num_rows: int, width: int = 18):
+    def __init__(self, num_rows: int, width: int = 40):
         super().__init__()
         self.num_rows, self.width = num_rows, width
-        features = 2 * width
-        self.point = nn.Sequential(
-            nn.Linear(11, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, width)
-        )
-        self.face = nn.Sequential(nn.Linear(3 * len(LEVELS) + 6, 32), nn.ReLU(), nn.Linear(32, 8), nn.ReLU())
-        described = 2 * width + 6 * 8 + 3 * len(QUANTILES) + 22 + num_rows
-        self.part = nn.Sequential(nn.Linear(described, features), nn.ReLU(), nn.Linear(features, features), nn.ReLU())
-        moves = nn.Linear(features, 6)
-        nn.init.zeros_(moves.weight)
-        nn.init.zeros_(moves.bias)
-        self.faces = nn.Sequential(nn.Linear(4 * features, features), nn.ReLU(), moves)
+        described = 2 * NUM_CANDIDATES + 8 + 6 + num_rows
+        self.alone = nn.Sequential(nn.Linear(described, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
+        self.among = nn.Sequential(nn.Linear(6 * width, width), nn.ReLU(), nn.Linear(width, NUM_CANDIDATES + 1))
+        self.trust = nn.Parameter(_TRUST * (torch.arange(NUM_CANDIDATES) == 0))
 
     def forward(self, evidence: Evidence) -> tuple[Tensor, Tensor]:
         """Centres and sizes (B, P, 3) of the boxes, in the rest frame, in diagonals."""
-        center, size = evidence.center, evidence.size
-        part = self.part(self._described(evidence))
-        valid = evidence.valid[..., None]
-        mean = (part * valid).sum(1, keepdim=True) / valid.sum(1, keepdim=True)
-        most = part.masked_fill(~valid, 0.0).amax(1, keepdim=True)
-        others = [values.expand_as(part) for values in (mean, most, part[:, :1])]
-        half = 0.5 * size
-        move = _STEP * self.faces(torch.cat([part, *others], dim=-1)) * (half + _THIN).repeat(1, 1, 2)
-        low, high = center - half + move[..., :3], center + half + move[..., 3:]
+        valid = evidence.valid[..., None, None]
+        face = self.alone(self._described(evidence)) * valid
+        same = [face.sum(1, keepdim=True) / valid.sum(1, keepdim=True), face.amax(1, keepdim=True), face[:, :1]]
+        others = [face.roll(3, dims=2), face.mean(2, keepdim=True), *same]
+        score = self.among(torch.cat([face, *(values.expand_as(face) for values in others)], dim=-1))
+        weight = (score[..., :-1] + self.trust).softmax(-1)
+        half = 0.5 * evidence.size
+        out = (weight * evidence.candidates).sum(-1) + _STEP * score[..., -1] * (half + _THIN).repeat(1, 1, 2)
+        low, high = evidence.center - half - out[..., :3], evidence.center + half + out[..., 3:]
         return 0.5 * (low + high), (high - low).clamp(min=0.0)
 
     def _described(self, evidence: Evidence) -> Tensor:
-        """(B, P, C) features of each part."""
-        center, size = evidence.center, evidence.size
-        P = size.shape[1]
-        unit = 0.5 * size + _THIN
-        offset = evidence.points[:, None] - center[:, :, None]
-        local = (offset / unit[:, :, None]).clamp(-_FAR, _FAR)
-        own = evidence.part[:, None] == torch.arange(P, device=size.device)[:, None]
-        of_root = (evidence.part == 0)[:, None].expand_as(own)
-        flags = torch.stack([own, of_root], dim=-1).to(size.dtype)
-        ray = evidence.ray[:, None].expand_as(offset)
-        seen = self.point(torch.cat([local, offset, flags, ray], dim=-1))
-        # No part is without points of its own here: a floor stands for none.
-        pooled = [seen.masked_fill(~mask[..., None], -_FAR).amax(2) for mask in (own, ~own)]
-        face = torch.eye(6, device=size.device).expand(*size.shape[:2], -1, -1)
-        faces = self.face(torch.cat([evidence.probes.flatten(3), face], dim=-1))
-        quantiles = ((evidence.quantiles - center[:, :, None]) / unit[:, :, None]).clamp(-_FAR, _FAR)
-        expected = evidence.perceived_center - center
+        """(B, P, 6, C) features of each face."""
+        size, candidates = evidence.size, evidence.candidates
+        unit = (0.5 * size + _THIN).repeat(1, 1, 2)[..., None]
         log_size = (size + _THIN).log()
-        described = [
-            *pooled,
-            faces.flatten(2),
-            quantiles.flatten(2),
-            log_size,
-            center - center[:, :1],
-            log_size[:, :1].expand_as(size),
-            (expected / unit).clamp(-_FAR, _FAR),
-            5.0 * expected,
-            (evidence.perceived_size + _THIN).log() - log_size,
-            evidence.count[..., None].sqrt(),
-            evidence.eye,
-            torch.eye(self.num_rows, device=size.device).expand(len(size), -1, -1),
+        along = [
+            log_size, log_size.roll(-1, dims=-1), log_size.roll(-2, dims=-1), log_size[:, :1].expand_as(size),
+            (evidence.perceived_size + _THIN).log() - log_size, evidence.center - evidence.center[:, :1],
+            evidence.share.sqrt()[..., None].expand_as(size),
+        ]  # fmt: skip
+        known = [
+            (10.0 * candidates).clamp(-_FAR, _FAR),
+            (candidates / unit).clamp(-_FAR, _FAR),
+            torch.stack([values.repeat(1, 1, 2) for values in along] + [evidence.facing], dim=-1),
+            torch.eye(6, device=size.device).expand(*size.shape[:2], -1, -1),
+            torch.eye(self.num_rows, device=size.device)[:, None].expand(len(size), -1, 6, -1),
         ]
-        return torch.cat(described, dim=-1)
+        return torch.cat(known, dim=-1)
 
 
 def box_losses(center: Tensor, size: Tensor, true_center: Tensor, true_size: Tensor, valid: Tensor) -> Tensor:

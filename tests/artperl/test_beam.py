@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+import pybullet_data
 import pytest
 import torch
 from torch import Tensor
 
 import artsim
-from artperl.beam import _from_the_root_down, _grid, beam
+from artperl.beam import _from_the_root_down, _grid, beam, half_turned
 from artperl.pose import Theta, Trees, pose_parts
 from artperl.refine import RefineOptions, refine
 from artperl.rotations import rotation_from_vector
@@ -119,3 +121,26 @@ def test_a_part_as_an_object_of_its_own_is_where_it_is_in_the_whole() -> None:
     )  # fmt: skip
     own = pose_parts(alone.trees, placed, alone.box_center).points(alone.points, alone.box_center)
     torch.testing.assert_close(own[:, 0], posed.points(shapes.points, shapes.box_center)[:, 2])
+
+
+def test_half_turns_leave_what_hangs_from_a_shoulder_where_it_is() -> None:
+    arm = artsim.load(Path(pybullet_data.getDataPath(), "franka_panda", "panda.urdf"))
+    shapes = Shapes.from_objects([arm], 64)
+    rest = Theta.at_rest(shapes.trees)
+    state = rest.state.clone()
+    state[:, 1:7] = torch.tensor([0.5, 0.8, -1.0, -1.5, 0.4, 2.0])
+    theta = replace(rest, state=state)
+    others = half_turned(shapes, theta)
+    assert others is not None
+    assert torch.allclose((others.state - state)[0, 1:4], torch.tensor([-np.pi, -1.6, np.pi], dtype=state.dtype))
+    before, after = (pose_parts(shapes.trees, values, shapes.box_center) for values in (theta, others[:1]))
+    stays = torch.isclose(before.rotation, after.rotation, atol=1e-5).all(-1).all(-1)[0]
+    assert stays.tolist() == [True, False, False, *[True] * (len(stays) - 3)]
+    assert torch.allclose(before.center[0, stays], after.center[0, stays], atol=1e-5)
+
+
+def test_limits_and_axes_that_do_not_meet_forbid_half_turns() -> None:
+    shapes, true, _, _ = view(7)
+    assert half_turned(shapes, true) is None
+    laptop = Shapes.from_objects([artsim.make("laptop", 0)], 64)
+    assert half_turned(laptop, Theta.at_rest(laptop.trees)) is None

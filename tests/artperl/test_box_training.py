@@ -11,22 +11,32 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
+import artsim
 from artperl import box_training
 from artperl.batch import concatenate
 from artperl.boxes import iou_aligned
 from artperl.checkpoint import load_estimator
-from artperl.evidence import LEVELS, NUM_POINTS, QUANTILES, Evidence
+from artperl.estimator import Estimator
+from artperl.evidence import SHARES, Evidence
 from artperl.networks.boxes import Boxes, box_losses
 from artperl.settings import TrainOptions
 from artperl.training import Training
 
-OUTWARD = [n for n, level in enumerate(LEVELS) if level > 0.01]
-INWARD = [n for n, level in enumerate(LEVELS) if level < -0.01]
-HERE = LEVELS.index(0.0)
+SIGNS = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+"""Of the faces' outward normals."""
+PERCEIVED = len(SHARES) + 2
+"""The candidate that perception gives; those of all points and of the size come before and after it."""
+
+STAGE = TrainOptions(
+    base_objects=3, reference_points=48, perception_steps=0, agent_rollouts=0, box_views=4, box_steps=3,
+    test_objects=2, foreign_categories=1, validation_views=1, test_views=1, start_from="laptop",
+)  # fmt: skip
+"""Nothing but the stage for boxes."""
 
 
-def wall_and_box(seed: int = 0, times: int = 1) -> tuple[Evidence, torch.Tensor]:
+def wall_and_box(seed: int = 0) -> tuple[Evidence, torch.Tensor]:
     """A box of 20 x 40 x 30 cm, 2 m before the camera, that is seen from its front (-x) alone: 1,000 points of it."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-0.5, 0.5, (1000, 2)) * [0.4, 0.3]
@@ -34,59 +44,76 @@ def wall_and_box(seed: int = 0, times: int = 1) -> tuple[Evidence, torch.Tensor]
     # Rest x is away from the camera, y to the left of the image, z up; the camera looks along its z.
     T = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 2.0], [0, 0, 0, 1]], dtype=float)
     center, size = torch.zeros(1, 3), torch.tensor([[0.2, 0.4, 0.3]])
-    cloud, pose = torch.from_numpy(np.tile(points, (times, 1))).float(), torch.from_numpy(T)[None].float()
-    return Evidence.of(cloud, torch.zeros(len(cloud), dtype=torch.int64), pose, center, size, center + 0.3, size)
+    cloud, pose = torch.from_numpy(points).float(), torch.from_numpy(T)[None].float()
+    return Evidence.of(cloud, torch.zeros(len(cloud), dtype=torch.int64), pose, center, size, center + 0.3, 1.1 * size)
 
 
-def test_the_camera_sees_through_what_is_not_there() -> None:
+def places(evidence: Evidence, candidate: int) -> NDArray[np.float64]:
+    """(K, 6) coordinates of the faces by one kind of candidate."""
+    face = torch.cat([0.5 * evidence.size - evidence.center, 0.5 * evidence.size + evidence.center], dim=-1)
+    found: NDArray[np.float64] = (face + evidence.candidates[..., candidate])[0].double().numpy() * SIGNS
+    return found
+
+
+def test_points_say_how_far_out_each_face_lies_in_the_frame_of_its_part() -> None:
     evidence, unit = wall_and_box()
     assert float(unit) == pytest.approx(np.linalg.norm([0.2, 0.4, 0.3]))
-    before, beside, on = evidence.probes[0, 0].unbind(-1)
-    front, left, back = 0, 4, 3
-    assert before[front, OUTWARD].min() == 1.0
-    assert on[front, HERE] == 1.0
-    assert before[front, INWARD].max() == on[front, INWARD].max() == 0.0  # hidden: nobody knows
-    assert beside[left, -1] == 1.0
-    assert before[left].max() == 0.0
-    assert evidence.probes[0, 0, back].max() == 0.0  # all of it is hidden
-
-
-def test_points_that_come_several_times_tell_no_more() -> None:
-    assert torch.equal(wall_and_box()[0].probes, wall_and_box(times=3)[0].probes)
-
-
-def test_points_are_told_in_the_frame_of_their_part_in_diagonals() -> None:
-    evidence, unit = wall_and_box()
-    assert evidence.points.shape == (1, NUM_POINTS, 3)
-    assert torch.allclose(evidence.points[..., 0] * unit, torch.tensor(-0.1), atol=1e-6)
-    expected = torch.tensor([[q - 0.5] for q in QUANTILES]) * torch.tensor([0.4, 0.3])
-    assert torch.allclose(evidence.quantiles[0, 0, :, 1:] * unit, expected, atol=0.02)
-    assert torch.allclose(evidence.eye[0, 0], torch.tensor([-1.0, 0.0, 0.0]), atol=1e-6)
-    assert (evidence.ray[..., 0] > 0.9).all()
-    assert float(evidence.count) == 1.0
+    for n, share in enumerate(SHARES):
+        low, high = places(evidence, 1 + n).reshape(2, 3) * float(unit)
+        assert np.allclose(low[1:], (share - 0.5) * np.array([0.4, 0.3]), atol=0.02)
+        assert np.allclose(high[1:], (0.5 - share) * np.array([0.4, 0.3]), atol=0.02)
+        assert low[0] == pytest.approx(-0.1)
+        assert high[0] == pytest.approx(-0.1)  # the back is not seen
     # Perception's frame may have another origin: the root's boxes lie on each other.
-    assert torch.allclose(evidence.perceived_center, evidence.center)
+    expected = np.array([[-0.11, -0.22, -0.165, 0.11, 0.22, 0.165]]) / float(unit)
+    assert np.allclose(places(evidence, PERCEIVED), expected)
+    # As large as perceived, from what is seen of the front.
+    assert places(evidence, PERCEIVED + 1)[0, 3] * float(unit) == pytest.approx(0.12)
+    assert places(evidence, PERCEIVED + 2)[0, 3] * float(unit) == pytest.approx(0.1)
+    assert torch.allclose(evidence.facing[0, 0], torch.tensor([1.0, 0, 0, -1.0, 0, 0]), atol=1e-6)
+    assert float(evidence.share) == 1.0
 
 
-def test_a_network_that_has_learnt_nothing_leaves_boxes_as_they_are() -> None:
+def test_what_siblings_and_the_root_show_are_candidates() -> None:
+    """A root and three drawers, all with their frames at the camera; the last one is not seen."""
+    rng = np.random.default_rng(0)
+    reach = np.array([0.5, 0.3, 0.4])
+    part = np.repeat([0, 1, 2], 400)
+    points = rng.uniform(-1.0, 1.0, (1200, 3)) * reach[part, None]
+    points[::400] = reach[:, None]  # each part's outermost corner
+    center, size = torch.zeros(4, 3), torch.full((4, 3), 2.0)
+    poses = torch.eye(4).expand(4, -1, -1)
+    evidence, unit = Evidence.of(
+        torch.from_numpy(points).float(), torch.from_numpy(part), poses, center, size, center, size
+    )
+    everywhere, siblings, root = (places(evidence, n)[:, 3:] * float(unit) for n in (PERCEIVED - 1, -2, -1))
+    assert np.allclose(everywhere, 0.5, atol=1e-6)
+    assert np.allclose(root, 0.5, atol=1e-6)
+    assert np.allclose(siblings, np.array([0.4, 0.4, 0.3, 0.4])[:, None], atol=1e-6)
+    own = places(evidence, 1)[:, 3:] * float(unit)
+    assert np.allclose(own, np.array([0.5, 0.3, 0.4, 1.0])[:, None], atol=1e-6)  # unseen: its reference's faces
+    assert evidence.share[0].tolist() == pytest.approx([1 / 3, 1 / 3, 1 / 3, 0.0])
+
+
+def test_a_face_lies_where_all_candidates_say() -> None:
     evidence, _ = wall_and_box()
-    center, size = Boxes(3)(evidence.padded(3))
-    assert torch.allclose(center[:, :1], evidence.center)
-    assert torch.allclose(size[:, :1], evidence.size)
+    agreed = replace(evidence, candidates=torch.full_like(evidence.candidates, 0.03))
+    with torch.no_grad():
+        boxes = Boxes(3)
+        boxes.among[-1].weight[-1], boxes.among[-1].bias[-1] = 0.0, 0.0  # no more moves
+        center, size = boxes(agreed.padded(3))
+    assert torch.allclose(center[:, :1], evidence.center, atol=1e-6)
+    assert torch.allclose(size[:, :1], evidence.size + 0.06)
 
 
 def test_rows_without_a_part_do_not_matter() -> None:
     torch.manual_seed(0)
     boxes, (evidence, _) = Boxes(3), wall_and_box()
-    with torch.no_grad():
-        for values in boxes.faces.parameters():
-            values.normal_()
     padded = evidence.padded(3)
-    dirty = replace(padded, center=padded.center.clone(), probes=padded.probes.clone())
-    dirty.center[:, 1:], dirty.probes[:, 1:] = 7.0, 1.0
+    dirty = replace(padded, center=padded.center.clone(), candidates=padded.candidates.clone())
+    dirty.center[:, 1:], dirty.candidates[:, 1:] = 7.0, 1.0
     for clean_values, dirty_values in zip(boxes(padded), boxes(dirty), strict=True):
         assert torch.equal(clean_values[:, 0], dirty_values[:, 0])
-        assert not torch.allclose(clean_values[:, 0], torch.zeros(3))
 
 
 def test_the_loss_is_what_boxes_do_not_share_and_how_far_faces_are_off() -> None:
@@ -97,7 +124,7 @@ def test_the_loss_is_what_boxes_do_not_share_and_how_far_faces_are_off() -> None
     losses = box_losses(center, size, true_center, true_size, valid)
     shared = iou_aligned(center, size, true_center, true_size)
     faces = [
-        (c + sign * 0.5 * s - tc - sign * 0.5 * ts).abs() / (0.5 * ts + 0.002)
+        (c + sign * 0.5 * s - tc - sign * 0.5 * ts).abs() / (0.5 * ts + 0.004)
         for sign in (-1, 1)
         for c, s, tc, ts in [(center, size, true_center, true_size)]
     ]
@@ -121,12 +148,8 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
 
 
 def test_recording_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    options = TrainOptions(
-        base_objects=3, reference_points=48, perception_steps=0, agent_rollouts=0, box_views=4, box_steps=3,
-        test_objects=2, foreign_categories=1, validation_views=1, test_views=1, start_from="laptop",
-    )  # fmt: skip
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
-    Training(options, whole, workers=0, progress=False).run()
+    Training(STAGE, whole, workers=0, progress=False).run()
     examined, calls = box_training._examined, []
 
     def interrupted(*arguments: Any) -> Any:
@@ -137,12 +160,33 @@ def test_recording_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(box_training, "_examined", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        Training(options, stopped, workers=0, progress=False).run()
-    Training(options, stopped, workers=0, progress=False).run()
+        Training(STAGE, stopped, workers=0, progress=False).run()
+    Training(STAGE, stopped, workers=0, progress=False).run()
     assert len(calls) == 4
     assert (whole / "boxes.safetensors").read_bytes() == (stopped / "boxes.safetensors").read_bytes()
     weights = [folder / "best" / "weights.safetensors" for folder in (whole, stopped)]
     assert weights[0].read_bytes() == weights[1].read_bytes()
+
+
+def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Given objects are in the base; in use, those that are seen will not be."""
+    own = artsim.make("laptop", 7)
+    monkeypatch.setattr("artperl.training._given", lambda options: [own])
+    training = Training(replace(STAGE, box_views=2), tmp_path, workers=0, progress=False)
+    estimators = []
+
+    def watched(estimator: Estimator, *arguments: Any) -> Any:
+        estimators.append(estimator)
+        return box_training.record(estimator, *arguments)
+
+    monkeypatch.setattr("artperl.training.record", watched)
+    training.run()
+    (learnt_from,) = estimators
+    assert own.object_id not in learnt_from.base.object_ids
+    assert len(learnt_from.base) == STAGE.base_objects
+    assert own.object_id in load_estimator(tmp_path / "best").base.object_ids
 
 
 def test_a_shipped_estimator_moves_faces_and_nothing_else() -> None:

@@ -161,6 +161,12 @@ def test_outliers_are_left_out_and_the_object_is_not() -> None:
     assert len(kept) > 2990
 
 
+def test_a_thin_leg_of_a_few_points_is_no_outlier() -> None:
+    plate = np.random.default_rng(0).uniform(size=(2000, 3)) * [1.0, 1.0, 0.0]
+    leg = np.array([0.5, 0.5, -0.06]) * [[1.0, 1.0, n] for n in range(1, 7)]
+    assert len(clean(np.concatenate([plate, leg]))) == 2006
+
+
 def test_draws_take_every_point_before_any_twice() -> None:
     rng = np.random.default_rng(0)
     assert sorted(draw(10, 10, rng)) == list(range(10))
