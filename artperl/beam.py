@@ -107,26 +107,31 @@ def half_turned(shapes: Shapes, theta: Theta) -> Theta | None:
     theta : Theta
         Of one row.
     """
-    trees = shapes.trees
+    trees, parent = shapes.trees, shapes.trees.parent[0].tolist()
     turns = (trees.free[0] & (trees.turn[0] != 0.0) & (trees.slide[0] == 0.0)).tolist()
-    parent, found, before = trees.parent[0].tolist(), [], _posed(shapes, theta)
-    for last in range(len(parent)):
-        middle, first = parent[last], parent[parent[last]]
-        if not (turns[last] and turns[middle] and turns[first]):
-            continue
-        state = theta.state.clone()
-        state[:, middle] = 2.0 * trees.rest[:, middle] - state[:, middle]
-        for joint in (first, last):
-            back = state[:, joint] + torch.pi > trees.upper[:, joint]
-            state[:, joint] += torch.where(back, -torch.pi, torch.pi)
-        other = replace(theta, state=state)
+    in_a_row = [(parent[parent[k]], parent[k], k) for k in range(len(parent))]
+    others = [_other_way_round(trees, theta, *row) for row in in_a_row if all(turns[joint] for joint in row)]
+    if not others:
+        return None
+    before, found = _posed(shapes, theta), []
+    for other, last in others:
         after = _posed(shapes, other)
         twist = (after.rotation - before.rotation)[:, last].abs().amax()
         apart = torch.linalg.vector_norm((after.center - before.center)[:, last]) / shapes.diagonal
-        within = ((state >= trees.lower) & (state <= trees.upper))[:, [first, middle, last]].all()
+        within = ((other.state >= trees.lower) & (other.state <= trees.upper) | (other.state == theta.state)).all()
         if bool(within & (twist < _SAME) & (apart < _SAME)):
             found.append(other)
     return concatenate(found) if found else None
+
+
+def _other_way_round(trees: Trees, theta: Theta, first: int, middle: int, last: int) -> tuple[Theta, int]:
+    """The first and the last joint turned by half, the one between bent the other way; and the last one's number."""
+    state = theta.state.clone()
+    state[:, middle] = 2.0 * trees.rest[:, middle] - state[:, middle]
+    for joint in (first, last):
+        back = state[:, joint] + torch.pi > trees.upper[:, joint]
+        state[:, joint] += torch.where(back, -torch.pi, torch.pi)
+    return replace(theta, state=state), last
 
 
 def _part(shapes: Shapes, part: int, cloud: Tensor, probability: Tensor) -> _Part:

@@ -147,8 +147,8 @@ def find(
         found = _settle(shapes, observed, perceived, [theta], rows.tolist(), base, options, clock)
         others = half_turned(found.shapes, found.refined.theta) if options.beam else None
         if others is not None:
-            many, rows_again = found.shapes.repeat(len(others)), [found.reference] * len(others)
-            turned = _settle(many, observed, perceived, [others], rows_again, base, options, clock)
+            many, same = found.shapes.repeat(len(others)), [found.reference] * len(others)
+            turned = _settle(many, observed, perceived, [others], same, base, options, clock)
             found = min(found, turned, key=lambda one: one.residual)
         if found.residual <= options.retry_residual:
             return found

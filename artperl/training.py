@@ -143,6 +143,11 @@ class Training:
         options = EstimatorOptions(num_points=self.options.num_points)
         return Estimator(self.perception, self.base, agent, options, boxes=self.boxes)
 
+    @property
+    def _mixed(self) -> bool:
+        """Whether there are both procedural objects and given ones."""
+        return bool(self.procedural and self.given)
+
     def _base_of(self, objects: list[ArticulatedObject]) -> ShapeBase:
         options = self.options
         rows = options.max_parts if options.files else None
@@ -241,16 +246,16 @@ class Training:
             return
         if not (self.out / "best").is_dir():
             self._validate(board, 0)
-        best = load_estimator(self.out / "best", self.device)
-        if self.procedural and self.given:  # a given object is its own best reference, as none will be in use
-            best = replace(best, base=self._base_of(self.procedural))
+        best = learner = load_estimator(self.out / "best", self.device)
+        if self._mixed:  # a given object is its own best reference, as none will be in use
+            learner = replace(best, base=self._base_of(self.procedural))
         sample = replace(options.sample, num_points=options.num_points if options.dataset else _TEST_POINTS)
         samples = samples_from(
             options.dataset, options.categories, sample, options.seed + 2, 2, self.perception.num_rows, options.parts,
             self.given,
         )  # fmt: skip
         file = self.out / "boxes.safetensors"
-        records = record(best, samples, options.box_views, file, stop, self.progress)
+        records = record(learner, samples, options.box_views, file, stop, self.progress)
         learnt = None
         if records is not None:
             learnt = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
@@ -259,21 +264,20 @@ class Training:
         if learnt is None:
             tqdm.write("boxes: no estimate fits its view; they stay as they are")
         else:
-            self._choose_boxes(best, replace(best, boxes=learnt.half().float()), board)  # as precise as files are
+            self._choose_boxes(best, learner, learnt.half().float(), board)  # as precise as files are
         self._save()
 
-    def _choose_boxes(self, best: Estimator, moved: Estimator, board: SummaryWriter) -> None:
-        """Keep the estimator with other boxes if they are better on unseen objects, and on given ones."""
-        options = self.options
-        validation = self._unseen(options.validation_views, VALIDATION_SEEDS)
-        if self.procedural and self.given:
-            sample = replace(options.sample, num_points=_TEST_POINTS)
-            validation += samples_of(self.given, -(-len(validation) // len(self.given)), sample, VALIDATION_SEEDS)
-        before, after = (evaluate(estimator, validation, self.progress) for estimator in (best, moved))
+    def _choose_boxes(self, best: Estimator, learner: Estimator, boxes: Boxes, board: SummaryWriter) -> None:
+        """Give the best estimator other boxes if the learner's are better so on unseen objects, and on given ones."""
+        validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
+        if self._mixed:
+            validation += self._of_given(len(validation), VALIDATION_SEEDS)
+        before, after = (
+            evaluate(estimator, validation, self.progress) for estimator in (learner, replace(learner, boxes=boxes))
+        )
         figures = summary(after)
         if mean_iou(after) > mean_iou(before):
-            kept = replace(load_estimator(self.out / "best", self.device), boxes=moved.boxes)
-            save_estimator(kept, self.out / "best", self._about({"validation": figures}))
+            save_estimator(replace(best, boxes=boxes), self.out / "best", self._about({"validation": figures}))
         _write(board, "validation", _curves(figures), sum(self.done.values()))
         tqdm.write(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
 
@@ -306,13 +310,18 @@ class Training:
         return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")
 
     def _unseen(self, views: int, first_seed: int) -> list[Sample]:
-        sample = replace(self.options.sample, num_points=_TEST_POINTS)
         options = self.options
         if not options.categories:
-            return samples_of(self.given, -(-options.test_objects * views // len(self.given)), sample, first_seed)
+            return self._of_given(options.test_objects * views, first_seed)
+        sample = replace(options.sample, num_points=_TEST_POINTS)
         return frozen_samples(
             options.categories, options.test_objects, views, sample, first_seed, options.parts, options.max_parts
         )
+
+    def _of_given(self, views: int, first_seed: int) -> list[Sample]:
+        """At least so many views of given objects, of each as many."""
+        sample = replace(self.options.sample, num_points=_TEST_POINTS)
+        return samples_of(self.given, -(-views // len(self.given)), sample, first_seed)
 
     def _finish(self) -> dict[str, Any]:
         """Test the best estimator on objects that had no say in which one that is."""
