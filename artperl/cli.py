@@ -53,6 +53,9 @@ class Train:
     seed: int = 0
     perception_steps: int | None = None
     """Batches that perception learns from; by default the preset's."""
+    dense_steps: int | None = None
+    """More batches, of clouds with twice the points; with any, the estimator looks at so many. By default the
+    preset's."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
     box_views: int | None = None
@@ -101,6 +104,7 @@ class Train:
             test_objects=max(preset.test_objects, _FILE_VIEWS) if self.files else preset.test_objects,
             sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
             perception_steps=preset.perception_steps if steps is None else steps,
+            dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,
             ppo=replace(

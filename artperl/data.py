@@ -207,7 +207,10 @@ class Recorded:
                 "generate one with these categories, or use --parts any",
             )  # fmt: skip
         if len(self.dataset[self._usable[0]].points) < num_points:
-            raise DatasetError(f"its clouds have fewer than {num_points} points", folder, "generate larger ones")
+            raise DatasetError(
+                f"its clouds have fewer than {num_points} points", folder,
+                "generate larger ones; without dense steps half as many are enough",
+            )  # fmt: skip
         self._turn, self._order = -1, np.empty(0, dtype=np.int64)
 
     def __getitem__(self, i: int) -> Sample:

@@ -43,6 +43,10 @@ _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
 _BOX_POINTS = 2048
 """Points by which faces of boxes are looked for."""
+_LOOKS = 2
+"""Times that boxes are looked for: the first ones tell which part a point cannot be of."""
+_OUTSIDE = 0.01
+"""Distance out of a part's box, in diagonals, that weighs as much against a label as odds of 1 to e."""
 _FEWEST = 8
 """Points below which there is nothing to fit."""
 
@@ -122,6 +126,23 @@ class Estimate:
     milliseconds: dict[str, float]
 
 
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What is kept of perception once a cloud is fitted.
+
+    Attributes
+    ----------
+    log_odds : (N, P) float
+        Of each point to be of each part; NaN for outliers.
+    box_center, box_size : (P, 3) float
+        In the rest frame, metres.
+    """
+
+    log_odds: Array
+    box_center: Tensor
+    box_size: Tensor
+
+
 @dataclass(eq=False)
 class Estimator:
     """Everything that is needed to estimate poses of a category, or of several.
@@ -166,25 +187,27 @@ class Estimator:
             When there is no object to be seen in the cloud.
         """
         clock = Clock()
-        estimate, expected = self._fit(points, clock)
+        estimate, seen = self._fit(points, clock)
         if self.boxes is None:
             return estimate
+        T, part = estimate.T_camera_part, estimate.part
         with clock("boxes"):
-            evidence, unit = _evidence(points, estimate, expected, self.boxes.num_rows)
-            boxes = self.boxes(evidence.to(self.perception.device))
-            center, size = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
-            T = estimate.T_camera_part
-            posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
-        return replace(estimate, translation=posed, size=size)
+            for _ in range(_LOOKS):
+                evidence, unit = _evidence(points, replace(estimate, part=part), seen, self.boxes.num_rows)
+                boxes = self.boxes(evidence.to(self.perception.device))
+                center, size = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
+                part = inside(np.asarray(points, dtype=np.float64), T, center, size, seen.log_odds, _OUTSIDE * unit)
+        posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
+        return replace(estimate, translation=posed, size=size, part=part)
 
     @torch.inference_mode()
     def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
-        estimate, expected = self._fit(points, Clock())
-        return estimate, *_evidence(points, estimate, expected, self.perception.num_rows)
+        estimate, seen = self._fit(points, Clock())
+        return estimate, *_evidence(points, estimate, seen, self.perception.num_rows)
 
-    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, tuple[Tensor, Tensor]]:
-        """The estimate whose boxes are the reference's, and perceived boxes (P, 3), metres."""
+    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Seen]:
+        """The estimate whose boxes are the reference's, and what it goes by."""
         options = self.options
         points = np.asarray(points, dtype=np.float64)
         with clock("clean"):
@@ -196,20 +219,22 @@ class Estimator:
             perceived = self.perception(clouds.points)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
         with clock("report"):
+            nearest = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
+            log_odds = np.full((len(points), self.perception.num_rows), np.nan)
+            log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[nearest]
             metres = (perceived.log_diagonal.exp() * clouds.radius).cpu()
-            expected = perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres
-            return self._report(points, good, found, clock), expected
+            seen = _Seen(log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres)
+            part = np.full(len(points), -1)
+            part[good] = found.observed.part[0].numpy()[nearest]
+            return self._report(points, part, found, clock), seen
 
-    def _report(self, points: Array, good: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
-        """Everything about one fitted reference, as arrays."""
+    def _report(self, points: Array, part: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
+        """Everything about one fitted reference and labelled points, as arrays."""
         shapes, observed, theta = found.shapes, found.observed, found.refined.theta
         trees, reference = shapes.trees, found.reference
         K = int(trees.valid[0].sum())
         posed = pose_parts(trees, theta, shapes.box_center)
         axis, origin = joint_axes(trees, posed)
-        part = np.full(len(points), -1)
-        nearest = cKDTree(observed.points[0].numpy()).query(points[good], workers=1)[1]
-        part[good] = observed.part[0].numpy()[nearest]
         poses = [_transforms(shapes, step)[:K] for step in found.path]
         rotation, center = _numpy(posed.rotation)[:K], _numpy(posed.center)[:K]
         translation, size = widen(rotation, center, _numpy(shapes.box_size * posed.scale)[:K], points, part)
@@ -234,18 +259,37 @@ class Estimator:
         )
 
 
-def _evidence(
-    points: ArrayLike, estimate: Estimate, expected: tuple[Tensor, Tensor], rows: int
-) -> tuple[Evidence, float]:
+def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:
     """Evidence of one estimate, padded to that many parts, and its unit in metres."""
     T, K = estimate.T_camera_part, len(estimate.size)
     good = np.flatnonzero(estimate.part >= 0)
     good = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
     arrays = np.asarray(points)[good], T, brought_to_rest(estimate.translation, T), estimate.size
-    cloud, *fitted = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
+    cloud, poses, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
     part = torch.from_numpy(estimate.part[good])
-    evidence, unit = Evidence.of(cloud, part, *fitted, *(boxes[:K] for boxes in expected))
+    evidence, unit = Evidence.of(cloud, part, poses, center, size, seen.box_center[:K], seen.box_size[:K])
     return evidence.padded(rows), float(unit)
+
+
+def inside(
+    points: Array, T_camera_part: Array, center: Array, size: Array, log_odds: Array, distance: float
+) -> NDArray[np.int64]:
+    """(N,) parts of points (N, 3), given both the odds (N, P) of each part and how far out of its box a point lies.
+
+    Parameters
+    ----------
+    T_camera_part : (K, 4, 4) float
+    center, size : (K, 3) float
+        Boxes in the rest frame, metres.
+    distance : float
+        Metres that weigh as much as odds of 1 to e.
+    """
+    out = np.stack([
+        np.linalg.norm(np.maximum(np.abs((points - T[:3, 3]) @ T[:3, :3] - middle) - 0.5 * whole, 0.0), axis=1)
+        for T, middle, whole in zip(T_camera_part, center, size, strict=True)
+    ], axis=1)  # fmt: skip
+    score = log_odds[:, : len(size)] - (out / distance) ** 2
+    return np.where(np.isnan(score).any(axis=1), -1, score.argmax(axis=1))
 
 
 def brought_to_rest(posed: Array, T_camera_part: Array) -> Array:

@@ -46,7 +46,7 @@ class EstimatorOptions:
     """The pipeline."""
 
     num_points: int = 1024
-    """Points that perception sees."""
+    """Points that perception sees, and that are labelled in the end."""
     early_points: int = 256
     """Of these, points by which the best start is found."""
     fit_points: int = 1024
@@ -79,7 +79,7 @@ class Found:
     ----------
     shapes : Shapes
     observed : Observed
-        With the labels of the last refinement.
+        The cloud, labelled by what perception says and by how near the fitted parts are.
     refined : Refined
     path : list of Theta
         The start, the agent's steps, and the end.
@@ -130,6 +130,18 @@ def find(
     options: EstimatorOptions, clock: Clock,
 ) -> Found:  # fmt: skip
     """The best fit to a cloud (1, N, 3) that has been perceived."""
+    found = _best(cloud, clouds, perceived, base, agent, options, clock)
+    with clock("relabel"):
+        observed = Observed.of(cloud, perceived.part)
+        part = relabel(found.shapes, observed, found.refined.theta, perceived.part_logits)
+    return replace(found, observed=replace(observed, part=part))
+
+
+def _best(
+    cloud: Tensor, clouds: Clouds, perceived: Perceived, base: ShapeBase, agent: Agent | None,
+    options: EstimatorOptions, clock: Clock,
+) -> Found:  # fmt: skip
+    """The best fit, observed by the points that it was fitted to."""
     with clock("start"):
         rows, chosen = references(base, perceived, min(options.references, len(base)))
         shapes, theta = start(clouds, perceived, chosen, len(rows))

@@ -28,7 +28,7 @@ from artperl.benchmarks.artimage import real_train_objects
 from artperl.box_training import learn, record
 from artperl.categories import arranged, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
-from artperl.data import batches, samples_from
+from artperl.data import Recorded, batches, samples_from
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator
 from artperl.evaluation import (
@@ -67,6 +67,8 @@ BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
 _TEST_POINTS = 2048
+_DENSER = 2
+"""Clouds of the end of stage 1 have so many times more points, and batches so many times fewer clouds."""
 _VIEWS = 8
 """Episodes of a rollout that fit the same object: most of the time goes into making objects."""
 _AS_GOOD = 1.01
@@ -104,11 +106,15 @@ class Training:
         )
         self.given = _given(options)
         self.base = self._base_of([*self.procedural, *self.given])
+        if options.dataset is not None:  # what is wrong with it is told before anything is learnt
+            rows, points = self.base.shapes.trees.num_rows, options.num_points * (_DENSER if options.dense_steps else 1)
+            Recorded(options.dataset, options.categories, options.seed, rows, points, options.parts)
         self.device = _device(options.device)
         torch.manual_seed(options.seed)
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
         self.agent, self._agent_known = Agent().to(self.device), False
         self.boxes: Boxes | None = None
+        self._seen_points = options.num_points
         if options.start_from is not None:
             self._take_over(load_estimator(options.start_from))
         self.optimizers = {
@@ -140,7 +146,8 @@ class Training:
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
         agent = self.agent if self.done["agent"] or self._agent_known else None
-        options = EstimatorOptions(num_points=self.options.num_points)
+        dense = self.done["perception"] > self.options.perception_steps
+        options = EstimatorOptions(num_points=_DENSER * self.options.num_points if dense else self._seen_points)
         return Estimator(self.perception, self.base, agent, options, boxes=self.boxes)
 
     @property
@@ -162,19 +169,31 @@ class Training:
                 "use the same categories and preset",
             )  # fmt: skip
         own.load_state_dict(theirs.state_dict())
+        self._seen_points = estimator.options.num_points
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())
             self._agent_known = True
         self.boxes = estimator.boxes
 
     def _learn_to_perceive(self, board: SummaryWriter, stop: Stop) -> None:
+        options = self.options
+        steps, points, clouds = options.perception_steps, options.num_points, options.batch_size
+        self._perceive(0, steps, points, clouds, options.seed, board, stop)
+        self._perceive(
+            steps, options.dense_steps, _DENSER * points, max(1, clouds // _DENSER), options.seed + 3, board, stop
+        )
+
+    def _perceive(
+        self, before: int, total: int, num_points: int, batch_size: int, seed: int, board: SummaryWriter, stop: Stop
+    ) -> None:
+        """So many steps after those before, with their own cycle of the rate."""
         options, optimizer = self.options, self.optimizers["perception"]
-        first, total = self.done["perception"], options.perception_steps
+        first = self.done["perception"] - before
         if first >= total:
             return
         data = batches(
-            options.categories, self.perception.num_rows, options.num_points, options.batch_size, first, options.seed,
-            self.workers, options.sample, options.parts, self.given, options.dataset,
+            options.categories, self.perception.num_rows, num_points, batch_size, first, seed, self.workers,
+            options.sample, options.parts, self.given, options.dataset,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
@@ -190,15 +209,15 @@ class Training:
             loss.backward()
             nn.utils.clip_grad_norm_(self.perception.parameters(), 1.0)
             optimizer.step()
-            self.done["perception"] = step + 1
+            done = self.done["perception"] = before + step + 1
             figures = {name: value.item() for name, value in losses.items()}
             figures["accuracy"] = (perceived.part == truth.part).float().mean().item()
             figures["coordinates"] = (perceived.canonical - truth.canonical).norm(dim=-1).median().item()
-            _write(board, "perception", figures, step)
+            _write(board, "perception", figures, done - 1)
             bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
             bar.update()
             if (step + 1) % options.validate_every == 0 or step + 1 == total:
-                self._validate(board, step + 1)
+                self._validate(board, done)
             elif (step + 1) % _SAVE_STEPS == 0:
                 self._save()
             self._stop_if(stop)
@@ -233,7 +252,7 @@ class Training:
             bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
             bar.update()
             if (n + 1) % options.validate_rollouts == 0 or n + 1 == total:
-                self._validate(board, options.perception_steps + n + 1)
+                self._validate(board, self.done["perception"] + n + 1)
             elif (n + 1) % _SAVE_ROLLOUTS == 0:
                 self._save()
             self._stop_if(stop)

@@ -5,7 +5,8 @@ edge MLP is decomposed: ``W (f_j, x_j - x_i) = (W_f f_j + W_x x_j) - W_x x_i``, 
 each point, and only sums and a maximum once for each edge.
 
 Clouds come in random order (as artsim's do), so the first points of a cloud are a random sample of it: they serve as
-the centres of the coarser levels.
+the centres of the coarser levels. Levels and neighbourhoods are shares of a cloud, so that they reach as far in a dense
+cloud as in a sparse one: weights that learnt from 1,024 points read 2,048 at once, and see finer.
 """
 
 from __future__ import annotations
@@ -23,6 +24,13 @@ from typing_extensions import ParamSpec
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+_COARSER = 4
+"""Each level has so many times fewer points than the one before."""
+_NEIGHBOURHOOD = 64
+"""A neighbourhood holds this part of a cloud's points, 16 of 1,024 ..."""
+_FEWEST = 8
+"""... but no fewer than these."""
 
 
 def exact(function: Callable[P, R]) -> Callable[P, R]:
@@ -120,15 +128,13 @@ class PointNet2(nn.Module):
     ----------
     width : int
         Channels of the finest level; they double from level to level.
-    sizes : sequence of int
-        Points of the coarser levels.
-    neighbours : int
+    levels : int
+        Coarser levels, each with a quarter of the points of the one before.
     """
 
-    def __init__(self, width: int = 48, sizes: Sequence[int] = (256, 64, 16), neighbours: int = 16):
+    def __init__(self, width: int = 48, levels: int = 3):
         super().__init__()
-        self.sizes, self.neighbours = tuple(sizes), neighbours
-        channels = [width * 2**level for level in range(len(sizes) + 1)]
+        channels = [width * 2**level for level in range(levels + 1)]
         self.stem = nn.Sequential(nn.Linear(3, width), nn.ReLU())
         self.down = nn.ModuleList(SetAbstraction(a, b) for a, b in pairwise(channels))
         self.whole = nn.Sequential(nn.Linear(channels[-1], channels[-1]), nn.ReLU())
@@ -150,14 +156,16 @@ class PointNet2(nn.Module):
         -------
         (B, N, point_channels) and (B, cloud_channels)
         """
-        near = Neighbourhoods.of(points, self.sizes, self.neighbours)
+        neighbours = max(_FEWEST, points.shape[1] // _NEIGHBOURHOOD)
+        sizes = [max(1, points.shape[1] // _COARSER ** (level + 1)) for level in range(len(self.down))]
+        near = Neighbourhoods.of(points, sizes, neighbours)
         features = [self.stem(points)]
         for level, layer in enumerate(self.down):
-            radius = (self.neighbours / near.points[level].shape[1]) ** 0.5
+            radius = (neighbours / near.points[level].shape[1]) ** 0.5
             features.append(layer(features[-1], near.points[level], near.points[level + 1], near.down[level], radius))
         cloud = self.whole(features[-1]).amax(1)
         decoded = torch.cat([features[-1], cloud[:, None].expand(-1, features[-1].shape[1], -1)], dim=-1)
         for step, layer in enumerate(self.up):
-            level = len(self.sizes) - 1 - step
+            level = len(self.up) - 1 - step
             decoded = layer(decoded, features[level], near.up[level])
         return decoded, cloud

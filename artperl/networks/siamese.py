@@ -31,7 +31,7 @@ class Siamese(nn.Module):
     def __init__(self, num_rows: int, width: int = 24, outputs: int = 64):
         super().__init__()
         self.num_rows = num_rows
-        self.backbone = PointNet2(width, (128, 32, 16))
+        self.backbone = PointNet2(width)
         pooled = num_rows * (width + 1) + self.backbone.cloud_channels
         self.head = nn.Sequential(nn.Linear(pooled, 128), nn.ReLU(), nn.Linear(128, outputs))
 

@@ -15,7 +15,7 @@ from artperl.categories import objects_of
 from artperl.checkpoint import load_estimator, save_estimator
 from artperl.data import Clouds, to_batch, training_rows
 from artperl.embedding import by_boxes
-from artperl.estimator import Calibration, Estimator, clean, draw, widen
+from artperl.estimator import Calibration, Estimator, clean, draw, inside, widen
 from artperl.evaluation import (
     TEST_SEEDS,
     Scored,
@@ -165,6 +165,16 @@ def test_a_thin_leg_of_a_few_points_is_no_outlier() -> None:
     plate = np.random.default_rng(0).uniform(size=(2000, 3)) * [1.0, 1.0, 0.0]
     leg = np.array([0.5, 0.5, -0.06]) * [[1.0, 1.0, n] for n in range(1, 7)]
     assert len(clean(np.concatenate([plate, leg]))) == 2006
+
+
+def test_points_are_of_a_part_whose_box_they_are_in() -> None:
+    """Two boxes side by side, the second one turned: odds decide within both and within neither, boxes elsewhere."""
+    T = np.tile(np.eye(4), (2, 1, 1))
+    T[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    center, size = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.array([[1.0, 1.0, 1.0], [0.2, 1.2, 1.0]])
+    points = np.array([[0.2, 0.0, 0.0], [0.2, 0.05, 0.0], [0.45, 0.0, 0.0], [1.4, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    odds = np.log([[0.1, 0.8, 0.1], [0.8, 0.1, 0.1], [0.3, 0.6, 0.1], [0.9, 0.05, 0.05], [np.nan] * 3])
+    assert inside(points, T, center, size, odds, 0.01).tolist() == [0, 0, 1, 1, -1]
 
 
 def test_draws_take_every_point_before_any_twice() -> None:

@@ -8,10 +8,13 @@ import torch
 from torch import Tensor
 
 from artperl.categories import ARTIMAGE, objects_of
+from artperl.checkpoint import load_estimator
 from artperl.data import Clouds, Samples, Truth, batches
+from artperl.evaluation import VALIDATION_SEEDS, frozen_samples
 from artperl.networks.perception import Perceived, Perception, perception_losses
 from artperl.networks.pointnet2 import Neighbourhoods, strongest
 from artsim.plan import SampleOptions
+from artsim.sample import Sample
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +165,20 @@ def test_strongest_is_the_maximum_over_neighbours_with_its_gradient() -> None:
     (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
     (other,) = torch.autograd.grad((direct**2).sum(), features)
     torch.testing.assert_close(one, other)
+
+
+@pytest.mark.parametrize("category", sorted(ARTIMAGE))
+def test_a_denser_cloud_is_read_as_well(category: str) -> None:
+    net = load_estimator(category).perception
+    samples = frozen_samples([category], 6, 2, SampleOptions(num_points=2048), first_seed=VALIDATION_SEEDS)
+    right = {n: np.mean([_read(net, sample, n) for sample in samples]) for n in (1024, 2048)}
+    assert min(right.values()) > 0.9
+    assert right[2048] > right[1024] - 0.01
+
+
+def _read(net: Perception, sample: Sample, num_points: int) -> float:
+    """Share of the first points that are given to the right part."""
+    points = torch.from_numpy(sample.points[None, :num_points]).float()
+    with torch.inference_mode():
+        part = net(Clouds.of(points).points).part[0].numpy()
+    return float((part == sample.part[:num_points]).mean())

@@ -16,7 +16,7 @@ import torch
 from safetensors.torch import load_file
 
 from artperl import cli
-from artperl.checkpoint import load_estimator, read_settings
+from artperl.checkpoint import load_estimator, read_settings, save_estimator
 from artperl.data import Given, Recorded, batches
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
@@ -34,9 +34,9 @@ from artsim.stream import STREAM_SEEDS
 from artsim.urdf import load
 
 TINY = TrainOptions(
-    base_objects=3, reference_points=48, width=16, perception_steps=4, batch_size=4, num_points=96, agent_rollouts=3,
-    episodes=3, box_views=0, validate_every=2, validate_rollouts=2, test_objects=2, foreign_categories=1,
-    validation_views=1, test_views=1,
+    base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, batch_size=4, num_points=96,
+    agent_rollouts=3, episodes=3, box_views=0, validate_every=2, validate_rollouts=2, test_objects=2,
+    foreign_categories=1, validation_views=1, test_views=1,
     ppo=PPOOptions(minibatch=4), fitting=FittingOptions(steps=2, observed_points=48, reference_points=16),
 )  # fmt: skip
 
@@ -58,10 +58,21 @@ def test_a_run_leaves_an_estimator_a_table_and_curves(whole: Path) -> None:
     points = np.random.default_rng(0).normal(size=(200, 3)) * 0.1 + [0.0, 0.0, 1.0]
     assert np.isfinite(estimator(points).T_camera_part).all()
     history = json.loads((whole / "state.json").read_text())["history"]
-    assert [(h["done"]["perception"], h["done"]["agent"]) for h in history] == [(2, 0), (4, 0), (4, 2), (4, 3)]
+    assert [(h["done"]["perception"], h["done"]["agent"]) for h in history] == [(2, 0), (3, 0), (5, 0), (5, 2), (5, 3)]
 
 
-@pytest.mark.parametrize("stop", [("perception", 3), ("agent", 1)], ids=str)
+def test_an_estimator_sees_as_many_points_as_perception_learnt_from(whole: Path, tmp_path: Path) -> None:
+    sparse, dense = TINY.num_points, 2 * TINY.num_points
+    training = Training(TINY, tmp_path / "new", workers=0, progress=False)
+    for steps, points in ((0, sparse), (3, sparse), (4, dense), (5, dense)):
+        training.done["perception"] = steps
+        assert training.estimator().options.num_points == points
+    save_estimator(training.estimator(), tmp_path / "dense", {})
+    goes_on = replace(TINY, start_from=str(tmp_path / "dense"), perception_steps=0, dense_steps=0)
+    assert Training(goes_on, tmp_path / "on", workers=0, progress=False).estimator().options.num_points == dense
+
+
+@pytest.mark.parametrize("stop", [("perception", 2), ("perception", 4), ("agent", 1)], ids=str)
 def test_a_stopped_run_ends_as_if_it_had_not_been(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: tuple[str, int]
 ) -> None:
@@ -198,7 +209,10 @@ def test_an_estimator_for_any_parts_reads_a_dataset_in_the_order_that_it_knows(t
 
 
 def test_a_run_on_a_dataset_ends_like_any_other(recorded: Path, tmp_path: Path) -> None:
-    Training(replace(TINY, dataset=str(recorded)), tmp_path, workers=0, progress=False).run()
+    options = replace(TINY, dataset=str(recorded))
+    with pytest.raises(DatasetError, match="fewer than 192"):
+        Training(options, tmp_path, workers=0, progress=False)
+    Training(replace(options, dense_steps=0), tmp_path, workers=0, progress=False).run()
     assert "laptop 1" in (tmp_path / "table.txt").read_text()
     assert read_settings(tmp_path / "best")["about"]["options"]["dataset"] == str(recorded)
 
