@@ -54,7 +54,7 @@ class Train:
     perception_steps: int | None = None
     """Batches that perception learns from; by default the preset's."""
     dense_steps: int | None = None
-    """More batches, of clouds with twice the points; with any, the estimator looks at so many. By default the
+    """More batches, of half as many clouds with twice the points: as many as the estimator looks at. By default the
     preset's."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""

@@ -49,7 +49,7 @@ class EstimatorOptions:
     """Points that perception sees, and that are labelled in the end."""
     early_points: int = 256
     """Of these, points by which the best start is found."""
-    fit_points: int = 1024
+    fit_points: int = 2048
     """Of these, points that the best one is fitted to."""
     references: int = 3
     """References that are tried, the nearest first."""

@@ -43,14 +43,13 @@ class TrainOptions:
     perception_steps: int = 4000
     """Batches of stage 1."""
     dense_steps: int = 1000
-    """Batches of half as many clouds with twice the points, in the end of stage 1. With any, the estimator looks at so
-    many points, and tells thin parts and narrow gaps."""
+    """Batches in its end, of half as many clouds with twice the points: as many as the estimator looks at."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""
     batch_size: int = 32
     num_points: int = 1024
-    """Points of a cloud that is learnt from; of those of ``dense_steps``, half."""
+    """Points of a cloud, half of those that the estimator looks at."""
     agent_rollouts: int = 150
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6

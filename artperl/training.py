@@ -68,7 +68,8 @@ BASE_SEEDS = 2_000_000
 _STATE = "state"
 _TEST_POINTS = 2048
 _DENSER = 2
-"""Clouds of the end of stage 1 have so many times more points, and batches so many times fewer clouds."""
+"""Estimators look at so many times more points than most clouds have that they learn from. Weights carry over, and the
+end of stage 1 is as dense as that, with so many times fewer clouds in a batch."""
 _VIEWS = 8
 """Episodes of a rollout that fit the same object: most of the time goes into making objects."""
 _AS_GOOD = 1.01
@@ -114,7 +115,6 @@ class Training:
         self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
         self.agent, self._agent_known = Agent().to(self.device), False
         self.boxes: Boxes | None = None
-        self._seen_points = options.num_points
         if options.start_from is not None:
             self._take_over(load_estimator(options.start_from))
         self.optimizers = {
@@ -146,8 +146,7 @@ class Training:
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
         agent = self.agent if self.done["agent"] or self._agent_known else None
-        dense = self.done["perception"] > self.options.perception_steps
-        options = EstimatorOptions(num_points=_DENSER * self.options.num_points if dense else self._seen_points)
+        options = EstimatorOptions(num_points=_DENSER * self.options.num_points)
         return Estimator(self.perception, self.base, agent, options, boxes=self.boxes)
 
     @property
@@ -169,7 +168,6 @@ class Training:
                 "use the same categories and preset",
             )  # fmt: skip
         own.load_state_dict(theirs.state_dict())
-        self._seen_points = estimator.options.num_points
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())
             self._agent_known = True

@@ -16,7 +16,7 @@ import torch
 from safetensors.torch import load_file
 
 from artperl import cli
-from artperl.checkpoint import load_estimator, read_settings, save_estimator
+from artperl.checkpoint import load_estimator, read_settings
 from artperl.data import Given, Recorded, batches
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
@@ -61,15 +61,8 @@ def test_a_run_leaves_an_estimator_a_table_and_curves(whole: Path) -> None:
     assert [(h["done"]["perception"], h["done"]["agent"]) for h in history] == [(2, 0), (3, 0), (5, 0), (5, 2), (5, 3)]
 
 
-def test_an_estimator_sees_as_many_points_as_perception_learnt_from(whole: Path, tmp_path: Path) -> None:
-    sparse, dense = TINY.num_points, 2 * TINY.num_points
-    training = Training(TINY, tmp_path / "new", workers=0, progress=False)
-    for steps, points in ((0, sparse), (3, sparse), (4, dense), (5, dense)):
-        training.done["perception"] = steps
-        assert training.estimator().options.num_points == points
-    save_estimator(training.estimator(), tmp_path / "dense", {})
-    goes_on = replace(TINY, start_from=str(tmp_path / "dense"), perception_steps=0, dense_steps=0)
-    assert Training(goes_on, tmp_path / "on", workers=0, progress=False).estimator().options.num_points == dense
+def test_an_estimator_looks_at_twice_the_points_of_a_learnt_cloud(whole: Path) -> None:
+    assert load_estimator(whole / "best").options.num_points == 2 * TINY.num_points
 
 
 @pytest.mark.parametrize("stop", [("perception", 2), ("perception", 4), ("agent", 1)], ids=str)
