@@ -8,8 +8,9 @@ PY := $(VENV)/bin/python
 demo: $(VENV)/.ready
 	$(PY) examples/demo/main.py out/demo
 
+# Two processes of one thread each: four threads on two cores wait for each other.
 test: system $(VENV)/.ready-dev lint
-	$(PY) -m pytest -n 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(PY) -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.ready-dev
 	$(VENV)/bin/ruff format --check .
