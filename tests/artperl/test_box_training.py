@@ -189,13 +189,13 @@ def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(
     assert own.object_id in load_estimator(tmp_path / "best").base.object_ids
 
 
-def test_a_shipped_estimator_moves_faces_and_nothing_else() -> None:
+def test_a_shipped_estimator_moves_faces_and_labels_but_no_part() -> None:
     estimator = load_estimator("laptop")
     assert estimator.boxes is not None
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.5, 0.5, (800, 3)) * [0.4, 0.02, 0.3] + [0.0, 0.0, 1.0]
     with_boxes, without = estimator(points), replace(estimator, boxes=None)(points)
     assert np.array_equal(with_boxes.T_camera_part, without.T_camera_part)
-    assert np.array_equal(with_boxes.part, without.part)
+    assert np.array_equal(with_boxes.part < 0, without.part < 0)
     assert not np.allclose(with_boxes.size, without.size)
     assert "boxes" in with_boxes.milliseconds
