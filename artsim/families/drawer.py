@@ -1,7 +1,8 @@
 """Furniture with drawers: chests and nightstands, tables with drawers under the top, desks with pedestals.
 
-What varies: the kind; number and grid of the drawers, on which side of a desk they are, in one row or at the back of a
-table as well; open compartments and fronts that do not move; legs, plinths and shelves; fronts and handles.
+What varies: the kind; number and grid of the drawers, how wide those of a row and how high those of a column are, on
+which side of a desk they are, in one row or at the back of a table as well; open compartments and fronts that do not
+move; legs, plinths and shelves; fronts and handles.
 """
 
 from __future__ import annotations
@@ -153,7 +154,7 @@ def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
         contents[:others] = [str(rng.choice(["open", "fixed"], p=[0.7, 0.3]))] * others
     furniture.add_case(
         (x0, -y, legs), (x1, y, top), wall,
-        np.linspace(-y + wall, y - wall, columns + 1), _shares(rng, legs + wall, top - wall, rows), contents,
+        _widths(rng, -y + wall, y - wall, columns), _shares(rng, legs + wall, top - wall, rows), contents,
     )  # fmt: skip
     if rng.random() < 0.55:  # a top that stands over
         over = rng.uniform(0.003, 0.04)
@@ -188,7 +189,7 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
     sides = str(rng.choice(["front", "back", "both"], p=[0.82, 0.08, 0.1]))
     deepest = depth - 2 * over - 2 * inset - wall
     reach = deepest * (rng.uniform(0.3, 0.47) if sides == "both" else rng.uniform(0.45, 1.0))
-    edges = np.linspace(middle - span + wall, middle + span - wall, columns + 1)
+    edges = _widths(rng, middle - span + wall, middle + span - wall, columns)
     for back in (False, True):
         if sides in ("both", ("front", "back")[back]):
             furniture.add_case(
@@ -270,8 +271,21 @@ def _shares(rng: np.random.Generator, low: float, high: float, rows: int) -> Arr
     """(rows + 1,) levels: equal, at random, or growing downwards."""
     kind = rng.choice(3, p=[0.5, 0.3, 0.2])
     heights = (np.ones(rows), rng.dirichlet([12.0] * rows), np.linspace(rng.uniform(1.2, 2.0), 1.0, rows))[kind]
-    heights = np.maximum(heights / heights.sum(), 0.6 / rows)
-    levels: Array = low + np.concatenate([[0.0], np.cumsum(heights) / heights.sum()]) * (high - low)
+    return _levels(low, high, heights)
+
+
+def _widths(rng: np.random.Generator, low: float, high: float, columns: int) -> Array:
+    """(columns + 1,) edges: of equal columns; the same from either end, as where knees go; or at random."""
+    kind = rng.choice(3, p=[0.6, 0.25, 0.15])
+    half = rng.uniform(0.7, 1.5, (columns + 1) // 2)
+    mirrored = np.concatenate([half, half[: columns // 2][::-1]])
+    return _levels(low, high, (np.ones(columns), mirrored, rng.dirichlet([12.0] * columns))[kind])
+
+
+def _levels(low: float, high: float, shares: Array) -> Array:
+    """(n + 1,) levels that divide a range in these proportions, none much less than an equal share."""
+    shares = np.maximum(shares / shares.sum(), 0.6 / len(shares))
+    levels: Array = low + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * (high - low)
     return levels
 
 
