@@ -5,6 +5,7 @@ The network sees what it will see in use: references as they were found and fitt
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,6 @@ from tqdm import tqdm
 
 from artperl.batch import Batch, concatenate
 from artperl.checkpoint import save_tensors
-from artperl.data import Source
 from artperl.estimator import Estimator, brought_to_rest
 from artperl.evaluation import true_poses
 from artperl.evidence import Evidence
@@ -42,7 +42,7 @@ class Records(Batch):
 
 
 def record(
-    estimator: Estimator, samples: Source, views: int, file: Path, stop: Stop, progress: bool
+    estimator: Estimator, samples: Callable[[int], Sample], views: int, file: Path, stop: Stop, progress: bool
 ) -> Records | None:  # fmt: skip
     """Records of the first so many samples, in single precision; those that the file holds are taken from it.
 
@@ -56,7 +56,7 @@ def record(
     first, records = _load(file) if file.exists() else (0, [])
     bar = tqdm(total=views, initial=first, desc="boxes", disable=not progress, smoothing=0.02)
     for n in range(first, views):
-        records += _examined(estimator, samples[n])
+        records += _examined(estimator, samples(n))
         bar.update()
         if (n + 1) % _SAVE_VIEWS == 0 or n + 1 == views or stop.asked:
             _save(records, n + 1, file)

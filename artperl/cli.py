@@ -54,8 +54,9 @@ class Train:
     perception_steps: int | None = None
     """Batches that perception learns from; by default the preset's."""
     dense_steps: int | None = None
-    """More batches, of half as many clouds with twice the points: as many as the estimator looks at. By default the
-    preset's."""
+    """More batches, of fewer, denser clouds: of as many points as the estimator looks at. By default the preset's."""
+    denser: int = 2
+    """Times the points of a training cloud that the estimator looks at."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
     box_views: int | None = None
@@ -105,6 +106,7 @@ class Train:
             sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
             perception_steps=preset.perception_steps if steps is None else steps,
             dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
+            denser=self.denser,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,
             ppo=replace(
@@ -161,6 +163,8 @@ class Evaluate:
     """From where objects are seen."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
+    num_points: int = 8192
+    """Points of a cloud: pixels of the object, drawn at random."""
     json: Path | None = None
     """Write the figures to this file."""
 
@@ -184,7 +188,7 @@ class Evaluate:
             print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
         return run_rows(
             rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
-            self.views or VIEWS, sys.stderr.isatty(), lambda line: print(line, flush=True),
+            self.views or VIEWS, self.num_points, sys.stderr.isatty(), lambda line: print(line, flush=True),
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
@@ -197,7 +201,7 @@ class Evaluate:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
         estimator = load_estimator(self.estimator)
         learnt = read_settings(folder_of(self.estimator))["about"]["options"]
-        options = SampleOptions(views=ViewOptions(preset=self.preset), noise=self.noise)
+        options = SampleOptions(self.num_points, views=ViewOptions(preset=self.preset), noise=self.noise)
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:

@@ -41,7 +41,7 @@ _OUTERMOST = 0.004
 """Of a cloud's points, that lie too far out on each side of a part to say how large it is."""
 _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
-_BOX_POINTS = 2048
+_BOX_POINTS = 8192
 """Points by which faces of boxes are looked for."""
 _LOOKS = 2
 """Times that boxes are looked for: the first ones tell which part a point cannot be of."""
@@ -190,13 +190,13 @@ class Estimator:
         estimate, seen = self._fit(points, clock)
         if self.boxes is None:
             return estimate
-        T, part = estimate.T_camera_part, estimate.part
+        cloud, T, part = np.asarray(points, dtype=np.float64), estimate.T_camera_part, estimate.part
         with clock("boxes"):
             for _ in range(_LOOKS):
-                evidence, unit = _evidence(points, replace(estimate, part=part), seen, self.boxes.num_rows)
+                evidence, unit = _evidence(cloud, replace(estimate, part=part), seen, self.boxes.num_rows)
                 boxes = self.boxes(evidence.to(self.perception.device))
                 center, size = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
-                part = inside(np.asarray(points, dtype=np.float64), T, center, size, seen.log_odds, _OUTSIDE * unit)
+                part = labels_by_boxes(cloud, T, center, size, seen.log_odds, _OUTSIDE * unit)
         posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
         return replace(estimate, translation=posed, size=size, part=part)
 
@@ -271,7 +271,7 @@ def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> 
     return evidence.padded(rows), float(unit)
 
 
-def inside(
+def labels_by_boxes(
     points: Array, T_camera_part: Array, center: Array, size: Array, log_odds: Array, distance: float
 ) -> NDArray[np.int64]:
     """(N,) parts of points (N, 3), given both the odds (N, P) of each part and how far out of its box a point lies.

@@ -43,13 +43,15 @@ class TrainOptions:
     perception_steps: int = 4000
     """Batches of stage 1."""
     dense_steps: int = 1000
-    """Batches in its end, of half as many clouds with twice the points: as many as the estimator looks at."""
+    """Batches in its end, of fewer, denser clouds: of as many points as the estimator looks at."""
+    denser: int = 2
+    """Times the points of a training cloud that the estimator looks at: weights carry over."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""
     batch_size: int = 32
     num_points: int = 1024
-    """Points of a cloud, half of those that the estimator looks at."""
+    """Points of a cloud."""
     agent_rollouts: int = 150
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import torch
 from safetensors.torch import load_file
@@ -28,10 +29,11 @@ from artperl.benchmarks.artimage import real_train_objects
 from artperl.box_training import learn, record
 from artperl.categories import arranged, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
-from artperl.data import Recorded, batches, samples_from
+from artperl.data import Recorded, Source, batches, samples_from
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator
 from artperl.evaluation import (
+    NUM_POINTS,
     TEST_SEEDS,
     VALIDATION_SEEDS,
     calibrate,
@@ -60,16 +62,16 @@ from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.families import FAMILIES
 from artsim.files import write_atomic
 from artsim.objects import ArticulatedObject
+from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.sources import find_sources
 
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
-_TEST_POINTS = 2048
-_DENSER = 2
-"""Estimators look at so many times more points than most clouds have that they learn from. Weights carry over, and the
-end of stage 1 is as dense as that, with so many times fewer clouds in a batch."""
+_BOX_NOISE: Final = "d435"
+_NOISY_EVERY = 4
+"""Views of stage 3 of which one is seen by such a sensor: boxes go by outermost points, which suffer most."""
 _VIEWS = 8
 """Episodes of a rollout that fit the same object: most of the time goes into making objects."""
 _AS_GOOD = 1.01
@@ -108,7 +110,8 @@ class Training:
         self.given = _given(options)
         self.base = self._base_of([*self.procedural, *self.given])
         if options.dataset is not None:  # what is wrong with it is told before anything is learnt
-            rows, points = self.base.shapes.trees.num_rows, options.num_points * (_DENSER if options.dense_steps else 1)
+            rows, denser = self.base.shapes.trees.num_rows, options.denser if options.dense_steps else 1
+            points = options.num_points * denser
             Recorded(options.dataset, options.categories, options.seed, rows, points, options.parts)
         self.device = _device(options.device)
         torch.manual_seed(options.seed)
@@ -146,13 +149,18 @@ class Training:
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
         agent = self.agent if self.done["agent"] or self._agent_known else None
-        options = EstimatorOptions(num_points=_DENSER * self.options.num_points)
+        options = EstimatorOptions(num_points=self.options.denser * self.options.num_points)
         return Estimator(self.perception, self.base, agent, options, boxes=self.boxes)
 
     @property
     def _mixed(self) -> bool:
         """Whether there are both procedural objects and given ones."""
         return bool(self.procedural and self.given)
+
+    @property
+    def _noisy_boxes(self) -> bool:
+        """Whether boxes learn from some views by a sensor: those of a run with a sensor of its own do so anyway."""
+        return self.options.dataset is None and self.options.sample.noise == "none"
 
     def _base_of(self, objects: list[ArticulatedObject]) -> ShapeBase:
         options = self.options
@@ -177,9 +185,8 @@ class Training:
         options = self.options
         steps, points, clouds = options.perception_steps, options.num_points, options.batch_size
         self._perceive(0, steps, points, clouds, options.seed, board, stop)
-        self._perceive(
-            steps, options.dense_steps, _DENSER * points, max(1, clouds // _DENSER), options.seed + 3, board, stop
-        )
+        points, clouds = points * options.denser, max(1, clouds // options.denser)
+        self._perceive(steps, options.dense_steps, points, clouds, options.seed + 3, board, stop)
 
     def _perceive(
         self, before: int, total: int, num_points: int, batch_size: int, seed: int, board: SummaryWriter, stop: Stop
@@ -266,13 +273,8 @@ class Training:
         best = learner = load_estimator(self.out / "best", self.device)
         if self._mixed:  # a given object is its own best reference, as none will be in use
             learner = replace(best, base=self._base_of(self.procedural))
-        sample = replace(options.sample, num_points=options.num_points if options.dataset else _TEST_POINTS)
-        samples = samples_from(
-            options.dataset, options.categories, sample, options.seed + 2, 2, self.perception.num_rows, options.parts,
-            self.given,
-        )  # fmt: skip
         file = self.out / "boxes.safetensors"
-        records = record(learner, samples, options.box_views, file, stop, self.progress)
+        records = record(learner, self._box_samples(), options.box_views, file, stop, self.progress)
         learnt = None
         if records is not None:
             learnt = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
@@ -284,15 +286,38 @@ class Training:
             self._choose_boxes(best, learner, learnt.half().float(), board)  # as precise as files are
         self._save()
 
+    def _box_samples(self) -> Callable[[int], Sample]:
+        """Fresh views by number."""
+        options = self.options
+        sample = replace(options.sample, num_points=options.num_points if options.dataset else NUM_POINTS)
+
+        def source(sample: SampleOptions) -> Source:
+            return samples_from(
+                options.dataset, options.categories, sample, options.seed + 2, 2, self.perception.num_rows,
+                options.parts, self.given,
+            )  # fmt: skip
+
+        clean = source(sample)
+        if not self._noisy_boxes:
+            return clean.__getitem__
+        noisy = source(replace(sample, noise=_BOX_NOISE))
+        return lambda n: (noisy if n % _NOISY_EVERY == _NOISY_EVERY - 1 else clean)[n]
+
     def _choose_boxes(self, best: Estimator, learner: Estimator, boxes: Boxes, board: SummaryWriter) -> None:
         """Give the best estimator other boxes if the learner's are better so on unseen objects, and on given ones."""
-        validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
+        views = self.options.validation_views
+        validation = self._unseen(views, VALIDATION_SEEDS, self._as_tested)
         if self._mixed:
-            validation += self._of_given(len(validation), VALIDATION_SEEDS)
+            validation += self._of_given(len(validation), VALIDATION_SEEDS, self._as_tested)
+        noisy = []
+        if self._noisy_boxes:
+            with_noise = replace(self._as_tested, noise=_BOX_NOISE)
+            noisy = self._unseen(-(-views // _NOISY_EVERY), VALIDATION_SEEDS, with_noise)
         before, after = (
-            evaluate(estimator, validation, self.progress) for estimator in (learner, replace(learner, boxes=boxes))
+            evaluate(estimator, validation + noisy, self.progress)
+            for estimator in (learner, replace(learner, boxes=boxes))
         )
-        figures = summary(after)
+        figures = summary(after[: len(validation)])
         if mean_iou(after) > mean_iou(before):
             save_estimator(replace(best, boxes=boxes), self.out / "best", self._about({"validation": figures}))
         _write(board, "validation", _curves(figures), sum(self.done.values()))
@@ -306,7 +331,7 @@ class Training:
     def _validate(self, board: SummaryWriter, step: int) -> None:
         """Score the estimator on a frozen set of unseen objects, keep the best, and write down where the run stands."""
         if not self._validation:
-            self._validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS)
+            self._validation = self._unseen(self.options.validation_views, VALIDATION_SEEDS, self._as_tested)
         scored = evaluate(self.estimator(), self._validation, self.progress)
         figures, score = summary(scored), headline(scored)
         self.history.append({"step": step, "score": score, "done": dict(self.done)})
@@ -326,24 +351,26 @@ class Training:
         others = [category for category in FAMILIES if category not in self.base.categories]
         return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")
 
-    def _unseen(self, views: int, first_seed: int) -> list[Sample]:
+    @property
+    def _as_tested(self) -> SampleOptions:
+        return replace(self.options.sample, num_points=NUM_POINTS)
+
+    def _unseen(self, views: int, first_seed: int, sample: SampleOptions) -> list[Sample]:
         options = self.options
         if not options.categories:
-            return self._of_given(options.test_objects * views, first_seed)
-        sample = replace(options.sample, num_points=_TEST_POINTS)
+            return self._of_given(options.test_objects * views, first_seed, sample)
         return frozen_samples(
             options.categories, options.test_objects, views, sample, first_seed, options.parts, options.max_parts
         )
 
-    def _of_given(self, views: int, first_seed: int) -> list[Sample]:
+    def _of_given(self, views: int, first_seed: int, sample: SampleOptions) -> list[Sample]:
         """At least so many views of given objects, of each as many."""
-        sample = replace(self.options.sample, num_points=_TEST_POINTS)
         return samples_of(self.given, -(-views // len(self.given)), sample, first_seed)
 
     def _finish(self) -> dict[str, Any]:
         """Test the best estimator on objects that had no say in which one that is."""
         best = load_estimator(self.out / "best")
-        samples = self._unseen(self.options.test_views, TEST_SEEDS)
+        samples = self._unseen(self.options.test_views, TEST_SEEDS, self._as_tested)
         scored = evaluate(best, samples, self.progress)
         figures = summary(scored)
         about = read_settings(self.out / "best")["about"]

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 
 from artperl.categories import ARTIMAGE, objects_of
-from artperl.evaluation import TEST_SEEDS, samples_of
+from artperl.evaluation import NUM_POINTS, TEST_SEEDS, samples_of
 from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
 from artsim.kinematics import KinematicTree
@@ -43,8 +43,9 @@ OBJECTS, VIEWS = 40, 500
 
 
 def row_samples(
-    row: Row, category: str, partnet: Path | None = None, objects: int = OBJECTS, views: int = VIEWS
-) -> list[Sample]:
+    row: Row, category: str, partnet: Path | None = None, objects: int = OBJECTS, views: int = VIEWS,
+    num_points: int = NUM_POINTS,
+) -> list[Sample]:  # fmt: skip
     """Test samples of one category: always the same ones. Empty where there is no real object.
 
     Parameters
@@ -58,6 +59,8 @@ def row_samples(
         Procedural ones.
     views : int
         In all, at least.
+    num_points : int
+        Of a cloud: pixels of the object, drawn at random.
     """
     preset: Literal["artimage", "sphere"] = "sphere" if row.endswith("_sphere") else "artimage"
     if row.startswith("procedural"):
@@ -66,7 +69,8 @@ def row_samples(
         tested = real_objects(category, "test", partnet)
     if not tested:
         return []
-    return samples_of(tested, -(-views // len(tested)), SampleOptions(views=ViewOptions(preset=preset)))
+    options = SampleOptions(num_points=num_points, views=ViewOptions(preset=preset))
+    return samples_of(tested, -(-views // len(tested)), options)
 
 
 def real_objects(category: str, half: Literal["train", "test"], partnet: Path | None) -> list[ArticulatedObject]:

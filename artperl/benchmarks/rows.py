@@ -9,7 +9,7 @@ from typing import Any
 from artperl.benchmarks.artimage import OBJECTS, VIEWS, Row, row_samples
 from artperl.checkpoint import WEIGHTS, load_estimator
 from artperl.estimator import Estimator
-from artperl.evaluation import evaluate, summary, table
+from artperl.evaluation import NUM_POINTS, evaluate, summary, table
 
 PUBLISHED: dict[str, dict[str, tuple[float, ...]]] = {
     "laptop": {"rotation_deg": (4.9, 4.7), "translation_partnet": (0.053, 0.066), "iou": (0.646, 0.504)},
@@ -41,6 +41,7 @@ def run_rows(
     partnet: Path | None = None,
     objects: int = OBJECTS,
     views: int = VIEWS,
+    num_points: int = NUM_POINTS,
     progress: bool = False,
     say: Callable[[str], None] = print,
 ) -> dict[str, Any]:
@@ -55,7 +56,7 @@ def run_rows(
         Folder of estimators that have learnt from real objects, for the row ``real_trained``.
     partnet : Path, optional
         Folder of real objects.
-    objects, views : int
+    objects, views, num_points : int
         As in :func:`artperl.benchmarks.artimage.row_samples`.
     progress : bool
     say : callable
@@ -72,7 +73,7 @@ def run_rows(
         say(f"{row}: regenerated ArtImage")
         result[row] = {}
         for category in categories:
-            samples = row_samples(row, category, partnet, objects, views)
+            samples = row_samples(row, category, partnet, objects, views, num_points)
             if not samples:
                 say(f"{category}: no object")
                 continue

@@ -65,7 +65,7 @@ def test_an_estimator_looks_at_twice_the_points_of_a_learnt_cloud(whole: Path) -
     assert load_estimator(whole / "best").options.num_points == 2 * TINY.num_points
 
 
-@pytest.mark.parametrize("stop", [("perception", 4), ("agent", 1)], ids=str)
+@pytest.mark.parametrize("stop", [("perception", 2), ("perception", 4), ("agent", 1)], ids=str)
 def test_a_stopped_run_ends_as_if_it_had_not_been(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: tuple[str, int]
 ) -> None:
