@@ -12,7 +12,7 @@ from artperl.checkpoint import load_estimator
 from artperl.data import Clouds, Samples, Truth, batches
 from artperl.evaluation import VALIDATION_SEEDS, frozen_samples
 from artperl.networks.perception import Perceived, Perception, perception_losses
-from artperl.networks.pointnet2 import Neighbourhoods, strongest
+from artperl.networks.pointnet2 import Neighbourhoods, nearest_by_products, nearest_by_trees, strongest
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 
@@ -153,6 +153,18 @@ def test_neighbours_are_the_nearest() -> None:
     torch.testing.assert_close(near.up[0].sum(-1), torch.ones(2, 40))
     assert ((near.up[0] > 0).sum(-1) <= 3).all()
     torch.testing.assert_close(near.up[0][:, :10].amax(-1), torch.ones(2, 10), atol=1e-3, rtol=0)
+
+
+def test_trees_and_products_find_the_same_neighbours() -> None:
+    generator = torch.Generator().manual_seed(1)
+    points, queries = (torch.randn(3, n, 3, generator=generator) for n in (50, 20))
+    by_trees, by_products = (
+        sorted(zip(near[2, 7].tolist(), index[2, 7].tolist(), strict=True))
+        for near, index in (nearest_by_trees(queries, points, 6), nearest_by_products(queries, points, 6))
+    )
+    assert [i for _, i in by_trees] == [i for _, i in by_products]
+    np.testing.assert_allclose([d for d, _ in by_trees], [d for d, _ in by_products], atol=1e-5)
+    torch.testing.assert_close(nearest_by_trees(points, points, 1)[1][..., 0], torch.arange(50).expand(3, 50))
 
 
 def test_strongest_is_the_maximum_over_neighbours_with_its_gradient() -> None:
