@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.batch import Batch
@@ -18,6 +19,8 @@ SHARES = (0.0, 0.004, 0.02, 0.1, 0.5)
 """Of a part's points, that lie farther out than a candidate: labels near a border are not always right."""
 NUM_CANDIDATES = len(SHARES) + 7
 """See :attr:`Evidence.candidates`."""
+_LOOKED_AT, _NEIGHBOURS = 256, 8
+"""Points whose surroundings are looked at for noise, and how many of these points there are, with their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,9 @@ class Evidence(Batch):
     perceived_size : (B, P, 3) float
     share : (B, P) float
         Of the points.
+    roughness : (B,) float
+        How far points lie from planes through their neighbours, in the middle: what a sensor's noise leaves there, so
+        that outermost points are to be trusted less.
     """
 
     center: Tensor
@@ -49,6 +55,7 @@ class Evidence(Batch):
     facing: Tensor
     perceived_size: Tensor
     share: Tensor
+    roughness: Tensor
 
     @staticmethod
     def of(
@@ -91,15 +98,26 @@ class Evidence(Batch):
             facing=torch.cat([-eye, eye], dim=-1),
             perceived_size=perceived_size,
             share=own.to(points.dtype).mean(1),
+            roughness=_roughness(points) / unit,
         )
         return evidence.map(lambda tensor: tensor[None]), unit
 
     def padded(self, rows: int) -> Evidence:
         """With that many rows for parts."""
         missing = rows - self.valid.shape[1]
-        return self.map(
-            lambda values: torch.cat([values, values.new_zeros(len(values), missing, *values.shape[2:])], dim=1)
-        )
+
+        def pad(values: Tensor) -> Tensor:
+            return torch.cat([values, values.new_zeros(len(values), missing, *values.shape[2:])], dim=1)
+
+        return self.map(lambda values: pad(values) if values.dim() > 1 else values)
+
+
+def _roughness(points: Tensor) -> Tensor:
+    """() median distance, root mean square, of some of the points (N, 3) and their neighbours from planes, metres."""
+    cloud = points.cpu().numpy()
+    index = cKDTree(cloud).query(cloud[:_LOOKED_AT], min(_NEIGHBOURS, len(cloud)))[1]
+    near = points[torch.from_numpy(index).to(points.device)]
+    return torch.linalg.svdvals(near - near.mean(1, keepdim=True))[:, -1].median() / near.shape[1] ** 0.5
 
 
 def _candidates(

@@ -11,6 +11,8 @@ _THIN = 0.004
 """Half-size below which places are no longer measured in half-sizes of their part, in diagonals."""
 _FAR = 3.0
 """Half-sizes, or tenths of the diagonal, beyond which places are all alike."""
+_SMOOTH = 1e-4
+"""Roughness, in diagonals, below which clouds are all alike."""
 _STEP = 0.1
 """Half-sizes that an output of 1 moves a face by, after candidates were weighed."""
 _TRUST = 2.0
@@ -34,7 +36,7 @@ class Boxes(nn.Module):
     def __init__(self, num_rows: int, width: int = 40):
         super().__init__()
         self.num_rows, self.width = num_rows, width
-        described = 2 * NUM_CANDIDATES + 8 + 6 + num_rows
+        described = 2 * NUM_CANDIDATES + 9 + 6 + num_rows
         self.alone = nn.Sequential(nn.Linear(described, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
         self.among = nn.Sequential(nn.Linear(6 * width, width), nn.ReLU(), nn.Linear(width, NUM_CANDIDATES + 1))
         self.trust = nn.Parameter(_TRUST * (torch.arange(NUM_CANDIDATES) == 0))
@@ -61,6 +63,7 @@ class Boxes(nn.Module):
             log_size, log_size.roll(-1, dims=-1), log_size.roll(-2, dims=-1), log_size[:, :1].expand_as(size),
             (evidence.perceived_size + _THIN).log() - log_size, evidence.center - evidence.center[:, :1],
             evidence.share.sqrt()[..., None].expand_as(size),
+            (evidence.roughness + _SMOOTH).log()[:, None, None].expand_as(size),
         ]  # fmt: skip
         known = [
             (10.0 * candidates).clamp(-_FAR, _FAR),
