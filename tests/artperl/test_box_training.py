@@ -36,11 +36,11 @@ STAGE = TrainOptions(
 """Nothing but the stage for boxes."""
 
 
-def wall_and_box(seed: int = 0) -> tuple[Evidence, torch.Tensor]:
+def wall_and_box(seed: int = 0, noise: float = 0.0) -> tuple[Evidence, torch.Tensor]:
     """A box of 20 x 40 x 30 cm, 2 m before the camera, that is seen from its front (-x) alone: 1,000 points of it."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-0.5, 0.5, (1000, 2)) * [0.4, 0.3]
-    points = np.column_stack([places[:, 0], -places[:, 1], np.full(1000, 1.9)])
+    points = np.column_stack([places[:, 0], -places[:, 1], 1.9 + noise * rng.normal(size=1000)])
     # Rest x is away from the camera, y to the left of the image, z up; the camera looks along its z.
     T = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 2.0], [0, 0, 0, 1]], dtype=float)
     center, size = torch.zeros(1, 3), torch.tensor([[0.2, 0.4, 0.3]])
@@ -53,6 +53,13 @@ def places(evidence: Evidence, candidate: int) -> NDArray[np.float64]:
     face = torch.cat([0.5 * evidence.size - evidence.center, 0.5 * evidence.size + evidence.center], dim=-1)
     found: NDArray[np.float64] = (face + evidence.candidates[..., candidate])[0].double().numpy() * SIGNS
     return found
+
+
+def test_roughness_is_the_noise_about_planes_through_eight_points() -> None:
+    """Three of eight degrees of freedom go into the plane; the median of chi squared with five is 4.35."""
+    assert float(wall_and_box()[0].roughness) < 1e-5
+    evidence, unit = wall_and_box(noise=0.003)
+    assert float(evidence.roughness * unit) == pytest.approx(0.003 * np.sqrt(4.35 / 8), rel=0.1)
 
 
 def test_points_say_how_far_out_each_face_lies_in_the_frame_of_its_part() -> None:
