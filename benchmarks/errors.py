@@ -27,12 +27,12 @@ from artperl import metrics
 from artperl.benchmarks.rows import find_estimator
 from artperl.categories import ARTIMAGE
 from artperl.estimator import Estimate
-from artperl.evaluation import VALIDATION_SEEDS, frozen_samples, rest_centers, true_poses
+from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, frozen_samples, rest_centers, true_poses
 from artsim.files import atomic_file
 from artsim.sample import Sample
 
 Array = NDArray[np.float64]
-BINS = (0, 20, 100, 300, 2049)
+BINS = (0, 80, 400, 1200, NUM_POINTS + 1)
 FACES = ("-x", "-y", "-z", "+x", "+y", "+z")
 
 
@@ -157,7 +157,8 @@ def draw(every: dict[str, Array], path: Path) -> None:
         for row, (column, label) in enumerate(((1, "rotation, deg"), (2, "IoU of posed boxes"))):
             axes = figure.add_subplot(2, len(every), row * len(every) + n + 1)
             axes.scatter(np.maximum(table[:, 0], 1), table[:, column], s=6, alpha=0.5)
-            axes.set(xscale="log", xlim=(0.8, 2048), title=category if row == 0 else "", xlabel="points of 2,048")
+            axes.set(xscale="log", xlim=(0.8, NUM_POINTS), xlabel=f"points of {NUM_POINTS:,}")
+            axes.set(title=category if row == 0 else "")
             axes.set(ylabel=label if n == 0 else "")
             if row == 0:
                 axes.set(yscale="log", ylim=(0.05, 180))
