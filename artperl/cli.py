@@ -90,6 +90,8 @@ class Train:
         if self.threads is not None:
             torch.set_num_threads(self.threads)
         preset = PRESETS[self.preset]
+        if self.denser < 1:
+            raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
         if self.files and (self.category or self.real or self.parts == "artimage"):
             raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")
         category = self.category or (() if self.files else ("laptop",))
