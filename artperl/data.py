@@ -209,7 +209,7 @@ class Recorded:
         if len(self.dataset[self._usable[0]].points) < num_points:
             raise DatasetError(
                 f"its clouds have fewer than {num_points} points", folder,
-                "generate larger ones; without dense steps half as many are enough",
+                "generate larger ones; without dense steps fewer are enough",
             )  # fmt: skip
         self._turn, self._order = -1, np.empty(0, dtype=np.int64)
 

@@ -98,7 +98,7 @@ class GenerateObjects:
     """Write procedural objects as files: simulation-ready URDF folders in PartNet-Mobility's style, MJCF, USD.
 
     Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: the same
-    command goes on where it stopped. The bytes depend on category, seed and formats alone.
+    command goes on where it stopped. On one kind of processor, bytes depend on category, seed and formats alone.
 
     Example: artsim generate-objects --category drawer --count 1000 --out out/drawers
     """

@@ -158,8 +158,7 @@ def draw(every: dict[str, Array], path: Path) -> None:
             axes = figure.add_subplot(2, len(every), row * len(every) + n + 1)
             axes.scatter(np.maximum(table[:, 0], 1), table[:, column], s=6, alpha=0.5)
             axes.set(xscale="log", xlim=(0.8, NUM_POINTS), xlabel=f"points of {NUM_POINTS:,}")
-            axes.set(title=category if row == 0 else "")
-            axes.set(ylabel=label if n == 0 else "")
+            axes.set(title=category if row == 0 else "", ylabel=label if n == 0 else "")
             if row == 0:
                 axes.set(yscale="log", ylim=(0.05, 180))
             axes.grid(alpha=0.3)
