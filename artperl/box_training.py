@@ -13,10 +13,12 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
+from torch.utils.data import DataLoader, Dataset
 from tqdm import tqdm
 
 from artperl.batch import Batch, concatenate
 from artperl.checkpoint import save_tensors
+from artperl.data import carry_on
 from artperl.estimator import Estimator, brought_to_rest
 from artperl.evaluation import true_poses
 from artperl.evidence import Evidence
@@ -29,7 +31,7 @@ _SAVE_VIEWS = 200
 _FITS = 0.02
 """Residual up to which an estimate is learnt from: of others there is no saying what their boxes show."""
 _BATCH = 32
-_RATE = 4e-3
+_RATE, _DECAY = 2e-3, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +43,24 @@ class Records(Batch):
     size: Tensor
 
 
+class _Examined(Dataset[list[Records]]):
+    """Records by number of the sample."""
+
+    def __init__(self, estimator: Estimator, samples: Callable[[int], Sample]):
+        self.estimator, self.samples = estimator, samples
+
+    def __getitem__(self, number: int) -> list[Records]:
+        return _examined(self.estimator, self.samples(number))
+
+
 def record(
-    estimator: Estimator, samples: Callable[[int], Sample], views: int, file: Path, stop: Stop, progress: bool
+    estimator: Estimator, samples: Callable[[int], Sample], views: int, file: Path, stop: Stop, workers: int,
+    progress: bool,
 ) -> Records | None:  # fmt: skip
     """Records of the first so many samples, in single precision; those that the file holds are taken from it.
 
-    None when no estimate fits.
+    None when no estimate fits. Each of the workers, processes of one thread, estimates other samples; without any, or
+    on a GPU, this process does.
 
     Raises
     ------
@@ -55,8 +69,12 @@ def record(
     """
     first, records = _load(file) if file.exists() else (0, [])
     bar = tqdm(total=views, initial=first, desc="boxes", disable=not progress, smoothing=0.02)
-    for n in range(first, views):
-        records += _examined(estimator, samples(n))
+    loader = DataLoader(
+        _Examined(estimator, samples), batch_size=None, sampler=range(first, views),
+        num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=carry_on,
+    )  # fmt: skip
+    for n, made in enumerate(loader, first):
+        records += [each.map(torch.clone) for each in made]  # out of the workers' shared memory
         bar.update()
         if (n + 1) % _SAVE_VIEWS == 0 or n + 1 == views or stop.asked:
             _save(records, n + 1, file)
@@ -71,7 +89,7 @@ def learn(records: Records, num_rows: int, steps: int, seed: int, progress: bool
     """A network that has learnt from records: always the same one for the same arguments."""
     torch.manual_seed(seed)
     boxes = Boxes(num_rows).to(records.center.device)
-    optimizer = torch.optim.AdamW(boxes.parameters(), weight_decay=1e-2)
+    optimizer = torch.optim.AdamW(boxes.parameters(), weight_decay=_DECAY)
     bar = tqdm(range(steps), "moving faces", disable=not progress, smoothing=0.02)
     for step in bar:
         set_rate(optimizer, _RATE * one_cycle(step, steps))

@@ -76,7 +76,8 @@ class Train:
     device: Literal["cpu", "cuda"] | None = None
     """Where the networks learn; by default the preset's."""
     workers: int = 1
-    """Processes that make clouds while the network learns; the result does not depend on it."""
+    """Processes that make clouds while the network learns, and estimates that boxes learn from; the result does not
+    depend on it."""
     threads: int | None = None
     """Processor threads of the network; by default torch's choice."""
 

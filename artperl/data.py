@@ -326,7 +326,7 @@ class _Rows(IterableDataset[dict[str, Array]]):
             batch += workers
 
 
-def _carry_on(worker: int) -> None:
+def carry_on(worker: int) -> None:
     """A worker ends with the process that it works for, which hears Ctrl-C, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -375,7 +375,7 @@ def batches(
     samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)
     rows = _Rows(samples, num_points, fresh, begin * fresh)
     loader = DataLoader(
-        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=_carry_on
+        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=carry_on
     )
     window: deque[dict[str, Tensor]] = deque(maxlen=_WINDOW)
     for n, made in enumerate(loader, begin):

@@ -65,7 +65,7 @@ class TrainOptions:
     """Episodes of a rollout."""
     box_views: int = 2500
     """Fresh views of stage 3, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
-    box_steps: int = 4000
+    box_steps: int = 12000
     """Batches that boxes are learnt in."""
     validate_every: int = 1000
     """Steps of stage 1 between tests."""

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -90,7 +91,7 @@ class Training:
         Folder of the run: ``best`` and ``last`` hold estimators, ``state.*`` what is needed to go on, ``events`` curves
         for TensorBoard, ``table.txt`` and ``figures.json`` the last test.
     workers : int
-        Processes that make training clouds; the result does not depend on it.
+        Processes that make training clouds, and estimates that boxes learn from; the result does not depend on it.
     progress : bool
         Show a bar, and tables as they come.
 
@@ -274,7 +275,7 @@ class Training:
         if self._mixed:  # a given object is its own best reference, as none will be in use
             learner = replace(best, base=self._base_of(self.procedural))
         file = self.out / "boxes.safetensors"
-        records = record(learner, self._box_samples(), options.box_views, file, stop, self.progress)
+        records = record(learner, self._box_samples(), options.box_views, file, stop, self.workers, self.progress)
         learnt = None
         if records is not None:
             learnt = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
@@ -301,7 +302,7 @@ class Training:
         if not self._noisy_boxes:
             return clean.__getitem__
         noisy = source(replace(sample, noise=_BOX_NOISE))
-        return lambda n: (noisy if n % _NOISY_EVERY == _NOISY_EVERY - 1 else clean)[n]
+        return partial(_mostly_clean, clean, noisy)
 
     def _choose_boxes(self, best: Estimator, learner: Estimator, boxes: Boxes, board: SummaryWriter) -> None:
         """Give the best estimator other boxes if the learner's are better so on unseen objects, and on given ones."""
@@ -374,7 +375,7 @@ class Training:
         scored = evaluate(best, samples, self.progress)
         figures = summary(scored)
         about = read_settings(self.out / "best")["about"]
-        save_estimator(best, self.out / "best", {**about, "test": figures})
+        save_estimator(best, self.out / "best", {**about, "test": _rounded(figures)})
         write_atomic(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
         write_atomic(self.out / "table.txt", (table(figures) + "\n").encode())
         try:
@@ -384,7 +385,7 @@ class Training:
         return figures
 
     def _about(self, figures: dict[str, Any]) -> dict[str, Any]:
-        return {"options": _plain(self.options), "done": dict(self.done), **figures}
+        return {"options": _plain(self.options), "done": dict(self.done), **_rounded(figures)}
 
     def _save(self) -> None:
         """Everything that going on needs. The tensors come first: the JSON names the steps that they belong to."""
@@ -416,6 +417,10 @@ class Training:
                     moments.setdefault(int(number), {})[moment] = value
             optimizer = self.optimizers[name]
             optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+
+
+def _mostly_clean(clean: Source, noisy: Source, number: int) -> Sample:
+    return (noisy if number % _NOISY_EVERY == _NOISY_EVERY - 1 else clean)[number]
 
 
 def _given(options: TrainOptions) -> list[ArticulatedObject]:
@@ -451,6 +456,15 @@ def _device(name: str) -> torch.device:
     if device.type == "cuda" and not torch.cuda.is_available():
         raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
     return device
+
+
+def _rounded(figures: Any) -> Any:
+    """Figures with as many digits as anybody reads."""
+    if isinstance(figures, dict):
+        return {name: _rounded(value) for name, value in figures.items()}
+    if isinstance(figures, list):
+        return [_rounded(value) for value in figures]
+    return float(f"{figures:.4g}") if isinstance(figures, float) else figures
 
 
 def _write(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:

@@ -33,7 +33,7 @@ class Boxes(nn.Module):
         Channels.
     """
 
-    def __init__(self, num_rows: int, width: int = 40):
+    def __init__(self, num_rows: int, width: int = 80):
         super().__init__()
         self.num_rows, self.width = num_rows, width
         described = 2 * NUM_CANDIDATES + 9 + 6 + num_rows

@@ -154,9 +154,9 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
 
 
-def test_recording_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recording_goes_on_where_it_stopped_whoever_estimates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
-    Training(STAGE, whole, workers=0, progress=False).run()
+    Training(STAGE, whole, workers=2, progress=False).run()
     examined, calls = box_training._examined, []
 
     def interrupted(*arguments: Any) -> Any:
