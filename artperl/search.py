@@ -37,6 +37,8 @@ _CHAIN = 3
 """Joints one after another from which parts below have to tell how those above have turned."""
 _BEAM_STARTS = 8
 """Ends of the beam search that are refined."""
+_MOST_WEIGHT = 8.0
+"""Weight of a point of a hardly visible part against one of the part with most points."""
 _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
@@ -145,7 +147,8 @@ def _best(
     with clock("start"):
         rows, chosen = references(base, perceived, min(options.references, len(base)))
         shapes, theta = start(clouds, perceived, chosen, len(rows))
-        observed = Observed.of(cloud[:, : options.fit_points], perceived.part[:, : options.fit_points])
+        part = perceived.part[:, : options.fit_points]
+        observed = Observed.of(cloud[:, : options.fit_points], part, evened(part))
     if options.perceived_start and options.beam and int(shapes.trees.depth[0].max()) >= _CHAIN:
         with clock("beam"):
             ends = beam(
@@ -256,6 +259,16 @@ def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, 
         fitting.step(expected_action(agent(fitting.view())[0]))
         path.append(fitting.theta)
     return path
+
+
+def evened(part: Tensor) -> Tensor:
+    """(B, N) weights of points of such parts (B, N): a part counts by the root of how many points it has.
+
+    If all points counted alike, a temple that is seen from its end would have no say against the frame.
+    """
+    count = torch.nn.functional.one_hot(part).sum(1)
+    weight = (count.amax(1, keepdim=True) / count.clamp(min=1)).sqrt().clamp(max=_MOST_WEIGHT)
+    return weight.gather(1, part)
 
 
 def relabel(shapes: Shapes, observed: Observed, theta: Theta, logits: Tensor) -> Tensor:

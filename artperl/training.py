@@ -144,6 +144,8 @@ class Training:
         with closing(SummaryWriter(str(self.out / "events"))) as board, Stop() as stop:
             self._learn_to_perceive(board, stop)
             self._learn_to_fit(board, stop)
+            if not (self.out / "best").is_dir():  # nothing was learnt: what is known is calibrated
+                self._validate(board, 0)
             self._learn_boxes(board, stop)
         return self._finish()
 
@@ -269,8 +271,6 @@ class Training:
         options = self.options
         if self.done["boxes"] >= options.box_views:
             return
-        if not (self.out / "best").is_dir():
-            self._validate(board, 0)
         best = learner = load_estimator(self.out / "best", self.device)
         if self._mixed:  # a given object is its own best reference, as none will be in use
             learner = replace(best, base=self._base_of(self.procedural))

@@ -175,6 +175,14 @@ def test_recording_goes_on_where_it_stopped_whoever_estimates(tmp_path: Path, mo
     assert weights[0].read_bytes() == weights[1].read_bytes()
 
 
+def test_a_run_that_learns_nothing_calibrates_what_it_begins_with(tmp_path: Path) -> None:
+    Training(replace(STAGE, box_views=0), tmp_path, workers=0, progress=False).run()
+    shipped, again = load_estimator("laptop"), load_estimator(tmp_path / "best")
+    assert again.calibration != shipped.calibration
+    tensors = zip(shipped.perception.parameters(), again.perception.parameters(), strict=True)
+    assert all(torch.equal(a, b) for a, b in tensors)
+
+
 def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,7 +33,7 @@ from artperl.evaluation import (
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perceived, Perception
 from artperl.retrieval import ShapeBase
-from artperl.search import EstimatorOptions
+from artperl.search import EstimatorOptions, evened
 from artsim.errors import ArtsimError, DatasetError
 from artsim.sample import Sample
 
@@ -176,6 +176,14 @@ def test_points_are_of_a_part_whose_box_they_are_in() -> None:
     points = np.array([[0.2, 0.0, 0.0], [0.2, 0.05, 0.0], [0.45, 0.0, 0.0], [1.4, 0.0, 0.0], [0.0, 0.0, 0.0]])
     odds = np.log([[0.1, 0.8, 0.1], [0.8, 0.1, 0.1], [0.3, 0.6, 0.1], [0.9, 0.05, 0.05], [np.nan] * 3])
     assert labels_by_boxes(points, T, center, size, odds, 0.01).tolist() == [0, 0, 1, 1, -1]
+
+
+def test_parts_count_by_the_root_of_their_points_but_no_point_for_more_than_eight() -> None:
+    part = torch.tensor([[0] * 1600 + [1] * 400 + [2], [0] * 500 + [2] * 1501])
+    weight = evened(part)
+    assert [weight[0, part[0] == k].sum().item() for k in range(3)] == [1600.0, 800.0, 8.0]
+    total = [weight[1, part[1] == k].sum().item() for k in (0, 2)]
+    assert total[0] / total[1] == pytest.approx((500 / 1501) ** 0.5)
 
 
 def test_draws_take_every_point_before_any_twice() -> None:
