@@ -375,7 +375,8 @@ class Training:
         scored = evaluate(best, samples, self.progress)
         figures = summary(scored)
         about = read_settings(self.out / "best")["about"]
-        save_estimator(best, self.out / "best", {**about, "test": _rounded(figures)})
+        told = {name: about[name] for name in ("options", "done")}  # not how validation went: it chose this one
+        save_estimator(best, self.out / "best", {**told, "test": _rounded(figures)})
         write_atomic(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
         write_atomic(self.out / "table.txt", (table(figures) + "\n").encode())
         try:
