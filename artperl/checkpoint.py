@@ -66,7 +66,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         "calibration": asdict(estimator.calibration),
         "about": dict(about),
     }
-    write_atomic(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
+    write_atomic(folder / _SETTINGS, (json.dumps(settings) + "\n").encode())
 
 
 def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Estimator:
