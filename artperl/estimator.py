@@ -94,7 +94,8 @@ class Estimate:
     reference : str
         Retrieved object.
     residual : float
-        Root of the mean robust squared distance of the cloud from the fitted reference, over the diagonal.
+        Root of the mean robust squared distance of the cloud from the fitted reference, over the diagonal; parts count
+        by the root of how many points they have.
     disagreement : float
         Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
     visibility : (K,) float

@@ -108,7 +108,7 @@ class Found:
 
     @property
     def residual(self) -> float:
-        """Root of the mean robust squared distance from the reference, in diagonals."""
+        """Root of the mean robust squared distance from the reference, in diagonals, weighed by :func:`evened`."""
         return float(self.refined.energy[0].clamp(min=0).sqrt())
 
 

@@ -110,7 +110,7 @@ class Observed(Batch):
     part : (B, N) int64
         Part of each point.
     weight : (B, N) float
-        Trust in each point; 0 for padding and outliers.
+        How much each point counts; 0 for padding and outliers.
     """
 
     points: Tensor

@@ -1,8 +1,9 @@
 """Training and testing in one loop.
 
 Stage 1 teaches perception by what is true of fresh procedural objects; stage 2 teaches the agent by behaviour cloning
-and PPO (Algorithm 1) on fitting problems whose points carry the labels that perception gives them. At intervals the
-whole estimator is tested on a frozen set of unseen objects, and the best is kept.
+and PPO (Algorithm 1) on fitting problems whose points carry the labels that perception gives them; stage 3 teaches
+where boxes end, from the whole estimator's own estimates. At intervals the whole estimator is tested on a frozen set of
+unseen objects, and the best is kept.
 
 A run depends on its options alone. Batches, rollouts and learning rates are functions of their number, so that a
 stopped run goes on exactly as if it had not been stopped: only weights, the optimiser's moments and the number of
@@ -88,8 +89,8 @@ class Training:
     ----------
     options : TrainOptions
     out : Path
-        Folder of the run: ``best`` and ``last`` hold estimators, ``state.*`` what is needed to go on, ``events`` curves
-        for TensorBoard, ``table.txt`` and ``figures.json`` the last test.
+        Folder of the run: ``best`` holds the estimator, ``state.*`` and ``boxes.safetensors`` what is needed to go on,
+        ``events`` curves for TensorBoard, ``table.txt`` and ``figures.json`` the last test.
     workers : int
         Processes that make training clouds, and estimates that boxes learn from; the result does not depend on it.
     progress : bool
