@@ -57,6 +57,8 @@ class Train:
     """More batches, of fewer, denser clouds: of as many points as the estimator looks at. By default the preset's."""
     denser: int = 2
     """Times the points of a training cloud that the estimator looks at."""
+    stretched: float = 0.0
+    """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
     box_views: int | None = None
@@ -93,6 +95,8 @@ class Train:
         preset = PRESETS[self.preset]
         if self.denser < 1:
             raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
+        if not 0.0 <= self.stretched <= 1.0:
+            raise ConfigError(f"{self.stretched} is no share", "stretched", "use 0 to 1")
         if self.files and (self.category or self.real or self.parts == "artimage"):
             raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")
         category = self.category or (() if self.files else ("laptop",))
@@ -110,6 +114,7 @@ class Train:
             perception_steps=preset.perception_steps if steps is None else steps,
             dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
             denser=self.denser,
+            stretched=self.stretched,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,
             ppo=replace(

@@ -18,6 +18,7 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 from artperl.batch import Batch
 from artperl.categories import Parts, arranged, has_parts
 from artperl.order import reordered_sample, visible_order
+from artperl.stretch import stretch
 from artsim.dataset import open_dataset
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.kinematics import Array
@@ -32,6 +33,10 @@ _USES = 4
 """Batches that a cloud is seen in, on average. Making one takes as long as learning from one."""
 _WINDOW = 64
 """Batches, after which a cloud is not seen again."""
+_STRETCHING = 1
+"""Of the seed of what is stretched."""
+_SPARE = 2
+"""Times the points of a cloud that are made where some may be left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,9 +317,9 @@ def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch."""
 
-    def __init__(self, samples: Source, num_points: int, batch_size: int, first: int):
+    def __init__(self, samples: Source, num_points: int, batch_size: int, first: int, stretched: float):
         self.samples, self.num_points = samples, num_points
-        self.batch_size, self.first = batch_size, first
+        self.batch_size, self.first, self.stretched = batch_size, first, stretched
 
     def __iter__(self) -> Iterator[dict[str, Array]]:
         info = get_worker_info()
@@ -322,8 +327,12 @@ class _Rows(IterableDataset[dict[str, Array]]):
         batch = self.first // self.batch_size + worker
         while True:
             for i in range(batch * self.batch_size, (batch + 1) * self.batch_size):
-                yield training_rows(self.samples[i], self.num_points, self.samples.num_rows)
+                yield training_rows(self._sample(i), self.num_points, self.samples.num_rows)
             batch += workers
+
+    def _sample(self, i: int) -> Sample:
+        sample, rng = self.samples[i], np.random.default_rng([_STRETCHING, i])
+        return stretch(sample, self.num_points, rng) if rng.random() < self.stretched else sample
 
 
 def carry_on(worker: int) -> None:
@@ -343,6 +352,7 @@ def batches(
     parts: Parts = "artimage",
     given: Sequence[ArticulatedObject] = (),
     dataset: str | Path | None = None,
+    stretched: float = 0.0,
 ) -> Iterator[tuple[Clouds, Truth]]:
     """Endless batches of fresh procedural objects, or of a dataset.
 
@@ -369,11 +379,14 @@ def batches(
         See :func:`samples_from`.
     dataset : str or Path, optional
         See :class:`Recorded`.
+    stretched : float
+        Share of the views whose objects are stretched; see :func:`artperl.stretch.stretched`.
     """
-    options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
+    cast = _SPARE * num_points if stretched else num_points
+    options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": cast})
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
     samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)
-    rows = _Rows(samples, num_points, fresh, begin * fresh)
+    rows = _Rows(samples, num_points, fresh, begin * fresh, stretched)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=carry_on
     )

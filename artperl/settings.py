@@ -46,6 +46,8 @@ class TrainOptions:
     """Batches in its end, of fewer, denser clouds: of as many points as the estimator looks at."""
     denser: int = 2
     """Times the points of a training cloud that the estimator looks at: weights carry over."""
+    stretched: float = 0.0
+    """Share of these clouds whose objects are stretched between the edges of their parts."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""

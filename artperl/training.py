@@ -202,7 +202,7 @@ class Training:
             return
         data = batches(
             options.categories, self.perception.num_rows, num_points, batch_size, first, seed, self.workers,
-            options.sample, options.parts, self.given, options.dataset,
+            options.sample, options.parts, self.given, options.dataset, options.stretched,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
