@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from artperl.coherence import coherent
 from artperl.data import Clouds
 from artperl.evidence import Evidence
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
-from artperl.networks.perception import Perception
+from artperl.networks.perception import Perceived, Perception
 from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts
 from artperl.retrieval import ShapeBase
 from artperl.search import Clock, EstimatorOptions, Found, find
@@ -218,6 +219,8 @@ class Estimator:
         with clock("perception"):
             clouds = Clouds.of(cloud)
             perceived = self.perception(clouds.points)
+        with clock("coherence"):
+            perceived = _held_together(clouds, perceived)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
         with clock("report"):
             nearest = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
@@ -258,6 +261,13 @@ class Estimator:
             trajectory=np.stack(poses),
             milliseconds=clock.milliseconds,
         )
+
+
+def _held_together(clouds: Clouds, perceived: Perceived) -> Perceived:
+    """What is perceived of one cloud, its labels :func:`artperl.coherence.coherent`."""
+    points, alone = _numpy(clouds.points.cpu()), _numpy(perceived.part_logits.softmax(-1).cpu())
+    probability = torch.from_numpy(coherent(points, alone, float(perceived.log_diagonal.exp()[0])))
+    return replace(perceived, part_logits=probability.clamp(min=1e-6).log()[None].to(perceived.part_logits))
 
 
 def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:

@@ -21,6 +21,7 @@ _SPREAD = 0.35
 _APART = 0.01
 """Edges that are nearer than that, in diagonals, are stretched together."""
 _PARALLEL = 1e-3
+"""Sine of the angle within which directions are the same."""
 _NEIGHBOURS = 12
 _MOST_GROWTH = 4.0
 """Of a place in the image: what comes apart at a depth edge says nothing."""
@@ -66,10 +67,11 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
 def stretchable(sample: Sample) -> list[int]:
     """Axes of the rest frame along which stretching commutes with every joint."""
     along = np.abs(sample.joint_axis)
-    minds = {"prismatic": along > _PARALLEL, "screw": np.full_like(along, True, dtype=bool)}
-    turns = along < 1.0 - _PARALLEL
-    free = [not any(minds.get(kind, turns)[k, axis] for k, kind in enumerate(sample.joint_type) if k) for axis in range(3)]
-    return [axis for axis in range(3) if free[axis]]
+    slides, turns = along > _PARALLEL, np.sqrt(np.clip(1.0 - along**2, 0.0, 1.0)) > _PARALLEL
+    minds = np.zeros_like(slides)
+    for k, kind in enumerate(sample.joint_type):
+        minds[k] = {"free": False, "prismatic": slides[k], "screw": True}.get(kind, turns[k])
+    return np.flatnonzero(~minds.any(axis=0)).tolist()
 
 
 def _spread_of_neighbours(before: Array, after: Array) -> Array:

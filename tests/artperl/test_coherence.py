@@ -1,0 +1,101 @@
+"""Points of one surface get one label; steps and creases keep labels apart."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import artsim
+from artperl.benchmarks.artimage import real_objects
+from artperl.coherence import coherent
+from artsim.kinematics import Array
+from artsim.objects import ArticulatedObject
+from artsim.plan import SampleOptions, draw_sample
+from artsim.renderers import shared_renderer
+from artsim.sample import Sample
+
+
+def view(obj: ArticulatedObject, seed: int) -> Sample:
+    options = SampleOptions(num_points=2048)
+    return draw_sample(obj, options, seed, 0, shared_renderer(options.renderer))
+
+
+@cache
+def made(category: str, seed: int) -> Sample:
+    return view(artsim.make(category, seed), seed)
+
+
+def guessed(part: Array, parts: int, wrong: float, seed: int) -> Array:
+    """Probabilities that are for another part at a share of the points, drawn at random."""
+    rng = np.random.default_rng(seed)
+    other = rng.random(len(part)) < wrong
+    label = np.where(other, rng.integers(parts, size=len(part)), part)
+    return 0.1 / parts + 0.9 * np.eye(parts)[label]
+
+
+def plane(count: int, height: float, seed: int) -> Array:
+    xy = np.random.default_rng(seed).uniform(-0.35, 0.35, (count, 2))
+    return np.column_stack([xy, np.full(count, height)])
+
+
+def test_labels_do_not_cross_a_step() -> None:
+    """Left half and right half, one 3 % of the diagonal above the other: a wrong border moves towards the step."""
+    points = plane(3000, 0.0, 0)
+    points[points[:, 0] > 0.1, 2] = 0.03
+    part = (points[:, 0] > 0.1).astype(int)
+    guess = 0.5 + 0.4 * np.clip((points[:, 0] - 0.16) / 0.1, -1, 1)  # the border at .16
+    label = coherent(points, np.stack([1 - guess, guess], 1), 1.0).argmax(1)
+    before = ((guess > 0.5) != part).mean()
+    assert (label != part).mean() < 0.8 * before
+
+
+def test_without_a_step_a_border_stays_where_it_was() -> None:
+    points = plane(3000, 0.0, 1)
+    guess = (points[:, 0] > 0.16).astype(float)
+    label = coherent(points, np.stack([1 - guess, guess], 1), 1.0).argmax(1)
+    assert (label != guess).mean() < 0.02
+
+
+@given(category=st.sampled_from(["laptop", "dishwasher", "drawer", "scissors"]), seed=st.integers(0, 5))
+def test_labels_drawn_at_random_give_way_to_those_around(category: str, seed: int) -> None:
+    sample = made(category, seed)
+    guess = guessed(sample.part, len(sample.joint_type), 0.3, seed)
+    label = coherent(sample.points.astype(float), guess, sample.diagonal).argmax(1)
+    assert (label != sample.part).mean() < 0.2 * (guess.argmax(1) != sample.part).mean()
+
+
+def test_so_they_do_on_real_objects(partnet_dir: Path) -> None:
+    for obj in real_objects("laptop", "train", partnet_dir)[:2]:
+        sample = view(obj, 0)
+        guess = guessed(sample.part, 2, 0.3, 0)
+        label = coherent(sample.points.astype(float), guess, sample.diagonal).argmax(1)
+        assert (label != sample.part).mean() < 0.2 * (guess.argmax(1) != sample.part).mean()
+
+
+@given(scale=st.floats(0.01, 100.0), seed=st.integers(0, 5))
+def test_they_are_probabilities_whatever_the_pose_size_and_order(scale: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sample = made("laptop", seed)
+    points, guess = sample.points.astype(float), guessed(sample.part, 2, 0.3, seed)
+    out = coherent(points, guess, sample.diagonal)
+    assert (out >= 0).all()
+    np.testing.assert_allclose(out.sum(1), 1.0, atol=1e-9)
+    turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    order = rng.permutation(len(points))
+    moved = scale * points[order] @ turn.T + rng.standard_normal(3)
+    again = coherent(moved, guess[order], scale * sample.diagonal)
+    assert (again.argmax(1) == out[order].argmax(1)).mean() > 0.999  # neighbours at equal distance may change places
+    same = np.tile([0.3, 0.7], (len(points), 1))
+    np.testing.assert_allclose(coherent(points, same, sample.diagonal), same, atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_a_few_points_are_enough(count: int) -> None:
+    points = np.random.default_rng(0).standard_normal((count, 3))
+    out = coherent(points, np.full((count, 2), 0.5), 1.0)
+    np.testing.assert_allclose(out, 0.5)
