@@ -54,7 +54,7 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
     center, whole = 0.5 * (low + high), high - low
     shift = np.einsum("nij,nj->ni", sample.T_camera_part[sample.part, :3, :3], moved - rest)
     points = sample.points + shift
-    growth = _spread_of_neighbours(sample.points, points)
+    growth = _spread_of_neighbours(sample.points.astype(np.float64), points)
     kept = rng.choice(len(points), num_points, replace=False, p=growth / growth.sum())
     part = sample.part[kept]
     npcs = (moved[kept] - center[part]) / np.linalg.norm(whole, axis=1)[part, None] + 0.5
