@@ -59,6 +59,8 @@ class Train:
     """Times the points of a training cloud that the estimator looks at."""
     stretched: float = 0.0
     """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
+    perception_rate: float = 2e-3
+    """Highest learning rate of perception; a lower one changes less of what --start-from brings along."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
     box_views: int | None = None
@@ -95,6 +97,8 @@ class Train:
         preset = PRESETS[self.preset]
         if self.denser < 1:
             raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
+        if not 0.0 < self.perception_rate < 1.0:
+            raise ConfigError(f"{self.perception_rate} is no learning rate", "perception_rate", "use 1e-4 to 1e-2")
         if not 0.0 <= self.stretched <= 1.0:
             raise ConfigError(f"{self.stretched} is no share", "stretched", "use 0 to 1")
         if self.files and (self.category or self.real or self.parts == "artimage"):
@@ -115,6 +119,7 @@ class Train:
             dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
             denser=self.denser,
             stretched=self.stretched,
+            perception_rate=self.perception_rate,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,
             ppo=replace(
