@@ -382,7 +382,7 @@ def batches(
     stretched : float
         Share of the views whose objects are stretched; see :func:`artperl.stretch.stretched`.
     """
-    cast = _SPARE * num_points if stretched else num_points
+    cast = _SPARE * num_points if stretched and dataset is None else num_points  # a dataset has what it has
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": cast})
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
     samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)

@@ -37,7 +37,7 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
     Parameters
     ----------
     sample : Sample
-        With more points than are wanted.
+        With at least as many points as are wanted.
     num_points : int
         Points that are kept, the more the more their place has grown in the camera's view: how dense a cloud is must
         not tell how it was stretched.

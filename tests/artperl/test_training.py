@@ -34,8 +34,8 @@ from artsim.stream import STREAM_SEEDS
 from artsim.urdf import load
 
 TINY = TrainOptions(
-    base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, batch_size=4, num_points=96,
-    agent_rollouts=3, episodes=3, box_views=0, validate_every=2, validate_rollouts=2, test_objects=2,
+    base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, stretched=0.5, batch_size=4,
+    num_points=96, agent_rollouts=3, episodes=3, box_views=0, validate_every=2, validate_rollouts=2, test_objects=2,
     foreign_categories=1, validation_views=1, test_views=1,
     ppo=PPOOptions(minibatch=4), fitting=FittingOptions(steps=2, observed_points=48, reference_points=16),
 )  # fmt: skip
@@ -240,3 +240,14 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
     with pytest.raises(SystemExit):
         cli.train_main()
     assert "files are learnt from alone" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("option", "value"), [("--stretched", "2"), ("--perception-rate", "0"), ("--denser", "0")])
+def test_an_impossible_option_is_named(
+    option: str, value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["train.py", option, value, "--out", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        cli.train_main()
+    assert option.removeprefix("--").replace("-", "_") in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
