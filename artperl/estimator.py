@@ -208,6 +208,15 @@ class Estimator:
         estimate, seen = self._fit(points, Clock())
         return estimate, *_evidence(points, estimate, seen, self.perception.num_rows)
 
+    def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
+        """What is perceived of one cloud."""
+        with clock("perception"):
+            perceived = self.perception(clouds.points)
+        if self.options.coherent:
+            with clock("coherence"):
+                perceived = _held_together(clouds, perceived)
+        return perceived
+
     def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Seen]:
         """The estimate whose boxes are the reference's, and what it goes by."""
         options = self.options
@@ -216,11 +225,8 @@ class Estimator:
             good = clean(points)
             chosen = draw(len(good), options.num_points, np.random.default_rng(0))
             cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None].to(self.perception.device)
-        with clock("perception"):
             clouds = Clouds.of(cloud)
-            perceived = self.perception(clouds.points)
-        with clock("coherence"):
-            perceived = _held_together(clouds, perceived)
+        perceived = self.perceive(clouds, clock)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
         with clock("report"):
             nearest = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]

@@ -49,6 +49,8 @@ class EstimatorOptions:
 
     num_points: int = 1024
     """Points that perception sees, and that are labelled in the end."""
+    coherent: bool = True
+    """Labels of points on one smooth surface hold together: :mod:`artperl.coherence`."""
     early_points: int = 256
     """Of these, points by which the best start is found."""
     fit_points: int = 2048

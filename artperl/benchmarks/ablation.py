@@ -20,6 +20,7 @@ from artperl.pose import Theta, pose_parts
 from artperl.refine import refine
 from artperl.retrieval import ShapeBase
 from artperl.rotations import rotate
+from artperl.search import Clock
 from artperl.shapes import Observed
 from artperl.start import part_poses, start
 from artsim.sample import Sample
@@ -47,6 +48,7 @@ def variants(
         "whole": estimator,
         "random reference": replace(estimator, base=shuffled(estimator.base)),
         "part by part, no kinematics": PartByPart(**vars(estimator)),
+        "labels of each point by itself": changed(coherent=False),
         "boxes of the references": replace(estimator, boxes=None),
         "no refinement": changed(refine=unrefined),
         "refinement only: no agent": without_agent,
@@ -116,7 +118,7 @@ class PartByPart(Estimator):
         chosen = draw(len(known), self.options.num_points, np.random.default_rng(0))
         cloud = torch.from_numpy(known[chosen].astype(np.float32))[None]
         clouds = Clouds.of(cloud)
-        perceived = self.perception(clouds.points)
+        perceived = self.perceive(clouds, Clock())
         query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
         shapes, _ = start(clouds, perceived, self.base.shapes[self.base.nearest(query)[0][0]], 1)
         P = int(shapes.trees.valid.sum())
