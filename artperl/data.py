@@ -34,7 +34,7 @@ _USES = 4
 _WINDOW = 64
 """Batches, after which a cloud is not seen again."""
 _STRETCHING = 1
-"""Of the seed of what is stretched."""
+"""Begins the seed of how a view is stretched; its number is the rest."""
 _SPARE = 2
 """Times the points of a cloud that are made where some may be left out."""
 
@@ -287,8 +287,6 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
     """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
     K = len(sample.joint_type)
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
-    size = np.linalg.norm(sample.box_size, axis=1)
-    rest = (sample.npcs[:num_points] - 0.5) * size[part, None] + sample.box_center[part]
 
     def pad(rows: Array) -> Array:
         padded = np.zeros((num_rows, *rows.shape[1:]), dtype=np.float32)
@@ -298,7 +296,7 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
     return {
         "points": points.astype(np.float32),
         "part": part,
-        "canonical": (rest / sample.diagonal).astype(np.float32),
+        "canonical": (sample.rest_points[:num_points] / sample.diagonal).astype(np.float32),
         "part_valid": np.arange(num_rows) < K,
         "box_center": pad(sample.box_center / sample.diagonal),
         "box_size": pad(sample.box_size / sample.diagonal),
@@ -380,7 +378,7 @@ def batches(
     dataset : str or Path, optional
         See :class:`Recorded`.
     stretched : float
-        Share of the views whose objects are stretched; see :func:`artperl.stretch.stretched`.
+        Share of the views whose objects are stretched; see :func:`artperl.stretch.stretch`.
     """
     cast = _SPARE * num_points if stretched and dataset is None else num_points  # a dataset has what it has
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": cast})

@@ -23,6 +23,7 @@ _APART = 0.01
 _PARALLEL = 1e-3
 """Sine of the angle within which directions are the same."""
 _NEIGHBOURS = 12
+"""Of a point in the image, which tell how much its place has grown."""
 _MOST_GROWTH = 4.0
 """Of a place in the image: what comes apart at a depth edge says nothing."""
 
@@ -44,8 +45,7 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
     rng : numpy.random.Generator
     """
     low, high = sample.box_center - 0.5 * sample.box_size, sample.box_center + 0.5 * sample.box_size
-    size = np.linalg.norm(sample.box_size, axis=1)
-    rest = (sample.npcs - 0.5) * size[sample.part, None] + sample.box_center[sample.part]
+    rest = sample.rest_points
     moved = rest.copy()
     for axis in stretchable(sample):
         along = _stretching(np.concatenate([low[:, axis], high[:, axis]]), _APART * sample.diagonal, rng)

@@ -106,6 +106,13 @@ class Sample:
     part_mask: NDArray[np.uint8] | None = None
     rgb: NDArray[np.uint8] | None = None
 
+    @property
+    def rest_points(self) -> Array:
+        """(N, 3) where in the rest frame, at rest, each place lies that ``npcs`` names, metres."""
+        diagonal = np.linalg.norm(self.box_size, axis=1)
+        rest: Array = (self.npcs - 0.5) * diagonal[self.part, None] + self.box_center[self.part]
+        return rest
+
 
 def observe(
     obj: ArticulatedObject,

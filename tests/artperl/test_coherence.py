@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,24 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import artsim
 from artperl.benchmarks.artimage import real_objects
 from artperl.coherence import coherent
 from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions, draw_sample
-from artsim.renderers import shared_renderer
-from artsim.sample import Sample
-
-
-def view(obj: ArticulatedObject, seed: int) -> Sample:
-    options = SampleOptions(num_points=2048)
-    return draw_sample(obj, options, seed, 0, shared_renderer(options.renderer))
-
-
-@cache
-def made(category: str, seed: int) -> Sample:
-    return view(artsim.make(category, seed), seed)
+from tests.artperl.worlds import made, view
 
 
 def guessed(part: Array, parts: int, wrong: float, seed: int) -> Array:
@@ -43,8 +28,8 @@ def plane(count: int, height: float, seed: int) -> Array:
     return np.column_stack([xy, np.full(count, height)])
 
 
-def test_labels_do_not_cross_a_step() -> None:
-    """Left half and right half, one 3 % of the diagonal above the other: a wrong border moves towards the step."""
+def test_a_wrong_border_moves_towards_a_step() -> None:
+    """Left half and right half, one 3 % of the diagonal above the other."""
     points = plane(3000, 0.0, 0)
     points[points[:, 0] > 0.1, 2] = 0.03
     part = (points[:, 0] > 0.1).astype(int)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,21 +16,10 @@ from artperl.benchmarks.artimage import real_objects
 from artperl.data import batches
 from artperl.stretch import stretch, stretchable
 from artsim.kinematics import Array, KinematicTree
-from artsim.plan import SampleOptions, draw_sample
-from artsim.renderers import shared_renderer
 from artsim.sample import Sample
+from tests.artperl.worlds import made, view
 
 CATEGORIES = ("drawer", "storage_furniture", "laptop", "dishwasher", "eyeglasses", "scissors", "robot_arm", "window")
-
-
-def view(obj: artsim.ArticulatedObject, seed: int, num_points: int = 3000) -> Sample:
-    options = SampleOptions(num_points=num_points)
-    return draw_sample(obj, options, seed, 0, shared_renderer(options.renderer))
-
-
-@cache
-def made(category: str, seed: int) -> Sample:
-    return view(artsim.make(category, seed), seed)
 
 
 def rest_of(sample: Sample) -> Array:

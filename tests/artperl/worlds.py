@@ -8,6 +8,10 @@ import artsim
 from artperl.embedding import by_boxes
 from artperl.problems import Problem, Problems
 from artperl.retrieval import ShapeBase
+from artsim.objects import ArticulatedObject
+from artsim.plan import SampleOptions, draw_sample
+from artsim.renderers import shared_renderer
+from artsim.sample import Sample
 
 
 @cache
@@ -20,3 +24,15 @@ def small_base(*categories: str, objects: int = 6) -> ShapeBase:
 def small_problem(*categories: str, batch: int = 6) -> Problem:
     """A few fitting problems."""
     return Problems(categories, small_base(*categories), batch, 128, seed=3)[0]
+
+
+def view(obj: ArticulatedObject, seed: int, num_points: int = 2048) -> Sample:
+    """An object from somewhere in front, in some state."""
+    options = SampleOptions(num_points=num_points)
+    return draw_sample(obj, options, seed, 0, shared_renderer(options.renderer))
+
+
+@cache
+def made(category: str, seed: int) -> Sample:
+    """A view of a procedural object."""
+    return view(artsim.make(category, seed), seed)
