@@ -27,11 +27,14 @@ class _Style:
 
     front: str
     overlay: bool  # the fronts lie before the case, or within it
+    recess: float  # of fronts within the case, behind its edges
     handle: str
     size: float  # of the handle, over the front's width
     reach: float
     rise: float  # of the handle above the front's middle, over its height
     side: float  # height of the drawer's sides over its front's
+    lift: float  # of the drawer's sides above its front's lower edge, over the front's height
+    floor: float  # of the drawer above the lower edge of its sides, over the front's height
     length: float  # of the drawer over the case's depth
     travel: float  # over the drawer's length
 
@@ -83,9 +86,9 @@ class _Furniture:
                     drawer, travel = self._drawer(cell_low + GAP, cell_high - GAP, wall)
                     self.drawers.append((drawer.mirrored(0) if back else drawer, 1.0 if back else -1.0, travel))
                 elif content == "fixed":
-                    face = low[0] - GAP - (_FRONT if self.style.overlay else 0.0)
+                    face = low[0] - GAP + (-_FRONT if self.style.overlay else self.style.recess)
                     front_low = np.array([face, *(cell_low[1:] - thin / 2)])
-                    front_high = np.array([low[0] + 0.01, *(cell_high[1:] + thin / 2)])
+                    front_high = np.array([max(low[0], face) + 0.012, *(cell_high[1:] + thin / 2)])
                     solid += panel(self.style.front, front_low, front_high, 0.045, 0.006)
                     solid += _handle(self.style, front_low, front_high)
         self.body += solid.mirrored(0) if back else solid
@@ -93,16 +96,18 @@ class _Furniture:
     def _drawer(self, low: Array, high: Array, wall: float) -> tuple[Solid, float]:
         """Box open at the top behind a front with a handle, and how far it comes out."""
         style = self.style
-        face = low[0] - _FRONT - 2 * GAP if style.overlay else low[0]
+        face = low[0] - _FRONT - 2 * GAP if style.overlay else low[0] + style.recess
         spread = wall / 4 if style.overlay else 0.0
         front_low = np.array([face, low[1] - spread, low[2] - spread])
         front_high = np.array([face + _FRONT, high[1] + spread, high[2] + spread])
         length = style.length * (high[0] - low[0])
         solid = panel(style.front, front_low, front_high, 0.045, 0.006)
-        side_top = low[2] + style.side * (high[2] - low[2])
+        height = high[2] - low[2]
+        bottom, rim = low[2] + style.lift * height, low[2] + style.side * height
         solid += tray(
-            (face + _FRONT - 0.005, low[1] + 0.004, low[2]), (low[0] + length, high[1] - 0.004, side_top), 0.010
-        )
+            (face + _FRONT - 0.005, low[1] + 0.004, bottom), (low[0] + length, high[1] - 0.004, rim), 0.010,
+            max(0.010, style.floor * height),
+        )  # fmt: skip
         return solid + _handle(style, front_low, front_high), style.travel * length
 
     def build(self) -> Assembly:
@@ -128,11 +133,14 @@ def _style(rng: np.random.Generator) -> _Style:
     return _Style(
         front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
         overlay=bool(rng.random() < 0.5),
-        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.3, 0.3, 0.2, 0.1, 0.1])),
+        recess=rng.uniform(0.0, 0.02) if rng.random() < 0.5 else 0.0,
+        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.23, 0.22, 0.15, 0.06, 0.34])),
         size=rng.uniform(0.15, 0.7),
         reach=rng.uniform(0.015, 0.04),
         rise=rng.uniform(-0.2, 0.3),
-        side=rng.uniform(0.6, 0.95),
+        side=rng.uniform(0.6, 1.0),
+        lift=rng.uniform(0.0, 0.2) if rng.random() < 0.5 else 0.0,
+        floor=rng.uniform(0.0, 0.25),
         length=rng.uniform(0.75, 1.0),
         travel=rng.uniform(0.55, 0.92),
     )
