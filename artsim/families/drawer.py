@@ -17,7 +17,6 @@ from artsim.families.details import bar_handle, bow_handle, knob, panel
 from artsim.kinematics import Array
 from artsim.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
 
-GAP = 0.002
 _FRONT = 0.018  # thickness of a front
 
 
@@ -27,6 +26,7 @@ class _Style:
 
     front: str
     overlay: bool  # the fronts lie before the case, or within it
+    gap: float  # around a front; most real models have none that could be seen
     recess: float  # of fronts within the case, behind its edges
     handle: str
     size: float  # of the handle, over the front's width
@@ -71,7 +71,10 @@ class _Furniture:
             Turns it to open towards +X, reflected in the plane x = 0.
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        thin = wall / 4
+        thin, gap = wall / 4, self.style.gap
+        beside = [
+            np.pad(np.full(len(edges) - 2, thin), 1) for edges in (edges_y, edges_z)
+        ]  # half of what divides cells
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
         for z in edges_z[1:-1]:
             solid += box((low[0], low[1] + wall / 2, z - thin), (high[0] - wall / 4, high[1] - wall / 2, z + thin))
@@ -80,13 +83,19 @@ class _Furniture:
         for row in range(len(edges_z) - 2, -1, -1):
             content = contents[row] if contents else "drawer"
             for column in range(len(edges_y) - 1):
-                cell_low = np.array([low[0], edges_y[column] + thin, edges_z[row] + thin])
-                cell_high = np.array([high[0] - wall / 2, edges_y[column + 1] - thin, edges_z[row + 1] - thin])
+                cell_low = np.array([low[0], edges_y[column] + beside[0][column], edges_z[row] + beside[1][row]])
+                cell_high = np.array(
+                    [
+                        high[0] - wall / 2,
+                        edges_y[column + 1] - beside[0][column + 1],
+                        edges_z[row + 1] - beside[1][row + 1],
+                    ]
+                )
                 if content == "drawer":
-                    drawer, travel = self._drawer(cell_low + GAP, cell_high - GAP, wall)
+                    drawer, travel = self._drawer(cell_low + gap, cell_high - gap, wall)
                     self.drawers.append((drawer.mirrored(0) if back else drawer, 1.0 if back else -1.0, travel))
                 elif content == "fixed":
-                    face = low[0] - GAP + (-_FRONT if self.style.overlay else self.style.recess)
+                    face = low[0] - gap + (-_FRONT if self.style.overlay else self.style.recess)
                     front_low = np.array([face, *(cell_low[1:] - thin / 2)])
                     front_high = np.array([max(low[0], face) + 0.012, *(cell_high[1:] + thin / 2)])
                     solid += panel(self.style.front, front_low, front_high, 0.045, 0.006)
@@ -96,7 +105,7 @@ class _Furniture:
     def _drawer(self, low: Array, high: Array, wall: float) -> tuple[Solid, float]:
         """Box open at the top behind a front with a handle, and how far it comes out."""
         style = self.style
-        face = low[0] - _FRONT - 2 * GAP if style.overlay else low[0] + style.recess
+        face = low[0] - _FRONT - 2 * style.gap if style.overlay else low[0] + style.recess
         spread = wall / 4 if style.overlay else 0.0
         front_low = np.array([face, low[1] - spread, low[2] - spread])
         front_high = np.array([face + _FRONT, high[1] + spread, high[2] + spread])
@@ -133,6 +142,7 @@ def _style(rng: np.random.Generator) -> _Style:
     return _Style(
         front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
         overlay=bool(rng.random() < 0.5),
+        gap=rng.uniform(0.0005, 0.004) if rng.random() < 0.4 else 0.0005,
         recess=rng.uniform(0.0, 0.02) if rng.random() < 0.5 else 0.0,
         handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.23, 0.22, 0.15, 0.06, 0.34])),
         size=rng.uniform(0.15, 0.7),
