@@ -2,7 +2,7 @@
 
 What varies: the kind; number and grid of the drawers, how wide those of a row and how high those of a column are, on
 which side of a desk they are, in one row or at the back of a table as well; open compartments and fronts that do not
-move; legs, plinths and shelves; fronts and handles.
+move; legs, plinths and shelves; fronts, how well they fill their openings, and handles; how high drawers' floors lie.
 """
 
 from __future__ import annotations
@@ -72,9 +72,8 @@ class _Furniture:
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
         thin, gap = wall / 4, self.style.gap
-        beside = [
-            np.pad(np.full(len(edges) - 2, thin), 1) for edges in (edges_y, edges_z)
-        ]  # half of what divides cells
+        # between two cells lies a divider, and nothing between a cell and a wall
+        half_y, half_z = (np.pad(np.full(len(edges) - 2, thin), 1) for edges in (edges_y, edges_z))
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
         for z in edges_z[1:-1]:
             solid += box((low[0], low[1] + wall / 2, z - thin), (high[0] - wall / 4, high[1] - wall / 2, z + thin))
@@ -83,14 +82,9 @@ class _Furniture:
         for row in range(len(edges_z) - 2, -1, -1):
             content = contents[row] if contents else "drawer"
             for column in range(len(edges_y) - 1):
-                cell_low = np.array([low[0], edges_y[column] + beside[0][column], edges_z[row] + beside[1][row]])
-                cell_high = np.array(
-                    [
-                        high[0] - wall / 2,
-                        edges_y[column + 1] - beside[0][column + 1],
-                        edges_z[row + 1] - beside[1][row + 1],
-                    ]
-                )
+                near, far = (edges_y + half_y)[column], (edges_y - half_y)[column + 1]
+                cell_low = np.array([low[0], near, (edges_z + half_z)[row]])
+                cell_high = np.array([high[0] - wall / 2, far, (edges_z - half_z)[row + 1]])
                 if content == "drawer":
                     drawer, travel = self._drawer(cell_low + gap, cell_high - gap, wall)
                     self.drawers.append((drawer.mirrored(0) if back else drawer, 1.0 if back else -1.0, travel))
@@ -109,9 +103,8 @@ class _Furniture:
         spread = wall / 4 if style.overlay else 0.0
         front_low = np.array([face, low[1] - spread, low[2] - spread])
         front_high = np.array([face + _FRONT, high[1] + spread, high[2] + spread])
-        length = style.length * (high[0] - low[0])
+        length, height = style.length * (high[0] - low[0]), high[2] - low[2]
         solid = panel(style.front, front_low, front_high, 0.045, 0.006)
-        height = high[2] - low[2]
         bottom, rim = low[2] + style.lift * height, low[2] + style.side * height
         solid += tray(
             (face + _FRONT - 0.005, low[1] + 0.004, bottom), (low[0] + length, high[1] - 0.004, rim), 0.010,
