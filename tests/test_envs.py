@@ -96,7 +96,7 @@ def test_what_is_seen_is_true(camera: str) -> None:
 
 
 def test_opening_an_object_is_rewarded() -> None:
-    obj = make("drawer", 2)
+    obj = make("drawer", 1)
     env = new(obj=obj, episode_length=30)
     env.reset(seed=0)
     steps = [env.step(np.ones(16)) for _ in range(30)]
@@ -107,7 +107,7 @@ def test_opening_an_object_is_rewarded() -> None:
 
 
 def test_an_action_is_a_share_of_the_limits() -> None:
-    obj = make("drawer", 2)
+    obj = make("drawer", 1)
     env, simulated = new(obj=obj), new(obj=obj)
     _, info = env.reset(seed=0)
     simulated.reset(seed=0)

@@ -2,7 +2,7 @@
 
 What varies: the kind; number and grid of the drawers, how wide those of a row and how high those of a column are, on
 which side of a desk they are, in one row or at the back of a table as well; open compartments and fronts that do not
-move; legs, plinths and shelves; fronts, how well they fill their openings, and handles; how high drawers' floors lie.
+move; legs, plinths and shelves; fronts and handles.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from artsim.families.details import bar_handle, bow_handle, knob, panel
 from artsim.kinematics import Array
 from artsim.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
 
+GAP = 0.002
 _FRONT = 0.018  # thickness of a front
 
 
@@ -26,15 +27,11 @@ class _Style:
 
     front: str
     overlay: bool  # the fronts lie before the case, or within it
-    gap: float  # around a front; most real models have none that could be seen
-    recess: float  # of fronts within the case, behind its edges
     handle: str
     size: float  # of the handle, over the front's width
     reach: float
     rise: float  # of the handle above the front's middle, over its height
     side: float  # height of the drawer's sides over its front's
-    lift: float  # of the drawer's sides above its front's lower edge, over the front's height
-    floor: float  # of the drawer above the lower edge of its sides, over the front's height
     length: float  # of the drawer over the case's depth
     travel: float  # over the drawer's length
 
@@ -71,9 +68,7 @@ class _Furniture:
             Turns it to open towards +X, reflected in the plane x = 0.
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        thin, gap = wall / 4, self.style.gap
-        # between two cells lies a divider, and nothing between a cell and a wall
-        half_y, half_z = (np.pad(np.full(len(edges) - 2, thin), 1) for edges in (edges_y, edges_z))
+        thin = wall / 4
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
         for z in edges_z[1:-1]:
             solid += box((low[0], low[1] + wall / 2, z - thin), (high[0] - wall / 4, high[1] - wall / 2, z + thin))
@@ -82,16 +77,15 @@ class _Furniture:
         for row in range(len(edges_z) - 2, -1, -1):
             content = contents[row] if contents else "drawer"
             for column in range(len(edges_y) - 1):
-                near, far = (edges_y + half_y)[column], (edges_y - half_y)[column + 1]
-                cell_low = np.array([low[0], near, (edges_z + half_z)[row]])
-                cell_high = np.array([high[0] - wall / 2, far, (edges_z - half_z)[row + 1]])
+                cell_low = np.array([low[0], edges_y[column] + thin, edges_z[row] + thin])
+                cell_high = np.array([high[0] - wall / 2, edges_y[column + 1] - thin, edges_z[row + 1] - thin])
                 if content == "drawer":
-                    drawer, travel = self._drawer(cell_low + gap, cell_high - gap, wall)
+                    drawer, travel = self._drawer(cell_low + GAP, cell_high - GAP, wall)
                     self.drawers.append((drawer.mirrored(0) if back else drawer, 1.0 if back else -1.0, travel))
                 elif content == "fixed":
-                    face = low[0] - gap + (-_FRONT if self.style.overlay else self.style.recess)
+                    face = low[0] - GAP - (_FRONT if self.style.overlay else 0.0)
                     front_low = np.array([face, *(cell_low[1:] - thin / 2)])
-                    front_high = np.array([max(low[0], face) + 0.012, *(cell_high[1:] + thin / 2)])
+                    front_high = np.array([low[0] + 0.01, *(cell_high[1:] + thin / 2)])
                     solid += panel(self.style.front, front_low, front_high, 0.045, 0.006)
                     solid += _handle(self.style, front_low, front_high)
         self.body += solid.mirrored(0) if back else solid
@@ -99,17 +93,16 @@ class _Furniture:
     def _drawer(self, low: Array, high: Array, wall: float) -> tuple[Solid, float]:
         """Box open at the top behind a front with a handle, and how far it comes out."""
         style = self.style
-        face = low[0] - _FRONT - 2 * style.gap if style.overlay else low[0] + style.recess
+        face = low[0] - _FRONT - 2 * GAP if style.overlay else low[0]
         spread = wall / 4 if style.overlay else 0.0
         front_low = np.array([face, low[1] - spread, low[2] - spread])
         front_high = np.array([face + _FRONT, high[1] + spread, high[2] + spread])
-        length, height = style.length * (high[0] - low[0]), high[2] - low[2]
+        length = style.length * (high[0] - low[0])
         solid = panel(style.front, front_low, front_high, 0.045, 0.006)
-        bottom, rim = low[2] + style.lift * height, low[2] + style.side * height
+        side_top = low[2] + style.side * (high[2] - low[2])
         solid += tray(
-            (face + _FRONT - 0.005, low[1] + 0.004, bottom), (low[0] + length, high[1] - 0.004, rim), 0.010,
-            max(0.010, style.floor * height),
-        )  # fmt: skip
+            (face + _FRONT - 0.005, low[1] + 0.004, low[2]), (low[0] + length, high[1] - 0.004, side_top), 0.010
+        )
         return solid + _handle(style, front_low, front_high), style.travel * length
 
     def build(self) -> Assembly:
@@ -135,15 +128,11 @@ def _style(rng: np.random.Generator) -> _Style:
     return _Style(
         front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
         overlay=bool(rng.random() < 0.5),
-        gap=rng.uniform(0.0005, 0.004) if rng.random() < 0.4 else 0.0005,
-        recess=rng.uniform(0.0, 0.02) if rng.random() < 0.5 else 0.0,
-        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.23, 0.22, 0.15, 0.06, 0.34])),
+        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.3, 0.3, 0.2, 0.1, 0.1])),
         size=rng.uniform(0.15, 0.7),
         reach=rng.uniform(0.015, 0.04),
         rise=rng.uniform(-0.2, 0.3),
-        side=rng.uniform(0.6, 1.0),
-        lift=rng.uniform(0.0, 0.2) if rng.random() < 0.5 else 0.0,
-        floor=rng.uniform(0.0, 0.25),
+        side=rng.uniform(0.6, 0.95),
         length=rng.uniform(0.75, 1.0),
         travel=rng.uniform(0.55, 0.92),
     )
