@@ -1,8 +1,9 @@
 """Where errors come from: ``python -m benchmarks.errors``.
 
-Moving parts of unseen procedural objects, validation seeds, by how many of a cloud's points show them: rotation, IoU of
-posed boxes, and what that would be if one thing were known: where the box's faces are along each axis of the rest frame
-(x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known; and the root's
+Moving parts of unseen procedural objects, validation seeds, or of real ones, by how many of a cloud's points show them
+and by how far from rest they are, in % of their joint's range: how many of these points have their label, rotation, IoU
+of posed boxes, and what that would be if one thing were known: where the box's faces are along each axis of the rest
+frame (x to the back, y to the side, z up). Last, IoU at rest, and the same if the root's box were known; and the root's
 rotation, with and without the objects that it is worst for, and how far its faces are off. Errors against points are
 drawn as a picture. The last line is one JSON object.
 """
@@ -10,7 +11,8 @@ drawn as a picture. The last line is one JSON object.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,18 +23,26 @@ import tyro
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from tqdm import tqdm
 
 from artperl import metrics
+from artperl.benchmarks.artimage import real_objects
 from artperl.benchmarks.rows import find_estimator
-from artperl.categories import ARTIMAGE
-from artperl.estimator import Estimate
-from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, frozen_samples, rest_centers, true_poses
+from artperl.categories import ARTIMAGE, objects_of
+from artperl.data import Clouds
+from artperl.estimator import Estimate, Estimator
+from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
+from artperl.networks.perception import Perceived
+from artperl.search import Clock
 from artsim.files import atomic_file
+from artsim.objects import ArticulatedObject
 from artsim.sample import Sample
 
 Array = NDArray[np.float64]
-BINS = (0, 80, 400, 1200, NUM_POINTS + 1)
+BINS = {"points": (0, 80, 400, 1200, NUM_POINTS + 1), "percent moved": (0, 10, 30, 101)}
+"""Lower ends, and what lies above the last, of what moving parts are told apart by."""
+_SURE = 12.0  # the odds of a label that was told, as a logarithm
 FACES = ("-x", "-y", "-z", "+x", "+y", "+z")
 
 
@@ -44,57 +54,103 @@ class Options:
     """Folder of estimators (or of training runs) by category; by default those that come with the package."""
     categories: tuple[str, ...] = tuple(ARTIMAGE)
     objects: int = 40
+    """Procedural ones of each category."""
     views: int = 2
     """Of each object."""
+    real: bool = False
+    """Real objects of the test half of ``ARTSIM_PARTNET_DIR`` instead of procedural ones."""
+    true_labels: bool = False
+    """Tell the estimator which part each point is of: what is off even so is not for want of labels."""
     picture: Path | None = None
     """Draw errors against points here (.png)."""
     threads: int = 2
     """Processor threads."""
 
 
+@dataclass(kw_only=True)
+class Told(Estimator):
+    """An estimator that is told the true part of each point of one sample."""
+
+    sample: Sample
+
+    def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
+        """What is perceived, but for the parts."""
+        perceived = super().perceive(clouds, clock)
+        metres = (clouds.points[0] * clouds.radius + clouds.center).cpu().numpy()
+        part = torch.from_numpy(self.sample.part[cKDTree(self.sample.points).query(metres)[1]].astype(np.int64))
+        true = torch.nn.functional.one_hot(part, perceived.part_logits.shape[-1]).to(perceived.part_logits)
+        return replace(perceived, part_logits=_SURE * true[None])
+
+
 def main(options: Options) -> None:
     """Measure and print."""
     torch.set_num_threads(options.threads)
     result: dict[str, dict[str, Any]] = {}
-    every: dict[str, Array] = {}
+    every: dict[str, dict[str, Array]] = {}
     for category in options.categories:
-        estimator = find_estimator(options.weights, category)
-        samples = frozen_samples([category], options.objects, options.views, None, VALIDATION_SEEDS)
+        estimator, objects = find_estimator(options.weights, category), objects_to_test(category, options)
         rows, roots, faces = [], [], []
+        samples = samples_of(objects, options.views, None, VALIDATION_SEEDS)
         for sample in tqdm(samples, category, disable=None, leave=False):
-            estimate = estimator(sample.points)
+            asked = Told(**vars(estimator), sample=sample) if options.true_labels else estimator
+            estimate = asked(sample.points)
             if len(estimate.size) == len(sample.box_size):
                 rows += moving_parts(estimate, sample)
                 roots.append(metrics.rotation_error(estimate.rotation[0], true_poses(sample)[0][0]))
                 faces.append(root_faces(estimate, sample))
             else:
                 roots.append(np.array(metrics.FAILED["rotation_deg"]))
-        every[category] = table = np.array([list(row.values()) for row in rows])
-        names = list(rows[0])
-        result[category] = {}
-        print(f"{category}\n{'points':>10s}{'parts':>7s}" + "".join(f"{name:>11s}" for name in names[1:]))
-        for low, high in [*pairwise(BINS), (BINS[0], BINS[-1])]:
-            own = table[(table[:, 0] >= low) & (table[:, 0] < high)]
-            if len(own):
-                mean = own[:, 1:].mean(0)
-                label = f"{low}-{high - 1}" if (low, high) != (BINS[0], BINS[-1]) else "all"
-                result[category][label] = {
-                    "parts": len(own),
-                    **dict(zip(names[1:], mean.round(4).tolist(), strict=True)),
-                }
-                shown = "".join(f"{value:11.2f}" if n == 0 else f"{100 * value:11.1f}" for n, value in enumerate(mean))
-                print(f"{label:>10s}{len(own):7d}{shown}", flush=True)
-        result[category]["root"] = root_figures(np.reshape(roots, (options.objects, options.views)), np.array(faces))
-    print("mean rotation in degrees, and IoU in % if what the column says were known")
+        if not rows:
+            print(f"{category}: no object with the parts of ArtImage, or no estimate with as many")
+            continue
+        every[category] = table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        result[category] = {"all": figures(table), **{by: in_bins(table, by) for by in BINS}}
+        print_figures(category, result[category])
+        result[category]["root"] = root_figures(np.reshape(roots, (len(objects), options.views)), np.array(faces))
+    print("labelled: % of the part's points; mean rotation in degrees; IoU in %, if what the column says were known")
     if options.picture is not None:
         draw(every, options.picture)
     print(json.dumps(result))
 
 
+def objects_to_test(category: str, options: Options) -> list[ArticulatedObject]:
+    """Objects of one category, always the same ones."""
+    if not options.real:
+        return objects_of([category], options.objects, VALIDATION_SEEDS)
+    folder = os.environ.get("ARTSIM_PARTNET_DIR")
+    return real_objects(category, "test", Path(folder) if folder else None)
+
+
+def figures(table: dict[str, Array]) -> dict[str, float]:
+    """How many parts, and the mean of each figure."""
+    means = {name: round(float(np.nanmean(values)), 4) for name, values in table.items() if name not in BINS}
+    return {"parts": len(table["posed"]), **means}
+
+
+def in_bins(table: dict[str, Array], by: str) -> dict[str, dict[str, float]]:
+    """Figures of the parts in each bin that has any."""
+    bins = {f"{low}-{high - 1}": (table[by] >= low) & (table[by] < high) for low, high in pairwise(BINS[by])}
+    return {
+        label: figures({name: values[own] for name, values in table.items()})
+        for label, own in bins.items()
+        if own.any()
+    }
+
+
+def print_figures(category: str, result: dict[str, Any]) -> None:
+    """One table for each of what parts are told apart by."""
+    for by in BINS:
+        names = list(result["all"])
+        print(f"{category}\n{by:>12s}{names[0]:>7s}" + "".join(f"{name:>11s}" for name in names[1:]))
+        for label, means in [*result[by].items(), ("all", result["all"])]:
+            shown = (f"{means[n]:11.2f}" if n == "rotation" else f"{100 * means[n]:11.1f}" for n in names[1:])
+            print(f"{label:>12s}{means['parts']:7d}" + "".join(shown), flush=True)
+
+
 def root_figures(rotation: Array, faces: Array) -> dict[str, Any]:
     """Print and return how far roots are off: rotation (objects, views), degrees, faces (N, 6), % of diagonals."""
     by_object = np.sort(rotation.mean(1))
-    best = by_object[: -max(1, len(by_object) // 10)]
+    best = by_object[: max(1, len(by_object) * 9 // 10)]
     print(f"root: rotation {by_object.mean():.2f}, without the tenth of objects it is worst for {best.mean():.2f}")
     off = dict(zip(FACES, np.quantile(faces, [0.5, 0.9], axis=0).T.round(2).tolist(), strict=True))
     shown = ", ".join(f"{face} {median:.1f} {most:.1f}" for face, (median, most) in off.items())
@@ -110,10 +166,14 @@ def moving_parts(estimate: Estimate, sample: Sample) -> list[dict[str, float]]:
     known = known_axes(estimate, sample)
     rest, rooted = at_rest(estimate, sample), at_rest(estimate, sample, root_known=True)
     points = np.bincount(sample.part, minlength=len(off))
+    labelled = np.bincount(sample.part, estimate.part == sample.part, len(off)) / np.where(points > 0, points, np.nan)
+    low, high = sample.joint_limits.T
+    share = np.abs(sample.joint_state - sample.joint_rest) / np.where(high > low, high - low, np.inf)
     return [
         {
-            "points": float(points[k]), "rotation": off[k], "posed": posed[k], "x known": known[0][k],
-            "y known": known[1][k], "z known": known[2][k], "rest": rest[k], "root known": rooted[k],
+            "points": points[k], "percent moved": 100 * share[k], "labelled": labelled[k], "rotation": off[k],
+            "posed": posed[k], "x known": known[0][k], "y known": known[1][k], "z known": known[2][k],
+            "rest": rest[k], "root known": rooted[k],
         }
         for k in range(1, len(off))
     ]  # fmt: skip
@@ -149,14 +209,14 @@ def at_rest(estimate: Estimate, sample: Sample, root_known: bool = False) -> Arr
     return metrics.iou_rest_exact(rest_center, size, sample.box_center, sample.box_size)
 
 
-def draw(every: dict[str, Array], path: Path) -> None:
+def draw(every: dict[str, dict[str, Array]], path: Path) -> None:
     """Rotation and IoU of moving parts against the points that show them."""
     figure = Figure(figsize=(3.2 * len(every), 6.0))
     FigureCanvasAgg(figure)
     for n, (category, table) in enumerate(every.items()):
-        for row, (column, label) in enumerate(((1, "rotation, deg"), (2, "IoU of posed boxes"))):
+        for row, (column, label) in enumerate((("rotation", "rotation, deg"), ("posed", "IoU of posed boxes"))):
             axes = figure.add_subplot(2, len(every), row * len(every) + n + 1)
-            axes.scatter(np.maximum(table[:, 0], 1), table[:, column], s=6, alpha=0.5)
+            axes.scatter(np.maximum(table["points"], 1), table[column], s=6, alpha=0.5)
             axes.set(xscale="log", xlim=(0.8, NUM_POINTS), xlabel=f"points of {NUM_POINTS:,}")
             axes.set(title=category if row == 0 else "", ylabel=label if n == 0 else "")
             if row == 0:
