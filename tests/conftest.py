@@ -19,6 +19,7 @@ from hypothesis import settings
 
 from artsim.assembly import Assembly, continuous, prismatic, revolute, screw
 from artsim.errors import RenderError
+from artsim.families import make
 from artsim.kinematics import Joint, KinematicTree
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers import Renderer, make_renderer
@@ -51,6 +52,12 @@ def partnet_dir() -> Path:
     if not folder:
         absent("ARTSIM_PARTNET_DIR is not set: real PartNet-Mobility objects are not tested")
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def one_drawer() -> ArticulatedObject:
+    """Furniture whose only joint is that of a drawer."""
+    return next(obj for obj in (make("drawer", seed) for seed in range(100)) if len(obj) == 2)
 
 
 def backend(name: str) -> Renderer:

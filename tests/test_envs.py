@@ -19,6 +19,7 @@ from artsim.episode import openness
 from artsim.errors import ArtsimError, ConfigError
 from artsim.families import make
 from artsim.kinematics import invert_transform
+from artsim.objects import ArticulatedObject
 from artsim.sampling import ViewOptions
 from artsim.verify import sample_problems
 from tests.conftest import ASSETS
@@ -95,23 +96,21 @@ def test_what_is_seen_is_true(camera: str) -> None:
     assert angle == pytest.approx(0.0 if camera == "fixed" else 5.0, abs=1e-4)
 
 
-def test_opening_an_object_is_rewarded() -> None:
-    obj = make("drawer", 1)
-    env = new(obj=obj, episode_length=30)
+def test_opening_an_object_is_rewarded(one_drawer: ArticulatedObject) -> None:
+    env = new(obj=one_drawer, episode_length=30)
     env.reset(seed=0)
     steps = [env.step(np.ones(16)) for _ in range(30)]
     assert sum(reward for _, reward, *_ in steps) == pytest.approx(1.0)
-    assert steps[-1][4]["openness"] == pytest.approx(openness(obj, obj.tree.limits[:, 1]))
+    assert steps[-1][4]["openness"] == pytest.approx(openness(one_drawer, one_drawer.tree.limits[:, 1]))
     assert [truncated for *_, truncated, _ in steps] == [False] * 29 + [True]
     assert not any(terminated for _, _, terminated, _, _ in steps)
 
 
-def test_an_action_is_a_share_of_the_limits() -> None:
-    obj = make("drawer", 1)
-    env, simulated = new(obj=obj), new(obj=obj)
+def test_an_action_is_a_share_of_the_limits(one_drawer: ArticulatedObject) -> None:
+    env, simulated = new(obj=one_drawer), new(obj=one_drawer)
     _, info = env.reset(seed=0)
     simulated.reset(seed=0)
-    assert info["action_valid"].sum() == len(obj.tree.free_joints)
+    assert info["action_valid"].sum() == len(one_drawer.tree.free_joints)
     action = np.full(16, 0.02, np.float32)
     env.step(action)
     simulated.simulation.step(action[:1].astype(float) * info["action_limit"][:1])

@@ -48,15 +48,14 @@ def energy(obj: ArticulatedObject, q: Array, velocity: Array) -> float:
     return total
 
 
-def test_a_pushed_drawer_accelerates_by_force_over_mass() -> None:
-    obj = make("drawer", 1)
-    k = int(obj.tree.free_joints[0])
-    simulation = Simulation(obj, replace(FREE, substeps=4))
+def test_a_pushed_drawer_accelerates_by_force_over_mass(one_drawer: ArticulatedObject) -> None:
+    k = int(one_drawer.tree.free_joints[0])
+    simulation = Simulation(one_drawer, replace(FREE, substeps=4))
     force = 0.5
     for _ in range(30):
         simulation.step([force])
     seconds = 30 * simulation.options.control_step
-    expected = force / joined_inertia(part_inertia(obj, j) for j in range(k, len(obj))).mass
+    expected = force / joined_inertia(part_inertia(one_drawer, j) for j in range(k, len(one_drawer))).mass
     assert simulation.velocity[k] / seconds == pytest.approx(expected, rel=0.001)
     assert simulation.state[k] == pytest.approx(0.5 * expected * seconds**2, rel=0.02)
 
@@ -111,11 +110,10 @@ def test_joints_never_leave_their_limits_and_followers_follow(category: str) -> 
         np.testing.assert_allclose(speed[linear], rates[linear], atol=1e-6)
 
 
-def test_friction_holds_a_drawer_until_the_push_exceeds_it() -> None:
-    obj = make("drawer", 1)
-    k = int(obj.tree.free_joints[0])
-    simulation = Simulation(obj)
-    friction = as_robot(obj).joints[0].friction
+def test_friction_holds_a_drawer_until_the_push_exceeds_it(one_drawer: ArticulatedObject) -> None:
+    k = int(one_drawer.tree.free_joints[0])
+    simulation = Simulation(one_drawer)
+    friction = as_robot(one_drawer).joints[0].friction
     for push, moves in ((0.9, False), (1.1, True)):
         simulation.reset()
         for _ in range(5):
@@ -272,9 +270,9 @@ def test_real_objects_stay_within_their_limits(partnet_dir: Path) -> None:
 
 
 @pytest.mark.parametrize("action", [[], [0.0, 0.0], [np.nan], 1.0])
-def test_a_wrong_action_is_refused(action: object) -> None:
+def test_a_wrong_action_is_refused(action: object, one_drawer: ArticulatedObject) -> None:
     with pytest.raises(ArtsimError, match=r"1 finite numbers.*drawer"):
-        Simulation(make("drawer", 0)).step(action)  # type: ignore[arg-type]
+        Simulation(one_drawer).step(action)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
