@@ -108,7 +108,7 @@ def main(options: Options) -> None:
         print_figures(category, result[category])
         result[category]["root"] = root_figures(np.reshape(roots, (len(objects), options.views)), np.array(faces))
     print("labelled: % of the part's points; mean rotation in degrees; IoU in %, if what the column says were known")
-    if options.picture is not None:
+    if options.picture is not None and every:
         draw(every, options.picture)
     print(json.dumps(result))
 
