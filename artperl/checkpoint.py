@@ -57,7 +57,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
     part.replace(folder / _BASE)
     settings = {
         "format": _FORMAT,
-        "perception": {"num_rows": estimator.perception.num_rows, "width": estimator.perception.width},
+        "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
         "agent": None if estimator.agent is None else {"width": estimator.agent.width},
         "boxes": None
         if estimator.boxes is None

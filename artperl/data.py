@@ -77,6 +77,10 @@ class Truth(Batch):
         Where each point lies in the rest frame, at rest.
     part_valid : (B, P) bool
     box_center, box_size : (B, P, 3) float
+    joint : (B, P, 9) float
+        See :func:`joint_rows`.
+    level : (B, P) int64
+        How many joints are between the root and the part.
     diagonal : (B,) float
         Over the cloud's radius.
     """
@@ -86,7 +90,13 @@ class Truth(Batch):
     part_valid: Tensor
     box_center: Tensor
     box_size: Tensor
+    joint: Tensor
+    level: Tensor
     diagonal: Tensor
+
+    def of_points(self, rows: Tensor) -> Tensor:
+        """(B, N, ...) of each point's part, from (B, P, ...) of each part."""
+        return torch.stack([own[part] for own, part in zip(rows, self.part, strict=True)])
 
 
 class Samples:
@@ -283,10 +293,39 @@ def samples_from(
     return Samples(categories, options, seed, views_per_object, num_rows, parts, given)
 
 
+def joint_rows(
+    sliding: Array, turning: Array, axis: Array, origin: Array, center: Array, diagonal: float
+) -> Array:
+    """(K, 9) what tells the joints of K parts apart: zeros for the root and where a part is fixed.
+
+    The direction of a slide (3), that of a turning axis (3), and where the nearest point of this axis is from the
+    centre of the part's box, in diagonals (3).
+
+    Parameters
+    ----------
+    sliding, turning : (K,) bool
+    axis, origin, center : (K, 3) float
+        In the rest frame; axes of length 1.
+    diagonal : float
+        Of the object.
+    """
+    away = origin - center
+    pivot = (away - (away * axis).sum(-1, keepdims=True) * axis) / diagonal
+    rows: Array = np.concatenate([axis * sliding[:, None], axis * turning[:, None], pivot * turning[:, None]], axis=1)
+    return rows
+
+
 def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
     """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
-    K = len(sample.joint_type)
+    K, kinds = len(sample.joint_type), np.array(sample.joint_type)
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
+    sliding, turning = kinds == "prismatic", np.isin(kinds, ("revolute", "continuous"))
+    joint = joint_rows(
+        sliding, turning, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal
+    )
+    level = np.zeros(num_rows, dtype=np.int64)
+    for k in range(1, K):
+        level[k] = level[sample.joint_parent[k]] + 1
 
     def pad(rows: Array) -> Array:
         padded = np.zeros((num_rows, *rows.shape[1:]), dtype=np.float32)
@@ -300,6 +339,8 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
         "part_valid": np.arange(num_rows) < K,
         "box_center": pad(sample.box_center / sample.diagonal),
         "box_size": pad(sample.box_size / sample.diagonal),
+        "joint": pad(joint),
+        "level": level,
         "diagonal": np.float32(sample.diagonal),
     }
 
@@ -307,9 +348,8 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
 def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
     """Collated rows of :func:`training_rows` as records."""
     clouds = Clouds.of(rows["points"])
-    truth = Truth(**{name: rows[name] for name in ("part", "canonical", "part_valid", "box_center", "box_size")},
-                  diagonal=rows["diagonal"] / clouds.radius)  # fmt: skip
-    return clouds, truth
+    names = ("part", "canonical", "part_valid", "box_center", "box_size", "joint", "level")
+    return clouds, Truth(**{name: rows[name] for name in names}, diagonal=rows["diagonal"] / clouds.radius)
 
 
 class _Rows(IterableDataset[dict[str, Array]]):

@@ -52,7 +52,7 @@ from artperl.evaluation import (
 from artperl.fitting import Fitting
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
-from artperl.networks.perception import Perception, perception_losses
+from artperl.networks.perception import Perception, perception_figures, perception_losses
 from artperl.ppo import collect, update
 from artperl.problems import Problems
 from artperl.report import write_report
@@ -117,7 +117,7 @@ class Training:
             Recorded(options.dataset, options.categories, options.seed, rows, points, options.parts)
         self.device = _device(options.device)
         torch.manual_seed(options.seed)
-        self.perception = Perception(self.base.shapes.trees.num_rows, options.width).to(self.device)
+        self.perception = Perception(self.base.shapes.trees.num_rows, options.width, options.votes).to(self.device)
         self.agent, self._agent_known = Agent().to(self.device), False
         self.boxes: Boxes | None = None
         if options.start_from is not None:
@@ -179,7 +179,8 @@ class Training:
                 "networks of another size are to be learnt on", str(self.options.start_from),
                 "use the same categories and preset",
             )  # fmt: skip
-        own.load_state_dict(theirs.state_dict())
+        fits = {name: t for name, t in theirs.state_dict().items() if t.shape == own.state_dict()[name].shape}
+        own.load_state_dict(fits, strict=theirs.votes == own.votes)  # votes need a head of their own
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())
             self._agent_known = True
@@ -220,8 +221,7 @@ class Training:
             optimizer.step()
             done = self.done["perception"] = before + step + 1
             figures = {name: value.item() for name, value in losses.items()}
-            figures["accuracy"] = (perceived.part == truth.part).float().mean().item()
-            figures["coordinates"] = (perceived.canonical - truth.canonical).norm(dim=-1).median().item()
+            figures |= perception_figures(perceived, truth)
             _write(board, "perception", figures, done - 1)
             bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
             bar.update()
