@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
@@ -294,7 +295,7 @@ def samples_from(
 
 
 def joint_rows(
-    sliding: Array, turning: Array, axis: Array, origin: Array, center: Array, diagonal: float
+    sliding: NDArray[np.bool_], turning: NDArray[np.bool_], axis: Array, origin: Array, center: Array, diagonal: float
 ) -> Array:
     """(K, 9) what tells the joints of K parts apart: zeros for the root and where a part is fixed.
 
@@ -320,9 +321,7 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
     K, kinds = len(sample.joint_type), np.array(sample.joint_type)
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
     sliding, turning = kinds == "prismatic", np.isin(kinds, ("revolute", "continuous"))
-    joint = joint_rows(
-        sliding, turning, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal
-    )
+    joint = joint_rows(sliding, turning, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal)
     level = np.zeros(num_rows, dtype=np.int64)
     for k in range(1, K):
         level[k] = level[sample.joint_parent[k]] + 1

@@ -18,6 +18,7 @@ from torch import Tensor
 from artperl.coherence import coherent
 from artperl.data import Clouds
 from artperl.evidence import Evidence
+from artperl.grouping import perceive
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perceived, Perception
@@ -211,7 +212,7 @@ class Estimator:
     def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
         """What is perceived of one cloud."""
         with clock("perception"):
-            perceived = self.perception(clouds.points)
+            perceived = perceive(self.perception, clouds.points)
         if self.options.coherent:
             with clock("coherence"):
                 perceived = _held_together(clouds, perceived)

@@ -16,6 +16,7 @@ from artperl.batch import Batch
 from artperl.categories import Parts
 from artperl.data import Clouds, samples_from
 from artperl.embedding import box_embedding
+from artperl.grouping import perceive
 from artperl.networks.perception import Perception
 from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
@@ -146,7 +147,8 @@ class Problems:
     @torch.inference_mode()
     def _labels(self, points: Tensor) -> Tensor:
         assert self.perception is not None
-        return self.perception.eval()(Clouds.of(points.to(self.perception.device)).points).part.to("cpu", copy=True)
+        clouds = Clouds.of(points.to(self.perception.device))
+        return perceive(self.perception.eval(), clouds.points).part.to("cpu", copy=True)
 
 
 def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:

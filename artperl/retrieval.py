@@ -12,11 +12,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from artperl.data import joint_rows
 from artperl.pose import Trees
 from artperl.refine import AxisPrior
 from artperl.shapes import Shapes
 from artsim.errors import ArtsimError, ConfigError, DatasetError
-from artsim.kinematics import KinematicTree
+from artsim.kinematics import Joint, KinematicTree
 from artsim.objects import ArticulatedObject
 
 FORMAT = 2
@@ -24,6 +25,14 @@ _ALIKE = 0.02
 """Radians: axes that differ by less are alike."""
 _OTHER_SORT = 0.35
 """Radians: axes that differ by more are no two versions of one another, as those of doors and flaps."""
+_PIVOT = 2.0
+"""What a difference of one diagonal in the place of an axis counts for against one of 1 in its direction."""
+_ALONG = 0.9
+"""Cosine from which an axis is taken for another one, at least as it is perceived."""
+_LIKE = 0.3
+"""Differences of directions, and of places over the part's sides, up to which joints are of one sort."""
+_SURE = 0.3
+"""Length of a mean of votes for unit vectors, below which they do not agree."""
 _CLOUDS = ("box_center", "box_size", "points", "normals", "spacing", "diagonal")
 
 
@@ -123,7 +132,22 @@ class ShapeBase:
         """(B,) bool: objects of a category."""
         return torch.tensor([name == category for name in self.categories], device=self.shapes.diagonal.device)
 
-    def nearest(self, queries: Tensor, count: int = 1, allowed: Tensor | None = None) -> tuple[Tensor, Tensor]:
+    @cached_property
+    def joints(self) -> Tensor:
+        """(B, P, 9) joints as :func:`artperl.data.joint_rows` has them."""
+        trees = self.shapes.trees
+        rows = [
+            joint_rows(*(values.cpu().double().numpy() for values in own))
+            for own in zip(
+                trees.slide != 0, trees.turn != 0, trees.axis, trees.origin, self.shapes.box_center,
+                self.shapes.diagonal, strict=True,
+            )
+        ]  # fmt: skip
+        return torch.from_numpy(np.stack(rows)).to(self.shapes.box_center)
+
+    def nearest(
+        self, queries: Tensor, count: int = 1, allowed: Tensor | None = None, further: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
         """The objects whose embeddings are nearest (section 4.2: Euclidean distance), nearest first.
 
         Parameters
@@ -133,6 +157,8 @@ class ShapeBase:
             Objects for each query.
         allowed : (B,) or (Q, B) bool, optional
             Objects to choose among, for example those of a category; at least ``count`` for each query.
+        further : (Q, B) float, optional
+            Distances in other regards.
 
         Returns
         -------
@@ -147,6 +173,8 @@ class ShapeBase:
         if self.embeddings is None:
             raise ConfigError("the shape base has no embeddings", mend="give it some: with_embeddings")
         apart = torch.cdist(queries, self.embeddings.to(queries))
+        if further is not None:
+            apart = torch.hypot(apart, further)
         if allowed is not None:
             apart = apart.masked_fill(~allowed.to(apart.device), torch.inf)
         if count > len(self) or not bool(torch.isfinite(apart).sum(1).ge(count).all()):
@@ -154,47 +182,74 @@ class ShapeBase:
         distance, rows = apart.topk(count, largest=False)
         return rows, distance
 
-    def composed(self, row: int, center: Tensor, size: Tensor) -> Shapes:
-        """An object whose parts are those of any objects of its category that lie most like the ones asked for.
+    def composed(self, center: Tensor, size: Tensor, joint: Tensor, parent: Tensor) -> tuple[int, Shapes]:
+        """An object whose parts and joints are those of any objects that are most like the ones asked for.
 
-        No base holds every mix of doors and drawers, but a few objects have a door and a drawer of every kind.
+        No base holds every mix of doors and drawers, but a few objects have a door and a drawer of every kind. A part
+        is that with the box most like the one asked for, and moves as that part does whose joint is most like it.
 
         Parameters
         ----------
-        row : int
-            Object whose root is taken.
         center, size : (K, 3) float
             Boxes of the parts, in diagonals, the root's first.
+        joint : (K, 9) float
+            Their joints, as :attr:`joints` has them.
+        parent : (K,) int64
 
         Returns
         -------
-        Shapes
-            One row, of K parts; fewer where the category has none that could be the next.
+        int, Shapes
+            The object that the root is of; and one row, of K parts.
         """
-        own = torch.nonzero(self.of_category(self.categories[row]))[:, 0].tolist()
-        of_root = [(b, m) for b in own for m, parent in enumerate(self.trees[b].parents) if parent == 0]
-        joints, sources = [self.trees[row].joints[0]], [(row, 0)]
-        for k in range(1, len(center)):
-            # Parts of the root may have any number; those further down a chain keep theirs.
-            same = [(b, k) for b in own if k < len(self.trees[b])]
-            fit = of_root if any(self.trees[b].parents[k] == 0 for b, _ in same) else same
-            if not fit:
-                break
-            rows, parts = torch.tensor(fit, device=size.device).T
-            boxes = torch.cat([self.shapes.box_center[rows, parts], self.shapes.box_size[rows, parts]], dim=-1)
-            apart = torch.linalg.vector_norm(boxes - torch.cat([center[k], size[k]]), dim=-1)
-            b, m = fit[int(apart.argmin())]
-            joints.append(replace(self.trees[b].joints[m], name=f"{k}", mimic=None))
-            sources.append((b, m))
-        rows, parts = torch.tensor(sources, device=size.device).T
-        chosen = self.shapes[row : row + 1]
+        trees, P = self.shapes.trees, self.shapes.trees.num_rows
+        unit = self.shapes.diagonal[:, None, None]
+        boxes = torch.cat([self.shapes.box_center / unit, self.shapes.box_size / unit], dim=-1).flatten(0, 1)
+        known = weighed(self.joints).flatten(0, 1)
+        # Roots for the root; for other parts those that move alike, and any where there is none.
+        likely = 1 + (moves(self.joints).flatten()[:, None] == moves(joint))
+        likely[::P] = 0
+        likely[:, 0] = torch.arange(len(likely), device=likely.device) % P == 0
+        likely = likely * trees.valid.flatten()[:, None]
+        possible = likely == likely.amax(0)
+        shape = torch.cdist(boxes, torch.cat([center, size], dim=-1)).masked_fill(~possible, torch.inf).argmin(0)
+        mover = torch.cdist(known, weighed(joint)).masked_fill(~possible, torch.inf).argmin(0)
+        rows, parts = shape // P, shape % P
+        root = int(rows[0])
+        joints = [self.trees[root].joints[0]]
+        for n in range(1, len(center)):
+            b, k = divmod(int(mover[n]), P)
+            place, side = self.shapes.box_center[rows[n], parts[n]], self.shapes.box_size[rows[n], parts[n]]
+            joints.append(self._joint_like(b, k, place, side, joint[n], int(parent[n]), f"{n}"))
+        chosen = self.shapes[root : root + 1]
         fields = {}
         for name in ("box_center", "box_size", "points", "normals", "spacing"):
             values = getattr(self.shapes, name)
             fields[name] = torch.full_like(values[:1], torch.inf if name == "spacing" else 0.0)
             fields[name][0, : len(joints)] = values[rows, parts]
-        tree = Trees.stack([KinematicTree(joints)], chosen.trees.num_rows, size.dtype).to(size.device)
-        return replace(chosen, trees=tree, **fields)
+        tree = Trees.stack([KinematicTree(joints)], P, size.dtype).to(size.device)
+        return root, replace(chosen, trees=tree, **fields)
+
+    def _joint_like(
+        self, row: int, part: int, center: Tensor, side: Tensor, perceived: Tensor, parent: int, name: str
+    ) -> Joint:
+        """A joint like that of a part, at the same place of another box; as it is perceived if that differs."""
+        own, trees = self.joints[row, part], self.shapes.trees
+        pattern = replace(self.trees[row].joints[part], parent=parent, name=name, mimic=None)
+        if not bool(same_axes(own, perceived)):
+            slides = int(moves(perceived)) == 1
+            axis = torch.nn.functional.normalize(perceived[:3] if slides else perceived[3:6], dim=0)
+            far = 1.0 if slides else np.pi
+            return replace(
+                pattern, type="prismatic" if slides else "revolute", axis=_tuple(axis),
+                origin=_tuple(center + perceived[6:]), lower=-far, upper=far, rest=0.0,
+            )  # fmt: skip
+        place = self.joints[..., 6:] / self.shapes.box_size.clamp(min=1e-6)
+        like = torch.linalg.vector_norm(self.joints[..., :6] - own[:6], dim=-1) < _LIKE
+        like &= torch.linalg.vector_norm(place - place[row, part], dim=-1) < _LIKE
+        return replace(
+            pattern, origin=_tuple(center + place[row, part] * side), lower=float(trees.lower[like].amin()),
+            upper=float(trees.upper[like].amax()),
+        )  # fmt: skip
 
     def references(self, rows: Tensor) -> Shapes:
         """Shapes of the chosen objects, with no more rows for parts than they need."""
@@ -249,6 +304,29 @@ class ShapeBase:
             Shapes(trees=stacked, **tensors),
             None if embeddings is None else torch.from_numpy(embeddings),
         )
+
+
+def moves(joint: Tensor) -> Tensor:
+    """(...) int64 of joints (..., 9): 0 where nothing moves, 1 for slides, 2 where a part turns."""
+    slides, turns = (torch.linalg.vector_norm(axis, dim=-1) for axis in (joint[..., :3], joint[..., 3:6]))
+    return torch.where(turns > slides, 2, torch.where(slides > 0.0, 1, 0))
+
+
+def same_axes(joint: Tensor, perceived: Tensor) -> Tensor:
+    """(...) bool: whether joints (..., 9) of objects have the perceived axes, as far as these are sure."""
+    along = (joint[..., :6] * perceived[..., :6]).sum(-1)
+    length = torch.linalg.vector_norm(perceived[..., :6], dim=-1)
+    return (along >= _ALONG * length) | (length < _SURE)
+
+
+def weighed(joint: Tensor) -> Tensor:
+    """Joints (..., 9) whose Euclidean distance counts against that of boxes."""
+    return torch.cat([joint[..., :6], _PIVOT * joint[..., 6:]], dim=-1)
+
+
+def _tuple(values: Tensor) -> tuple[float, float, float]:
+    x, y, z = values.double().tolist()
+    return x, y, z
 
 
 def _angle(axis: Tensor, other: Tensor) -> Tensor:

@@ -21,11 +21,12 @@ from artperl.beam import beam, half_turned
 from artperl.data import Clouds
 from artperl.embedding import box_embedding
 from artperl.fitting import Fitting, FittingOptions
+from artperl.grouping import Grouped
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perceived
 from artperl.pose import Theta, pose_parts
 from artperl.refine import Refined, RefineOptions, refine
-from artperl.retrieval import ShapeBase
+from artperl.retrieval import ShapeBase, moves, same_axes, weighed
 from artperl.shapes import Observed, Shapes
 from artperl.start import facing, start
 
@@ -190,27 +191,42 @@ def _best(
 def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tensor, Shapes]:
     """(count,) rows of the objects nearest to what is perceived of one cloud, and their shapes.
 
-    Where objects of the category have other trees than the nearest, there is one among them composed of the parts
-    of several, with as many as are perceived; its row is that of the nearest. Boxes do not tell how axes lean, and no
-    hinge turns a part to where another one's would: where axes differ, there is an object whose axes lean otherwise
-    than those of the nearest, and one with the mean axes.
+    Boxes do not tell how axes lean, and no hinge turns a part to where another one's would: where axes differ, there is
+    an object whose axes lean otherwise than those of the nearest, and one with the mean axes. Where parts are found by
+    votes, only objects with the same tree will do, and one is composed of the parts of several; its row is that of
+    the nearest.
     """
     query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-    rows = base.nearest(query, count)[0][0]
-    shapes, first = base.shapes[rows], int(rows[0])
-    other_trees = base.of_category(base.categories[first]) & (base.kind != base.kind[first])
-    if count > 1 and bool(other_trees.any()):
-        parts = int(perceived.valid[0].sum())
-        own = base.composed(first, perceived.box_center[0, :parts], perceived.box_size[0, :parts])
-        order = [own, shapes[:1]] if parts != len(base.trees[first]) else [shapes[:1], own]
-        return torch.cat([rows[:1], rows[:-1]]), concatenate([*order, shapes[1:-1]])
-    otherwise = base.leaning_otherwise(first)
-    if count < 3 or not bool(otherwise.any()):
+    if isinstance(perceived, Grouped):
+        return _references_of_groups(base, perceived, query, count)
+    return _leaning(base, query, base.nearest(query, count)[0][0])
+
+
+def _leaning(base: ShapeBase, query: Tensor, rows: Tensor) -> tuple[Tensor, Shapes]:
+    """References whose axes differ, if those of their kind do: the last but the first are for those that lean."""
+    otherwise, shapes = base.leaning_otherwise(int(rows[0])), base.shapes[rows]
+    if len(rows) < 3 or not bool(otherwise.any()):
         return rows, shapes
     rows = torch.cat([rows[:1], base.nearest(query, 1, otherwise)[0][0], rows[1:-1]])
     shapes = base.shapes[rows]
     axis = torch.cat([shapes.trees.axis[:-1], base.mean_axis[rows[-1:]]])
     return rows, replace(shapes, trees=replace(shapes.trees, axis=axis))
+
+
+def _references_of_groups(base: ShapeBase, perceived: Grouped, query: Tensor, count: int) -> tuple[Tensor, Shapes]:
+    """Up to so many objects with the perceived tree, and one that is composed."""
+    trees, K = base.shapes.trees, int(perceived.valid[0].sum())
+    same = (moves(base.joints) == moves(perceived.joint[0])) & (trees.parent == perceived.parent[0])
+    same = same & (trees.valid == perceived.valid[0]) & same_axes(base.joints, perceived.joint)
+    alike = same.all(1)
+    further = torch.linalg.vector_norm(weighed(base.joints) - weighed(perceived.joint), dim=(1, 2))
+    part = perceived.box_center[0, :K], perceived.box_size[0, :K], perceived.joint[0, :K], perceived.parent[0, :K]
+    row, own = base.composed(*part)
+    rows = torch.tensor([row], device=query.device)
+    if not bool(alike.any()):
+        return rows, own
+    found, shapes = _leaning(base, query, base.nearest(query, min(count, int(alike.sum())), alike, further[None])[0][0])
+    return torch.cat([found, rows]), concatenate([shapes, own])
 
 
 def _doubt(found: Found) -> float:

@@ -40,9 +40,6 @@ class TrainOptions:
     """Points of each part of a reference."""
     width: int = 48
     """Channels of perception's finest level."""
-    votes: bool = False
-    """Points say which box and joint their part has, and are grouped by that, instead of naming it by its number: for
-    objects of many trees."""
     perception_steps: int = 4000
     """Batches of stage 1."""
     dense_steps: int = 1000
@@ -89,6 +86,11 @@ class TrainOptions:
     fitting: FittingOptions = field(default_factory=FittingOptions)
     start: StartOptions = field(default_factory=StartOptions)
 
+    @property
+    def votes(self) -> bool:
+        """Whether perception finds parts by votes: of families' objects with any parts, nobody knows how many."""
+        return self.parts == "any" and not self.files
+
 
 PRESETS = {
     "quick": TrainOptions(
@@ -102,7 +104,7 @@ PRESETS = {
         episodes=256,
     ),
     "joint": TrainOptions(
-        parts="any", max_parts=10, votes=True, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
+        parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
         perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0,
         test_objects=8, validation_views=1,
     ),

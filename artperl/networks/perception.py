@@ -173,7 +173,8 @@ def perception_losses(perceived: Perceived | Votes, truth: Truth) -> dict[str, T
         "spread": 0.2 * (distance.detach() * (-spread).exp() + spread).mean(),
         "diagonal": 2.0 * (perceived.log_diagonal - truth.diagonal.log()).abs().mean(),
     }
-    return losses | (_vote_losses if isinstance(perceived, Votes) else _number_losses)(perceived, truth)
+    of_parts = _vote_losses(perceived, truth) if isinstance(perceived, Votes) else _number_losses(perceived, truth)
+    return losses | of_parts
 
 
 def _number_losses(perceived: Perceived, truth: Truth) -> dict[str, Tensor]:

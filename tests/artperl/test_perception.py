@@ -11,7 +11,7 @@ from artperl.categories import ARTIMAGE, objects_of
 from artperl.checkpoint import load_estimator
 from artperl.data import Clouds, Samples, Truth, batches
 from artperl.evaluation import VALIDATION_SEEDS, frozen_samples
-from artperl.networks.perception import Perceived, Perception, perception_losses
+from artperl.networks.perception import Perceived, Perception, Votes, perception_figures, perception_losses
 from artperl.networks.pointnet2 import Neighbourhoods, nearest_by_products, nearest_by_trees, strongest
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
@@ -141,6 +141,56 @@ def test_losses_vanish_for_what_is_true(batch: tuple[Clouds, Truth]) -> None:
     losses = perception_losses(true, truth)
     for name in ("part", "canonical", "valid", "boxes", "diagonal"):
         assert losses[name].item() == pytest.approx(0.0, abs=1e-6), name
+
+
+def test_votes_are_learnt_and_losses_vanish_for_true_ones(batch: tuple[Clouds, Truth]) -> None:
+    clouds, truth = batch
+    torch.manual_seed(0)
+    net = Perception(4, 16, votes=True)
+    optimizer = torch.optim.Adam(net.parameters(), 3e-3)
+    seen: list[dict[str, Tensor]] = []
+    for _ in range(80):
+        votes = net(clouds.points)
+        seen.append(perception_losses(votes, truth))
+        optimizer.zero_grad()
+        torch.stack(list(seen[-1].values())).sum().backward()  # type: ignore[no-untyped-call]
+        optimizer.step()
+    for name in ("canonical", "boxes", "joints", "level", "diagonal"):
+        assert seen[-1][name] < 0.5 * seen[0][name], name
+    assert isinstance(votes, Votes)
+    assert (votes.box[..., 3:] > 0).all()
+    level = truth.of_points(truth.level)
+    box = truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1))
+    true = Votes(
+        truth.canonical, votes.spread, truth.diagonal.log(), box, truth.of_points(truth.joint),
+        100.0 * torch.nn.functional.one_hot(level, 4).float(),
+    )  # fmt: skip
+    losses = perception_losses(true, truth)
+    for name in ("canonical", "boxes", "joints", "level", "diagonal"):
+        assert losses[name].item() == pytest.approx(0.0, abs=1e-6), name
+    assert perception_figures(true, truth) == {"accuracy": 1.0, "coordinates": 0.0}
+
+
+def test_what_is_true_of_joints_is_what_the_sample_says() -> None:
+    """A door's axis passes its box at the pivot; a drawer has a direction alone; a link's level counts its joints."""
+    for category in ("storage_furniture", "robot_arm"):
+        _, truth = next(batches([category], 10, 64, 4, seed=3, workers=0, parts="any"))
+        samples = Samples([category], SampleOptions(num_points=64), 3, 1, 10, "any")
+        sample, joint = samples[0], truth.joint[0].double().numpy()
+        for k, kind in enumerate(sample.joint_type):
+            if k == 0:
+                assert not joint[0].any()
+                continue
+            turning = kind in ("revolute", "continuous")
+            np.testing.assert_allclose(joint[k, :3], 0.0 if turning else sample.joint_axis[k], atol=1e-6)
+            np.testing.assert_allclose(joint[k, 3:6], sample.joint_axis[k] if turning else 0.0, atol=1e-6)
+            if turning:
+                at = sample.box_center[k] + sample.diagonal * joint[k, 6:] - sample.joint_origin[k]
+                np.testing.assert_allclose(np.cross(at, sample.joint_axis[k]), 0.0, atol=1e-5)
+            level, parent = 1, int(sample.joint_parent[k])
+            while parent:
+                level, parent = level + 1, int(sample.joint_parent[parent])
+            assert int(truth.level[0, k]) == level
 
 
 def test_neighbours_are_the_nearest() -> None:

@@ -13,9 +13,11 @@ import torch
 import artsim
 from artperl.categories import objects_of
 from artperl.embedding import by_boxes
+from artperl.grouping import Grouped
 from artperl.networks.perception import Perceived
-from artperl.retrieval import ShapeBase, widened
+from artperl.retrieval import ShapeBase, moves, widened
 from artperl.search import references
+from artperl.shapes import Shapes
 from artsim.errors import ConfigError, DatasetError
 from tests.artperl.worlds import small_base
 
@@ -133,46 +135,68 @@ def test_references_have_axes_of_every_lean() -> None:
     assert torch.equal(shapes.points, laptops.shapes.points[nearest])
 
 
+def _composed(base: ShapeBase, like: ShapeBase, row: int) -> Shapes:
+    """Of a base, what is most like an object of another one."""
+    K, shapes = len(like.trees[row]), like.shapes
+    asked = shapes.box_center[row, :K], shapes.box_size[row, :K], like.joints[row, :K], shapes.trees.parent[row, :K]
+    return base.composed(*asked)[1]
+
+
 def test_an_object_is_composed_of_its_own_parts() -> None:
     base = ShapeBase.of(objects_of(["storage_furniture"], 4, 30, "any", 8), 16)
     for row in range(len(base)):
-        own, parts = base.shapes[row : row + 1], len(base.trees[row])
-        made = base.composed(row, own.box_center[0, :parts], own.box_size[0, :parts])
+        own = base.shapes[row : row + 1]
+        made = _composed(base, base, row)
         for name in ("box_center", "box_size", "points", "normals", "spacing", "diagonal"):
             assert torch.equal(getattr(made, name), getattr(own, name)), name
-        for name in ("valid", "kind", "parent", "axis", "origin", "lower", "upper", "carries", "free"):
+        for name in ("valid", "kind", "parent", "axis", "carries", "free"):
             assert torch.equal(getattr(made.trees, name), getattr(own.trees, name)), name
+        assert (made.trees.lower <= own.trees.lower).all()
+        assert (made.trees.upper >= own.trees.upper).all()
+        away = own.trees.origin - made.trees.origin  # along the axis it does not matter where its origin is
+        turns = own.trees.turn != 0
+        across = torch.linalg.cross(away, own.trees.axis)[turns]
+        torch.testing.assert_close(across, torch.zeros_like(across), atol=1e-5, rtol=0)
 
 
-def test_a_mix_that_no_object_has_is_composed_of_several() -> None:
-    base = ShapeBase.of(objects_of(["storage_furniture"], 6, 30, "any", 8), 16)
-    other = ShapeBase.of(objects_of(["storage_furniture"], 12, 60, "any", 6), 16)
-    right = []
+@pytest.mark.parametrize("category", ["storage_furniture", "robot_arm"])
+def test_what_no_object_is_like_is_composed_of_several(category: str) -> None:
+    """Doors, flaps, drawers and links at other places: the tree is right, and so are the axes."""
+    base = ShapeBase.of(objects_of([category], 12, 30, "any", 10), 16)
+    other = ShapeBase.of(objects_of([category], 12, 60, "any", 10), 16)
     for row in range(len(other)):
-        parts = len(other.trees[row])
-        made = base.composed(0, other.shapes.box_center[row, :parts], other.shapes.box_size[row, :parts])
-        assert int(made.trees.valid.sum()) == parts
-        right += (made.trees.kind[0, :parts] == other.shapes.trees.kind[row, :parts])[1:].tolist()
-    assert np.mean(right) > 0.8
+        made, own, K = _composed(base, other, row).trees, other.shapes.trees, len(other.trees[row])
+        assert made.valid[0].sum() == K
+        assert torch.equal(made.parent[0, :K], own.parent[row, :K])
+        assert torch.equal(made.slide[0, :K] != 0, own.slide[row, :K] != 0)
+        assert torch.equal(made.turn[0, :K] != 0, own.turn[row, :K] != 0)
+        along = (made.axis[0, :K] * own.axis[row, :K]).sum(-1)[1:]
+        assert (along >= 0.9 - 1e-6).all()
 
 
-def test_robot_arms_are_composed_along_their_chain() -> None:
-    base = ShapeBase.of(objects_of(["robot_arm"], 6, 30, "any", 10), 16)
-    arms = objects_of(["robot_arm"], 6, 60, "any", 6)
-    for arm in ShapeBase.of(arms, 16).trees:
-        made = base.composed(0, torch.zeros(len(arm), 3), torch.ones(len(arm), 3))
-        assert (made.trees.parent[0, 1 : len(arm)] < torch.arange(1, len(arm))).all()
-        assert int(made.trees.depth.max()) >= len(arm) - 2  # a gripper's two fingers are side by side
+def test_a_joint_that_no_object_has_is_as_it_is_perceived() -> None:
+    base = ShapeBase.of(objects_of(["drawer"], 3, 30), 16)
+    hinge = torch.tensor([0.0, 0.0, 0.0, 0.0, 0.6, 0.8, 0.1, 0.0, 0.0])
+    joint = torch.stack([torch.zeros(9), hinge])
+    center, size = torch.tensor([[0.0, 0.0, 0.0], [-0.2, 0.0, 0.1]]), torch.tensor([[0.5, 0.5, 0.6], [0.02, 0.4, 0.3]])
+    made = base.composed(center, size, joint, torch.tensor([0, 0]))[1]
+    assert float(made.trees.turn[0, 1]) == 1.0
+    torch.testing.assert_close(made.trees.axis[0, 1], hinge[3:6])
+    torch.testing.assert_close(made.trees.origin[0, 1], made.box_center[0, 1] + hinge[6:])
 
 
-def test_a_mix_of_its_own_is_tried_beside_the_nearest_object() -> None:
-    objects = objects_of(["storage_furniture"], 6, 30, "any", 8)
+def test_parts_by_votes_are_looked_for_among_objects_with_their_tree() -> None:
+    objects = objects_of(["storage_furniture"], 8, 30, "any", 8)
     base, whole = by_boxes(ShapeBase.of(objects[:-1], 16)), ShapeBase.of(objects, 16)
-    rows, shapes = references(base, _perceived(whole, 5), 3)
-    parts = [int(count) for count in shapes.trees.valid.sum(1)]
-    assert len(rows) == len(shapes) == 3
-    assert rows[0] == rows[1]
-    assert len(objects[5]) in parts[:2]
+    for row in (2, 7):
+        seen = _perceived(whole, row)
+        tree = whole.shapes.trees[row : row + 1]
+        groups = Grouped(**vars(seen), joint=whole.joints[row : row + 1], parent=tree.parent)
+        rows, shapes = references(base, groups, 3)
+        K = len(objects[row])
+        assert shapes.trees.valid.sum(1).tolist() == [K] * len(rows)
+        assert bool((moves(base.joints[rows[:-1], :K]) == moves(groups.joint[0, :K])).all())
+        assert (int(rows[0]) == row) == (row < 7)
 
 
 def test_only_axes_of_one_sort_lean() -> None:

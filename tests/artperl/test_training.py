@@ -99,6 +99,27 @@ def _interrupt(group: str, after: int) -> Callable[..., None]:
     return write
 
 
+def test_families_with_any_parts_are_learnt_by_votes_and_learnt_on_by_number(tmp_path: Path) -> None:
+    """An estimator of any parts begins one for files: what both have is taken over, heads are their own."""
+    options = replace(TINY, categories=("drawer",), parts="any", max_parts=5, dense_steps=0, agent_rollouts=0)
+    Training(options, tmp_path / "any", workers=0, progress=False).run()
+    learnt = load_estimator(tmp_path / "any" / "best").perception
+    assert learnt.votes
+    files = replace(
+        options, categories=(), files=("urdf_assets/cabinet/mobility.urdf",), max_parts=learnt.num_rows,
+        start_from=str(tmp_path / "any" / "best"),
+    )  # fmt: skip
+    begun = Training(files, tmp_path / "files", workers=0, progress=False).perception
+    assert not begun.votes
+    same = {
+        name: torch.equal(t, begun.state_dict()[name]) for name, t in learnt.state_dict().items() if "head" not in name
+    }
+    assert len(same) > 20
+    assert all(same.values())
+    with pytest.raises(ConfigError, match="another size"):
+        Training(replace(files, width=24), tmp_path / "wide", workers=0, progress=False)
+
+
 def test_a_finished_run_stays_as_it_is(whole: Path) -> None:
     before = (whole / "state.safetensors").read_bytes()
     Training(TINY, whole, workers=0, progress=False).run()
