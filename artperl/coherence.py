@@ -25,13 +25,13 @@ _STAY = 0.03
 _STEPS = 100
 
 
-def coherent(points: Array, probability: Array, diagonal: float) -> Array:
-    """(N, P) probabilities of parts, each the mean over where walks from a point end.
+def coherent(points: Array, values: Array, diagonal: float) -> Array:
+    """(N, P) probabilities of parts, or what else is said of each point: the mean over where walks from it end.
 
     Parameters
     ----------
     points : (N, 3) float
-    probability : (N, P) float
+    values : (N, P) float
         Of each point by itself.
     diagonal : float
         Of the object, in the unit of the points.
@@ -47,10 +47,10 @@ def coherent(points: Array, probability: Array, diagonal: float) -> Array:
     weight = sparse.csr_array((np.exp(-(off**2) - bent), (here, there)), shape=(N, N))
     weight = 0.5 * (weight + weight.T)
     total = _STAY + weight.sum(axis=1)
-    onward, stay = sparse.diags_array(1.0 / total) @ weight, (_STAY / total)[:, None] * probability
+    onward, stay = sparse.diags_array(1.0 / total) @ weight, (_STAY / total)[:, None] * values
     for _ in range(_STEPS):
-        probability = stay + onward @ probability
-    return probability
+        values = stay + onward @ values
+    return values
 
 
 def _normals(near: Array) -> Array:

@@ -18,10 +18,10 @@ from torch import Tensor
 from artperl.coherence import coherent
 from artperl.data import Clouds
 from artperl.evidence import Evidence
-from artperl.grouping import perceive
+from artperl.grouping import grouped
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
-from artperl.networks.perception import Perceived, Perception
+from artperl.networks.perception import Perceived, Perception, Votes
 from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts
 from artperl.retrieval import ShapeBase
 from artperl.search import Clock, EstimatorOptions, Found, find
@@ -212,11 +212,14 @@ class Estimator:
     def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
         """What is perceived of one cloud."""
         with clock("perception"):
-            perceived = perceive(self.perception, clouds.points)
+            seen = self.perception(clouds.points)
         if self.options.coherent:
             with clock("coherence"):
-                perceived = _held_together(clouds, perceived)
-        return perceived
+                seen = _held_together(clouds, seen)
+        if not isinstance(seen, Votes):
+            return seen
+        with clock("grouping"):
+            return grouped(seen)
 
     def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Seen]:
         """The estimate whose boxes are the reference's, and what it goes by."""
@@ -270,11 +273,19 @@ class Estimator:
         )
 
 
-def _held_together(clouds: Clouds, perceived: Perceived) -> Perceived:
-    """What is perceived of one cloud, its labels :func:`artperl.coherence.coherent`."""
-    points, alone = _numpy(clouds.points.cpu()), _numpy(perceived.part_logits.softmax(-1).cpu())
-    probability = torch.from_numpy(coherent(points, alone, float(perceived.log_diagonal.exp()[0])))
-    return replace(perceived, part_logits=probability.clamp(min=1e-6).log()[None].to(perceived.part_logits))
+def _held_together(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes:
+    """What is perceived of one cloud, its labels, or votes, :func:`artperl.coherence.coherent`."""
+    points, diagonal = _numpy(clouds.points.cpu()), float(seen.log_diagonal.exp()[0])
+    if isinstance(seen, Votes):
+        fields = {"box": seen.box, "joint": seen.joint, "level_logits": seen.level_logits.softmax(-1)}
+    else:
+        fields = {"part_logits": seen.part_logits.softmax(-1)}
+    alone = np.concatenate([_numpy(values.cpu()) for values in fields.values()], axis=1)
+    together = torch.from_numpy(coherent(points, alone, diagonal))[None]
+    values = dict(zip(fields, together.split([v.shape[2] for v in fields.values()], dim=2), strict=True))
+    for name in [name for name in values if name.endswith("_logits")]:
+        values[name] = values[name].clamp(min=1e-6).log()
+    return replace(seen, **{name: v.to(seen.canonical) for name, v in values.items()})
 
 
 def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:
