@@ -59,6 +59,8 @@ class Train:
     """Times the points of a training cloud that the estimator looks at."""
     stretched: float = 0.0
     """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
+    noisy: float = 0.0
+    """Share of perception's other training clouds that are as a depth sensor, a D435, sees them."""
     perception_rate: float = 2e-3
     """Highest learning rate of perception; a lower one changes less of what --start-from brings along."""
     agent_rollouts: int | None = None
@@ -99,8 +101,11 @@ class Train:
             raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
         if not 0.0 < self.perception_rate < 1.0:
             raise ConfigError(f"{self.perception_rate} is no learning rate", "perception_rate", "use 1e-4 to 1e-2")
-        if not 0.0 <= self.stretched <= 1.0:
-            raise ConfigError(f"{self.stretched} is no share", "stretched", "use 0 to 1")
+        for name, share in (("stretched", self.stretched), ("noisy", self.noisy)):
+            if not 0.0 <= share <= 1.0:
+                raise ConfigError(f"{share} is no share", name, "use 0 to 1")
+        if self.noisy and (self.dataset or self.noise != "none"):
+            raise ConfigError("clouds that have their noise get no other", "noisy", "use one of noise, dataset, noisy")
         if self.files and (self.category or self.real or self.parts == "artimage"):
             raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")
         category = self.category or (() if self.files else ("laptop",))
@@ -119,6 +124,7 @@ class Train:
             dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
             denser=self.denser,
             stretched=self.stretched,
+            noisy=self.noisy,
             perception_rate=self.perception_rate,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -36,6 +36,10 @@ _WINDOW = 64
 """Batches, after which a cloud is not seen again."""
 _STRETCHING = 1
 """Begins the seed of how a view is stretched; its number is the rest."""
+_BLURRING = 2
+"""Begins the seed of whether a view is as a sensor sees it."""
+SENSOR: Final = "d435"
+"""By which some training clouds are seen."""
 _SPARE = 2
 """Times the points of a cloud that are made where some may be left out."""
 
@@ -352,11 +356,17 @@ def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
 
 
 class _Rows(IterableDataset[dict[str, Array]]):
-    """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch."""
+    """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch.
 
-    def __init__(self, samples: Source, num_points: int, batch_size: int, first: int, stretched: float):
-        self.samples, self.num_points = samples, num_points
-        self.batch_size, self.first, self.stretched = batch_size, first, stretched
+    Some samples are stretched, and of the others some come from a source of ``noisy`` ones.
+    """
+
+    def __init__(
+        self, samples: Source, noisy: Source, num_points: int, batch_size: int, first: int, stretched: float,
+        noise: float,
+    ):  # fmt: skip
+        self.samples, self.noisy, self.num_points = samples, noisy, num_points
+        self.batch_size, self.first, self.stretched, self.noise = batch_size, first, stretched, noise
 
     def __iter__(self) -> Iterator[dict[str, Array]]:
         info = get_worker_info()
@@ -368,8 +378,11 @@ class _Rows(IterableDataset[dict[str, Array]]):
             batch += workers
 
     def _sample(self, i: int) -> Sample:
-        sample, rng = self.samples[i], np.random.default_rng([_STRETCHING, i])
-        return stretch(sample, self.num_points, rng) if rng.random() < self.stretched else sample
+        rng = np.random.default_rng([_STRETCHING, i])
+        if rng.random() < self.stretched:
+            return stretch(self.samples[i], self.num_points, rng)
+        noisy = np.random.default_rng([_BLURRING, i]).random() < self.noise
+        return (self.noisy if noisy else self.samples)[i]
 
 
 def carry_on(worker: int) -> None:
@@ -390,6 +403,7 @@ def batches(
     given: Sequence[ArticulatedObject] = (),
     dataset: str | Path | None = None,
     stretched: float = 0.0,
+    noisy: float = 0.0,
 ) -> Iterator[tuple[Clouds, Truth]]:
     """Endless batches of fresh procedural objects, or of a dataset.
 
@@ -418,12 +432,17 @@ def batches(
         See :class:`Recorded`.
     stretched : float
         Share of the views whose objects are stretched; see :func:`artperl.stretch.stretch`.
+    noisy : float
+        Share of the others that are as a :data:`SENSOR` sees them.
     """
     cast = _SPARE * num_points if stretched and dataset is None else num_points  # a dataset has what it has
     options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": cast})
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
-    samples = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)
-    rows = _Rows(samples, num_points, fresh, begin * fresh, stretched)
+    samples = sensed = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)
+    if noisy:
+        as_seen = replace(options, noise=SENSOR)
+        sensed = samples_from(dataset, categories, as_seen, seed, fresh, num_rows, parts, given)
+    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, stretched, noisy)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=carry_on
     )

@@ -48,6 +48,8 @@ class TrainOptions:
     """Times the points of a training cloud that the estimator looks at: weights carry over."""
     stretched: float = 0.0
     """Share of these clouds whose objects are stretched between the edges of their parts."""
+    noisy: float = 0.0
+    """Share of the others that are as a depth sensor, a D435, sees them."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""

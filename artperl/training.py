@@ -19,7 +19,7 @@ from contextlib import closing
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import torch
 from safetensors.torch import load_file
@@ -31,7 +31,7 @@ from artperl.benchmarks.artimage import real_train_objects
 from artperl.box_training import learn, record
 from artperl.categories import arranged, objects_of
 from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
-from artperl.data import Recorded, Source, batches, samples_from
+from artperl.data import SENSOR, Recorded, Source, batches, samples_from
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator
 from artperl.evaluation import (
@@ -71,9 +71,8 @@ from artsim.sources import find_sources
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
 _STATE = "state"
-_BOX_NOISE: Final = "d435"
 _NOISY_EVERY = 4
-"""Views of stage 3 of which one is seen by such a sensor: boxes go by outermost points, which suffer most."""
+"""Views of stage 3 of which one is seen by a sensor: boxes go by outermost points, which suffer most."""
 _VIEWS = 8
 """Episodes of a rollout that fit the same object: most of the time goes into making objects."""
 _AS_GOOD = 1.01
@@ -204,6 +203,7 @@ class Training:
         data = batches(
             options.categories, self.perception.num_rows, num_points, batch_size, first, seed, self.workers,
             options.sample, options.parts, self.given, options.dataset, options.stretched,
+            options.noisy,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):
@@ -302,7 +302,7 @@ class Training:
         clean = source(sample)
         if not self._noisy_boxes:
             return clean.__getitem__
-        noisy = source(replace(sample, noise=_BOX_NOISE))
+        noisy = source(replace(sample, noise=SENSOR))
         return partial(_mostly_clean, clean, noisy)
 
     def _choose_boxes(self, best: Estimator, learner: Estimator, boxes: Boxes, board: SummaryWriter) -> None:
@@ -313,7 +313,7 @@ class Training:
             validation += self._of_given(len(validation), VALIDATION_SEEDS, self._as_tested)
         noisy = []
         if self._noisy_boxes:
-            with_noise = replace(self._as_tested, noise=_BOX_NOISE)
+            with_noise = replace(self._as_tested, noise=SENSOR)
             noisy = self._unseen(-(-views // _NOISY_EVERY), VALIDATION_SEEDS, with_noise)
         before, after = (
             evaluate(estimator, validation + noisy, self.progress)

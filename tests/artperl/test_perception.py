@@ -102,6 +102,16 @@ def test_clouds_are_seen_in_several_batches_and_then_never_again(monkeypatch: py
     assert any(views & centers[n + 2] for n, views in enumerate(fresh[:-2]))
 
 
+def test_some_clouds_are_as_a_sensor_sees_them() -> None:
+    """The same views, of which a share is rough: points lie off the surfaces that they would lie on."""
+    clean, noisy = (next(batches(["drawer"], 4, 256, 32, workers=0, noisy=share)) for share in (0.0, 0.5))
+    again = next(batches(["drawer"], 4, 256, 32, workers=2, noisy=0.5))
+    assert again[0].points.equal(noisy[0].points)
+    same = [bool((a == b).all()) for a, b in zip(clean[0].points, noisy[0].points, strict=True)]
+    assert 4 < sum(same) < 28
+    assert clean[1].box_size.equal(noisy[1].box_size)
+
+
 def test_objects_with_too_many_parts_give_way_to_others() -> None:
     samples = Samples(["drawer"], SampleOptions(num_points=16), 0, 1, 3, "any")
     sizes = [len(samples[i].joint_type) for i in range(6)]

@@ -263,7 +263,10 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
     assert "files are learnt from alone" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("option", "value"), [("--stretched", "2"), ("--perception-rate", "0"), ("--denser", "0")])
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--stretched", "2"), ("--noisy", "-1"), ("--perception-rate", "0"), ("--denser", "0")],
+)
 def test_an_impossible_option_is_named(
     option: str, value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
