@@ -12,7 +12,6 @@ from typing import Any, Final
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
@@ -22,7 +21,7 @@ from artperl.order import reordered_sample, visible_order
 from artperl.stretch import stretch
 from artsim.dataset import open_dataset
 from artsim.errors import AssetError, ConfigError, DatasetError
-from artsim.kinematics import Array
+from artsim.kinematics import ROTATING, Array
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import shared_renderer
@@ -298,9 +297,7 @@ def samples_from(
     return Samples(categories, options, seed, views_per_object, num_rows, parts, given)
 
 
-def joint_rows(
-    sliding: NDArray[np.bool_], turning: NDArray[np.bool_], axis: Array, origin: Array, center: Array, diagonal: float
-) -> Array:
+def joint_rows(kinds: Sequence[str], axis: Array, origin: Array, center: Array, diagonal: float) -> Array:
     """(K, 9) what tells the joints of K parts apart: zeros for the root and where a part is fixed.
 
     The direction of a slide (3), that of a turning axis (3), and where the nearest point of this axis is from the
@@ -308,24 +305,27 @@ def joint_rows(
 
     Parameters
     ----------
-    sliding, turning : (K,) bool
+    kinds : sequence of str, length K
+        Types of joints.
     axis, origin, center : (K, 3) float
         In the rest frame; axes of length 1.
     diagonal : float
         Of the object.
     """
+    sliding, turning = (np.isin(kinds, types)[:, None] for types in ("prismatic", list(ROTATING)))
     away = origin - center
     pivot = (away - (away * axis).sum(-1, keepdims=True) * axis) / diagonal
-    rows: Array = np.concatenate([axis * sliding[:, None], axis * turning[:, None], pivot * turning[:, None]], axis=1)
+    rows: Array = np.concatenate([axis * sliding, axis * turning, pivot * turning], axis=1)
     return rows
 
 
 def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
     """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
-    K, kinds = len(sample.joint_type), np.array(sample.joint_type)
+    K = len(sample.joint_type)
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
-    sliding, turning = kinds == "prismatic", np.isin(kinds, ("revolute", "continuous"))
-    joint = joint_rows(sliding, turning, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal)
+    joint = joint_rows(
+        sample.joint_type, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal
+    )  # fmt: skip
     level = np.zeros(num_rows, dtype=np.int64)
     for k in range(1, K):
         level[k] = level[sample.joint_parent[k]] + 1

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from artperl.data import joint_rows
-from artperl.pose import Trees
+from artperl.pose import KINDS, Trees
 from artperl.refine import AxisPrior
 from artperl.shapes import Shapes
 from artsim.errors import ArtsimError, ConfigError, DatasetError
@@ -135,15 +135,13 @@ class ShapeBase:
     @cached_property
     def joints(self) -> Tensor:
         """(B, P, 9) joints as :func:`artperl.data.joint_rows` has them."""
-        trees = self.shapes.trees
+        trees, shapes = self.shapes.trees, self.shapes
+        parts = zip(trees.axis, trees.origin, shapes.box_center, shapes.diagonal, strict=True)
         rows = [
-            joint_rows(*(values.cpu().double().numpy() for values in own))
-            for own in zip(
-                trees.slide != 0, trees.turn != 0, trees.axis, trees.origin, self.shapes.box_center,
-                self.shapes.diagonal, strict=True,
-            )
-        ]  # fmt: skip
-        return torch.from_numpy(np.stack(rows)).to(self.shapes.box_center)
+            joint_rows([KINDS[k] for k in kinds], *(values.cpu().double().numpy() for values in own))
+            for kinds, own in zip(trees.kind.tolist(), parts, strict=True)
+        ]
+        return torch.from_numpy(np.stack(rows)).to(shapes.box_center)
 
     def nearest(
         self, queries: Tensor, count: int = 1, allowed: Tensor | None = None, further: Tensor | None = None
@@ -244,7 +242,8 @@ class ShapeBase:
                 origin=_tuple(center + perceived[6:]), lower=-far, upper=far, rest=0.0,
             )  # fmt: skip
         place = self.joints[..., 6:] / self.shapes.box_size.clamp(min=1e-6)
-        like = torch.linalg.vector_norm(self.joints[..., :6] - own[:6], dim=-1) < _LIKE
+        like = trees.kind == trees.kind[row, part]
+        like &= torch.linalg.vector_norm(self.joints[..., :6] - own[:6], dim=-1) < _LIKE
         like &= torch.linalg.vector_norm(place - place[row, part], dim=-1) < _LIKE
         return replace(
             pattern, origin=_tuple(center + place[row, part] * side), lower=float(trees.lower[like].amin()),

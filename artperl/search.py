@@ -194,7 +194,7 @@ def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tenso
     Boxes do not tell how axes lean, and no hinge turns a part to where another one's would: where axes differ, there is
     an object whose axes lean otherwise than those of the nearest, and one with the mean axes. Where parts are found by
     votes, only objects with the same tree will do, and one is composed of the parts of several; its row is that of
-    the nearest.
+    the object that has its root.
     """
     query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
     if isinstance(perceived, Grouped):
