@@ -26,16 +26,18 @@ from artperl.evaluation import (
     headline,
     mistake,
     retry_residual,
+    score,
     summary,
     table,
     true_poses,
 )
 from artperl.networks.agent import Agent
-from artperl.networks.perception import Perceived, Perception
+from artperl.networks.perception import Perceived, Perception, Votes
 from artperl.retrieval import ShapeBase
 from artperl.search import EstimatorOptions, evened
 from artsim.errors import ArtsimError, DatasetError
 from artsim.sample import Sample
+from tests.artperl.worlds import true_votes
 
 
 class Oracle(Perception):
@@ -332,3 +334,31 @@ def test_points_widen_boxes_and_never_narrow_them() -> None:
         rotation, center, size, np.concatenate([points, feet @ turn.T + [1.0, 2.0, 3.0]]), np.append(part, [0] * 120)
     )
     np.testing.assert_allclose(taller[0], [1.0, 1.992, 1.4], atol=0.01)
+
+
+class Voter(Oracle):
+    """Knows of each point what its part is like, and no numbers."""
+
+    votes = True
+
+    def forward(self, points: torch.Tensor) -> Votes:  # type: ignore[override]
+        rows = training_rows(self.sample, 2048, self.num_rows)
+        clouds, truth = to_batch({k: torch.from_numpy(np.asarray(v)[None]) for k, v in rows.items()})
+        nearest = torch.cdist(points, clouds.points).argmin(-1)[0]
+        return Votes(**{name: v if v.ndim == 1 else v[:, nearest] for name, v in vars(true_votes(truth)).items()})
+
+
+def test_a_cabinet_of_a_mix_that_no_reference_has_is_put_together_from_votes() -> None:
+    """Parts, axes and states of fresh furniture, from a base of other furniture."""
+    base = by_boxes(ShapeBase.of(objects_of(["storage_furniture"], 12, 2_000_000, "any", 10), 64))
+    seen = [s for s in frozen_samples(["storage_furniture"], 8, 1, parts="any", max_parts=10)
+            if np.bincount(s.part, minlength=len(s.joint_type)).min() > 80]  # fmt: skip
+    assert len(seen) >= 4
+    right = []
+    for sample in seen:
+        estimate = Estimator(Voter(sample, 10), base)(sample.points)
+        assert estimate.joint_parent.tolist() == sample.joint_parent.tolist()
+        sliding = [kind == "prismatic" for kind in sample.joint_type]
+        assert [kind == "prismatic" for kind in estimate.joint_type] == sliding
+        right += (score(Estimator(Voter(sample, 10), base), sample).rotation < 10.0).tolist()
+    assert np.mean(right) > 0.9

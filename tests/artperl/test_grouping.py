@@ -13,6 +13,7 @@ from artperl.evaluation import frozen_samples
 from artperl.grouping import clusters, differences, grouped
 from artperl.networks.perception import Votes
 from artsim.sample import Sample
+from tests.artperl.worlds import true_votes
 
 ROWS = 10
 
@@ -20,16 +21,6 @@ ROWS = 10
 def seen(sample: Sample, num_points: int = 2048) -> tuple[Clouds, Truth]:
     rows = training_rows(sample, num_points, ROWS)
     return to_batch({name: torch.from_numpy(np.asarray(values)[None]) for name, values in rows.items()})
-
-
-def true_votes(truth: Truth) -> Votes:
-    """What a network would say that knows everything."""
-    return Votes(
-        canonical=truth.canonical, spread=torch.zeros(truth.part.shape), log_diagonal=truth.diagonal.log(),
-        box=truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1)),
-        box_spread=torch.full(truth.part.shape, -4.0), joint=truth.of_points(truth.joint),
-        level_logits=20.0 * torch.nn.functional.one_hot(truth.of_points(truth.level), ROWS).float(),
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("category", ["storage_furniture", "drawer", "robot_arm", "eyeglasses"])

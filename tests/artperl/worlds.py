@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 
+import torch
+
 import artsim
+from artperl.data import Truth
 from artperl.embedding import by_boxes
+from artperl.networks.perception import Votes
 from artperl.problems import Problem, Problems
 from artperl.retrieval import ShapeBase
 from artsim.objects import ArticulatedObject
@@ -36,3 +40,14 @@ def view(obj: ArticulatedObject, seed: int, num_points: int = 2048) -> Sample:
 def made(category: str, seed: int) -> Sample:
     """A view of a procedural object."""
     return view(artsim.make(category, seed), seed)
+
+
+def true_votes(truth: Truth) -> Votes:
+    """What a network would say that knows everything."""
+    level = torch.nn.functional.one_hot(truth.of_points(truth.level), truth.part_valid.shape[1])
+    return Votes(
+        canonical=truth.canonical, spread=torch.zeros(truth.part.shape), log_diagonal=truth.diagonal.log(),
+        box=truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1)),
+        box_spread=torch.full(truth.part.shape, -4.0), joint=truth.of_points(truth.joint),
+        level_logits=20.0 * level.float(),
+    )  # fmt: skip
