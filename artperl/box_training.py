@@ -85,10 +85,10 @@ def record(
     return every
 
 
-def learn(records: Records, num_rows: int, steps: int, seed: int, progress: bool) -> Boxes:
+def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, progress: bool) -> Boxes:
     """A network that has learnt from records: always the same one for the same arguments."""
     torch.manual_seed(seed)
-    boxes = Boxes(num_rows).to(records.center.device)
+    boxes = Boxes(num_rows, width).to(records.center.device)
     optimizer = torch.optim.AdamW(boxes.parameters(), weight_decay=_DECAY)
     bar = tqdm(range(steps), "moving faces", disable=not progress, smoothing=0.02)
     for step in bar:

@@ -29,10 +29,15 @@ _SLACK = 0.01
 """Diagonals by which any two votes may differ."""
 _NEAR = 0.6
 """Share of these differences within which votes back each other."""
-_FEWEST = 3
-"""Votes that make a part."""
+_FEWEST = 0.01
+"""Of all points: votes that make a part."""
+_FEW = 3
+"""Votes that make a part of any cloud."""
 _INSIDE = 0.5
 """Share of a box that lies in that of a part with more votes: it is no other part, but one of unsure edges."""
+_OWN, _WELL_INSIDE = 0.5, 0.45
+"""Share of the points well inside a part's box, so far from its middle, that vote for it: what is said by points on the
+edge of two parts has few of its own."""
 _DOUBT = 0.02
 """Probability that a point is of a part whatever it votes."""
 
@@ -61,7 +66,8 @@ def perceive(perception: Perception, points: Tensor) -> Perceived:
 def grouped(votes: Votes) -> Grouped:
     """Parts of which points tell, in the order that :func:`artperl.order.visible_order` gives them."""
     box, joint, level = (values.double().cpu().numpy() for values in (votes.box, votes.joint, votes.level_logits))
-    rows = [_grouped(*own) for own in zip(box, joint, log_softmax(level, axis=-1), strict=True)]
+    place = votes.canonical.double().cpu().numpy()
+    rows = [_grouped(*own) for own in zip(place, box, joint, log_softmax(level, axis=-1), strict=True)]
     fields = {name: torch.from_numpy(np.stack([row[name] for row in rows])) for name in rows[0]}
     return Grouped(
         canonical=votes.canonical, spread=votes.spread, log_diagonal=votes.log_diagonal,
@@ -70,14 +76,15 @@ def grouped(votes: Votes) -> Grouped:
     )  # fmt: skip
 
 
-def _grouped(box: Array, joint: Array, level_log_odds: Array) -> dict[str, NDArray[Any]]:
+def _grouped(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dict[str, NDArray[Any]]:
     """Of one cloud and P rows for parts, what :class:`Grouped` says of parts."""
     rows, level = level_log_odds.shape[1], level_log_odds.argmax(1)
     level[level_log_odds[:, 0].argmax()] = 0  # there is a root
     members, depth = [np.flatnonzero(level == 0)], [0]
     for deep in range(1, rows):
         own = np.flatnonzero(level == deep)
-        found = sorted(clusters(box[own]), key=len, reverse=True)[: rows - len(members)]
+        fewest = max(_FEW, round(_FEWEST * len(box)))
+        found = sorted(clusters(place[own], box[own], fewest), key=len, reverse=True)[: rows - len(members)]
         members += [own[group] for group in found]
         depth += [deep] * len(found)
     boxes = np.stack([np.median(box[own], axis=0) for own in members])
@@ -112,25 +119,41 @@ def _parents(depth: Sequence[int], boxes: Array) -> NDArray[np.int64]:
     return np.array(parents)
 
 
-def clusters(box: Array) -> list[NDArray[np.int64]]:
-    """Indices of votes (N, 6) that are of one part each; stray votes are of none."""
+def clusters(place: Array, box: Array, fewest: int) -> list[NDArray[np.int64]]:
+    """Which votes are of one part each; stray votes are of none.
+
+    Parameters
+    ----------
+    place : (N, 3) float
+        Where the points that vote lie in the rest frame.
+    box : (N, 6) float
+        Votes.
+    fewest : int
+        Votes that make a part.
+
+    Returns
+    -------
+    list of (n,) int
+    """
     backed = differences(box[:, None], box[None]) < _NEAR
     left, middles = np.ones(len(box), dtype=bool), np.empty((0, 6))
     while left.any():
         support = (backed & left & left[:, None]).sum(1)
         first = int(support.argmax())
-        if support[first] < _FEWEST:
+        if support[first] < fewest:
             break
         middle = np.median(box[backed[first] & left], axis=0)
-        left &= differences(box, middle) >= 1.0
+        voters = differences(box, middle) < 1.0
+        left &= ~voters
         left[first] = False
-        if not (overlap(middles, middle) > _INSIDE).any():
+        inside = (np.abs(place - middle[:3]) < _WELL_INSIDE * middle[3:]).all(axis=1)
+        if (voters & inside).sum() >= _OWN * inside.sum() and not (overlap(middles, middle) > _INSIDE).any():
             middles = np.concatenate([middles, middle[None]])
     if not len(middles):
         return []
     apart = differences(box[:, None], middles[None])
     own = np.where(apart.min(1) < 1.0, apart.argmin(1), -1)
-    return [np.flatnonzero(own == n) for n in range(len(middles)) if (own == n).sum() >= _FEWEST]
+    return [np.flatnonzero(own == n) for n in range(len(middles)) if (own == n).sum() >= fewest]
 
 
 def overlap(box: Array, other: Array) -> Array:

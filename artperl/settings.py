@@ -71,6 +71,8 @@ class TrainOptions:
     """Fresh views of stage 3, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
     box_steps: int = 12000
     """Batches that boxes are learnt in."""
+    box_width: int = 80
+    """Channels of the network that they are learnt by."""
     validate_every: int = 1000
     """Steps of stage 1 between tests."""
     validate_rollouts: int = 50
@@ -107,7 +109,7 @@ PRESETS = {
     ),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
-        perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0,
+        perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0, box_width=40,
         test_objects=8, validation_views=1,
     ),
 }  # fmt: skip

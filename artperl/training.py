@@ -279,7 +279,8 @@ class Training:
         records = record(learner, self._box_samples(), options.box_views, file, stop, self.workers, self.progress)
         learnt = None
         if records is not None:
-            learnt = learn(records, self.perception.num_rows, options.box_steps, options.seed, self.progress)
+            rows, width = self.perception.num_rows, options.box_width
+            learnt = learn(records, rows, width, options.box_steps, options.seed, self.progress)
         self._stop_if(stop)
         self.done["boxes"] = options.box_views
         if learnt is None:

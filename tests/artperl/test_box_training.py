@@ -147,10 +147,10 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
     unit = float(np.linalg.norm([0.2, 0.4, 0.3]))
     true_size, true_center = torch.tensor([[[0.22, 0.4, 0.3]]]) / unit, torch.tensor([[[0.01, 0.0, 0.0]]]) / unit
     records = concatenate([box_training.Records(e, true_center, true_size) for e in evidence])
-    boxes = box_training.learn(records, 1, 150, 0, progress=False)
+    boxes = box_training.learn(records, 1, 80, 150, 0, progress=False)
     center, size = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
     assert iou_aligned(center, size, true_center, true_size).min() > 0.97
-    again = box_training.learn(records, 1, 150, 0, progress=False)
+    again = box_training.learn(records, 1, 80, 150, 0, progress=False)
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
 
 

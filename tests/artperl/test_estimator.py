@@ -352,7 +352,7 @@ def test_a_cabinet_of_a_mix_that_no_reference_has_is_put_together_from_votes() -
     """Parts, axes and states of fresh furniture, from a base of other furniture."""
     base = by_boxes(ShapeBase.of(objects_of(["storage_furniture"], 12, 2_000_000, "any", 10), 64))
     seen = [s for s in frozen_samples(["storage_furniture"], 8, 1, parts="any", max_parts=10)
-            if np.bincount(s.part, minlength=len(s.joint_type)).min() > 80]  # fmt: skip
+            if np.bincount(s.part, minlength=len(s.joint_type)).min() > 160]  # fmt: skip
     assert len(seen) >= 4
     right = []
     for sample in seen:
