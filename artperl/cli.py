@@ -55,8 +55,8 @@ class Train:
     """Batches that perception learns from; by default the preset's."""
     dense_steps: int | None = None
     """More batches, of fewer, denser clouds: of as many points as the estimator looks at. By default the preset's."""
-    denser: int = 2
-    """Times the points of a training cloud that the estimator looks at."""
+    denser: int | None = None
+    """Times the points of a training cloud that the estimator looks at; by default the preset's."""
     stretched: float = 0.0
     """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
     noisy: float = 0.0
@@ -97,7 +97,7 @@ class Train:
         if self.threads is not None:
             torch.set_num_threads(self.threads)
         preset = PRESETS[self.preset]
-        if self.denser < 1:
+        if self.denser is not None and self.denser < 1:
             raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
         if not 0.0 < self.perception_rate < 1.0:
             raise ConfigError(f"{self.perception_rate} is no learning rate", "perception_rate", "use 1e-4 to 1e-2")
@@ -122,7 +122,7 @@ class Train:
             sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
             perception_steps=preset.perception_steps if steps is None else steps,
             dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
-            denser=self.denser,
+            denser=preset.denser if self.denser is None else self.denser,
             stretched=self.stretched,
             noisy=self.noisy,
             perception_rate=self.perception_rate,

@@ -276,16 +276,22 @@ class Estimator:
 def _held_together(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes:
     """What is perceived of one cloud, its labels, or votes, :func:`artperl.coherence.coherent`."""
     points, diagonal = _numpy(clouds.points.cpu()), float(seen.log_diagonal.exp()[0])
-    if isinstance(seen, Votes):
-        fields = {"box": seen.box, "joint": seen.joint, "level_logits": seen.level_logits.softmax(-1)}
-    else:
-        fields = {"part_logits": seen.part_logits.softmax(-1)}
-    alone = np.concatenate([_numpy(values.cpu()) for values in fields.values()], axis=1)
-    together = torch.from_numpy(coherent(points, alone, diagonal))[None]
-    values = dict(zip(fields, together.split([v.shape[2] for v in fields.values()], dim=2), strict=True))
-    for name in [name for name in values if name.endswith("_logits")]:
-        values[name] = values[name].clamp(min=1e-6).log()
-    return replace(seen, **{name: v.to(seen.canonical) for name, v in values.items()})
+
+    def together(values: Tensor) -> Tensor:
+        return torch.from_numpy(coherent(points, _numpy(values.cpu()), diagonal))[None]
+
+    if not isinstance(seen, Votes):
+        logits = together(seen.part_logits.softmax(-1)).clamp(min=1e-6).log()
+        return replace(seen, part_logits=logits.to(seen.part_logits))
+    level = seen.level_logits.softmax(-1)
+    moves = 1.0 - level[..., :1]
+    said = torch.cat([seen.box, seen.joint], dim=-1)
+    every = together(torch.cat([level, moves * said, level[..., :1] * said], dim=-1)).to(said)
+    level, moving, still = every.split([level.shape[2], said.shape[2], said.shape[2]], dim=2)
+    # What moves and what does not are no mean of each other, where a walk goes from one to the other.
+    root = level.argmax(-1, keepdim=True) == 0
+    said = torch.where(root, still / level[..., :1], moving / level[..., 1:].sum(-1, keepdim=True))
+    return replace(seen, level_logits=level.clamp(min=1e-6).log(), box=said[..., :6], joint=said[..., 6:])
 
 
 def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:

@@ -109,8 +109,8 @@ PRESETS = {
     ),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
-        perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0, box_width=40,
-        test_objects=8, validation_views=1,
+        perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0,
+        box_width=40, test_objects=8, validation_views=1,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one
