@@ -21,15 +21,15 @@ from artperl.order import visible_order
 
 Array = NDArray[np.float64]
 
-_APART = 0.5
+_APART = 0.3
 """Of a box's side: votes whose centres differ by more are of two parts."""
 _UNLIKE = 0.6
 """Of a box's side: votes whose sides differ by more are of two parts."""
-_SLACK = 0.01
+_SLACK = 0.03
 """Diagonals by which any two votes may differ."""
 _NEAR = 0.6
 """Share of these differences within which votes back each other."""
-_FEWEST = 0.01
+_FEWEST = 0.012
 """Of all points: votes that make a part."""
 _FEW = 3
 """Votes that make a part of any cloud."""

@@ -66,7 +66,7 @@ def test_what_lies_between_two_parts_is_no_third_one() -> None:
 
 
 @settings(deadline=None)
-@given(count=st.integers(1, 8), height=st.floats(0.04, 0.3), seed=st.integers(0, 99))
+@given(count=st.integers(1, 8), height=st.floats(0.06, 0.3), seed=st.integers(0, 99))
 def test_drawers_of_a_row_are_told_apart_whatever_their_number(count: int, height: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     boxes = np.array([[0.0, 0.0, n * height, 0.4, 0.3, 0.95 * height] for n in range(count)])
