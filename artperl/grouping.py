@@ -137,15 +137,16 @@ def clusters(place: Array, box: Array, fewest: int) -> list[NDArray[np.int64]]:
     """
     backed = differences(box[:, None], box[None]) < _NEAR
     left, middles = np.ones(len(box), dtype=bool), np.empty((0, 6))
+    support = backed.sum(axis=1)
     while left.any():
-        support = (backed & left & left[:, None]).sum(1)
-        first = int(support.argmax())
+        first = int(np.where(left, support, 0).argmax())
         if support[first] < fewest:
             break
         middle = np.median(box[backed[first] & left], axis=0)
         voters = differences(box, middle) < 1.0
-        left &= ~voters
-        left[first] = False
+        gone = left & (voters | (np.arange(len(box)) == first))
+        support -= backed[:, gone].sum(axis=1)
+        left &= ~gone
         inside = (np.abs(place - middle[:3]) < _WELL_INSIDE * middle[3:]).all(axis=1)
         if (voters & inside).sum() >= _OWN * inside.sum() and not (overlap(middles, middle) > _INSIDE).any():
             middles = np.concatenate([middles, middle[None]])
@@ -168,8 +169,10 @@ def overlap(box: Array, other: Array) -> Array:
 
 def differences(box: Array, other: Array) -> Array:
     """How far boxes (..., 6) are from being those of one part: 1 where they may just be."""
-    side, sides = box[..., 3:], other[..., 3:]
-    center = np.abs(box[..., :3] - other[..., :3]) / (_APART * np.minimum(side, sides) + _SLACK)
-    size = np.abs(side - sides) / (_UNLIKE * np.maximum(side, sides) + _SLACK)
-    worst: Array = np.maximum(center, size).max(axis=-1)
+    worst: Array = np.zeros(np.broadcast_shapes(box.shape, other.shape)[:-1])
+    for axis in range(3):  # one after the other: all pairs of a cloud's votes fill the memory that is near
+        side, sides = box[..., 3 + axis], other[..., 3 + axis]
+        center = np.abs(box[..., axis] - other[..., axis]) / (_APART * np.minimum(side, sides) + _SLACK)
+        size = np.abs(side - sides) / (_UNLIKE * np.maximum(side, sides) + _SLACK)
+        worst = np.maximum(worst, np.maximum(center, size))
     return worst
