@@ -80,10 +80,9 @@ def _grouped(place: Array, box: Array, joint: Array, level_log_odds: Array) -> d
     """Of one cloud and P rows for parts, what :class:`Grouped` says of parts."""
     rows, level = level_log_odds.shape[1], level_log_odds.argmax(1)
     level[level_log_odds[:, 0].argmax()] = 0  # there is a root
-    members, depth = [np.flatnonzero(level == 0)], [0]
+    members, depth, fewest = [np.flatnonzero(level == 0)], [0], max(_FEW, round(_FEWEST * len(box)))
     for deep in range(1, rows):
         own = np.flatnonzero(level == deep)
-        fewest = max(_FEW, round(_FEWEST * len(box)))
         found = sorted(clusters(place[own], box[own], fewest), key=len, reverse=True)[: rows - len(members)]
         members += [own[group] for group in found]
         depth += [deep] * len(found)

@@ -216,9 +216,9 @@ def _leaning(base: ShapeBase, query: Tensor, rows: Tensor) -> tuple[Tensor, Shap
 def _references_of_groups(base: ShapeBase, perceived: Grouped, query: Tensor, count: int) -> tuple[Tensor, Shapes]:
     """Up to so many objects with the perceived tree, and one that is composed."""
     trees, K = base.shapes.trees, int(perceived.valid[0].sum())
-    same = (moves(base.joints) == moves(perceived.joint[0])) & (trees.parent == perceived.parent[0])
-    same = same & (trees.valid == perceived.valid[0]) & same_axes(base.joints, perceived.joint)
-    alike = same.all(1)
+    tree = (trees.valid == perceived.valid[0]) & (trees.parent == perceived.parent[0])
+    joint = (moves(base.joints) == moves(perceived.joint[0])) & same_axes(base.joints, perceived.joint)
+    alike = (tree & joint).all(1)
     further = torch.linalg.vector_norm(weighed(base.joints) - weighed(perceived.joint), dim=(1, 2))
     part = perceived.box_center[0, :K], perceived.box_size[0, :K], perceived.joint[0, :K], perceived.parent[0, :K]
     row, own = base.composed(*part)

@@ -178,12 +178,13 @@ class Training:
                 "networks of another size are to be learnt on", str(self.options.start_from),
                 "use the same categories and preset",
             )  # fmt: skip
+        alike = theirs.votes == own.votes  # votes need a head of their own
         fits = {name: t for name, t in theirs.state_dict().items() if t.shape == own.state_dict()[name].shape}
-        own.load_state_dict(fits, strict=theirs.votes == own.votes)  # votes need a head of their own
+        own.load_state_dict(fits, strict=alike)
         if estimator.agent is not None:
             self.agent.load_state_dict(estimator.agent.state_dict())
             self._agent_known = True
-        self.boxes = estimator.boxes
+        self.boxes = estimator.boxes if alike else None  # which learnt from what the other head says
 
     def _learn_to_perceive(self, board: SummaryWriter, stop: Stop) -> None:
         options = self.options
@@ -202,8 +203,7 @@ class Training:
             return
         data = batches(
             options.categories, self.perception.num_rows, num_points, batch_size, first, seed, self.workers,
-            options.sample, options.parts, self.given, options.dataset, options.stretched,
-            options.noisy,
+            options.sample, options.parts, self.given, options.dataset, options.stretched, options.noisy,
         )  # fmt: skip
         bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
         for step in range(first, total):

@@ -83,8 +83,6 @@ class Votes(Batch):
         As in :class:`Perceived`.
     box : (B, N, 6) float
         Centre and size of the part's box.
-    box_spread : (B, N) float
-        Logarithm of the expected error of ``box``, over the box's sides.
     joint : (B, N, 9) float
         The part's joint as :attr:`artperl.data.Truth.joint` has it.
     level_logits : (B, N, P) float
@@ -95,7 +93,6 @@ class Votes(Batch):
     spread: Tensor
     log_diagonal: Tensor
     box: Tensor
-    box_spread: Tensor
     joint: Tensor
     level_logits: Tensor
 
@@ -118,7 +115,7 @@ class Perception(nn.Module):
         self.num_rows, self.width, self.votes = num_rows, width, votes
         self.backbone = PointNet2(width)
         channels, whole = self.backbone.point_channels, self.backbone.cloud_channels
-        of_point, of_cloud = (num_rows + 20, 1) if votes else (num_rows + 4, 7 * num_rows + 1)
+        of_point, of_cloud = (num_rows + 19, 1) if votes else (num_rows + 4, 7 * num_rows + 1)
         self.point_head = nn.Sequential(nn.Linear(channels, 128), nn.ReLU(), nn.Linear(128, of_point))
         self.context = nn.Linear(whole, channels)
         self.cloud_head = nn.Sequential(nn.Linear(whole, 256), nn.ReLU(), nn.Linear(256, of_cloud))
@@ -146,8 +143,7 @@ class Perception(nn.Module):
                 spread=point[..., P + 3] - 3.0,
                 log_diagonal=whole[:, -1],
                 box=torch.cat([canonical.detach() + own[..., :3], 0.5 * functional.softplus(2.0 * own[..., 3:])], -1),
-                box_spread=point[..., P + 19],
-                joint=point[..., P + 10 : P + 19],
+                joint=point[..., P + 10 :],
                 level_logits=point[..., :P],
             )
         boxes = whole[:, P : 7 * P].reshape(-1, P, 6)
@@ -200,14 +196,12 @@ def _vote_losses(votes: Votes, truth: Truth) -> dict[str, Tensor]:
     box = torch.cat([truth.of_points(truth.box_center), size], dim=-1)
     off = (votes.box - box) / (size + _THIN).repeat(1, 1, 2)
     apart = functional.huber_loss(off, torch.zeros_like(off), reduction="none", delta=_SHARP).sum(-1) / _SHARP
-    spread = votes.box_spread.clamp(-4.0, 3.0)
     joint = functional.huber_loss(votes.joint, truth.of_points(truth.joint), reduction="none", delta=_JOINT_SHARP)
     level = functional.cross_entropy(
         votes.level_logits.flatten(0, 1), truth.of_points(truth.level).flatten(), reduction="none"
     )
     return {
         "boxes": (apart * weight).sum(),
-        "box spread": 0.2 * ((apart.detach() * (-spread).exp() + spread) * weight).sum(),
         "joints": 0.5 * (joint.sum(-1) * weight).sum() / _JOINT_SHARP,
         "level": 0.5 * (level.view_as(weight) * weight).sum(),
     }

@@ -172,7 +172,7 @@ def test_votes_are_learnt_and_losses_vanish_for_true_ones(batch: tuple[Clouds, T
     level = truth.of_points(truth.level)
     box = truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1))
     true = Votes(
-        truth.canonical, votes.spread, truth.diagonal.log(), box, votes.box_spread, truth.of_points(truth.joint),
+        truth.canonical, votes.spread, truth.diagonal.log(), box, truth.of_points(truth.joint),
         100.0 * torch.nn.functional.one_hot(level, 4).float(),
     )  # fmt: skip
     losses = perception_losses(true, truth)

@@ -16,10 +16,11 @@ import torch
 from safetensors.torch import load_file
 
 from artperl import cli
-from artperl.checkpoint import load_estimator, read_settings
+from artperl.checkpoint import load_estimator, read_settings, save_estimator
 from artperl.data import Given, Recorded, batches
 from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.fitting import FittingOptions
+from artperl.networks.boxes import Boxes
 from artperl.order import visible_order
 from artperl.ppo import PPOOptions
 from artperl.settings import PRESETS, TrainOptions
@@ -103,14 +104,20 @@ def test_families_with_any_parts_are_learnt_by_votes_and_learnt_on_by_number(tmp
     """An estimator of any parts begins one for files: what both have is taken over, heads are their own."""
     options = replace(TINY, categories=("drawer",), parts="any", max_parts=5, dense_steps=0, agent_rollouts=0)
     Training(options, tmp_path / "any", workers=0, progress=False).run()
-    learnt = load_estimator(tmp_path / "any" / "best").perception
+    best = load_estimator(tmp_path / "any" / "best")
+    learnt = best.perception
     assert learnt.votes
+    save_estimator(replace(best, boxes=Boxes(learnt.num_rows, 8)), tmp_path / "any" / "best", {})
     files = replace(
         options, categories=(), files=("urdf_assets/cabinet/mobility.urdf",), max_parts=learnt.num_rows,
         start_from=str(tmp_path / "any" / "best"),
     )  # fmt: skip
-    begun = Training(files, tmp_path / "files", workers=0, progress=False).perception
+    training = Training(files, tmp_path / "files", workers=0, progress=False)
+    begun = training.perception
     assert not begun.votes
+    assert training.boxes is None  # they learnt from parts by votes
+    same_head = replace(options, start_from=str(tmp_path / "any" / "best"))
+    assert Training(same_head, tmp_path / "again", workers=0, progress=False).boxes is not None
     same = {
         name: torch.equal(t, begun.state_dict()[name]) for name, t in learnt.state_dict().items() if "head" not in name
     }

@@ -48,6 +48,6 @@ def true_votes(truth: Truth) -> Votes:
     return Votes(
         canonical=truth.canonical, spread=torch.zeros(truth.part.shape), log_diagonal=truth.diagonal.log(),
         box=truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1)),
-        box_spread=torch.full(truth.part.shape, -4.0), joint=truth.of_points(truth.joint),
+        joint=truth.of_points(truth.joint),
         level_logits=20.0 * level.float(),
     )  # fmt: skip
