@@ -38,7 +38,8 @@ class Train:
     """
 
     category: tuple[str, ...] = ()
-    """Procedural categories, or 'all'; several share one estimator. By default laptop."""
+    """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By default
+    laptop."""
     files: tuple[Path, ...] = ()
     """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
     and from other sides; for objects that were not learnt from use artperl evaluate --files."""

@@ -95,7 +95,7 @@ def frozen_samples(
     """Samples of unseen procedural objects: always the same ones for the same arguments."""
     return [
         sample
-        for category in categories
+        for category in dict.fromkeys(categories)
         for sample in samples_of(
             objects_of([category], objects, first_seed, parts, max_parts), views_per_object, options, first_seed
         )
@@ -248,8 +248,8 @@ def table(figures: dict[str, Any]) -> str:
 
 
 def headline(scored: Sequence[Scored]) -> float:
-    """One number to keep the best by: mean over categories and parts of rotation in degrees and translation in % of the
-    diagonal, means and medians.
+    """One number to keep the best by: mean over categories of rotation in degrees and translation in % of the diagonal,
+    means and medians over views of their parts' means.
 
     Each error counts for ten at most: how many fail matters, but whether one that fails is off by 15 or by 150 degrees
     says more about the draw than about the estimator.
@@ -258,9 +258,8 @@ def headline(scored: Sequence[Scored]) -> float:
     for category in dict.fromkeys(s.category for s in scored):
         own = [s for s in scored if s.category == category]
         for errors in ([s.rotation for s in own], [100.0 * s.translation for s in own]):
-            for k in range(max(len(e) for e in errors)):
-                clipped = np.minimum([e[k] for e in errors if len(e) > k], _FAR_OFF)
-                terms += [np.median(clipped), np.mean(clipped)]
+            clipped = [np.minimum(e, _FAR_OFF).mean() for e in errors]
+            terms += [np.median(clipped), np.mean(clipped)]
     return float(np.mean(terms))
 
 

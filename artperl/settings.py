@@ -16,7 +16,7 @@ class TrainOptions:
     """What a run depends on."""
 
     categories: tuple[str, ...] = ("laptop",)
-    """Procedural categories; several share one estimator."""
+    """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families."""
@@ -110,7 +110,7 @@ PRESETS = {
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
         perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0,
-        box_width=40, test_objects=8, validation_views=1,
+        box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one

@@ -29,6 +29,7 @@ class FamilyStream:
     Parameters
     ----------
     categories : sequence of str
+        One that is named twice comes twice as often.
     options : SampleOptions, optional
     seed : int
     views_per_object : int
@@ -56,7 +57,8 @@ class FamilyStream:
                 f"a stream has no seed {seed}, {views_per_object} views per object, start {start}, step {step}",
                 mend="count from 0 upwards; views and step from 1",
             )
-        self.categories = [source.category for source in family_sources(categories, 1)]
+        family_sources(categories, 1)  # raises where there is none
+        self.categories = list(categories)
         self.options, self.seed = options or SampleOptions(), seed
         self.views_per_object, self.start, self.step = views_per_object, start, step
         self._renderer: Renderer | None = None

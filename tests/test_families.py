@@ -90,6 +90,8 @@ def test_a_stream_never_ends_and_repeats_itself_exactly() -> None:
     odd = list(itertools.islice(FamilyStream(["laptop", "drawer"], views_per_object=2, start=1, step=2), 4))
     assert [s.index for s in odd] == [2, 3, 6, 7]
     np.testing.assert_array_equal(odd[0].points, first[2].points)
+    twice = FamilyStream(["laptop", "drawer", "drawer"], views_per_object=1)
+    assert [twice.object(n).category for n in range(6)] == ["laptop", "drawer", "drawer"] * 2
 
 
 def test_a_dataset_of_made_objects_is_sound(tmp_path: Path) -> None:

@@ -258,6 +258,12 @@ def test_failures_count_with_the_worst_values(sample: Sample) -> None:
     assert headline([scored]) == 10.0
 
 
+def test_views_count_alike_in_the_score_however_many_parts_they_have(estimator: Estimator, sample: Sample) -> None:
+    (scored,) = evaluate(estimator, [sample])
+    two, four = (replace(scored, rotation=np.full(n, n / 2), translation=np.full(n, n / 200)) for n in (2, 4))
+    assert headline([two] * 3 + [four]) == pytest.approx((1.0 + 1.25) / 2)  # median and mean of 1, 1, 1, 2
+
+
 def test_the_table_holds_medians_and_means(estimator: Estimator, sample: Sample) -> None:
     one = evaluate(estimator, [sample])[0]
     scored = [replace(one, rotation=np.array([r, 2.0 * r])) for r in (1.0, 2.0, 6.0)]
