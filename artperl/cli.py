@@ -38,8 +38,8 @@ class Train:
     """
 
     category: tuple[str, ...] = ()
-    """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By default
-    laptop."""
+    """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By
+    default laptop."""
     files: tuple[Path, ...] = ()
     """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
     and from other sides; for objects that were not learnt from use artperl evaluate --files."""
@@ -212,9 +212,9 @@ class Evaluate:
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
+        from artperl.benchmarks.artimage import as_known
         from artperl.checkpoint import folder_of, load_estimator, read_settings
         from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
-        from artperl.order import as_seen
         from artsim.sources import find_sources
 
         if self.estimator is None:
@@ -225,8 +225,8 @@ class Evaluate:
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:
-            # Files number their parts in any order; estimators know them by where they are.
-            samples = samples_of((as_seen(source.load()) for source in find_sources(self.files)), views, options)
+            objects = (as_known(source.load(), categories, parts) for source in find_sources(self.files))
+            samples = samples_of(objects, views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")
         else:

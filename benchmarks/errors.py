@@ -34,8 +34,9 @@ from artperl.data import Clouds
 from artperl.estimator import Estimate, Estimator
 from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
 from artperl.networks.perception import Perceived
+from artperl.pictures import overlays
 from artperl.search import Clock
-from artsim.files import atomic_file
+from artsim.files import atomic_file, write_atomic
 from artsim.objects import ArticulatedObject
 from artsim.sample import Sample
 
@@ -43,6 +44,8 @@ Array = NDArray[np.float64]
 BINS = {"points": (0, 80, 400, 1200, NUM_POINTS + 1), "percent moved": (0, 10, 30, 101)}
 """Lower ends, and what lies above the last, of what moving parts are told apart by."""
 _SURE = 12.0  # the odds of a label that was told, as a logarithm
+SHOWN = 4
+"""Views in the picture of the worst."""
 FACES = ("-x", "-y", "-z", "+x", "+y", "+z")
 
 
@@ -63,6 +66,8 @@ class Options:
     """Tell the estimator which part each point is of: what is off even so is not for want of labels."""
     picture: Path | None = None
     """Draw errors against points here (.png)."""
+    worst: Path | None = None
+    """Draw the views of the last category whose moving parts have the lowest IoU here (.png)."""
     threads: int = 2
     """Processor threads."""
 
@@ -89,13 +94,16 @@ def main(options: Options) -> None:
     every: dict[str, dict[str, Array]] = {}
     for category in options.categories:
         estimator, objects = find_estimator(options.weights, category), objects_to_test(category, options)
-        rows, roots, faces = [], [], []
+        rows, roots, faces, fit = [], [], [], []
         samples = samples_of(objects, options.views, None, VALIDATION_SEEDS)
         for sample in tqdm(samples, category, disable=None, leave=False):
             asked = Told(**vars(estimator), sample=sample) if options.true_labels else estimator
             estimate = asked(sample.points)
+            fit.append(0.0)
             if len(estimate.size) == len(sample.box_size):
-                rows += moving_parts(estimate, sample)
+                own = moving_parts(estimate, sample)
+                rows += own
+                fit[-1] = float(np.mean([row["posed"] for row in own]))
                 roots.append(metrics.rotation_error(estimate.rotation[0], true_poses(sample)[0][0]))
                 faces.append(root_faces(estimate, sample))
             else:
@@ -106,6 +114,8 @@ def main(options: Options) -> None:
         every[category] = table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         result[category] = {"all": figures(table), **{by: in_bins(table, by) for by in BINS}}
         print_figures(category, result[category])
+        if options.worst is not None:
+            write_atomic(options.worst, overlays(estimator, [samples[n] for n in np.argsort(fit)[:SHOWN]]))
         result[category]["root"] = root_figures(np.reshape(roots, (len(objects), options.views)), np.array(faces))
     print("labelled: % of the part's points; mean rotation in degrees; IoU in %, if what the column says were known")
     if options.picture is not None and every:

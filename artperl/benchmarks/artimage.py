@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from artperl.categories import ARTIMAGE, objects_of
+from artperl.categories import ARTIMAGE, Parts, objects_of
 from artperl.evaluation import NUM_POINTS, TEST_SEEDS, samples_of
 from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
@@ -109,6 +109,15 @@ def real_train_objects(categories: Sequence[str]) -> list[ArticulatedObject]:
     if not objects:
         raise ConfigError("there is no real object to learn from", ", ".join(categories))
     return objects
+
+
+def as_known(obj: ArticulatedObject, categories: Sequence[str], parts: Parts) -> ArticulatedObject:
+    """An object of a file as an estimator of these categories and parts knows such objects.
+
+    Files number their parts in any order, and may have some that a category does not have in ArtImage.
+    """
+    category = categories[0] if len(set(categories)) == 1 else ""
+    return reduced(obj, ARTIMAGE[category], category) if parts == "artimage" and category in ARTIMAGE else as_seen(obj)
 
 
 def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:

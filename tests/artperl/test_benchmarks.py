@@ -13,7 +13,7 @@ import torch
 import artsim
 from artperl import metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
-from artperl.benchmarks.artimage import SPLIT, real_objects, reduced, row_samples, turned_round
+from artperl.benchmarks.artimage import SPLIT, as_known, real_objects, reduced, row_samples, turned_round
 from artperl.benchmarks.basin import ANGLES, _apart, basin_problem, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
 from artperl.categories import ARTIMAGE, objects_of
@@ -73,6 +73,15 @@ def test_parts_that_stay_at_rest_belong_to_what_carries_them() -> None:
     q[turning], state[1:] = 0.4, 0.4
     posed, own = obj.tree.forward_kinematics(q), merged.tree.forward_kinematics(state)
     np.testing.assert_allclose(own[1:], posed[turning])
+
+
+def test_files_are_tested_as_an_estimator_knows_them() -> None:
+    behind = turned_round(artsim.make("drawer", 1))
+    assert as_known(behind, ("drawer",), "artimage").tree.joints[1].axis[0] == -1.0
+    for categories, parts in ((("drawer",), "any"), (("drawer", "laptop"), "artimage"), ((), "any")):
+        known = as_known(behind, categories, parts)
+        assert known.tree.joints[1].axis[0] == 1.0
+        assert known.tree.types == behind.tree.types
 
 
 def test_rows_are_always_the_same_and_large_enough() -> None:
