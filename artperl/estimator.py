@@ -17,8 +17,9 @@ from torch import Tensor
 
 from artperl.coherence import coherent
 from artperl.data import Clouds
-from artperl.evidence import Evidence
+from artperl.evidence import Evidence, roughness
 from artperl.grouping import grouped
+from artperl.neighbours import query
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perceived, Perception, Votes
@@ -139,11 +140,17 @@ class _Seen:
         Of each point to be of each part; NaN for outliers.
     box_center, box_size : (P, 3) float
         In the rest frame, metres.
+    chosen : (M,) int64
+        Points by which faces of boxes are looked for.
+    roughness : () float
+        Of these, metres.
     """
 
     log_odds: Array
     box_center: Tensor
     box_size: Tensor
+    chosen: NDArray[np.int64]
+    roughness: Tensor
 
 
 @dataclass(eq=False)
@@ -233,13 +240,17 @@ class Estimator:
         perceived = self.perceive(clouds, clock)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
         with clock("report"):
-            nearest = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
+            index = query(cKDTree(found.observed.points[0].numpy()), points[good])[1]
             log_odds = np.full((len(points), self.perception.num_rows), np.nan)
-            log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[nearest]
+            log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]
             metres = (perceived.log_diagonal.exp() * clouds.radius).cpu()
-            seen = _Seen(log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres)
+            few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+            seen = _Seen(
+                log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres, few,
+                roughness(torch.from_numpy(points[few].astype(np.float32))),
+            )  # fmt: skip
             part = np.full(len(points), -1)
-            part[good] = found.observed.part[0].numpy()[nearest]
+            part[good] = found.observed.part[0].numpy()[index]
             return self._report(points, part, found, clock), seen
 
     def _report(self, points: Array, part: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
@@ -297,12 +308,12 @@ def _held_together(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes
 def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:
     """Evidence of one estimate, padded to that many parts, and its unit in metres."""
     T, K = estimate.T_camera_part, len(estimate.size)
-    good = np.flatnonzero(estimate.part >= 0)
-    good = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
-    arrays = np.asarray(points)[good], T, brought_to_rest(estimate.translation, T), estimate.size
+    arrays = np.asarray(points)[seen.chosen], T, brought_to_rest(estimate.translation, T), estimate.size
     cloud, poses, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
-    part = torch.from_numpy(estimate.part[good])
-    evidence, unit = Evidence.of(cloud, part, poses, center, size, seen.box_center[:K], seen.box_size[:K])
+    part = torch.from_numpy(estimate.part[seen.chosen])
+    evidence, unit = Evidence.of(
+        cloud, part, poses, center, size, seen.box_center[:K], seen.box_size[:K], seen.roughness
+    )  # fmt: skip
     return evidence.padded(rows), float(unit)
 
 
@@ -347,10 +358,10 @@ def clean(points: Array) -> NDArray[np.int64]:
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = cKDTree(points[known])
-        usual = np.median(tree.query(points[known[:1024]], _NEIGHBOURS + 1)[0][:, -1])
+        usual = np.median(query(tree, points[known[:1024]], [_NEIGHBOURS + 1])[0])
         within = max(_OUTLIER * usual, 1e-9)
-        apart = tree.query(points[good], _FEW_NEIGHBOURS + 1, distance_upper_bound=within)[0][:, -1]
-        good = good[np.isfinite(apart)]
+        apart = query(tree, points[good], [_FEW_NEIGHBOURS + 1], within)[0]
+        good = good[np.isfinite(apart[:, 0])]
     if len(good) < _FEWEST or not np.ptp(points[good], axis=0).any():
         raise ArtsimError(
             f"{len(good)} of {len(points)} points show an object", "points", "pass a cloud of the object, in metres"

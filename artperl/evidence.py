@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.batch import Batch
+from artperl.neighbours import query
 
 SHARES = (0.0, 0.004, 0.02, 0.1, 0.5)
 """Of a part's points, that lie farther out than a candidate: labels near a border are not always right."""
@@ -60,7 +62,7 @@ class Evidence(Batch):
     @staticmethod
     def of(
         points: Tensor, part: Tensor, T_camera_part: Tensor, center: Tensor, size: Tensor, perceived_center: Tensor,
-        perceived_size: Tensor,
+        perceived_size: Tensor, roughness: Tensor,
     ) -> tuple[Evidence, Tensor]:  # fmt: skip
         """Evidence of one cloud, and the diagonal that is its unit.
 
@@ -74,6 +76,8 @@ class Evidence(Batch):
             Boxes in the rest frame, metres.
         perceived_center, perceived_size : (K, 3) float
             Metres; in a rest frame of their own, where the middle of the root's box is the same place.
+        roughness : () float
+            Of the points: :func:`roughness`, metres.
 
         Returns
         -------
@@ -98,7 +102,7 @@ class Evidence(Batch):
             facing=torch.cat([-eye, eye], dim=-1),
             perceived_size=perceived_size,
             share=own.to(points.dtype).mean(1),
-            roughness=_roughness(points) / unit,
+            roughness=roughness / unit,
         )
         return evidence.map(lambda tensor: tensor[None]), unit
 
@@ -112,11 +116,12 @@ class Evidence(Batch):
         return self.map(lambda values: pad(values) if values.dim() > 1 else values)
 
 
-def _roughness(points: Tensor) -> Tensor:
+def roughness(points: Tensor) -> Tensor:
     """() median distance, root mean square, of some of the points (N, 3) and their neighbours from planes, metres."""
-    cloud = points.cpu().numpy()
-    index = cKDTree(cloud).query(cloud[:_LOOKED_AT], min(_NEIGHBOURS, len(cloud)))[1]
-    near = points[torch.from_numpy(index).to(points.device)]
+    cloud = points.numpy()
+    tree = cKDTree(cloud, balanced_tree=False)
+    index = query(tree, cloud[:_LOOKED_AT], range(1, min(_NEIGHBOURS, len(cloud)) + 1))[1]
+    near = points[torch.from_numpy(index)]
     return torch.linalg.svdvals(near - near.mean(1, keepdim=True))[:, -1].median() / near.shape[1] ** 0.5
 
 
@@ -143,11 +148,12 @@ def _faces(center: Tensor, size: Tensor) -> Tensor:
 
 def _outermost(outward: Tensor, own: Tensor, face: Tensor) -> Tensor:
     """(K, 6, S) how far out points (K, N, 6) of each part (K, N) reach, but for :data:`SHARES`; its faces if none."""
-    ordered = outward.masked_fill(~own[..., None], -torch.inf).sort(dim=1, descending=True).values
-    count = own.sum(1, keepdim=True)
-    place = (torch.tensor(SHARES, device=own.device) * (count - 1)).round().clamp(min=0).long()
-    found = ordered.gather(1, place[..., None].expand(-1, -1, 6)).transpose(1, 2)
-    return torch.where((count > 0)[..., None], found, face[..., None])
+    rows = face[..., None].repeat(1, 1, len(SHARES))
+    for k in own.any(1).nonzero()[:, 0].tolist():
+        depth = -outward[k, own[k]].T.numpy()
+        place = (torch.tensor(SHARES) * (depth.shape[1] - 1)).round().long().numpy()
+        rows[k] = -torch.from_numpy(np.partition(depth, place, axis=1)[:, place])
+    return rows
 
 
 def _siblings(outermost: Tensor, seen: Tensor) -> Tensor:

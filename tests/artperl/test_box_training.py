@@ -19,7 +19,7 @@ from artperl.batch import concatenate
 from artperl.boxes import iou_aligned
 from artperl.checkpoint import load_estimator
 from artperl.estimator import Estimator
-from artperl.evidence import SHARES, Evidence
+from artperl.evidence import SHARES, Evidence, roughness
 from artperl.networks.boxes import Boxes, box_losses
 from artperl.settings import TrainOptions
 from artperl.training import Training
@@ -45,7 +45,8 @@ def wall_and_box(seed: int = 0, noise: float = 0.0) -> tuple[Evidence, torch.Ten
     T = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 2.0], [0, 0, 0, 1]], dtype=float)
     center, size = torch.zeros(1, 3), torch.tensor([[0.2, 0.4, 0.3]])
     cloud, pose = torch.from_numpy(points).float(), torch.from_numpy(T)[None].float()
-    return Evidence.of(cloud, torch.zeros(len(cloud), dtype=torch.int64), pose, center, size, center + 0.3, 1.1 * size)
+    part = torch.zeros(len(cloud), dtype=torch.int64)
+    return Evidence.of(cloud, part, pose, center, size, center + 0.3, 1.1 * size, roughness(cloud))
 
 
 def places(evidence: Evidence, candidate: int) -> NDArray[np.float64]:
@@ -91,7 +92,7 @@ def test_what_siblings_and_the_root_show_are_candidates() -> None:
     center, size = torch.zeros(4, 3), torch.full((4, 3), 2.0)
     poses = torch.eye(4).expand(4, -1, -1)
     evidence, unit = Evidence.of(
-        torch.from_numpy(points).float(), torch.from_numpy(part), poses, center, size, center, size
+        torch.from_numpy(points).float(), torch.from_numpy(part), poses, center, size, center, size, torch.tensor(0.0)
     )
     everywhere, siblings, root = (places(evidence, n)[:, 3:] * float(unit) for n in (PERCEIVED - 1, -2, -1))
     assert np.allclose(everywhere, 0.5, atol=1e-6)
