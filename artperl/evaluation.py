@@ -125,17 +125,8 @@ def evaluate(estimator: Estimator, samples: Iterable[Sample], progress: bool = F
 
 def mistake(estimator: Estimator, samples: Iterable[Sample]) -> list[Scored]:
     """Scores of estimates for objects that are not of the estimator's categories: whatever it says is wrong."""
-    scored = []
-    for sample in samples:
-        estimate = estimator(sample.points)
-        wrong = _failed(sample, sum(estimate.milliseconds.values()))
-        scored.append(
-            replace(
-                wrong, failed=False, residual=estimate.residual, disagreement=estimate.disagreement,
-                confidence=estimate.confidence,
-            )
-        )  # fmt: skip
-    return scored
+    estimates = ((sample, estimator(sample.points)) for sample in samples)
+    return [_wrong(sample, estimate, sum(estimate.milliseconds.values())) for sample, estimate in estimates]
 
 
 def score(estimator: Estimator, sample: Sample) -> Scored:
@@ -147,7 +138,7 @@ def score(estimator: Estimator, sample: Sample) -> Scored:
         return _failed(sample, 1e3 * (time.perf_counter() - begun))
     milliseconds = 1e3 * (time.perf_counter() - begun)
     if len(estimate.state) != len(sample.joint_type):
-        return _failed(sample, milliseconds)
+        return _wrong(sample, estimate, milliseconds)
     return compare(estimate, sample, milliseconds)
 
 
@@ -277,12 +268,13 @@ def retry_residual(scored: Sequence[Scored]) -> float:
 def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calibration:
     """Confidence such that, of estimates with confidence p, a share p is right: regularised logistic regression.
 
-    Clouds of other things count as much, all together, as those of the category.
+    Clouds of other things count as much, all together, as those of the category. Estimates with a part too many or too
+    few are wrong ones.
 
     Weights of the residual and of the disagreement are kept from rising above 0, so that nothing that fits badly is
     ever trusted more for it, however far it lies from what was seen here.
     """
-    own, others = ([s for s in some if not s.failed] for some in (scored, foreign))
+    own, others = ([s for s in some if np.isfinite(s.residual)] for some in (scored, foreign))
     known = own + others
     default = Calibration()
     if not known:
@@ -313,6 +305,14 @@ def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array
     low, high = center - 0.5 * size, center + 0.5 * size
     middle: Array = 0.5 * (low.min(axis=0) + high.max(axis=0))
     return center - middle
+
+
+def _wrong(sample: Sample, estimate: Estimate, milliseconds: float) -> Scored:
+    """What fails, but says how well it fits: an estimate of an object with other parts."""
+    return replace(
+        _failed(sample, milliseconds), residual=estimate.residual, disagreement=estimate.disagreement,
+        confidence=estimate.confidence,
+    )  # fmt: skip
 
 
 def _failed(sample: Sample, milliseconds: float) -> Scored:

@@ -341,7 +341,8 @@ class Training:
         _write(board, "validation", _curves(figures) | {"score": score}, step)
         if score < _AS_GOOD * self.best:
             self.best = min(score, self.best)
-            foreign = mistake(self.estimator(), self._foreign())
+            judge = evaluate if self.options.votes else mistake  # any parts are right if they are where they are
+            foreign = judge(self.estimator(), self._foreign())
             best = replace(self.estimator(), calibration=calibrate(scored, foreign))
             best.options = replace(best.options, retry_residual=retry_residual(scored))
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
@@ -350,7 +351,7 @@ class Training:
         sys.stdout.flush()
 
     def _foreign(self) -> list[Sample]:
-        """Objects of other categories, for which confidence must be low."""
+        """Objects of other categories, for which confidence must be low where they are not what is asked for."""
         others = [category for category in FAMILIES if category not in self.base.categories]
         return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")
 

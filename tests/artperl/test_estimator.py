@@ -300,10 +300,19 @@ def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:
     assert calibrate([]) == Calibration()
 
 
+def test_estimates_with_other_parts_are_wrong_whatever_they_fit(estimator: Estimator, sample: Sample) -> None:
+    (other,) = evaluate(estimator, frozen_samples(["eyeglasses"], 1, 1))
+    assert other.failed
+    assert np.isfinite([other.residual, other.disagreement]).all()
+    right = [replace(evaluate(estimator, [sample])[0], residual=other.residual, disagreement=other.disagreement)]
+    among = calibrate(20 * right + 20 * [other])
+    assert among(other.residual, other.disagreement) == pytest.approx(0.5, abs=0.02)
+    assert calibrate(20 * right)(other.residual, other.disagreement) > 0.9
+
+
 def test_whatever_is_said_of_another_category_is_wrong(estimator: Estimator) -> None:
     (scored,) = mistake(estimator, frozen_samples(["bucket"], 1, 1))
     assert not scored.right
-    assert not scored.failed
     assert np.isfinite([scored.residual, scored.disagreement]).all()
 
 
