@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import linear_sum_assignment, minimize
 from tqdm import tqdm
 
 from artperl import metrics
@@ -55,6 +55,9 @@ class Scored:
         Degrees or metres; 0 for the root.
     axis : (K,) float
         Degrees, direction of each joint's axis; 0 for the root.
+    found : float
+        Share of parts with an estimated one of their own near their true pose, whatever its number; of as many as there
+        are, or as were estimated if those are more.
     segmentation : float
         Share of points with the right part.
     failed : bool
@@ -70,6 +73,7 @@ class Scored:
     iou_omad_legacy: Array
     state: Array
     axis: Array
+    found: float
     segmentation: float
     failed: bool
     residual: float
@@ -158,6 +162,7 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float) -> Scored:
         iou_omad_legacy=metrics.iou_omad_legacy(rest_center, estimate.size, sample.box_center, sample.box_size),
         state=metrics.state_error(estimate.state, sample.joint_state, sample.joint_type),
         axis=np.where(children, metrics.axis_error(estimate.joint_axis, sample.joint_axis_camera), 0.0),
+        found=found(estimate, sample),
         segmentation=float((estimate.part == sample.part).mean()),
         failed=False,
         residual=estimate.residual,
@@ -165,6 +170,15 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float) -> Scored:
         confidence=estimate.confidence,
         milliseconds=milliseconds,
     )
+
+
+def found(estimate: Estimate, sample: Sample) -> float:
+    """See :attr:`Scored.found`."""
+    rotation, center = true_poses(sample)
+    off = metrics.rotation_error(estimate.rotation[:, None], rotation[None])
+    away = metrics.translation_error(estimate.translation[:, None], center[None], sample.diagonal)
+    near = (off <= _RIGHT[0]) & (away <= _RIGHT[1])
+    return float(near[linear_sum_assignment(near, maximize=True)].sum() / max(near.shape))
 
 
 def true_poses(sample: Sample) -> tuple[Array, Array]:
@@ -208,6 +222,7 @@ def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]
         "instances": len(own),
         "failures": sum(s.failed for s in own),
         "right": float(np.mean([s.right for s in own])),
+        "parts_found": float(np.mean([s.found for s in own])),
         "segmentation": float(np.mean([s.segmentation for s in own])),
         "ms_per_instance": float(np.median([s.milliseconds for s in own])),
     }
@@ -232,7 +247,8 @@ def table(figures: dict[str, Any]) -> str:
             )
         lines.append(
             f"{'':14s}{figure['instances']} instances, {figure['failures']} failures, "
-            f"{100 * figure['right']:.0f} % right, {100 * figure['segmentation']:.1f} % of points right, "
+            f"{100 * figure['right']:.0f} % right, {100 * figure['parts_found']:.0f} % of parts found, "
+            f"{100 * figure['segmentation']:.1f} % of points right, "
             f"{figure['ms_per_instance']:.0f} ms"
         )
     return "\n".join(lines)
@@ -243,13 +259,17 @@ def headline(scored: Sequence[Scored]) -> float:
     means and medians over views of their parts' means.
 
     Each error counts for ten at most: how many fail matters, but whether one that fails is off by 15 or by 150 degrees
-    says more about the draw than about the estimator.
+    says more about the draw than about the estimator. Where there is a part too many or too few, those that are not
+    found count for ten.
     """
     terms = []
     for category in dict.fromkeys(s.category for s in scored):
         own = [s for s in scored if s.category == category]
         for errors in ([s.rotation for s in own], [100.0 * s.translation for s in own]):
-            clipped = [np.minimum(e, _FAR_OFF).mean() for e in errors]
+            clipped = [
+                _FAR_OFF * (1.0 - s.found) if s.failed else np.minimum(error, _FAR_OFF).mean()
+                for s, error in zip(own, errors, strict=True)
+            ]
             terms += [np.median(clipped), np.mean(clipped)]
     return float(np.mean(terms))
 
@@ -308,10 +328,10 @@ def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array
 
 
 def _wrong(sample: Sample, estimate: Estimate, milliseconds: float) -> Scored:
-    """What fails, but says how well it fits: an estimate of an object with other parts."""
+    """What fails, but says how well it fits: an estimate with other parts than the object has."""
     return replace(
-        _failed(sample, milliseconds), residual=estimate.residual, disagreement=estimate.disagreement,
-        confidence=estimate.confidence,
+        _failed(sample, milliseconds), found=found(estimate, sample), residual=estimate.residual,
+        disagreement=estimate.disagreement, confidence=estimate.confidence,
     )  # fmt: skip
 
 
@@ -323,7 +343,7 @@ def _failed(sample: Sample, milliseconds: float) -> Scored:
     state = metrics.state_error(np.zeros(K), np.where(np.isfinite(high - low), high - low, np.pi), sample.joint_type)
     return Scored(
         sample.category, rotation, far, none, none, none, np.where(children, state, 0.0),
-        np.where(children, 90.0, 0.0), 0.0, True, np.inf, np.inf, 0.0, milliseconds,
+        np.where(children, 90.0, 0.0), 0.0, 0.0, True, np.inf, np.inf, 0.0, milliseconds,
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from artperl.evaluation import (
     calibrate,
     compare,
     evaluate,
+    found,
     frozen_samples,
     headline,
     mistake,
@@ -240,7 +241,19 @@ def test_a_perfect_estimate_has_no_error(estimator: Estimator, sample: Sample) -
     }.items():
         np.testing.assert_allclose(getattr(scored, name), value, atol=1e-6)
     assert scored.right
+    assert scored.found == 1.0
     assert scored.segmentation == 1.0
+
+
+def test_parts_are_found_whatever_their_numbers_are(estimator: Estimator, sample: Sample) -> None:
+    rotation, center = true_poses(sample)
+    seen = replace(estimator(sample.points), rotation=rotation, translation=center)
+    assert found(replace(seen, rotation=rotation[::-1], translation=center[::-1]), sample) == 1.0
+    away = center + [[0, 0, 0], [0, 0, 0.06 * sample.diagonal]]
+    assert found(replace(seen, translation=away), sample) == 0.5
+    twice = replace(seen, rotation=rotation[[0, 1, 1, 1]], translation=center[[0, 1, 1, 1]])
+    assert found(twice, sample) == 0.5  # two parts too many
+    assert found(replace(seen, rotation=rotation[:1], translation=center[:1]), sample) == 0.5
 
 
 def test_failures_count_with_the_worst_values(sample: Sample) -> None:
