@@ -176,7 +176,9 @@ class Evaluate:
     objects: int = 40
     """Unseen procedural objects of each category."""
     files: tuple[Path, ...] = ()
-    """Instead of procedural objects: URDF files, object folders, or folders of them."""
+    """Instead of procedural objects: URDF files, object folders, or folders of them. An estimator of one category of
+    ArtImage is tested on them as ArtImage has it: parts that move otherwise stay at rest, and drawers open to the
+    front."""
     views: int | None = None
     """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
     preset: Literal["artimage", "sphere"] = "artimage"
