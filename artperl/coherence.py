@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from artperl.neighbours import query
-
 Array = NDArray[np.float64]
 
 _NEIGHBOURS = 5
@@ -40,7 +38,7 @@ def coherent(points: Array, values: Array, diagonal: float) -> Array:
     """
     N = len(points)
     k = min(_NEIGHBOURS, N - 1)
-    near = query(cKDTree(points), points, range(1, k + 2))[1]
+    near = cKDTree(points).query(points, range(1, k + 2), workers=1)[1]
     normal = _normals(points[near])
     here, there = np.repeat(np.arange(N), k), near[:, 1:].ravel()
     apart = points[there] - points[here]

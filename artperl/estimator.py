@@ -19,7 +19,6 @@ from artperl.coherence import coherent
 from artperl.data import Clouds
 from artperl.evidence import Evidence, roughness
 from artperl.grouping import grouped
-from artperl.neighbours import query
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perceived, Perception, Votes
@@ -240,7 +239,7 @@ class Estimator:
         perceived = self.perceive(clouds, clock)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
         with clock("report"):
-            index = query(cKDTree(found.observed.points[0].numpy()), points[good])[1]
+            index = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
             log_odds = np.full((len(points), self.perception.num_rows), np.nan)
             log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]
             metres = (perceived.log_diagonal.exp() * clouds.radius).cpu()
@@ -358,10 +357,10 @@ def clean(points: Array) -> NDArray[np.int64]:
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = cKDTree(points[known])
-        usual = np.median(query(tree, points[known[:1024]], [_NEIGHBOURS + 1])[0])
+        usual = np.median(tree.query(points[known[:1024]], [_NEIGHBOURS + 1])[0])
         within = max(_OUTLIER * usual, 1e-9)
-        apart = query(tree, points[good], [_FEW_NEIGHBOURS + 1], within)[0]
-        good = good[np.isfinite(apart[:, 0])]
+        apart = tree.query(points[good], [_FEW_NEIGHBOURS + 1], distance_upper_bound=within)[0][:, 0]
+        good = good[np.isfinite(apart)]
     if len(good) < _FEWEST or not np.ptp(points[good], axis=0).any():
         raise ArtsimError(
             f"{len(good)} of {len(points)} points show an object", "points", "pass a cloud of the object, in metres"

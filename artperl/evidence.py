@@ -15,7 +15,6 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.batch import Batch
-from artperl.neighbours import query
 
 SHARES = (0.0, 0.004, 0.02, 0.1, 0.5)
 """Of a part's points, that lie farther out than a candidate: labels near a border are not always right."""
@@ -120,7 +119,7 @@ def roughness(points: Tensor) -> Tensor:
     """() median distance, root mean square, of some of the points (N, 3) and their neighbours from planes, metres."""
     cloud = points.numpy()
     tree = cKDTree(cloud, balanced_tree=False)
-    index = query(tree, cloud[:_LOOKED_AT], range(1, min(_NEIGHBOURS, len(cloud)) + 1))[1]
+    index = tree.query(cloud[:_LOOKED_AT], range(1, min(_NEIGHBOURS, len(cloud)) + 1))[1]
     near = points[torch.from_numpy(index)]
     return torch.linalg.svdvals(near - near.mean(1, keepdim=True))[:, -1].median() / near.shape[1] ** 0.5
 
