@@ -351,7 +351,7 @@ class Training:
         sys.stdout.flush()
 
     def _foreign(self) -> list[Sample]:
-        """Objects of other categories, for which confidence must be low where they are not what is asked for."""
+        """Objects of other categories, by which confidence is calibrated, too."""
         others = [category for category in FAMILIES if category not in self.base.categories]
         return frozen_samples(others[: self.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")
 

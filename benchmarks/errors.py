@@ -36,6 +36,7 @@ from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, rest_centers, sampl
 from artperl.networks.perception import Perceived
 from artperl.pictures import overlays
 from artperl.search import Clock
+from artsim.errors import ConfigError
 from artsim.files import atomic_file, write_atomic
 from artsim.objects import ArticulatedObject
 from artsim.sample import Sample
@@ -67,7 +68,7 @@ class Options:
     picture: Path | None = None
     """Draw errors against points here (.png)."""
     worst: Path | None = None
-    """Draw the views of the last category whose moving parts have the lowest IoU here (.png)."""
+    """Draw the views whose moving parts have the lowest IoU here (.png): of one category, without true labels."""
     threads: int = 2
     """Processor threads."""
 
@@ -88,7 +89,15 @@ class Told(Estimator):
 
 
 def main(options: Options) -> None:
-    """Measure and print."""
+    """Measure and print.
+
+    Raises
+    ------
+    ConfigError
+        When one picture is to show several categories, or what is seen with true labels.
+    """
+    if options.worst is not None and (len(options.categories) > 1 or options.true_labels):
+        raise ConfigError("it shows one category, as it is perceived", "worst", "name one --categories, no true labels")
     torch.set_num_threads(options.threads)
     result: dict[str, dict[str, Any]] = {}
     every: dict[str, dict[str, Array]] = {}
@@ -99,11 +108,10 @@ def main(options: Options) -> None:
         for sample in tqdm(samples, category, disable=None, leave=False):
             asked = Told(**vars(estimator), sample=sample) if options.true_labels else estimator
             estimate = asked(sample.points)
-            fit.append(0.0)
-            if len(estimate.size) == len(sample.box_size):
-                own = moving_parts(estimate, sample)
+            own = moving_parts(estimate, sample) if len(estimate.size) == len(sample.box_size) else []
+            fit.append(float(np.mean([row["posed"] for row in own])) if own else 0.0)
+            if own:
                 rows += own
-                fit[-1] = float(np.mean([row["posed"] for row in own]))
                 roots.append(metrics.rotation_error(estimate.rotation[0], true_poses(sample)[0][0]))
                 faces.append(root_faces(estimate, sample))
             else:
