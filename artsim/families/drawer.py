@@ -128,13 +128,13 @@ def _style(rng: np.random.Generator) -> _Style:
     return _Style(
         front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
         overlay=bool(rng.random() < 0.5),
-        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.3, 0.3, 0.2, 0.1, 0.1])),
+        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.24, 0.24, 0.16, 0.08, 0.28])),
         size=rng.uniform(0.15, 0.7),
         reach=rng.uniform(0.015, 0.04),
         rise=rng.uniform(-0.2, 0.3),
         side=rng.uniform(0.6, 0.95),
         length=rng.uniform(0.75, 1.0),
-        travel=rng.uniform(0.55, 0.92),
+        travel=rng.triangular(0.6, 0.95, 1.0),
     )
 
 
