@@ -36,11 +36,21 @@ _RATE, _DECAY = 2e-3, 0.1
 
 @dataclass(frozen=True, eq=False)
 class Records(Batch):
-    """B estimates: what was seen, and where the true boxes (B, P, 3) are in the estimated rest frame, in diagonals."""
+    """B estimates: what was seen, and the true boxes, in the estimated rest frame, in diagonals.
+
+    Attributes
+    ----------
+    evidence : Evidence
+    center, size : (B, P, 3) float
+        Where the boxes are seen, brought to rest by the estimated poses.
+    rest : (B, P, 3) float
+        Their centres at rest.
+    """
 
     evidence: Evidence
     center: Tensor
     size: Tensor
+    rest: Tensor
 
 
 class _Examined(Dataset[list[Records]]):
@@ -94,9 +104,12 @@ def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, pr
     for step in bar:
         set_rate(optimizer, _RATE * one_cycle(step, steps))
         batch = records[torch.randint(len(records), (_BATCH,))]
-        center, size = boxes(batch.evidence)
-        losses = box_losses(center, size, batch.center, batch.size, batch.evidence.valid)
-        loss = losses.sum() / batch.evidence.valid.sum()
+        center, size, farther = boxes(batch.evidence)
+        axis, valid = batch.evidence.axis, batch.evidence.valid
+        slides = axis.any(-1)
+        losses = box_losses(center, size, batch.center, batch.size, valid)
+        losses += box_losses(center - farther[..., None] * axis, size, batch.rest, batch.size, slides)
+        loss = losses.sum() / (valid.sum() + slides.sum())
         optimizer.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(boxes.parameters(), 1.0)
@@ -111,9 +124,12 @@ def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
     K = len(sample.box_size)
     if estimate.residual > _FITS or len(estimate.size) != K:
         return []
-    center = brought_to_rest(true_poses(sample)[1], estimate.T_camera_part)
-    padded = np.zeros((2, 1, evidence.valid.shape[1], 3))
-    padded[:, 0, :K] = center / unit, sample.box_size / unit
+    T, T_true = estimate.T_camera_part, sample.T_camera_part[0]
+    center = brought_to_rest(true_poses(sample)[1], T)
+    still = sample.box_center @ T_true[:3, :3].T + T_true[:3, 3]  # every part where it is at rest, in the camera frame
+    rest = brought_to_rest(still, np.broadcast_to(T[0], T.shape))
+    padded = np.zeros((3, 1, evidence.valid.shape[1], 3))
+    padded[:, 0, :K] = center / unit, sample.box_size / unit, rest / unit
     return [Records(evidence, *torch.from_numpy(padded)).to(torch.float16)]
 
 
@@ -121,7 +137,7 @@ def _save(records: list[Records], views: int, file: Path) -> None:
     tensors = {"views": torch.tensor(views)}
     if records:
         every: Records = concatenate(records)
-        tensors |= {"center": every.center, "size": every.size}
+        tensors |= {name: values for name, values in vars(every).items() if name != "evidence"}
         tensors |= {f"evidence.{name}": values for name, values in vars(every.evidence).items()}
     save_tensors(tensors, file)
 
@@ -133,4 +149,4 @@ def _load(file: Path) -> tuple[int, list[Records]]:
     if not tensors:
         return views, []
     evidence = {k.removeprefix("evidence."): v for k, v in tensors.items() if k.startswith("evidence.")}
-    return views, [Records(Evidence(**evidence), tensors["center"], tensors["size"])]
+    return views, [Records(Evidence(**evidence), *(tensors[name] for name in ("center", "size", "rest")))]

@@ -22,7 +22,7 @@ from artperl.grouping import grouped
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perceived, Perception, Votes
-from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts
+from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.retrieval import ShapeBase
 from artperl.search import Clock, EstimatorOptions, Found, find
 from artperl.shapes import Observed, Shapes
@@ -105,7 +105,7 @@ class Estimate:
     confidence : float
         0 to 1.
     trajectory : (S, K, 4, 4) float
-        ``T_camera_part`` at the start, after each step of the agent where it was needed, and after refinement.
+        ``T_camera_part`` at the start, after each step of the agent where it was needed, and in the end.
     milliseconds : dict
         By stage.
     """
@@ -143,6 +143,8 @@ class _Seen:
         Points by which faces of boxes are looked for.
     roughness : () float
         Of these, metres.
+    lower : (K,) float
+        Limits of the joints' states.
     """
 
     log_odds: Array
@@ -150,6 +152,7 @@ class _Seen:
     box_size: Tensor
     chosen: NDArray[np.int64]
     roughness: Tensor
+    lower: Array
 
 
 @dataclass(eq=False)
@@ -204,10 +207,11 @@ class Estimator:
             for _ in range(_LOOKS):
                 evidence, unit = _evidence(cloud, replace(estimate, part=part), seen, self.boxes.num_rows)
                 boxes = self.boxes(evidence.to(self.perception.device))
-                center, size = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
+                center, size, farther = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
                 part = labels_by_boxes(cloud, T, center, size, seen.log_odds, _OUTSIDE * unit)
         posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
-        return replace(estimate, translation=posed, size=size, part=part)
+        farther = np.maximum(farther, np.minimum(seen.lower - estimate.state, 0.0))
+        return slid(replace(estimate, translation=posed, size=size, part=part), farther)
 
     @torch.inference_mode()
     def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
@@ -238,18 +242,20 @@ class Estimator:
             clouds = Clouds.of(cloud)
         perceived = self.perceive(clouds, clock)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
-        with clock("report"):
+        with clock("label"):
             index = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
+            part = np.full(len(points), -1)
+            part[good] = found.observed.part[0].numpy()[index]
+            few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+        with clock("report"):
             log_odds = np.full((len(points), self.perception.num_rows), np.nan)
             log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]
-            metres = (perceived.log_diagonal.exp() * clouds.radius).cpu()
-            few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+            trees, metres = found.shapes.trees, (perceived.log_diagonal.exp() * clouds.radius).cpu()
             seen = _Seen(
                 log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres, few,
                 roughness(torch.from_numpy(points[few].astype(np.float32))),
+                _numpy(trees.lower * reach(trees, found.refined.theta.log_scale))[: int(trees.valid[0].sum())],
             )  # fmt: skip
-            part = np.full(len(points), -1)
-            part[good] = found.observed.part[0].numpy()[index]
             return self._report(points, part, found, clock), seen
 
     def _report(self, points: Array, part: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
@@ -307,13 +313,32 @@ def _held_together(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes
 def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:
     """Evidence of one estimate, padded to that many parts, and its unit in metres."""
     T, K = estimate.T_camera_part, len(estimate.size)
-    arrays = np.asarray(points)[seen.chosen], T, brought_to_rest(estimate.translation, T), estimate.size
-    cloud, poses, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
+    slides = np.array(estimate.joint_type)[:, None] == "prismatic"
+    arrays = (
+        np.asarray(points)[seen.chosen], T, np.where(slides, estimate.joint_axis, 0.0),
+        brought_to_rest(estimate.translation, T), estimate.size,
+    )  # fmt: skip
+    cloud, poses, axis, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
     part = torch.from_numpy(estimate.part[seen.chosen])
     evidence, unit = Evidence.of(
-        cloud, part, poses, center, size, seen.box_center[:K], seen.box_size[:K], seen.roughness
+        cloud, part, poses, axis, center, size, seen.box_center[:K], seen.box_size[:K], seen.roughness
     )  # fmt: skip
     return evidence.padded(rows), float(unit)
+
+
+def slid(estimate: Estimate, farther: Array) -> Estimate:
+    """The estimate with parts that have slid farther (K,), metres, along their axes, and are where they were.
+
+    Where they are at rest changes, and with them where everything is at rest that they carry.
+    """
+    T, rotation = estimate.T_camera_part.copy(), estimate.rotation
+    shift = farther[:, None] * estimate.joint_axis
+    for k, parent in enumerate(estimate.joint_parent):
+        if parent >= 0:
+            shift[k] += rotation[k] @ rotation[parent].T @ shift[parent]
+    T[:, :3, 3] += shift
+    trajectory = np.concatenate([estimate.trajectory[:-1], T[None]])
+    return replace(estimate, T_camera_part=T, state=estimate.state + farther, trajectory=trajectory)
 
 
 def labels_by_boxes(

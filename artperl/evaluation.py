@@ -275,8 +275,8 @@ def headline(scored: Sequence[Scored]) -> float:
 
 
 def mean_iou(scored: Sequence[Scored]) -> float:
-    """Mean exact intersection over union of all posed boxes."""
-    return float(np.mean(np.concatenate([s.iou_exact for s in scored])))
+    """Mean exact intersection over union of all boxes, as posed and at rest."""
+    return float(np.mean(np.concatenate([np.stack([s.iou_exact, s.iou_rest_exact]) for s in scored], axis=1)))
 
 
 def retry_residual(scored: Sequence[Scored]) -> float:

@@ -20,6 +20,8 @@ SHARES = (0.0, 0.004, 0.02, 0.1, 0.5)
 """Of a part's points, that lie farther out than a candidate: labels near a border are not always right."""
 NUM_CANDIDATES = len(SHARES) + 7
 """See :attr:`Evidence.candidates`."""
+PERCEIVED = len(SHARES) + 2
+"""Which of them is where perception has the face."""
 _LOOKED_AT, _NEIGHBOURS = 256, 8
 """Points whose surroundings are looked at for noise, and how many of these points there are, with their own."""
 
@@ -42,6 +44,8 @@ class Evidence(Batch):
     facing : (B, P, 6) float
         Cosine of the angle between the outward normal and the direction to the camera.
     perceived_size : (B, P, 3) float
+    axis : (B, P, 3) float
+        Unit vector along which it slides; 0 for parts that turn.
     share : (B, P) float
         Of the points.
     roughness : (B,) float
@@ -55,13 +59,14 @@ class Evidence(Batch):
     candidates: Tensor
     facing: Tensor
     perceived_size: Tensor
+    axis: Tensor
     share: Tensor
     roughness: Tensor
 
     @staticmethod
     def of(
-        points: Tensor, part: Tensor, T_camera_part: Tensor, center: Tensor, size: Tensor, perceived_center: Tensor,
-        perceived_size: Tensor, roughness: Tensor,
+        points: Tensor, part: Tensor, T_camera_part: Tensor, axis: Tensor, center: Tensor, size: Tensor,
+        perceived_center: Tensor, perceived_size: Tensor, roughness: Tensor,
     ) -> tuple[Evidence, Tensor]:  # fmt: skip
         """Evidence of one cloud, and the diagonal that is its unit.
 
@@ -71,6 +76,8 @@ class Evidence(Batch):
             Camera frame, metres.
         part : (N,) int64
         T_camera_part : (K, 4, 4) float
+        axis : (K, 3) float
+            Unit vectors along which parts slide, camera frame; 0 for others.
         center, size : (K, 3) float
             Boxes in the rest frame, metres.
         perceived_center, perceived_size : (K, 3) float
@@ -100,6 +107,7 @@ class Evidence(Batch):
             candidates=_candidates(carried, own, center, size, perceived_center, perceived_size),
             facing=torch.cat([-eye, eye], dim=-1),
             perceived_size=perceived_size,
+            axis=(axis[:, None] @ rotation)[:, 0],
             share=own.to(points.dtype).mean(1),
             roughness=roughness / unit,
         )

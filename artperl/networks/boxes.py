@@ -1,11 +1,14 @@
-"""Boxes of the parts, from what a fitted cloud says of them: beyond the paper, whose boxes are the reference's."""
+"""Boxes of the parts, from what a fitted cloud says of them: beyond the paper, whose boxes are the reference's.
+
+And where they lie at rest: how far a drawer's front stands before that of its reference is not how far it is open.
+"""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
 
-from artperl.evidence import NUM_CANDIDATES, Evidence
+from artperl.evidence import NUM_CANDIDATES, PERCEIVED, Evidence
 
 _THIN = 0.004
 """Half-size below which places are no longer measured in half-sizes of their part, in diagonals."""
@@ -14,13 +17,16 @@ _FAR = 3.0
 _SMOOTH = 1e-4
 """Roughness, in diagonals, below which clouds are all alike."""
 _STEP = 0.1
-"""Half-sizes that an output of 1 moves a face by, after candidates were weighed."""
+"""Half-sizes that an output of 1 moves a face by, after candidates were weighed, or how far a part has slid."""
 _TRUST = 2.0
 """Logarithm of how much more likely than others the reference is at first."""
 
 
 class Boxes(nn.Module):
     """Weighs, for each face of each part's box, the candidates for where it is, and moves their mean a little.
+
+    How far a part has slid is corrected by a share of how far its leading face lies beyond where perception has it at
+    rest, and a little more.
 
     Every face goes through the same layers, twice: alone; and with its part, its opposite face, the same face of other
     parts, and of the root.
@@ -38,21 +44,29 @@ class Boxes(nn.Module):
         self.num_rows, self.width = num_rows, width
         described = 2 * NUM_CANDIDATES + 9 + 6 + num_rows
         self.alone = nn.Sequential(nn.Linear(described, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
-        self.among = nn.Sequential(nn.Linear(6 * width, width), nn.ReLU(), nn.Linear(width, NUM_CANDIDATES + 1))
+        self.among = nn.Sequential(nn.Linear(6 * width, width), nn.ReLU(), nn.Linear(width, NUM_CANDIDATES + 3))
         self.trust = nn.Parameter(_TRUST * (torch.arange(NUM_CANDIDATES) == 0))
 
-    def forward(self, evidence: Evidence) -> tuple[Tensor, Tensor]:
-        """Centres and sizes (B, P, 3) of the boxes, in the rest frame, in diagonals."""
+    def forward(self, evidence: Evidence) -> tuple[Tensor, Tensor, Tensor]:
+        """Centres and sizes (B, P, 3) of the boxes in the rest frame, and how much farther parts (B, P) have slid.
+
+        In diagonals. Boxes are where the part is seen, brought to rest by the poses that were given; at rest they lie
+        as much farther back along the axis.
+        """
         valid = evidence.valid[..., None, None]
         face = self.alone(self._described(evidence)) * valid
         same = [face.sum(1, keepdim=True) / valid.sum(1, keepdim=True), face.amax(1, keepdim=True), face[:, :1]]
         others = [face.roll(3, dims=2), face.mean(2, keepdim=True), *same]
         score = self.among(torch.cat([face, *(values.expand_as(face) for values in others)], dim=-1))
-        weight = (score[..., :-1] + self.trust).softmax(-1)
+        weight = (score[..., :NUM_CANDIDATES] + self.trust).softmax(-1)
+        step, share, more = score[..., NUM_CANDIDATES:].unbind(-1)
         half = 0.5 * evidence.size
-        out = (weight * evidence.candidates).sum(-1) + _STEP * score[..., -1] * (half + _THIN).repeat(1, 1, 2)
+        unit = _STEP * (half + _THIN).repeat(1, 1, 2)
+        out = (weight * evidence.candidates).sum(-1) + step * unit
         low, high = evidence.center - half - out[..., :3], evidence.center + half + out[..., 3:]
-        return 0.5 * (low + high), (high - low).clamp(min=0.0)
+        beyond = share * (out - evidence.candidates[..., PERCEIVED]) + more * unit
+        leads = torch.cat([-evidence.axis, evidence.axis], dim=-1).clamp(min=0.0)
+        return 0.5 * (low + high), (high - low).clamp(min=0.0), (leads * beyond).sum(-1)
 
     def _described(self, evidence: Evidence) -> Tensor:
         """(B, P, 6, C) features of each face."""

@@ -19,16 +19,14 @@ from artperl.batch import concatenate
 from artperl.boxes import iou_aligned
 from artperl.checkpoint import load_estimator
 from artperl.estimator import Estimator
-from artperl.evidence import SHARES, Evidence, roughness
+from artperl.evaluation import frozen_samples
+from artperl.evidence import PERCEIVED, SHARES, Evidence, roughness
 from artperl.networks.boxes import Boxes, box_losses
 from artperl.settings import TrainOptions
 from artperl.training import Training
 
 SIGNS = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 """Of the faces' outward normals."""
-PERCEIVED = len(SHARES) + 2
-"""The candidate that perception gives; those of all points and of the size come before and after it."""
-
 STAGE = TrainOptions(
     base_objects=3, reference_points=48, perception_steps=0, dense_steps=0, agent_rollouts=0, box_views=4,
     box_steps=3, test_objects=2, foreign_categories=1, validation_views=1, test_views=1, start_from="laptop",
@@ -46,7 +44,8 @@ def wall_and_box(seed: int = 0, noise: float = 0.0) -> tuple[Evidence, torch.Ten
     center, size = torch.zeros(1, 3), torch.tensor([[0.2, 0.4, 0.3]])
     cloud, pose = torch.from_numpy(points).float(), torch.from_numpy(T)[None].float()
     part = torch.zeros(len(cloud), dtype=torch.int64)
-    return Evidence.of(cloud, part, pose, center, size, center + 0.3, 1.1 * size, roughness(cloud))
+    slides = torch.tensor([[0.0, 0.0, -1.0]])  # towards the camera
+    return Evidence.of(cloud, part, pose, slides, center, size, center + 0.3, 1.1 * size, roughness(cloud))
 
 
 def places(evidence: Evidence, candidate: int) -> NDArray[np.float64]:
@@ -91,8 +90,9 @@ def test_what_siblings_and_the_root_show_are_candidates() -> None:
     points[::400] = reach[:, None]  # each part's outermost corner
     center, size = torch.zeros(4, 3), torch.full((4, 3), 2.0)
     poses = torch.eye(4).expand(4, -1, -1)
+    cloud, turns = torch.from_numpy(points).float(), torch.zeros(4, 3)
     evidence, unit = Evidence.of(
-        torch.from_numpy(points).float(), torch.from_numpy(part), poses, center, size, center, size, torch.tensor(0.0)
+        cloud, torch.from_numpy(part), poses, turns, center, size, center, size, torch.tensor(0.0)
     )
     everywhere, siblings, root = (places(evidence, n)[:, 3:] * float(unit) for n in (PERCEIVED - 1, -2, -1))
     assert np.allclose(everywhere, 0.5, atol=1e-6)
@@ -103,15 +103,41 @@ def test_what_siblings_and_the_root_show_are_candidates() -> None:
     assert evidence.share[0].tolist() == pytest.approx([1 / 3, 1 / 3, 1 / 3, 0.0])
 
 
+def test_axes_are_those_of_joints_at_rest() -> None:
+    """Whatever the view: drawers slide towards the front, -x."""
+    (sample,) = frozen_samples(["drawer"], 1, 1)
+    arrays = sample.points, sample.T_camera_part, sample.joint_axis_camera, sample.box_center, sample.box_size
+    points, poses, axis, center, size = (torch.from_numpy(np.asarray(values, np.float64)) for values in arrays)
+    part = torch.from_numpy(sample.part.astype(np.int64))
+    evidence, _ = Evidence.of(points, part, poses, axis, center, size, center, size, torch.tensor(0.0))
+    assert np.allclose(evidence.axis[0, 1:], [-1.0, 0.0, 0.0], atol=1e-6)
+
+
 def test_a_face_lies_where_all_candidates_say() -> None:
     evidence, _ = wall_and_box()
     agreed = replace(evidence, candidates=torch.full_like(evidence.candidates, 0.03))
     with torch.no_grad():
         boxes = Boxes(3)
-        boxes.among[-1].weight[-1], boxes.among[-1].bias[-1] = 0.0, 0.0  # no more moves
-        center, size = boxes(agreed.padded(3))
+        boxes.among[-1].weight[-3], boxes.among[-1].bias[-3] = 0.0, 0.0  # no more moves
+        center, size, _ = boxes(agreed.padded(3))
     assert torch.allclose(center[:, :1], evidence.center, atol=1e-6)
     assert torch.allclose(size[:, :1], evidence.size + 0.06)
+
+
+def test_how_far_a_part_has_slid_is_told_by_its_leading_face() -> None:
+    """Seen at 0.03 before its box; perceived at 0.05 behind it at rest: it has slid by 0.08 more. Else by nothing."""
+    evidence, _ = wall_and_box()
+    candidates = torch.full_like(evidence.candidates, 0.03)
+    candidates[..., PERCEIVED] = 7.0
+    candidates[:, :, 0, PERCEIVED] = -0.05  # of the face towards the camera
+    with torch.no_grad():
+        boxes = Boxes(1)
+        boxes.trust[PERCEIVED] = -100.0  # of no use to say where the face is now
+        boxes.among[-1].weight[-3:], boxes.among[-1].bias[-3:] = 0.0, torch.tensor([0.0, 1.0, 0.0])
+        farther = boxes(replace(evidence, candidates=candidates))[2]
+        still = boxes(replace(evidence, candidates=candidates, axis=0.0 * evidence.axis))[2]
+    assert farther.item() == pytest.approx(0.08, abs=1e-5)
+    assert still.item() == 0.0
 
 
 def test_rows_without_a_part_do_not_matter() -> None:
@@ -143,14 +169,16 @@ def test_the_loss_is_what_boxes_do_not_share_and_how_far_faces_are_off() -> None
 
 
 def test_boxes_that_are_all_off_alike_are_learnt() -> None:
-    """The true box is 10 % deeper than the reference's, and its back is never seen."""
+    """The true box is 10 % deeper than the reference's, and its back is never seen; at rest it lies 1 cm farther in."""
     evidence = [wall_and_box(seed)[0] for seed in range(8)]
     unit = float(np.linalg.norm([0.2, 0.4, 0.3]))
     true_size, true_center = torch.tensor([[[0.22, 0.4, 0.3]]]) / unit, torch.tensor([[[0.01, 0.0, 0.0]]]) / unit
-    records = concatenate([box_training.Records(e, true_center, true_size) for e in evidence])
+    rest = true_center + torch.tensor([0.01, 0.0, 0.0]) / unit
+    records = concatenate([box_training.Records(e, true_center, true_size, rest) for e in evidence])
     boxes = box_training.learn(records, 1, 80, 150, 0, progress=False)
-    center, size = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
+    center, size, farther = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
     assert iou_aligned(center, size, true_center, true_size).min() > 0.97
+    assert float(farther[0, 0] * unit) == pytest.approx(0.01, abs=0.002)
     again = box_training.learn(records, 1, 80, 150, 0, progress=False)
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
 

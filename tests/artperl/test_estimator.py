@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,17 @@ from artperl.categories import objects_of
 from artperl.checkpoint import load_estimator, save_estimator
 from artperl.data import Clouds, to_batch, training_rows
 from artperl.embedding import by_boxes
-from artperl.estimator import Calibration, Estimator, clean, draw, labels_by_boxes, widen
+from artperl.estimator import (
+    Calibration,
+    Estimate,
+    Estimator,
+    brought_to_rest,
+    clean,
+    draw,
+    labels_by_boxes,
+    slid,
+    widen,
+)
 from artperl.evaluation import (
     TEST_SEEDS,
     Scored,
@@ -390,3 +401,45 @@ def test_a_cabinet_of_a_mix_that_no_reference_has_is_put_together_from_votes() -
         assert [kind == "prismatic" for kind in estimate.joint_type] == sliding
         right += (score(Estimator(Voter(sample, 10), base), sample).rotation < 10.0).tolist()
     assert np.mean(right) > 0.9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_has_slid_farther_is_where_it_was_and_was_elsewhere_at_rest(seed: int) -> None:
+    """Random trees: at rest, what a drawer carries lies as much farther back."""
+    (sample,) = frozen_samples(["random_tree"], 1, 1, first_seed=seed)
+    K, rng = len(sample.box_size), np.random.default_rng(seed)
+    estimate = Estimate(
+        rotation=sample.T_camera_part[:, :3, :3], translation=true_poses(sample)[1], size=sample.box_size,
+        T_camera_part=sample.T_camera_part, state=sample.joint_state, joint_type=sample.joint_type,
+        joint_parent=sample.joint_parent, joint_axis=sample.joint_axis_camera,
+        joint_origin=sample.joint_origin_camera, part=sample.part.astype(np.int64), reference="", residual=0.0,
+        disagreement=0.0, visibility=np.ones(K), confidence=1.0, trajectory=sample.T_camera_part[None], milliseconds={},
+    )  # fmt: skip
+    farther = np.where(np.array(sample.joint_type) == "prismatic", rng.normal(0.0, 0.1, K), 0.0)
+    moved = slid(estimate, farther)
+    assert np.array_equal(moved.translation, estimate.translation)
+    assert np.allclose(moved.state, sample.joint_state + farther)
+    assert np.array_equal(moved.trajectory[-1], moved.T_camera_part)
+    back = [brought_to_rest(each.translation, each.T_camera_part) for each in (estimate, moved)]
+    for k in range(K):
+        carriers, above = [k], int(sample.joint_parent[k])
+        while above >= 0:
+            carriers, above = [*carriers, above], int(sample.joint_parent[above])
+        expected = -sum(farther[j] * sample.joint_axis[j] for j in carriers)
+        assert np.allclose(back[1][k] - back[0][k], expected, atol=1e-9)
+
+
+def test_drawers_slide_as_their_states_say_and_not_into_their_case() -> None:
+    drawers = load_estimator("drawer")
+    (sample,) = frozen_samples(["drawer"], 1, 1)
+    assert drawers.boxes is not None
+    boxes = copy.deepcopy(drawers.boxes)
+    with torch.no_grad():
+        boxes.among[-1].bias[-1] = -100.0  # all are farther in than they can be
+    for estimator, shut in ((drawers, False), (replace(drawers, boxes=boxes), True)):
+        estimate = estimator(sample.points)
+        T = estimate.T_camera_part
+        apart = np.einsum("kji,kj->ki", np.broadcast_to(T[0, :3, :3], (4, 3, 3)), T[:, :3, 3] - T[0, :3, 3])
+        assert np.allclose(np.linalg.norm(apart, axis=1), np.abs(estimate.state), atol=1e-3)
+        assert (estimate.state > -1e-9).all()
+        assert shut == np.allclose(estimate.state, 0.0)
