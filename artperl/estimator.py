@@ -1,8 +1,8 @@
 """From a cloud to the 9D pose of every part, in one call (ArtPERL, section 4).
 
 Perception says which part each point belongs to and where it lies in the object's rest frame; :mod:`artperl.search`
-finds the reference and the pose that explain it; last, a network moves the faces of its boxes to where the cloud, seen
-from there, says that they are.
+finds the reference and the pose that explain it; :mod:`artperl.squaring` turns it as its flat surfaces face; last, a
+network moves the faces of its boxes to where the cloud, seen from there, says that they are.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from artperl.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_par
 from artperl.retrieval import ShapeBase
 from artperl.search import Clock, EstimatorOptions, Found, find
 from artperl.shapes import Observed, Shapes
+from artperl.squaring import squared
 from artsim.errors import ArtsimError
 
 Array = NDArray[np.float64]
@@ -242,11 +243,13 @@ class Estimator:
             clouds = Clouds.of(cloud)
         perceived = self.perceive(clouds, clock)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
-        with clock("label"):
+        with clock("square"):
             index = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
             part = np.full(len(points), -1)
             part[good] = found.observed.part[0].numpy()[index]
             few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+            if options.squared:
+                found = found.ending(squared(found.shapes, found.refined.theta, points[few], part[few]))
         with clock("report"):
             log_odds = np.full((len(points), self.perception.num_rows), np.nan)
             log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]

@@ -74,6 +74,8 @@ class EstimatorOptions:
     """Steps of the agent from each of them; 0 goes without it."""
     refine: RefineOptions = field(default_factory=RefineOptions)
     """The last refinement."""
+    squared: bool = True
+    """In the end, parts turn until their flat surfaces face along their axes: :mod:`artperl.squaring`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,6 @@ class Found:
     refined: Refined
     path: list[Theta]
     reference: int
-
     disagreement: float
 
     def to(self, device: torch.device | str) -> Found:
@@ -108,6 +109,10 @@ class Found:
             self, shapes=self.shapes.to(device), observed=self.observed.to(device), refined=self.refined.to(device),
             path=[theta.to(device) for theta in self.path],
         )  # fmt: skip
+
+    def ending(self, theta: Theta) -> Found:
+        """The fit with another end."""
+        return replace(self, refined=replace(self.refined, theta=theta), path=[*self.path[:-1], theta])
 
     @property
     def residual(self) -> float:
