@@ -51,12 +51,12 @@ def variants(
         "labels of each point by itself": changed(coherent=False),
         "boxes of the references": replace(estimator, boxes=None),
         "not squared": changed(squared=False),
-        "no refinement": changed(refine=unrefined, squared=False),
+        "no refinement, not squared": changed(refine=unrefined, squared=False),
         "refinement only: no agent": without_agent,
         "no second try": changed(retry_residual=float("inf")),
         "single start": changed(retry_residual=float("inf"), references=1),
         "no rest-frame coordinates": changed(perceived_start=False),
-        "the same, agent only": changed(perceived_start=False, refine=unrefined, squared=False),
+        "the same, agent only, not squared": changed(perceived_start=False, refine=unrefined, squared=False),
         "the same, refinement only": changed(without_agent, perceived_start=False),
     }
     for name, agent in (("cloning only", cloned), ("PPO only", reinforced)):
