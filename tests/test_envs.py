@@ -63,8 +63,8 @@ def test_equal_seeds_make_equal_episodes(options: dict[str, Any]) -> None:
 
 def test_every_episode_has_an_object_of_its_own() -> None:
     env = new(categories=("laptop", "drawer"))
-    objects = [env.reset(seed=0 if n == 0 else None)[1] for n in range(6)]
-    assert len({info["object_id"] for info in objects}) == 6
+    objects = [env.reset(seed=0 if n == 0 else None)[1] for n in range(12)]
+    assert len({info["object_id"] for info in objects}) == 12
     assert {info["category"] for info in objects} == {"laptop", "drawer"}
 
 
