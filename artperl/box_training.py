@@ -148,5 +148,6 @@ def _load(file: Path) -> tuple[int, list[Records]]:
     views = int(tensors.pop("views"))
     if not tensors:
         return views, []
-    evidence = {k.removeprefix("evidence."): v for k, v in tensors.items() if k.startswith("evidence.")}
-    return views, [Records(Evidence(**evidence), *(tensors[name] for name in ("center", "size", "rest")))]
+    names = [name for name in tensors if name.startswith("evidence.")]
+    evidence = {name.removeprefix("evidence."): tensors.pop(name) for name in names}
+    return views, [Records(Evidence(**evidence), **tensors)]

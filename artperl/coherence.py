@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from artperl.normals import planes
+
 Array = NDArray[np.float64]
 
 _NEIGHBOURS = 5
@@ -39,7 +41,7 @@ def coherent(points: Array, values: Array, diagonal: float) -> Array:
     N = len(points)
     k = min(_NEIGHBOURS, N - 1)
     near = cKDTree(points).query(points, range(1, k + 2), workers=1)[1]
-    normal = _normals(points[near])
+    normal = planes(points[near])[1]
     here, there = np.repeat(np.arange(N), k), near[:, 1:].ravel()
     apart = points[there] - points[here]
     off = np.maximum(*(np.abs((normal[end] * apart).sum(1)) for end in (here, there))) / (_STEP * diagonal)
@@ -51,10 +53,3 @@ def coherent(points: Array, values: Array, diagonal: float) -> Array:
     for _ in range(_STEPS):
         values = stay + onward @ values
     return values
-
-
-def _normals(near: Array) -> Array:
-    """(N, 3) direction in which neighbours (N, k, 3) spread least."""
-    offset = near - near.mean(axis=1, keepdims=True)
-    normal: Array = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))[1][:, :, 0]
-    return normal

@@ -145,7 +145,7 @@ class _Seen:
     roughness : () float
         Of these, metres.
     lower : (K,) float
-        Limits of the joints' states.
+        Least states of the joints, radians or metres.
     """
 
     log_odds: Array
@@ -243,12 +243,13 @@ class Estimator:
             clouds = Clouds.of(cloud)
         perceived = self.perceive(clouds, clock)
         found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
-        with clock("square"):
+        with clock("report"):
             index = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
             part = np.full(len(points), -1)
             part[good] = found.observed.part[0].numpy()[index]
             few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
-            if options.squared:
+        if options.squared:
+            with clock("square"):
                 found = found.ending(squared(found.shapes, found.refined.theta, points[few], part[few]))
         with clock("report"):
             log_odds = np.full((len(points), self.perception.num_rows), np.nan)

@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from artperl.normals import planes
 from artperl.pose import Theta, clamp_state, pose_parts
 from artperl.rotations import rotation_from_vector
 from artperl.shapes import Shapes
@@ -32,7 +33,7 @@ _TRUST = 0.005
 """Share of the points that weighs as much as the fit does."""
 _SQUARE, _SHARP = 0.2, 0.7
 """Shares of the part's points, and of those that count, that must be that near an axis in the end: flat, not round."""
-_LEAST, _MOST = 0.5, 3.0
+_LEAN, _MOST = 0.5, 3.0
 """Degrees that a hinge may lean from the axes for its part to be square, and that a part is turned by at most."""
 
 
@@ -43,10 +44,9 @@ def normals_of(points: Array) -> tuple[NDArray[np.int64], Array]:
     """
     count = min(_NEIGHBOURS, len(points))
     index = cKDTree(points, balanced_tree=False).query(points[:_LOOKED_AT], range(1, count + 1))[1]
-    near = points[index] - points[index].mean(axis=1, keepdims=True)
-    spread, direction = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+    spread, normal = planes(points[index])
     flat = np.flatnonzero((spread[:, 0] < _FLAT**2 * spread[:, 1]) & (spread[:, 1] > 0.0))
-    return flat, direction[flat, :, 0]
+    return flat, normal[flat]
 
 
 def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]) -> Theta:
@@ -73,11 +73,9 @@ def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]
     looked_at = part[:_LOOKED_AT]
     own = looked_at[flat]
     turning = (trees.turn[0] != 0).numpy()
-    carries = trees.carries[0].numpy()
-    still = ~carries[turning].any(axis=0) & trees.valid[0].numpy()
-    rigid = still[own]
+    still = ~trees.carries[0].numpy()[turning].any(axis=0)
     R = theta.rotation[0].double().numpy()
-    turn = _turn(normal[rigid] @ R, np.eye(3), int(still[looked_at].sum()))
+    turn = _turn(normal[still[own]] @ R, np.eye(3), int(still[looked_at].sum()))
     if turn is not None:
         middle = points[still[part]].mean(axis=0)
         turned = R @ rotation_from_vector(torch.from_numpy(turn)).numpy()
@@ -86,9 +84,9 @@ def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]
             theta, rotation=torch.from_numpy(turned)[None].to(theta.rotation),
             translation=torch.from_numpy(moved)[None].to(theta.translation),
         )  # fmt: skip
-    for k in np.argsort(trees.depth[0].numpy(), kind="stable"):
+    for k in np.flatnonzero(turning & trees.free[0].numpy()):  # parents come before their children
         axis = trees.axis[0, k].double().numpy()
-        if turning[k] and trees.free[0, k] and np.abs(axis).max() > np.cos(np.radians(_LEAST)):
+        if np.abs(axis).max() > np.cos(np.radians(_LEAN)):
             R = pose_parts(trees, theta, shapes.box_center).rotation[0, k].double().numpy()
             turn = _turn(normal[own == k] @ R, axis[None], int((looked_at == k).sum()))
             if turn is not None:
