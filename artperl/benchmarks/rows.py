@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from artperl.benchmarks.artimage import OBJECTS, VIEWS, Row, row_samples
+from artperl.benchmarks.artimage import OBJECTS, VIEWS, Row, has_train_half, row_samples
 from artperl.checkpoint import WEIGHTS, load_estimator
 from artperl.estimator import Estimator
 from artperl.evaluation import NUM_POINTS, evaluate, summary, table
@@ -66,13 +66,16 @@ def run_rows(
     -------
     dict
         ``{row: {category: figures}}``, figures as :func:`artperl.evaluation.summary` gives them, with the number of
-        ``objects``. Categories of which there is no real object are left out of the rows of real ones.
+        ``objects``. Categories of which there is no real object, or none to learn from, are left out of such rows.
     """
     result: dict[str, Any] = {}
     for row in rows:
         say(f"{row}: regenerated ArtImage")
         result[row] = {}
         for category in categories:
+            if row == "real_trained" and not has_train_half(category):
+                say(f"{category}: no real object to learn from")
+                continue
             samples = row_samples(row, category, partnet, objects, views, num_points)
             if not samples:
                 say(f"{category}: no object")

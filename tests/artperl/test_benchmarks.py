@@ -126,6 +126,14 @@ def test_a_shuffled_base_finds_other_objects_of_the_same_tree() -> None:
     assert all(base.categories[a] == base.categories[b] for a, b in enumerate(found))
 
 
+def test_what_could_not_learn_from_real_objects_is_left_out_of_their_row(tmp_path: Path) -> None:
+    """Drawers have one real object, to test on, and so no weights that learnt from others."""
+    lines: list[str] = []
+    figures = run_rows(["real_trained"], ["drawer", "scissors"], None, tmp_path, say=lines.append)
+    assert figures == {"real_trained": {}}
+    assert lines[1:] == ["drawer: no real object to learn from", "scissors: no real object to learn from"]
+
+
 def test_variants_are_scored_on_the_same_samples() -> None:
     (sample,) = frozen_samples(["laptop"], 1, 1)
     torch.manual_seed(0)
