@@ -66,6 +66,13 @@ def test_objects_stand_in_their_rest_frame(category: str) -> None:
     assert len(obj.tree.free_joints) >= 1
 
 
+@pytest.mark.parametrize("seed", [2750, 4487])
+def test_the_narrowest_tables_have_room_for_drawers(seed: int) -> None:
+    obj = make("drawer", seed)
+    assert [str(gate) for gate in check(obj) if not gate.passed] == []
+    assert (obj.box_size[1:].min(axis=1) > 0.02).all()
+
+
 def test_topology_varies_as_well_as_size() -> None:
     counts = {category: {len(make(category, seed)) for seed in range(12)} for category in CATEGORIES}
     assert sum(len(numbers) > 1 for numbers in counts.values()) >= 12, counts

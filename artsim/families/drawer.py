@@ -19,6 +19,7 @@ from artsim.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_
 
 GAP = 0.002
 _FRONT = 0.018  # thickness of a front
+_NARROWEST, _SHALLOWEST = 0.12, 0.1  # of what is between a table's legs, and of its drawers with what is around them
 
 
 @dataclass(frozen=True)
@@ -176,6 +177,7 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
     depth = min(max(width * rng.uniform(0.35, 1.0), 0.3), 1.0)
     thick, over = rng.uniform(0.015, 0.05), rng.uniform(0.0, 0.07)
     leg = height * rng.uniform(0.05, 0.13)
+    over = min(over, width / 2 - leg - _NARROWEST / 2, depth / 2 - leg - _SHALLOWEST / 2)  # room between the legs
     x0, x1, y = -depth / 2 + over, depth / 2 - over, width / 2 - over
     top = height - thick
     apron = max(height * rng.uniform(0.11, 0.25), 0.075)
@@ -183,12 +185,15 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
     furniture.body += _top(rng, depth, width, top, height) + _legs(rng, x0, x1, y, top + 0.001, leg)
     between = y - leg + 0.002  # the apron reaches into the legs
     inset = rng.uniform(0.0, 0.4) * leg
-    span = between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9))
+    span = max(between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9)), _NARROWEST / 2)
     middle = 0.0 if rng.random() < 0.8 else rng.choice([-1.0, 1.0]) * (between - span)
     columns = int(np.clip(round(2 * span / rng.uniform(0.25, 0.7)), 1, 4))
     sides = str(rng.choice(["front", "back", "both"], p=[0.82, 0.08, 0.1]))
     deepest = depth - 2 * over - 2 * inset - wall
-    reach = deepest * (rng.uniform(0.3, 0.47) if sides == "both" else rng.uniform(0.45, 1.0))
+    share = rng.uniform(0.3, 0.47) if sides == "both" else rng.uniform(0.45, 1.0)
+    if sides == "both" and deepest < 2.2 * _SHALLOWEST:
+        sides = "front"
+    reach = max(deepest * share, _SHALLOWEST)
     edges = _widths(rng, middle - span + wall, middle + span - wall, columns)
     for back in (False, True):
         if sides in ("both", ("front", "back")[back]):
