@@ -68,6 +68,8 @@ class Train:
     """Batches of episodes that the agent learns from, 0 for no agent; by default the preset's."""
     box_views: int | None = None
     """Fresh views whose estimates teach where boxes end, 0 to keep those of the references; by default the preset's."""
+    box_width: int | None = None
+    """Channels of the network that says where boxes end; by default the preset's."""
     learning: Literal["both", "cloning", "reinforcement"] = "both"
     """How the agent learns: behaviour cloning and PPO, or one of them alone."""
     real: bool = False
@@ -100,6 +102,8 @@ class Train:
         preset = PRESETS[self.preset]
         if self.denser is not None and self.denser < 1:
             raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
+        if self.box_width is not None and self.box_width < 1:
+            raise ConfigError(f"{self.box_width} channels are none", "box_width", "use 1 or more")
         if not 0.0 < self.perception_rate < 1.0:
             raise ConfigError(f"{self.perception_rate} is no learning rate", "perception_rate", "use 1e-4 to 1e-2")
         for name, share in (("stretched", self.stretched), ("noisy", self.noisy)):
@@ -129,6 +133,7 @@ class Train:
             perception_rate=self.perception_rate,
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,
+            box_width=preset.box_width if self.box_width is None else self.box_width,
             ppo=replace(
                 preset.ppo, behaviour_cloning=self.learning != "reinforcement",
                 reinforcement=self.learning != "cloning",

@@ -272,7 +272,7 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("--stretched", "2"), ("--noisy", "-1"), ("--perception-rate", "0"), ("--denser", "0")],
+    [("--stretched", "2"), ("--noisy", "-1"), ("--perception-rate", "0"), ("--denser", "0"), ("--box-width", "0")],
 )
 def test_an_impossible_option_is_named(
     option: str, value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
