@@ -19,6 +19,7 @@ from artperl.coherence import coherent
 from artperl.data import Clouds
 from artperl.evidence import Evidence, roughness
 from artperl.grouping import grouped
+from artperl.hidden import uncovered
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perceived, Perception, Votes
@@ -248,6 +249,9 @@ class Estimator:
             part = np.full(len(points), -1)
             part[good] = found.observed.part[0].numpy()[index]
             few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+        if options.uncovered:
+            with clock("uncover"):
+                found = found.ending(uncovered(found.shapes, found.refined.theta, points[few], part[few]))
         if options.squared:
             with clock("square"):
                 found = found.ending(squared(found.shapes, found.refined.theta, points[few], part[few]))

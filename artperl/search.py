@@ -74,6 +74,8 @@ class EstimatorOptions:
     """Steps of the agent from each of them; 0 goes without it."""
     refine: RefineOptions = field(default_factory=RefineOptions)
     """The last refinement."""
+    uncovered: bool = True
+    """Parts that hardly show turn to where no more of them would be seen: :mod:`artperl.hidden`."""
     squared: bool = True
     """In the end, parts turn until their flat surfaces face along their axes: :mod:`artperl.squaring`."""
 

@@ -50,6 +50,7 @@ def variants(
         "part by part, no kinematics": PartByPart(**vars(estimator)),
         "labels of each point by itself": changed(coherent=False),
         "boxes of the references": replace(estimator, boxes=None),
+        "not uncovered": changed(uncovered=False),
         "not squared": changed(squared=False),
         "no refinement, not squared": changed(refine=unrefined, squared=False),
         "refinement only: no agent": without_agent,

@@ -139,7 +139,7 @@ def test_variants_are_scored_on_the_same_samples() -> None:
     torch.manual_seed(0)
     estimator = Estimator(Oracle(sample, 2), small_base("laptop"), Agent(16))
     table = variants(estimator, Agent(16), Agent(16))
-    assert len(table) == 17
+    assert len(table) == 18
     few = {name: table[name] for name in ("whole", "part by part, no kinematics", "no rest-frame coordinates")}
     lines: list[str] = []
     result = run_ablation(few, [sample], lines.append)
