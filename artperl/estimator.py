@@ -1,8 +1,9 @@
 """From a cloud to the 9D pose of every part, in one call (ArtPERL, section 4).
 
 Perception says which part each point belongs to and where it lies in the object's rest frame; :mod:`artperl.search`
-finds the reference and the pose that explain it; :mod:`artperl.squaring` turns it as its flat surfaces face; last, a
-network moves the faces of its boxes to where the cloud, seen from there, says that they are.
+finds the reference and the pose that explain it; :mod:`artperl.hidden` turns what hardly shows to where it would not,
+:mod:`artperl.squaring` the rest as its flat surfaces face; last, a network moves the faces of its boxes to where the
+cloud, seen from there, says that they are.
 """
 
 from __future__ import annotations
