@@ -36,7 +36,7 @@ _LESS_LIKELY = 4.0
 
 @dataclass(frozen=True)
 class _View:
-    """What a camera sees: depths, by where rays meet the plane at depth 1; how far apart these are, and how dense."""
+    """What a camera sees: depths, by where rays meet the plane at depth 1, and how far apart these are there."""
 
     rays: cKDTree
     depth: Array
@@ -86,14 +86,14 @@ def uncovered(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int6
         return theta
     view = _View.of(points)
     for k in hardly:  # parents come before their children
-        limits = np.linspace(float(trees.lower[0, k]), float(trees.upper[0, k]), _STATES)
-        states = np.append(limits, float(theta.state[0, k]))
+        grid = np.linspace(float(trees.lower[0, k]), float(trees.upper[0, k]), _STATES)
+        states = np.append(grid, float(theta.state[0, k]))
         *tried, fitted = _log_likelihood(shapes, theta, int(k), states, view, points[part == k])
         if count[k] < _TELLING or fitted < max(tried) - _LESS_LIKELY:
             share = np.exp(np.array(tried) - max(tried))
             share /= share.sum()
             state = theta.state.clone()
-            state[0, k] = float(np.interp(0.5, share.cumsum() - 0.5 * share, limits))
+            state[0, k] = float(np.interp(0.5, share.cumsum() - 0.5 * share, grid))
             theta = replace(theta, state=state)
     return theta
 
