@@ -137,10 +137,12 @@ def refine(
     damping = torch.full_like(unit, 1e-2)
     steps = torch.zeros_like(unit, dtype=torch.int64)
     settled = torch.zeros_like(unit, dtype=torch.bool)
-    width = options.robust_start
+    width, normal = options.robust_start, None
     for i in range(options.iterations):
         rigid = i < options.rigid_iterations
-        step = _step(leaning(shapes, lean), target, current, lean, prior, width, damping, rigid)
+        if normal is None:
+            normal = _Normal.of(leaning(shapes, lean), target, current, lean, prior, width, rigid)
+        step = normal.step(damping, prior.active.shape[1])
         theta, leant = _moved(shapes.trees, current.theta, lean, step, target.middle)
         candidate = match(leaning(shapes, leant), target, theta, options.outline_weight)
         cost = prior.cost(theta, leant)
@@ -152,7 +154,9 @@ def refine(
         if width == options.robust_end and not rigid:
             settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 1.0)
         damping = torch.where(better, 0.3 * damping, 10.0 * damping).clamp(1e-3, 1e8)
-        width = max(options.robust_end, options.narrowing * width)
+        before_width, width = width, max(options.robust_end, options.narrowing * width)
+        if bool(better.any()) or width != before_width or i + 1 == options.rigid_iterations:
+            normal = None  # what it says is of another state, or of other weights
         if bool(settled.all()):
             break
     final = robust(current, options.robust_end) + current_cost
@@ -248,39 +252,59 @@ def robust(matches: Matches, width: float) -> Tensor:
     return (matches.weight * (width**2 * square / (width**2 + square))).sum(1)
 
 
-def _step(
-    shapes: Shapes, target: Target, matches: Matches, lean: Tensor, prior: _Prior, width: float, damping: Tensor,
-    rigid: bool,
-) -> Tensor:  # fmt: skip
-    """(B, D) damped Gauss-Newton step of the reweighted least squares; shape parameters stay when ``rigid``."""
-    weight = matches.weight * (width**2 / (width**2 + matches.square)) ** 2
-    directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
-    residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
-    leans = prior.active.shape[1] > 9 + 7 * shapes.trees.num_rows
-    rows = _columns(shapes, target.middle, matches, directions, rigid, leans)
-    rows = rows.flatten(1, 2) / target.unit[:, None, None]
-    D = rows.shape[-1]
-    active = prior.active[:, :D]
-    rows = rows * active[:, None]
-    weighted = rows * weight.repeat_interleave(2, dim=1)[..., None]
-    precision = prior.precision[:, :D, :D]
-    curvature = (weighted.transpose(1, 2) @ rows + precision).double()
-    slope = (weighted.transpose(1, 2) @ residual[..., None])[..., 0]
-    slope = (slope + (precision @ prior.values(matches.theta, lean)[:, :D, None])[..., 0] - prior.pull[:, :D]).double()
-    # A state at its limit stays there while the energy falls beyond it.
-    D_states = slice(6, 6 + shapes.trees.num_rows)
-    state = matches.theta.state
-    held = torch.zeros_like(active)
-    held[:, D_states] = ((state <= shapes.trees.lower) & (slope[:, D_states] > 0)) | (
-        (state >= shapes.trees.upper) & (slope[:, D_states] < 0)
-    )
-    moves = (active & ~held).double()
-    curvature = curvature * moves[:, None] * moves[:, :, None]
-    diagonal = curvature.diagonal(dim1=1, dim2=2)
-    floor = 1e-6 * diagonal.mean(-1, keepdim=True) + 1e-30
-    curvature = curvature + torch.diag_embed(damping[:, None] * diagonal + floor + (1.0 - moves))
-    step = torch.linalg.solve(curvature, -(slope * moves)[..., None])[..., 0].to(rows.dtype)
-    return torch.nn.functional.pad(step, (0, prior.active.shape[1] - D))
+@dataclass(frozen=True, eq=False)
+class _Normal(Batch):
+    """Normal equations of the reweighted least squares, of D parameters: the same until something changes.
+
+    Attributes
+    ----------
+    curvature : (B, D, D) float64
+    slope : (B, D) float64
+    moves : (B, D) float64
+        1 for parameters that move, 0 for others.
+    """
+
+    curvature: Tensor
+    slope: Tensor
+    moves: Tensor
+
+    @staticmethod
+    def of(
+        shapes: Shapes, target: Target, matches: Matches, lean: Tensor, prior: _Prior, width: float, rigid: bool
+    ) -> _Normal:
+        """At a state; shape parameters are left out when ``rigid``."""
+        weight = matches.weight * (width**2 / (width**2 + matches.square)) ** 2
+        directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
+        residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
+        leans = prior.active.shape[1] > 9 + 7 * shapes.trees.num_rows
+        rows = _columns(shapes, target.middle, matches, directions, rigid, leans)
+        rows = rows.flatten(1, 2) / target.unit[:, None, None]
+        D = rows.shape[-1]
+        active = prior.active[:, :D]
+        rows = rows * active[:, None]
+        weighted = rows * weight.repeat_interleave(2, dim=1)[..., None]
+        precision = prior.precision[:, :D, :D]
+        curvature = (weighted.transpose(1, 2) @ rows + precision).double()
+        slope = (weighted.transpose(1, 2) @ residual[..., None])[..., 0]
+        slope = slope + (precision @ prior.values(matches.theta, lean)[:, :D, None])[..., 0] - prior.pull[:, :D]
+        slope = slope.double()
+        # A state at its limit stays there while the energy falls beyond it.
+        D_states = slice(6, 6 + shapes.trees.num_rows)
+        state = matches.theta.state
+        held = torch.zeros_like(active)
+        held[:, D_states] = ((state <= shapes.trees.lower) & (slope[:, D_states] > 0)) | (
+            (state >= shapes.trees.upper) & (slope[:, D_states] < 0)
+        )
+        moves = (active & ~held).double()
+        return _Normal(curvature * moves[:, None] * moves[:, :, None], slope, moves)
+
+    def step(self, damping: Tensor, count: int) -> Tensor:
+        """(B, count) damped Gauss-Newton step of all parameters; those that were left out stay."""
+        diagonal = self.curvature.diagonal(dim1=1, dim2=2)
+        floor = 1e-6 * diagonal.mean(-1, keepdim=True) + 1e-30
+        curvature = self.curvature + torch.diag_embed(damping[:, None] * diagonal + floor + (1.0 - self.moves))
+        step = torch.linalg.solve(curvature, -(self.slope * self.moves)[..., None])[..., 0].to(damping.dtype)
+        return torch.nn.functional.pad(step, (0, count - step.shape[1]))
 
 
 def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tensor, rigid: bool, leans: bool) -> Tensor:
