@@ -19,7 +19,7 @@ from artperl.shapes import Shapes
 Array = NDArray[np.float64]
 
 _HARDLY = 0.025
-"""Share of the points up to which a part, with all that it carries, hardly shows."""
+"""Share of the points up to which a part, with all that moves with it, hardly shows."""
 _TELLING = 3
 """Points that tell the state of a joint."""
 _STATES = 65
@@ -43,10 +43,13 @@ class _View:
     apart: float
 
     @staticmethod
-    def of(points: Array) -> _View:
-        """The view of a cloud (N, 3)."""
-        rays = cKDTree(points[:, :2] / points[:, 2:], balanced_tree=False)
-        return _View(rays, points[:, 2], float(rays.query(rays.data, [2])[0].mean()))
+    def of(points: Array) -> _View | None:
+        """The view of a cloud (N, 3), points of which may come more than once; None where it is a single ray."""
+        rays, first = np.unique(points[:, :2] / points[:, 2:], axis=0, return_index=True)
+        if len(rays) < 2:
+            return None
+        tree = cKDTree(rays, balanced_tree=False)
+        return _View(tree, points[first, 2], float(tree.query(rays, [2])[0].mean()))
 
     @property
     def density(self) -> float:
@@ -77,19 +80,18 @@ def uncovered(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int6
     """
     trees = shapes.trees
     count = np.bincount(part[part >= 0], minlength=trees.num_rows)
-    carried = trees.carries[0].numpy() @ count
-    hinges = (trees.free & (trees.turn != 0) & shapes.has_surface & torch.isfinite(trees.upper - trees.lower))[
-        0
-    ].numpy()
-    hardly = np.flatnonzero(hinges & (carried <= _HARDLY * len(points)))
-    if not len(hardly):
+    moved = trees.carries[0].numpy() @ count
+    moved = np.bincount(trees.source[0].numpy(), moved, minlength=trees.num_rows)  # followers move with their source
+    hinges = trees.free & (trees.turn != 0) & shapes.has_surface & torch.isfinite(trees.upper - trees.lower)
+    hardly = np.flatnonzero(hinges[0].numpy() & (moved <= _HARDLY * len(points)))
+    view = _View.of(points) if len(hardly) else None
+    if view is None:
         return theta
-    view = _View.of(points)
     for k in hardly:  # parents come before their children
         grid = np.linspace(float(trees.lower[0, k]), float(trees.upper[0, k]), _STATES)
         states = np.append(grid, float(theta.state[0, k]))
         *tried, fitted = _log_likelihood(shapes, theta, int(k), states, view, points[part == k])
-        if count[k] < _TELLING or fitted < max(tried) - _LESS_LIKELY:
+        if moved[k] < _TELLING or fitted < max(tried) - _LESS_LIKELY:
             share = np.exp(np.array(tried) - max(tried))
             share /= share.sum()
             state = theta.state.clone()
@@ -108,7 +110,8 @@ def _log_likelihood(shapes: Shapes, theta: Theta, k: int, states: Array, view: _
     unit = float(shapes.diagonal[0] * theta.log_scale[0].mean().exp())
     area = float(shapes.spacing[0, k] * posed.scale[0, k].mean()) ** 2  # that a point of the surface stands for
     facing = -(surface * normal).sum(-1) / np.linalg.norm(surface, axis=-1)
-    shows = (facing > 0.0) & view.would_show(surface, _AHEAD * unit)
+    shows = facing > 0.0
+    shows[shows] = view.would_show(surface[shows], _AHEAD * unit)
     more = view.density * area * (np.where(shows, facing, 0.0) / surface[..., 2] ** 2).sum(1)
     # Roots of Poisson counts have a variance of a quarter; half as sure, since surfaces are a reference's.
     likelihood: Array = -0.5 * np.maximum(np.sqrt(more) - np.sqrt(len(own)), 0.0) ** 2

@@ -98,6 +98,33 @@ def test_what_shows_or_slides_or_carries_what_shows_stays_where_fits_have_it(cat
         assert (state - 1e-6 <= shapes.trees.upper)[shapes.trees.free].all()
 
 
+def test_what_moves_with_a_hinge_that_shows_stays_too() -> None:
+    """The second temple follows the first one: its points tell the state of both."""
+    shapes, sample, truth = seen("eyeglasses", 1, 60.0, FRONT)
+    trees = shapes.trees
+    source, multiplier = torch.tensor([[0, 1, 1]]), torch.tensor([[0.0, 1.0, 1.0]])
+    free = torch.tensor([[False, True, False]])
+    coupled = replace(shapes, trees=replace(trees, source=source, multiplier=multiplier, free=free))
+    part = sample.part.astype(np.int64)
+    part[part == 1] = -1
+    part[np.flatnonzero(part == 0)[:300]] = 2  # it shows plenty
+    opened = replace(truth, state=truth.state * 0.0)
+    points = sample.points.astype(np.float64)
+    assert uncovered(shapes, opened, points, part).state[0, 1] > 0.0
+    assert torch.equal(uncovered(coupled, opened, points, part).state, opened.state)
+
+
+def test_points_that_come_twice_change_next_to_nothing() -> None:
+    shapes, sample, truth = seen("eyeglasses", 3, 60.0, FRONT)
+    points, part = sample.points.astype(np.float64), sample.part.astype(np.int64)
+    opened = replace(truth, state=truth.state * 0.0)
+    once, twice = (uncovered(shapes, opened, *(np.repeat(x, n, axis=0) for x in (points, part))) for n in (1, 2))
+    assert (once.state - truth.state).abs().max() < np.radians(3.5)
+    assert (twice.state - once.state).abs().max() < np.radians(3.5)
+    same = uncovered(shapes, opened, points[:1].repeat(50, axis=0), np.zeros(50, dtype=np.int64))
+    assert torch.equal(same.state, opened.state)
+
+
 def test_few_points_do_no_harm() -> None:
     shapes, sample, truth = seen("eyeglasses", 0, 60.0, FRONT)
     for count in (2, 5, 50):
