@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from artperl.normals import planes
+from artperl.neighbours import planes
 
 Array = NDArray[np.float64]
 

@@ -8,6 +8,8 @@ cloud, seen from there, says that they are.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -158,9 +160,26 @@ class _Seen:
     lower: Array
 
 
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Torch works on one thread.
+
+    An estimate is thousands of small operations. A second thread hardly helps with them, and where another process has
+    its core, all wait for it: four times as long.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
 @dataclass(eq=False)
 class Estimator:
     """Everything that is needed to estimate poses of a category, or of several.
+
+    An estimate takes one thread of the processor, so that several processes may estimate side by side.
 
     Parameters
     ----------
@@ -188,6 +207,7 @@ class Estimator:
             self.boxes.to(self.perception.device)
 
     @torch.inference_mode()
+    @_one_thread()
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.
 
@@ -217,6 +237,7 @@ class Estimator:
         return slid(replace(estimate, translation=posed, size=size, part=part), farther)
 
     @torch.inference_mode()
+    @_one_thread()
     def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
         estimate, seen = self._fit(points, Clock())

@@ -15,11 +15,13 @@ appear next to it are at a distance, too.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
 from artperl.batch import Batch
+from artperl.neighbours import nearest
 from artperl.pose import Posed, Theta, pose_parts
 from artperl.shapes import Observed, Shapes
 
@@ -79,9 +81,7 @@ class Target(Batch):
         middle = (share[..., None] * observed.points).sum(1, keepdim=True)
         rays = observed.points[..., :2] / observed.points[..., 2:].clamp(min=1e-6)
         rays = torch.where(observed.weight[..., None] > 0, rays, 1e3)
-        apart = torch.cdist(rays, rays)
-        apart.diagonal(dim1=1, dim2=2).fill_(torch.inf)
-        gap = _GAP * (share * apart.amin(-1)).sum(1)
+        gap = _GAP * (share * nearest(rays, rays, 2)[0].amax(-1).sqrt()).sum(1)  # each ray is the nearest to itself
         x = ((observed.points - middle) / unit[:, None, None]).float()  # small numbers, for single precision
         monomials = torch.cat([x * x, x * x.roll(1, -1), x, torch.ones_like(x[..., :1])], dim=-1)
         slot, source, block_part = _blocks(observed.part)
@@ -146,7 +146,7 @@ class Matches(Batch):
     excess: Tensor
     weight: Tensor
 
-    @property
+    @cached_property
     def square(self) -> Tensor:
         """(B, R) squared distances e^2, in diagonals."""
         return self.offset**2 + (GLIDE * self.excess) ** 2
@@ -169,9 +169,9 @@ def _surface(shapes: Shapes, target: Target, posed: Posed, points: Tensor) -> tu
     """Rows of :class:`Matches` for the observed points."""
     observed = target.observed
     normals = posed.normals(shapes.normals)
-    nearest = _nearest_disc(target, points, normals)
+    disc = _nearest_disc(target, points, normals)
     B, P, M, _ = points.shape
-    flat = observed.part * M + nearest
+    flat = observed.part * M + disc
 
     def at(values: Tensor) -> Tensor:
         return values.reshape(B, P * M, 3).gather(1, flat[..., None].expand(-1, -1, 3))
@@ -196,8 +196,8 @@ def _outline(shapes: Shapes, target: Target, points: Tensor, outline_weight: flo
     depth = point[..., 2:].clamp(min=1e-6)
     rays = point[..., :2] / depth
     cost = (target.rays**2).sum(-1)[:, None] - 2.0 * rays @ target.rays.transpose(1, 2)
-    nearest = target.rays.gather(1, _argmin(cost)[..., None].expand(-1, -1, 2))
-    outwards = rays - nearest
+    ray = target.rays.gather(1, _argmin(cost)[..., None].expand(-1, -1, 2))
+    outwards = rays - ray
     length = torch.linalg.vector_norm(outwards, dim=-1)
     outwards = outwards / length.clamp(min=1e-12)[..., None]
     # depth * length grows by outwards . (dx - rays * dz) when the point moves: pushed against that, it comes back.
@@ -232,8 +232,8 @@ def _nearest_disc(target: Target, points: Tensor, normals: Tensor) -> Tensor:
     # Few objects at a time on a CPU, so that their distances stay in its cache.
     rows = len(y) if y.is_cuda else max(1, 1_000_000 // (own.shape[1] * own.shape[2] * _BLOCK))
     pairs = zip(target.monomials.split(rows), own.split(rows), strict=True)
-    nearest = torch.cat([_argmin(a @ b.transpose(-1, -2)) for a, b in pairs])
-    return nearest.flatten(1).gather(1, target.slot)
+    index = torch.cat([_argmin(a @ b.transpose(-1, -2)) for a, b in pairs])
+    return index.flatten(1).gather(1, target.slot)
 
 
 def _argmin(cost: Tensor) -> Tensor:

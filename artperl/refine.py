@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from artperl.batch import Batch
 from artperl.matching import GLIDE, Matches, Target, match
@@ -137,22 +138,28 @@ def refine(
     damping = torch.full_like(unit, 1e-2)
     steps = torch.zeros_like(unit, dtype=torch.int64)
     settled = torch.zeros_like(unit, dtype=torch.bool)
-    width, normal = options.robust_start, None
+    width, normal, turned = options.robust_start, None, shapes
     for i in range(options.iterations):
         rigid = i < options.rigid_iterations
         if normal is None:
-            normal = _Normal.of(leaning(shapes, lean), target, current, lean, prior, width, rigid)
+            normal = _Normal.of(turned, target, current, lean, prior, width, rigid)
         step = normal.step(damping, prior.active.shape[1])
         theta, leant = _moved(shapes.trees, current.theta, lean, step, target.middle)
-        candidate = match(leaning(shapes, leant), target, theta, options.outline_weight)
+        moved = leaning(shapes, leant)
+        candidate = match(moved, target, theta, options.outline_weight)
         cost = prior.cost(theta, leant)
         before, after = robust(current, width) + current_cost, robust(candidate, width) + cost
         better = after < before
         current_cost, lean = torch.where(better, cost, current_cost), torch.where(better[:, None, None], leant, lean)
-        current = candidate if bool(better.all()) else candidate.where(better, current)
+        if bool(better.all()):
+            current, turned = candidate, moved
+        else:
+            current = candidate.where(better, current)
+            turned = leaning(shapes, lean)
         steps += better
         if width == options.robust_end and not rigid:
-            settled |= torch.where(better, after > (1.0 - options.tolerance) * before, damping > 1.0)
+            worth = torch.where(better, before - after, normal.promised(step))
+            settled |= worth < options.tolerance * before
         damping = torch.where(better, 0.3 * damping, 10.0 * damping).clamp(1e-3, 1e8)
         before_width, width = width, max(options.robust_end, options.narrowing * width)
         if bool(better.any()) or width != before_width or i + 1 == options.rigid_iterations:
@@ -178,7 +185,7 @@ def leaning(shapes: Shapes, lean: Tensor) -> Shapes:
 class _Prior(Batch):
     """Which parameters p move, and what they cost: ``p . precision p - 2 pull . p + constant``.
 
-    Parameters are ordered as :func:`_columns` says.
+    Parameters are ordered as :func:`_maps` says.
     """
 
     active: Tensor
@@ -277,15 +284,19 @@ class _Normal(Batch):
         directions = torch.stack([matches.normal, GLIDE * (matches.excess > 0)[..., None] * matches.across], dim=2)
         residual = torch.stack([matches.offset, GLIDE * matches.excess], dim=2).flatten(1)
         leans = prior.active.shape[1] > 9 + 7 * shapes.trees.num_rows
-        rows = _columns(shapes, target.middle, matches, directions, rigid, leans)
-        rows = rows.flatten(1, 2) / target.unit[:, None, None]
-        D = rows.shape[-1]
+        rows = _rates(shapes, target.middle, matches, directions, rigid).flatten(1, 2)
+        maps = _maps(shapes, target.middle, matches.theta, matches.posed, rigid, leans)
+        maps = maps / target.unit[:, None, None, None]
+        D = maps.shape[-1]
         active = prior.active[:, :D]
-        rows = rows * active[:, None]
-        weighted = rows * weight.repeat_interleave(2, dim=1)[..., None]
+        # Sums over each part's points, few numbers, are taken before parameters come in, which are many.
+        own = functional.one_hot(matches.part, maps.shape[1]).transpose(1, 2) * weight[:, None]
+        weighted = (own.repeat_interleave(2, dim=2)[..., None] * rows[:, None]).transpose(2, 3)
+        maps = (maps * active[:, None, None]).flatten(1, 2)
+        square = (weighted @ rows[:, None] @ maps.unflatten(1, weighted.shape[1:3])).flatten(1, 2)
         precision = prior.precision[:, :D, :D]
-        curvature = (weighted.transpose(1, 2) @ rows + precision).double()
-        slope = (weighted.transpose(1, 2) @ residual[..., None])[..., 0]
+        curvature = (maps.transpose(1, 2) @ square + precision).double()
+        slope = (maps.transpose(1, 2) @ (weighted @ residual[:, None, :, None]).flatten(1, 2))[..., 0]
         slope = slope + (precision @ prior.values(matches.theta, lean)[:, :D, None])[..., 0] - prior.pull[:, :D]
         slope = slope.double()
         # A state at its limit stays there while the energy falls beyond it.
@@ -304,61 +315,82 @@ class _Normal(Batch):
         floor = 1e-6 * diagonal.mean(-1, keepdim=True) + 1e-30
         curvature = self.curvature + torch.diag_embed(damping[:, None] * diagonal + floor + (1.0 - self.moves))
         step = torch.linalg.solve(curvature, -(self.slope * self.moves)[..., None])[..., 0].to(damping.dtype)
-        return torch.nn.functional.pad(step, (0, count - step.shape[1]))
+        return functional.pad(step, (0, count - step.shape[1]))
+
+    def promised(self, step: Tensor) -> Tensor:
+        """(B,) by how much the energy would fall after a step (B, count) if every point kept its match."""
+        own = step[:, : self.slope.shape[1]].to(self.slope)
+        return -(own * (2.0 * self.slope + (self.curvature @ own[..., None])[..., 0])).sum(-1).to(step.dtype)
 
 
-def _columns(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tensor, rigid: bool, leans: bool) -> Tensor:
-    """Derivatives of the points' offsets from the reference along given directions.
+def _rates(shapes: Shapes, middle: Tensor, matches: Matches, directions: Tensor, rigid: bool) -> Tensor:
+    """What the points' offsets from the reference change by, in few numbers, whatever the tree: see :func:`_maps`.
 
     Parameters
     ----------
     middle : (B, 1, 3) float
         What the object turns about.
     directions : (B, R, 2, 3) float
-        In the camera frame; they turn with the part.
+        Of the offsets, in the camera frame; they turn with the part.
 
     Returns
     -------
-    (B, R, 2, D) float
+    (B, R, 2, 6) float
+        When the part turns about the middle (3) and moves (3); unless ``rigid``, (B, R, 2, 9): when it grows about its
+        box centre (3), too.
+    """
+    point, posed = (matches.point - middle)[:, :, None].expand_as(directions), matches.posed
+    rates = [torch.linalg.cross(point, directions), directions]
+    if not rigid:
+        rotation = _rows(posed.rotation.flatten(2), matches.part).unflatten(2, (3, 3))
+        grown = _rows(posed.scale, matches.part) * (matches.local - _rows(shapes.box_center, matches.part))
+        rates.append((directions @ rotation) * grown[:, :, None])
+    return -torch.cat(rates, dim=-1)
+
+
+def _maps(shapes: Shapes, middle: Tensor, theta: Theta, posed: Posed, rigid: bool, leans: bool) -> Tensor:
+    """How each part turns, moves and grows with the parameters.
+
+    Returns
+    -------
+    (B, P, 6, D) float, unless ``rigid`` (B, P, 9, D)
+        Rows as :func:`_rates` has them; with them, derivatives of the offsets of a part's points are ``rates @ map``.
         Columns: turn about the middle (3), motion (3), states (P), and unless ``rigid`` log_scale (3), stretch (3 P),
         shift (3 P) and, if axes lean at all, lean (3 P).
     """
-    trees, posed = shapes.trees, matches.posed
-    P = trees.num_rows
-    moment = torch.linalg.cross((matches.point - middle)[:, :, None].expand_as(directions), directions)
+    trees = shapes.trees
+    B, P = trees.valid.shape
     axis, origin = joint_axes(trees, posed)
-    turn = trees.turn[..., None]
+    turn, arm = trees.turn[..., None], origin - middle
+    carried = trees.carries.transpose(1, 2).to(axis.dtype)[:, :, None]  # (B, P, 1, joints)
     # The moment about a joint's axis is that about the middle less the direction's own about the axis (Pluecker).
-    lines = torch.cat(
-        [turn * axis, (trees.slide * posed.reach)[..., None] * axis - turn * torch.linalg.cross(axis, origin - middle)],
-        dim=-1,
-    )
-    wrench = torch.cat([moment, directions], dim=-1).flatten(1, 2)
-    effect = (wrench @ lines.transpose(1, 2)).unflatten(1, directions.shape[1:3])
-    carried = _rows(trees.carries.transpose(1, 2).to(moment.dtype), matches.part)[:, :, None]
-    follow = trees.multiplier[..., None] * torch.nn.functional.one_hot(trees.source, P)
-    blocks = [moment, directions, (carried * effect) @ follow[:, None]]
-    if not rigid:
-        local = directions @ _rows(posed.rotation.flatten(2), matches.part).reshape(*matches.part.shape, 3, 3)
-        above, _ = parent_pose(trees, posed)
-        own = (
-            local
-            * (_rows(posed.scale, matches.part) * (matches.local - _rows(shapes.box_center, matches.part)))[:, :, None]
-        )
-        lever = _rows(_scale_lever(shapes, matches.theta, posed, above).flatten(2), matches.part)
-        whole = own + directions @ lever.reshape(*matches.part.shape, 3, 3)
-        stretch = torch.nn.functional.one_hot(matches.part, P)[:, :, None, :, None] * own[..., None, :]
-        shift = carried[..., None] * torch.einsum("brdi,bpij->brdpj", directions, above)
-        blocks += [whole, stretch.flatten(3), shift.flatten(3)]
-        if leans:
-            # An axis that leans by d takes what is turned by R, about the anchor, to exp(d) R exp(-d).
-            turned = above.transpose(-1, -2) @ posed.rotation
-            swing = (turn[..., None] * (above - above @ turned)).transpose(-1, -2)
-            arm = (origin - middle)[:, :, None].expand_as(swing)
-            lines = torch.cat([swing, -torch.linalg.cross(swing, arm)], dim=-1).flatten(1, 2)
-            effect = (wrench @ lines.transpose(1, 2)).unflatten(1, directions.shape[1:3])
-            blocks.append(carried.repeat_interleave(3, dim=-1) * effect)
-    return -torch.cat(blocks, dim=-1)
+    slide = (trees.slide * posed.reach)[..., None] * axis - turn * torch.linalg.cross(axis, arm)
+    lines = torch.cat([turn * axis, slide], dim=-1).transpose(1, 2)
+    follow = trees.multiplier[..., None] * functional.one_hot(trees.source, P)
+    eye = torch.eye(6, dtype=axis.dtype, device=axis.device).expand(B, P, 6, 6)
+    motion = torch.cat([eye, (carried * lines[:, None]) @ follow[:, None]], dim=-1)
+    if rigid:
+        return motion
+    above, _ = parent_pose(trees, posed)
+    shift = torch.einsum("bpj,bjri->bprji", carried[:, :, 0], above).flatten(3)
+    lever = _scale_lever(shapes, theta, posed, above)
+    grows = axis.new_zeros(B, P, 6, 3 + 3 * P)
+    grows[:, :, 3:, :3] = lever
+    moved = torch.cat([torch.zeros_like(shift), shift], dim=2)
+    own = torch.eye(3, dtype=axis.dtype, device=axis.device)
+    stretch = torch.einsum("pq,ri->prqi", torch.eye(P, dtype=axis.dtype, device=axis.device), own).flatten(2)
+    below = torch.cat([own.expand(P, 3, 3), stretch], dim=-1).expand(B, P, 3, 3 + 3 * P)
+    blocks = [motion, grows, moved]
+    if leans:
+        # An axis that leans by d takes what is turned by R, about the anchor, to exp(d) R exp(-d).
+        turned = above.transpose(-1, -2) @ posed.rotation
+        swing = (turn[..., None] * (above - above @ turned)).transpose(-1, -2)
+        lines = torch.cat([swing, -torch.linalg.cross(swing, arm[:, :, None].expand_as(swing))], dim=-1)
+        blocks.append(carried.repeat_interleave(3, dim=-1) * lines.flatten(1, 2).transpose(1, 2)[:, None])
+    upper = torch.cat(blocks, dim=-1)
+    pose = axis.new_zeros(B, P, 3, motion.shape[3])
+    rest = axis.new_zeros(B, P, 3, upper.shape[3] - motion.shape[3] - below.shape[3])
+    return torch.cat([upper, torch.cat([pose, below, rest], dim=-1)], dim=2)
 
 
 def _scale_lever(shapes: Shapes, theta: Theta, posed: Posed, above: Tensor) -> Tensor:
@@ -376,7 +408,7 @@ def _scale_lever(shapes: Shapes, theta: Theta, posed: Posed, above: Tensor) -> T
 
 
 def _moved(trees: Trees, theta: Theta, lean: Tensor, step: Tensor, middle: Tensor) -> tuple[Theta, Tensor]:
-    """Theta and lean after a step of the parameters that :func:`_columns` lists; states stay within their limits."""
+    """Theta and lean after a step of the parameters that :func:`_maps` lists; states stay within their limits."""
     P = trees.num_rows
     turn = rotation_from_vector(step[:, :3])
     pivot = middle[:, 0]

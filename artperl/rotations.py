@@ -5,6 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+_CROSS = torch.tensor([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]])
+"""Cross matrices of the unit vectors, row by row."""
+
 
 def rotation_about(axis: Tensor, angle: Tensor) -> Tensor:
     """Rodrigues' formula.
@@ -38,9 +41,7 @@ def rotation_from_vector(vector: Tensor) -> Tensor:
 
 def cross_matrix(vectors: Tensor) -> Tensor:
     """(..., 3, 3) skew-symmetric matrices: ``cross_matrix(a) @ b == cross(a, b)``."""
-    x, y, z = vectors.unbind(-1)
-    zero = torch.zeros_like(x)
-    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=-1).reshape(*x.shape, 3, 3)
+    return (vectors @ _CROSS.to(vectors)).unflatten(-1, (3, 3))
 
 
 def rotate(matrix: Tensor, vectors: Tensor) -> Tensor:

@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from artperl.normals import planes
+from artperl.neighbours import planes
 from artperl.pose import Theta, clamp_state, pose_parts
 from artperl.rotations import rotation_from_vector
 from artperl.shapes import Shapes

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 import tyro
 
 from artperl.benchmarks.artimage import row_samples
@@ -32,14 +31,11 @@ class Options:
     categories: tuple[str, ...] = tuple(ARTIMAGE)
     instances: int = 100
     """Of each category, at least."""
-    threads: int = 2
-    """Processor threads."""
 
 
 def main(options: Options) -> None:
     """Measure and print."""
-    torch.set_num_threads(options.threads)
-    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, {options.threads} threads")
+    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, of which an estimate takes one")
     median: dict[str, float] = {}
     stages: dict[str, dict[str, float]] = {}
     for category in options.categories:
@@ -49,7 +45,7 @@ def main(options: Options) -> None:
         stages[category] = {s: round(float(np.median([one.get(s, 0.0) for one in times])), 1) for s in every}
         by_stage = ", ".join(f"{stage} {value}" for stage, value in stages[category].items())
         print(f"{category:12} {median[category]:6.1f} ms ({by_stage}), {len(times)} instances", flush=True)
-    print(json.dumps({"median_ms": median, "stages_ms": stages, "threads": options.threads}))
+    print(json.dumps({"median_ms": median, "stages_ms": stages}))
 
 
 def milliseconds(category: str, options: Options) -> list[dict[str, float]]:

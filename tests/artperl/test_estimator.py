@@ -142,6 +142,21 @@ def test_the_same_cloud_gives_the_same_estimate(estimator: Estimator, sample: Sa
     assert np.array_equal(estimator(sample.points).T_camera_part, estimator(sample.points).T_camera_part)
 
 
+def test_an_estimate_takes_one_thread_and_leaves_torch_as_it_was(estimator: Estimator, sample: Sample) -> None:
+    before, used = torch.get_num_threads(), []
+    hook = estimator.perception.register_forward_hook(lambda *_: used.append(torch.get_num_threads()))
+    try:
+        torch.set_num_threads(2)
+        estimator(sample.points)
+        with pytest.raises(ArtsimError):
+            estimator(np.zeros((0, 3)))
+        assert used == [1]
+        assert torch.get_num_threads() == 2
+    finally:
+        hook.remove()
+        torch.set_num_threads(before)
+
+
 def test_what_does_not_fit_is_looked_for_again(base: ShapeBase, sample: Sample) -> None:
     torch.manual_seed(0)
     options = EstimatorOptions(references=2, agent_steps=3, retry_residual=0.0)

@@ -11,8 +11,9 @@ from artperl.categories import ARTIMAGE, objects_of
 from artperl.checkpoint import load_estimator
 from artperl.data import Clouds, Samples, Truth, batches
 from artperl.evaluation import VALIDATION_SEEDS, frozen_samples
+from artperl.neighbours import nearest_by_products, nearest_by_trees
 from artperl.networks.perception import Perceived, Perception, Votes, perception_figures, perception_losses
-from artperl.networks.pointnet2 import Neighbourhoods, nearest_by_products, nearest_by_trees, strongest
+from artperl.networks.pointnet2 import Neighbourhoods, interpolated, strongest
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 
@@ -210,9 +211,10 @@ def test_neighbours_are_the_nearest() -> None:
     for b in range(2):
         for i in range(10):
             assert set(near.down[0][b, i].tolist()) == set(apart[b, i].argsort()[:5].tolist())
-    torch.testing.assert_close(near.up[0].sum(-1), torch.ones(2, 40))
-    assert ((near.up[0] > 0).sum(-1) <= 3).all()
-    torch.testing.assert_close(near.up[0][:, :10].amax(-1), torch.ones(2, 10), atol=1e-3, rtol=0)
+    weight, index = near.up[0]
+    torch.testing.assert_close(weight.sum(-1), torch.ones(2, 40))
+    best = index.gather(2, weight.argmax(-1, keepdim=True))[..., 0]
+    assert torch.equal(best, torch.cdist(points, points[:, :10]).argmin(-1))
 
 
 def test_trees_and_products_find_the_same_neighbours() -> None:
@@ -234,6 +236,21 @@ def test_strongest_is_the_maximum_over_neighbours_with_its_gradient() -> None:
     direct = torch.stack([features[b][index[b]].amax(1) for b in range(2)])
     found = strongest(features, index)
     torch.testing.assert_close(found, direct)
+    (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
+    (other,) = torch.autograd.grad((direct**2).sum(), features)
+    torch.testing.assert_close(one, other)
+    torch.testing.assert_close(strongest(features.detach(), index), direct.detach())
+
+
+def test_interpolated_is_the_weighted_sum_over_neighbours_with_its_gradient() -> None:
+    generator = torch.Generator().manual_seed(0)
+    features = torch.randn(2, 9, 4, generator=generator, requires_grad=True)
+    index = torch.stack([torch.randperm(9, generator=generator)[:3] for _ in range(10)]).reshape(2, 5, 3)
+    weight = torch.rand(2, 5, 3, generator=generator)
+    direct = torch.stack([(weight[b][..., None] * features[b][index[b]]).sum(1) for b in range(2)])
+    found = interpolated(features, weight, index)
+    torch.testing.assert_close(found, direct)
+    torch.testing.assert_close(interpolated(features.detach(), weight, index), direct.detach())
     (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
     (other,) = torch.autograd.grad((direct**2).sum(), features)
     torch.testing.assert_close(one, other)

@@ -13,7 +13,7 @@ from artperl import metrics
 from artperl.energy import joint_energy, part_energy, refine_by_gradient
 from artperl.matching import Matches, Target, match
 from artperl.pose import Theta, Trees, clamp_state, pose_parts, theta_from_parts
-from artperl.refine import AxisPrior, RefineOptions, _columns, _moved, leaning, refine
+from artperl.refine import AxisPrior, RefineOptions, _maps, _moved, _rates, leaning, refine
 from artperl.rotations import rotate, rotation_from_vector
 from artperl.shapes import Observed, Shapes, spread_points
 from artsim.errors import ConfigError
@@ -264,7 +264,8 @@ def test_steps_follow_the_derivatives_of_the_distances() -> None:
     D = 9 + 10 * P
     expected = torch.autograd.functional.jacobian(distance, torch.zeros(B, D, dtype=torch.float64))
     expected = torch.stack([expected[b, :, :, b] for b in range(B)])
-    found = _columns(shapes, target.middle, matches, directions, rigid=False, leans=True)
+    maps = _maps(shapes, target.middle, theta, matches.posed, rigid=False, leans=True)
+    found = _rates(shapes, target.middle, matches, directions, rigid=False) @ _of_part(matches, maps)
     shift = 9 + 4 * P
     expected[..., shift : shift + 3] = 0.0  # the root's anchor is nobody's
     slides = (shapes.trees.turn == 0).repeat_interleave(3, dim=1)
