@@ -2,12 +2,12 @@
 
 Varied: the outline of the lenses (round, rectangular, aviator, cat eye), one lens each or a shield, the rim (wire,
 thick, above only, none), the bridge (one bar, two, saddle), nose pads, the wrap of the front, the temples (flat or
-wire, tapered, bent ends, sleeves), and which temple folds above the other.
+wire, tapered, bent ends, sleeves, or slim, on hinges without knuckles), and which temple folds above the other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +20,8 @@ GAP = 0.0006
 MM = 0.001
 STEEPEST = np.deg2rad(8.5)
 """Largest tilt of the hinges from the vertical."""
+SLIM = 0.3
+"""Share of the glasses whose temples are slim."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Front:
     height, thickness : float
         Of the temples at the hinges.
     barrel : float
-        Radius of the hinges.
+        Radius of the hinges; 0 for those without knuckles, of slim temples.
     """
 
     half: float
@@ -65,10 +67,18 @@ def build(rng: np.random.Generator) -> Assembly:
     front = _front(rng, style, outline, rim, size, flat)
 
     depth = max(rim * rng.uniform(0.8, 1.2), 2.2 * MM)
+    others = rng.spawn(1)[0]  # so that glasses without slim temples do not depend on how these are drawn
+    slim = others.random() < SLIM
+    sheet = slim and others.random() < 0.4
+    if slim:
+        front = replace(front, thickness=others.uniform(0.9, 2.2) * MM, barrel=0.0)
+    if sheet:
+        front = replace(front, wrap=0.0, ahead=depth + others.uniform(0.9, 1.5) * MM)
     frame = _glass(rng, style, outline, front, rim, depth)
     if style != "shield":
         frame += _bridge(rng, style, outline, front, rim)
-    frame += _nose_pads(rng, style, outline, front, rim)
+    if not sheet:
+        frame += _nose_pads(rng, style, outline, front, rim)
 
     # The temples sweep two parallel planes: hinges tilted sideways by one angle keep one above the other however far
     # each is folded, as real ones lie across one another. The tilt bounds how far their ends may bend down.
@@ -258,6 +268,8 @@ def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
 
 def _hinge(front: Front) -> tuple[Solid, Solid]:
     """Knuckles on the axis of the hinge at +y: the frame's, above and below, and the temple's between them."""
+    if front.barrel == 0.0:
+        return Solid(), Solid()
     half, b = 0.5 * max(min(0.8 * front.height, 6.0 * MM), 3.6 * MM), front.barrel
     third = half / 3
 
@@ -275,7 +287,8 @@ def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> 
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
     z = -bend * (share / share[-1]) ** rng.uniform(1.2, 1.8)
-    y = front.barrel + 0.5 * front.thickness - rng.uniform(0.0, 3.0) * MM * (x / length) ** 2
+    bow = rng.uniform(0.0, 3.0) * MM * (0.2 if front.barrel == 0.0 else 1.0)
+    y = front.barrel + 0.5 * front.thickness - bow * (x / length) ** 2
     waist = rng.uniform(0.45, 0.95) if flat else 0.8
     heights = front.height * (1 - (1 - waist) * np.clip(x / (0.55 * length), 0, 1))
     thick = front.thickness * (1 - (0.3 if flat else 0.15) * x / length)
@@ -283,7 +296,8 @@ def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> 
     heights = np.minimum(heights * (1 + (paddle - 1) * share / share[-1]), front.height)
     if not flat and rng.random() < 0.8:  # a sleeve over the end of the wire
         sleeve = x > 0.64 * length
-        heights, thick = np.where(sleeve, 4.0 * MM, heights), np.where(sleeve, 2.8 * MM, thick)
+        heights = np.where(sleeve, 4.0 * MM, heights)
+        thick = np.where(sleeve & (front.barrel > 0.0), 2.8 * MM, thick)
     heights[-1] *= 0.75
     slopes = np.gradient(z, x)
     slopes[0] = 0.0
