@@ -40,6 +40,8 @@ _NEIGHBOURS = 8
 _FEW_NEIGHBOURS = 3
 _OUTLIER = 6.0
 """A point with fewer neighbours than that within so many times the usual distance is an outlier: thin legs are not."""
+_CELLS = 65536
+"""Cells to either side of the middle, in each direction, within which points are looked for in cells."""
 _CLEANED = 4096
 """Points that are looked at for outliers."""
 _ENOUGH_TO_WIDEN = 32
@@ -414,13 +416,27 @@ def clean(points: Array) -> NDArray[np.int64]:
         tree = cKDTree(points[known])
         usual = np.median(tree.query(points[known[:1024]], [_NEIGHBOURS + 1])[0])
         within = max(_OUTLIER * usual, 1e-9)
-        apart = tree.query(points[good], [_FEW_NEIGHBOURS + 1], distance_upper_bound=within)[0][:, 0]
-        good = good[np.isfinite(apart)]
+        alone = ~_crowded(points[good], points[known], within)
+        apart = tree.query(points[good[alone]], [_FEW_NEIGHBOURS + 1], distance_upper_bound=within)[0][:, 0]
+        alone[alone] = ~np.isfinite(apart)
+        good = good[~alone]
     if len(good) < _FEWEST or not np.ptp(points[good], axis=0).any():
         raise ArtsimError(
             f"{len(good)} of {len(points)} points show an object", "points", "pass a cloud of the object, in metres"
         )
     return good
+
+
+def _crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]:
+    """(N,) whether points share a cell, that long from corner to corner, with enough known ones: as most points do."""
+    cells = [np.floor((values - np.median(known, axis=0)) * (np.sqrt(3.0) / within)) for values in (points, known)]
+    number, own = (
+        ((cell.clip(-_CELLS, _CELLS) + _CELLS) @ (2.0 * _CELLS + 1.0) ** np.arange(3)).astype(np.int64)
+        for cell in cells
+    )
+    taken, count = np.unique(own, return_counts=True)
+    taken = taken[count > _FEW_NEIGHBOURS + 1]
+    return np.isin(number, taken) & (np.abs(cells[0]) < _CELLS).all(axis=1)
 
 
 def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
