@@ -45,7 +45,7 @@ def found(shapes: Shapes, theta: Theta, sample: Sample) -> Theta:
 def test_temples_of_a_few_points_are_folded_as_far_as_they_are(degrees: float) -> None:
     """Fits leave them open, where they would show."""
     after = []
-    for seed in range(6):
+    for seed in range(8):
         shapes, sample, truth = seen("eyeglasses", seed, degrees, FRONT)
         few = torch.from_numpy(np.bincount(sample.part, minlength=3) <= 0.025 * 8192)
         state = found(shapes, replace(truth, state=truth.state * 0.0), sample).state
