@@ -204,7 +204,7 @@ def test_a_batch_gives_what_its_objects_give_alone(drawers: tuple[Shapes, Observ
 
 def test_hinges_lean_as_the_points_say_and_as_far_as_they_may() -> None:
     """References whose hinges lean by six degrees the other way; both hinges of a pair lean together."""
-    objects, samples = views("eyeglasses", 12, first_seed=30)
+    objects, samples = views("eyeglasses", 16, first_seed=30)
     shapes, observed = Shapes.from_objects(objects, dtype=torch.float32), observe(samples)
     folded = torch.tensor([min(abs(s.joint_state[1:])) > 0.5 for s in samples])
     lean = torch.zeros_like(shapes.points[:, :, 0])
