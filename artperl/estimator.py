@@ -435,8 +435,7 @@ def _crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]:
         for cell in cells
     )
     taken, count = np.unique(own, return_counts=True)
-    taken = taken[count > _FEW_NEIGHBOURS + 1]
-    return np.isin(number, taken) & (np.abs(cells[0]) < _CELLS).all(axis=1)
+    return np.isin(number, taken[count > _FEW_NEIGHBOURS]) & (np.abs(cells[0]) < _CELLS).all(axis=1)
 
 
 def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int64]:

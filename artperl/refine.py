@@ -53,7 +53,7 @@ class RefineOptions:
     prior_weight: float = 5e-6
     """Squared distance that a deviation of one sigma costs."""
     tolerance: float = 1e-3
-    """Relative decrease of the energy below which an object counts as done."""
+    """Relative decrease of the energy, made by a step or promised by one that failed, below which an object is done."""
 
     def __post_init__(self) -> None:
         if self.iterations < 0 or not 0.0 < self.robust_end <= self.robust_start:
@@ -367,30 +367,26 @@ def _maps(shapes: Shapes, middle: Tensor, theta: Theta, posed: Posed, rigid: boo
     slide = (trees.slide * posed.reach)[..., None] * axis - turn * torch.linalg.cross(axis, arm)
     lines = torch.cat([turn * axis, slide], dim=-1).transpose(1, 2)
     follow = trees.multiplier[..., None] * functional.one_hot(trees.source, P)
-    eye = torch.eye(6, dtype=axis.dtype, device=axis.device).expand(B, P, 6, 6)
-    motion = torch.cat([eye, (carried * lines[:, None]) @ follow[:, None]], dim=-1)
+    whole, stretches = slice(6 + P, 9 + P), slice(9 + P, 9 + 4 * P)
+    shifts, leant = slice(9 + 4 * P, 9 + 7 * P), slice(9 + 7 * P, 9 + 10 * P)
+    last = slice(6 + P) if rigid else leant if leans else shifts
+    maps = axis.new_zeros(B, P, 6 if rigid else 9, last.stop)
+    maps[:, :, :6, :6] = torch.eye(6, device=axis.device)
+    maps[:, :, :6, 6 : 6 + P] = (carried * lines[:, None]) @ follow[:, None]
     if rigid:
-        return motion
+        return maps
     above, _ = parent_pose(trees, posed)
-    shift = torch.einsum("bpj,bjri->bprji", carried[:, :, 0], above).flatten(3)
-    lever = _scale_lever(shapes, theta, posed, above)
-    grows = axis.new_zeros(B, P, 6, 3 + 3 * P)
-    grows[:, :, 3:, :3] = lever
-    moved = torch.cat([torch.zeros_like(shift), shift], dim=2)
-    own = torch.eye(3, dtype=axis.dtype, device=axis.device)
-    stretch = torch.einsum("pq,ri->prqi", torch.eye(P, dtype=axis.dtype, device=axis.device), own).flatten(2)
-    below = torch.cat([own.expand(P, 3, 3), stretch], dim=-1).expand(B, P, 3, 3 + 3 * P)
-    blocks = [motion, grows, moved]
+    maps[:, :, 3:6, whole] = _scale_lever(shapes, theta, posed, above)
+    maps[:, :, 6:, whole] = torch.eye(3, device=axis.device)
+    maps[:, :, 6:, stretches] = torch.eye(3 * P, device=axis.device).reshape(P, 3, 3 * P)
+    maps[:, :, 3:6, shifts] = torch.einsum("bpj,bjri->bprji", carried[:, :, 0], above).flatten(3)
     if leans:
         # An axis that leans by d takes what is turned by R, about the anchor, to exp(d) R exp(-d).
         turned = above.transpose(-1, -2) @ posed.rotation
         swing = (turn[..., None] * (above - above @ turned)).transpose(-1, -2)
         lines = torch.cat([swing, -torch.linalg.cross(swing, arm[:, :, None].expand_as(swing))], dim=-1)
-        blocks.append(carried.repeat_interleave(3, dim=-1) * lines.flatten(1, 2).transpose(1, 2)[:, None])
-    upper = torch.cat(blocks, dim=-1)
-    pose = axis.new_zeros(B, P, 3, motion.shape[3])
-    rest = axis.new_zeros(B, P, 3, upper.shape[3] - motion.shape[3] - below.shape[3])
-    return torch.cat([upper, torch.cat([pose, below, rest], dim=-1)], dim=2)
+        maps[:, :, :6, leant] = carried.repeat_interleave(3, dim=-1) * lines.flatten(1, 2).transpose(1, 2)[:, None]
+    return maps
 
 
 def _scale_lever(shapes: Shapes, theta: Theta, posed: Posed, above: Tensor) -> Tensor:

@@ -69,8 +69,6 @@ class Options:
     """Draw errors against points here (.png)."""
     worst: Path | None = None
     """Draw the views whose moving parts have the lowest IoU here (.png): of one category, without true labels."""
-    threads: int = 2
-    """Processor threads."""
 
 
 @dataclass(kw_only=True)
@@ -98,7 +96,6 @@ def main(options: Options) -> None:
     """
     if options.worst is not None and (len(options.categories) > 1 or options.true_labels):
         raise ConfigError("it shows one category, as it is perceived", "worst", "name one --categories, no true labels")
-    torch.set_num_threads(options.threads)
     result: dict[str, dict[str, Any]] = {}
     every: dict[str, dict[str, Array]] = {}
     for category in options.categories:

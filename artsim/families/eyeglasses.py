@@ -49,6 +49,11 @@ class Front:
     thickness: float
     barrel: float
 
+    @property
+    def slim(self) -> bool:
+        """Whether temples are slim, on hinges without knuckles."""
+        return self.barrel == 0.0
+
     def x(self, y: Array | float) -> Array:
         """Middle surface of the front over y."""
         depth: Array = self.wrap * (np.asarray(y) / self.half) ** 2 - self.ahead
@@ -268,7 +273,7 @@ def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
 
 def _hinge(front: Front) -> tuple[Solid, Solid]:
     """Knuckles on the axis of the hinge at +y: the frame's, above and below, and the temple's between them."""
-    if front.barrel == 0.0:
+    if front.slim:
         return Solid(), Solid()
     half, b = 0.5 * max(min(0.8 * front.height, 6.0 * MM), 3.6 * MM), front.barrel
     third = half / 3
@@ -287,7 +292,7 @@ def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> 
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
     z = -bend * (share / share[-1]) ** rng.uniform(1.2, 1.8)
-    bow = rng.uniform(0.0, 3.0) * MM * (0.2 if front.barrel == 0.0 else 1.0)
+    bow = rng.uniform(0.0, 3.0) * MM * (0.2 if front.slim else 1.0)
     y = front.barrel + 0.5 * front.thickness - bow * (x / length) ** 2
     waist = rng.uniform(0.45, 0.95) if flat else 0.8
     heights = front.height * (1 - (1 - waist) * np.clip(x / (0.55 * length), 0, 1))
@@ -297,7 +302,7 @@ def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> 
     if not flat and rng.random() < 0.8:  # a sleeve over the end of the wire
         sleeve = x > 0.64 * length
         heights = np.where(sleeve, 4.0 * MM, heights)
-        thick = np.where(sleeve & (front.barrel > 0.0), 2.8 * MM, thick)
+        thick = thick if front.slim else np.where(sleeve, 2.8 * MM, thick)
     heights[-1] *= 0.75
     slopes = np.gradient(z, x)
     slopes[0] = 0.0
