@@ -16,7 +16,7 @@ from artsim.cli import run_program
 from artsim.errors import ConfigError
 from artsim.files import atomic_file, write_atomic
 from artsim.plan import SampleOptions
-from artsim.sampling import ViewOptions
+from artsim.sampling import ViewOptions, ViewPreset
 
 _FILE_VIEWS = 40
 """Views of files, at least, that an estimator is tested with."""
@@ -80,8 +80,8 @@ class Train:
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
-    views: Literal["artimage", "sphere"] = "artimage"
-    """From where objects are seen: from the front, as in ArtImage, or from all round."""
+    views: ViewPreset = "artimage"
+    """From where objects are seen: from the front, as in ArtImage, from all round, or half of them each way."""
     device: Literal["cpu", "cuda"] | None = None
     """Where the networks learn; by default the preset's."""
     workers: int = 1
@@ -186,7 +186,7 @@ class Evaluate:
     front."""
     views: int | None = None
     """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
-    preset: Literal["artimage", "sphere"] = "artimage"
+    preset: ViewPreset = "artimage"
     """From where objects are seen."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""

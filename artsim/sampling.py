@@ -41,12 +41,16 @@ class StateOptions:
                 raise ConfigError(f"{low} to {high} is not a range", f"joint_range {pattern!r}", "write LOW HIGH")
 
 
+ViewPreset = Literal["artimage", "sphere", "mixed"]
+
+
 @dataclass(frozen=True)
 class ViewOptions:
     """From where, and with which camera, objects are seen."""
 
-    preset: Literal["artimage", "sphere"] = "artimage"
-    """artimage: azimuth within 75 deg of the front, elevation 10 to 60 deg; sphere: all round, elevation -10 to 85."""
+    preset: ViewPreset = "artimage"
+    """artimage: azimuth within 75 deg of the front, elevation 10 to 60 deg; sphere: all round, elevation -10 to 85;
+    mixed: each view as one or the other, by chance."""
     azimuth: tuple[float, float] | None = None
     """Range in degrees about the vertical, 0 = in front of the object, 90 = from its right (its -Y side); overrides
     the preset."""
@@ -72,14 +76,20 @@ class ViewOptions:
         if not 1.0 <= self.fov <= 170.0:
             raise ConfigError(f"a field of view of {self.fov} deg is not within 1..170", "fov", "write 45")
 
-    @property
-    def directions(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Ranges of azimuth and elevation, degrees."""
-        azimuth, elevation = _PRESETS[self.preset]
-        return self.azimuth or azimuth, self.elevation or elevation
+    def draw_directions(self, rng: np.random.Generator, count: int | None = None) -> tuple[Array, Array]:
+        """Azimuths and elevations in radians, (count,) each; of a single view, without a count."""
+        number = rng.integers(2, size=count) if self.preset == "mixed" else list(_DIRECTIONS).index(self.preset)
+        preset = np.array(list(_DIRECTIONS.values()))[number]
+
+        def angles(given: tuple[float, float] | None, ranges: Array) -> Array:
+            low, high = ranges.T if given is None else given
+            return np.deg2rad(rng.uniform(low, high, count))
+
+        return angles(self.azimuth, preset[..., 0, :]), angles(self.elevation, preset[..., 1, :])
 
 
-_PRESETS = {"artimage": ((-75.0, 75.0), (10.0, 60.0)), "sphere": ((-180.0, 180.0), (-10.0, 85.0))}
+_DIRECTIONS = {"artimage": ((-75.0, 75.0), (10.0, 60.0)), "sphere": ((-180.0, 180.0), (-10.0, 85.0))}
+"""Ranges of azimuth and elevation, degrees."""
 
 Scale = Literal["native", "unit"] | tuple[float, float]
 """native: as the file has it; unit: diagonal of 1 m; or a range of diagonals in metres."""
@@ -165,7 +175,7 @@ def sample_view(obj: ArticulatedObject, q: ArrayLike, options: ViewOptions, rng:
     """
     if options.custom is not None:
         return view_sampler(options.custom)(rng, obj, np.asarray(q, dtype=np.float64))
-    azimuth, elevation = (np.deg2rad(rng.uniform(*bounds)) for bounds in options.directions)
+    azimuth, elevation = options.draw_directions(rng)
     fill = rng.uniform(*options.fill)
     center, radius = bounding_sphere(obj, q)
     fov_y = np.deg2rad(options.fov)

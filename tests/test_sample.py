@@ -16,7 +16,7 @@ from artsim.kinematics import invert_transform, transform_points
 from artsim.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND
 from artsim.sample import Sample
-from artsim.sampling import bounding_sphere, joint_intervals, sample_scale
+from artsim.sampling import ViewPreset, bounding_sphere, joint_intervals, sample_scale
 from artsim.sources import find_sources
 from artsim.verify import sample_problems
 from tests.conftest import ASSETS, DEMO
@@ -148,14 +148,14 @@ def test_state_options_do_what_they_say() -> None:
     assert -0.2 <= min(ranged) <= max(ranged) <= upper
 
 
-@pytest.mark.parametrize("preset", ["artimage", "sphere"])
-def test_views_see_the_whole_object_from_the_preset_directions(preset: str) -> None:
+@pytest.mark.parametrize("preset", ["artimage", "sphere", "mixed"])
+def test_views_see_the_whole_object_from_the_preset_directions(preset: ViewPreset) -> None:
     obj = artsim.load(ASSETS / "dishwasher")
     azimuths, elevations = [], []
     for seed in range(200):
         rng = np.random.default_rng(seed)
         q = sample_state(obj, StateOptions(), rng)
-        camera = sample_view(obj, q, ViewOptions(preset=preset), rng)  # type: ignore[arg-type]
+        camera = sample_view(obj, q, ViewOptions(preset=preset), rng)
         center, _ = bounding_sphere(obj, q)
         away = camera.T_world_camera[:3, 3] - center
         azimuths.append(np.rad2deg(np.arctan2(-away[1], -away[0])))
@@ -170,6 +170,10 @@ def test_views_see_the_whole_object_from_the_preset_directions(preset: str) -> N
     assert 0.9 * wide < max(np.abs(azimuths)) <= wide
     assert low - 1e-6 <= min(elevations) < low + 5
     assert high - 5 < max(elevations) <= high + 1e-6
+    # Mixed views are from within 75 deg of the front half of the time, and 150 / 360 of the other half.
+    share = {"artimage": 1.0, "sphere": 150 / 360, "mixed": 0.5 + 0.5 * 150 / 360}[preset]
+    in_front = np.mean(np.abs(azimuths) <= 75)
+    assert abs(in_front - share) < 4 * np.sqrt(share * (1 - share) / 200) + 1e-9
 
 
 def test_a_view_function_of_ones_own_is_used() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import ks_2samp
@@ -12,7 +14,7 @@ from artsim.errors import ConfigError
 from artsim.kinematics import invert_transform
 from artsim.objects import ArticulatedObject
 from artsim.renderers.views import draw_views
-from artsim.sampling import bounding_sphere
+from artsim.sampling import ViewPreset, bounding_sphere
 
 COUNT = 1500
 CAMERAS = ViewOptions(width=160, height=120)
@@ -27,18 +29,24 @@ def traits(obj: ArticulatedObject, q: np.ndarray, T_world_camera: np.ndarray) ->
 
 
 @pytest.mark.parametrize(
-    "states", [StateOptions(), StateOptions(fraction_open=(0.2, 0.9)), StateOptions(joint_range={"*": (0.0, 0.1)})]
+    ("states", "preset"),
+    [
+        (StateOptions(), "artimage"),
+        (StateOptions(fraction_open=(0.2, 0.9)), "sphere"),
+        (StateOptions(joint_range={"*": (0.0, 0.1)}), "mixed"),
+    ],
 )
-def test_views_at_once_are_distributed_as_views_one_by_one(states: StateOptions) -> None:
+def test_views_at_once_are_distributed_as_views_one_by_one(states: StateOptions, preset: ViewPreset) -> None:
     obj, rng = make("desk_lamp", seed=1), np.random.default_rng(0)
-    views = draw_views([obj], COUNT, rng, states, CAMERAS)
+    cameras = replace(CAMERAS, preset=preset)
+    views = draw_views([obj], COUNT, rng, states, cameras)
     together = np.array(
         [traits(obj, q, invert_transform(T)) for q, T in zip(views.q, views.T_camera_object, strict=True)]
     )
     one_by_one = []
     for _ in range(COUNT):
         q = sample_state(obj, states, rng)
-        camera = sample_view(obj, q, CAMERAS, rng)
+        camera = sample_view(obj, q, cameras, rng)
         one_by_one.append(traits(obj, q, camera.T_world_camera))
     for ours, theirs in zip(together.T, np.array(one_by_one).T, strict=True):
         assert ks_2samp(ours, theirs).pvalue > 1e-4

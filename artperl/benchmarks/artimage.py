@@ -29,7 +29,7 @@ from artsim.kinematics import KinematicTree
 from artsim.objects import ArticulatedObject, Part
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
-from artsim.sampling import ViewOptions
+from artsim.sampling import ViewOptions, ViewPreset
 from artsim.urdf import load
 
 SPLIT = Path(__file__).with_suffix(".json")
@@ -62,7 +62,7 @@ def row_samples(
     num_points : int
         Of a cloud: pixels of the object, drawn at random.
     """
-    preset: Literal["artimage", "sphere"] = "sphere" if row.endswith("_sphere") else "artimage"
+    preset: ViewPreset = "sphere" if row.endswith("_sphere") else "artimage"
     if row.startswith("procedural"):
         tested = objects_of([category], objects, TEST_SEEDS)
     else:

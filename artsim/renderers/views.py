@@ -119,7 +119,7 @@ def draw_views(
         state = states_at(obj, states, rng.random((len(chosen), len(obj))))
         q[chosen, : len(obj)] = state
         low[chosen], high[chosen] = posed_bounds(obj, state)
-    azimuth, elevation = (np.deg2rad(rng.uniform(*bounds, count)) for bounds in cameras.directions)
+    azimuth, elevation = cameras.draw_directions(rng, count)
     distance = 0.5 * np.linalg.norm(high - low, axis=1) / half_width(cameras, rng.uniform(*cameras.fill, count))
     T_camera_object = np.zeros((count, 4, 4))
     T_camera_object[:, :3, :3] = rotation = _facing(azimuth, elevation)
