@@ -12,6 +12,8 @@ from artperl.benchmarks.basin import basin_problem, run_basin
 from artperl.categories import ARTIMAGE
 from artperl.checkpoint import WEIGHTS, folder_of, load_estimator, read_settings
 from artperl.evaluation import evaluate, frozen_samples, samples_of
+from artsim.plan import SampleOptions
+from artsim.sampling import ViewOptions
 
 _SEEDS = 1_200_000
 """Neither of streams and bases, nor of the test and validation sets."""
@@ -39,6 +41,13 @@ def test_unseen_procedural_objects_are_found(category: str) -> None:
     assert np.median([one.rotation.max() for one in scored]) < 4.0
     assert np.median([one.translation.max() for one in scored]) < 0.1
     assert np.mean([one.segmentation for one in scored]) > 0.85
+
+
+@pytest.mark.parametrize("category", [name for name in ARTIMAGE if name != "drawer"])
+def test_objects_are_found_from_behind(category: str) -> None:
+    behind = SampleOptions(views=ViewOptions(azimuth=(105.0, 255.0)))
+    scored = evaluate(load_estimator(category), frozen_samples([category], 8, 2, behind, first_seed=_SEEDS))
+    assert np.mean([one.right for one in scored]) > 0.6
 
 
 @pytest.mark.parametrize("category", [name for name in ARTIMAGE if name != "scissors"])
