@@ -78,18 +78,17 @@ class ViewOptions:
 
     def draw_directions(self, rng: np.random.Generator, count: int | None = None) -> tuple[Array, Array]:
         """Azimuths and elevations in radians, (count,) each; of a single view, without a count."""
-        number = rng.integers(2, size=count) if self.preset == "mixed" else list(_DIRECTIONS).index(self.preset)
-        preset = np.array(list(_DIRECTIONS.values()))[number]
-
-        def angles(given: tuple[float, float] | None, ranges: Array) -> Array:
-            low, high = ranges.T if given is None else given
-            return np.deg2rad(rng.uniform(low, high, count))
-
-        return angles(self.azimuth, preset[..., 0, :]), angles(self.elevation, preset[..., 1, :])
+        names = list(_DIRECTIONS)
+        number = rng.integers(len(names), size=count) if self.preset == "mixed" else names.index(self.preset)
+        azimuth, elevation = (np.array([_DIRECTIONS[name][angle] for name in names])[number].T for angle in range(2))
+        low, high = azimuth if self.azimuth is None else self.azimuth
+        azimuths = rng.uniform(low, high, count)
+        low, high = elevation if self.elevation is None else self.elevation
+        return np.deg2rad(azimuths), np.deg2rad(rng.uniform(low, high, count))
 
 
 _DIRECTIONS = {"artimage": ((-75.0, 75.0), (10.0, 60.0)), "sphere": ((-180.0, 180.0), (-10.0, 85.0))}
-"""Ranges of azimuth and elevation, degrees."""
+"""Ranges of azimuth and elevation, degrees; mixed is any of these."""
 
 Scale = Literal["native", "unit"] | tuple[float, float]
 """native: as the file has it; unit: diagonal of 1 m; or a range of diagonals in metres."""
