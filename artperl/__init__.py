@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from artperl.estimator import Estimator
@@ -11,14 +11,23 @@ if TYPE_CHECKING:
 __all__ = ["load_estimator"]
 
 
-def load_estimator(name: str | Path) -> Estimator:
+def load_estimator(name: str | Path, **changes: Any) -> Estimator:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
+
+    Parameters
+    ----------
+    name : str or Path
+    **changes
+        Of its options, such as ``seen_from=(-75.0, 75.0)``, degrees, where the camera is known to be in front of the
+        object. :class:`artperl.search.EstimatorOptions` has them all.
 
     Raises
     ------
+    ConfigError
+        When there is no such option.
     DatasetError
-        When there is none, or its files are damaged.
+        When there is no such estimator, or its files are damaged.
     """
     from artperl.checkpoint import load_estimator as load  # torch takes seconds to import
 
-    return load(name)
+    return load(name, **changes)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from artperl.networks.perception import Perception
 from artperl.refine import RefineOptions
 from artperl.retrieval import ShapeBase
 from artperl.search import EstimatorOptions
-from artsim.errors import DatasetError
+from artsim.errors import ConfigError, DatasetError
 from artsim.files import write_atomic
 
 WEIGHTS = Path(__file__).parent / "weights"
@@ -69,7 +69,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
     write_atomic(folder / _SETTINGS, (json.dumps(settings) + "\n").encode())
 
 
-def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Estimator:
+def load_estimator(name: str | Path, device: torch.device | str = "cpu", **changes: Any) -> Estimator:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
 
     Parameters
@@ -77,12 +77,19 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Esti
     name : str or Path
     device : torch.device or str
         Where it works, such as "cuda".
+    **changes
+        Of its :class:`~artperl.search.EstimatorOptions`, such as ``seen_from=(-75.0, 75.0)``.
 
     Raises
     ------
+    ConfigError
+        When there is no such option.
     DatasetError
-        When there is none, or its files are damaged.
+        When there is no such estimator, or its files are damaged.
     """
+    unknown = ", ".join(changes.keys() - {field.name for field in fields(EstimatorOptions)})
+    if unknown:
+        raise ConfigError("an estimator has no such option", unknown, "see artperl.search.EstimatorOptions")
     folder = folder_of(name)
     settings = read_settings(folder)
     try:
@@ -99,7 +106,7 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu") -> Esti
         options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings["options"].items()}
         options["refine"] = RefineOptions(**options["refine"])
         return Estimator(
-            perception.to(device), ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**options),
+            perception.to(device), ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**(options | changes)),
             Calibration(**settings["calibration"]), boxes,
         )  # fmt: skip
     except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:

@@ -188,6 +188,9 @@ class Evaluate:
     """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
     preset: ViewPreset = "artimage"
     """From where objects are seen."""
+    seen_from: tuple[float, float] | None = None
+    """Azimuths that the estimator is told that the camera is within, degrees about the object's vertical, 0 for its
+    front. By default it is not told."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
     num_points: int = 8192
@@ -216,6 +219,7 @@ class Evaluate:
         return run_rows(
             rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
             self.views or VIEWS, self.num_points, sys.stderr.isatty(), lambda line: print(line, flush=True),
+            self.seen_from,
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
@@ -226,7 +230,7 @@ class Evaluate:
 
         if self.estimator is None:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
-        estimator = load_estimator(self.estimator)
+        estimator = load_estimator(self.estimator, seen_from=self.seen_from)
         learnt = read_settings(folder_of(self.estimator))["about"]["options"]
         options = SampleOptions(self.num_points, views=ViewOptions(preset=self.preset), noise=self.noise)
         views, parts = self.views or 4, learnt.get("parts", "artimage")
@@ -277,13 +281,16 @@ class Estimate:
     """JSON with fx, fy, cx, cy, or with a matrix K, in pixels."""
     depth_scale: float = 0.001
     """Metres of one unit of a depth image of whole numbers."""
+    seen_from: tuple[float, float] | None = None
+    """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
+    a robot that stands before a cabinet. By default it may be anywhere."""
 
     def run(self) -> None:
         from artperl.checkpoint import load_estimator
         from artperl.inputs import read_points
 
         points = read_points(self.cloud, self.mask, self.intrinsics, self.depth_scale)
-        estimate = load_estimator(self.category)(points)
+        estimate = load_estimator(self.category, seen_from=self.seen_from)(points)
         record = {name: _plain(value) for name, value in vars(estimate).items() if name != "part"}
         if self.view is not None:
             from artperl.view import page

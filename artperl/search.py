@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -27,19 +28,27 @@ from artperl.networks.perception import Perceived
 from artperl.pose import Theta, pose_parts
 from artperl.refine import Refined, RefineOptions, refine
 from artperl.retrieval import ShapeBase, moves, same_axes, weighed
+from artperl.rotations import rotate
 from artperl.shapes import Observed, Shapes
-from artperl.start import facing, start
+from artperl.start import by_another_part, facing, start
+from artsim.errors import ConfigError
 
 _DISAGREEMENT = 0.3
 """Weight of the disagreement with perception against the residual."""
 _CLEARLY = 0.8
 """Share of the first estimate's doubt below which a second one takes its place: most others that fit are wrong."""
+_NEVER = 1e6
+"""Added to the energy, or the doubt, of what would be seen from where the camera is not."""
 _CHAIN = 3
 """Joints one after another from which parts below have to tell how those above have turned."""
 _BEAM_STARTS = 8
 """Ends of the beam search that are refined."""
+_HINGED_STARTS = 8
+"""States of a joint by which a root that hardly shows is placed."""
 _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
+_ASTRAY = np.deg2rad(15.0)
+"""Arc that a camera may be away from where it is known to be: an estimate need not have it to the degree."""
 _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
@@ -67,7 +76,7 @@ class EstimatorOptions:
     retry_residual: float = 0.006
     """Estimates with a larger residual are looked for again, from other starts; infinite for never, 0 for always."""
     azimuths: tuple[float, ...] = (-50.0, 0.0, 50.0)
-    """Of these other starts, degrees about the object's vertical, 0 for its front."""
+    """Of these other starts, degrees about the object's vertical, from the middle of :attr:`seen_from`."""
     elevation: float = 35.0
     """Degrees from which the other starts are seen."""
     agent_steps: int = 16
@@ -78,6 +87,13 @@ class EstimatorOptions:
     """Parts that hardly show turn to where no more of them would be seen: :mod:`artperl.hidden`."""
     squared: bool = True
     """In the end, parts turn until their flat surfaces face along their axes: :mod:`artperl.squaring`."""
+    seen_from: tuple[float, float] | None = None
+    """Azimuths that the camera is known to be within, degrees about the object's vertical: 0 in front of it, 90 to its
+    right (its -Y side), as for :class:`artsim.sampling.ViewOptions`. None: it may be anywhere."""
+
+    def __post_init__(self) -> None:
+        if self.seen_from is not None and not self.seen_from[0] <= self.seen_from[1]:
+            raise ConfigError(f"{self.seen_from} is not a range", "seen_from", "write LOW HIGH, such as -75 75")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +131,10 @@ class Found:
     def ending(self, theta: Theta) -> Found:
         """The fit with another end."""
         return replace(self, refined=replace(self.refined, theta=theta), path=[*self.path[:-1], theta])
+
+    def astray(self, seen_from: tuple[float, float] | None) -> bool:
+        """Whether the object would be seen from elsewhere, see :func:`astray`."""
+        return bool(astray(self.refined.theta, seen_from)[0])
 
     @property
     def residual(self) -> float:
@@ -159,14 +179,16 @@ def _best(
         shapes, theta = start(clouds, perceived, chosen, len(rows))
         part = perceived.part[:, : options.fit_points]
         observed = Observed.of(cloud[:, : options.fit_points], part, evened(part))
+        others = by_another_part(clouds, perceived, shapes[:1], theta[:1], _HINGED_STARTS)
+        if options.perceived_start and others is not None:
+            shapes, theta, rows = _with_more(shapes, theta, rows, others)
     if options.perceived_start and options.beam and int(shapes.trees.depth[0].max()) >= _CHAIN:
         with clock("beam"):
             ends = beam(
                 shapes[:1], cloud, perceived.part_probability[..., : shapes.trees.num_rows], theta[:1], _BEAM_STARTS,
                 options.beam, options.refine,
             )  # fmt: skip
-            shapes, theta = concatenate([shapes, shapes[:1].repeat(len(ends))]), concatenate([theta, ends])
-            rows = torch.cat([rows, rows[:1].expand(len(ends))])
+            shapes, theta, rows = _with_more(shapes, theta, rows, ends)
     found = None
     if options.perceived_start:
         found = _settle(shapes, observed, perceived, [theta], rows.tolist(), base, options, clock)
@@ -174,15 +196,16 @@ def _best(
         if others is not None:
             many, same = found.shapes.repeat(len(others)), [found.reference] * len(others)
             turned = _settle(many, observed, perceived, [others], same, base, options, clock)
-            found = min(found, turned, key=lambda one: one.residual)
-        if found.residual <= options.retry_residual:
+            found = min(found, turned, key=lambda one: (one.astray(options.seen_from), one.residual))
+        if found.residual <= options.retry_residual and not found.astray(options.seen_from):
             return found
     with clock("start"):
         first, row = (shapes[:1], int(rows[0])) if found is None else (found.shapes, found.reference)
-        shapes = first.repeat(len(options.azimuths))
-        around = facing(shapes, clouds.center, options.azimuths, options.elevation)
+        shapes, middle = first.repeat(len(options.azimuths)), np.mean(options.seen_from or (0.0, 0.0))
+        around = facing(shapes, clouds.center, middle + np.array(options.azimuths), options.elevation)
         if found is not None:
-            shapes, around = concatenate([shapes, first]), concatenate([around, found.path[0]])
+            before = [found.path[0], turned_round(found.refined.theta)]
+            shapes, around = concatenate([shapes, first.repeat(2)]), concatenate([around, *before])
         theta = around
     path = [theta]
     with clock("agent"):
@@ -192,7 +215,13 @@ def _best(
     again = _settle(shapes, observed, perceived, path, [row] * len(shapes), base, options, clock)
     if found is None:
         return again
-    return again if _doubt(again) < _CLEARLY * _doubt(found) else found
+    return again if _doubt(again, options) < _CLEARLY * _doubt(found, options) else found
+
+
+def _with_more(shapes: Shapes, theta: Theta, rows: Tensor, more: Theta) -> tuple[Shapes, Theta, Tensor]:
+    """Starts, and more of the first reference."""
+    many, same = shapes[:1].repeat(len(more)), rows[:1].expand(len(more))
+    return concatenate([shapes, many]), concatenate([theta, more]), torch.cat([rows, same])
 
 
 def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tensor, Shapes]:
@@ -236,9 +265,10 @@ def _references_of_groups(base: ShapeBase, perceived: Grouped, query: Tensor, co
     return torch.cat([found, rows]), concatenate([shapes, own])
 
 
-def _doubt(found: Found) -> float:
+def _doubt(found: Found, options: EstimatorOptions) -> float:
     """What is to be low: a flat part fits a wrong pose just as well, but perception does not agree with that."""
-    return found.residual + _DISAGREEMENT * found.disagreement
+    astray = _NEVER * found.astray(options.seen_from)
+    return found.residual + _DISAGREEMENT * found.disagreement + astray
 
 
 def _settle(
@@ -252,7 +282,7 @@ def _settle(
         few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(all_shapes))
         count = min(options.early_iterations, options.refine.iterations)
         early = refine(all_shapes, few, theta, replace(options.refine, iterations=count, rigid_iterations=count))
-        best = int(early.energy.argmin())
+        best = int((early.energy + _NEVER * astray(early.theta, options.seen_from)).argmin())
         own, theta = all_shapes[best : best + 1], early.theta[best : best + 1]
     with clock("relabel"):
         observed = replace(observed, part=relabel(own, observed, theta, perceived.part_logits))
@@ -274,6 +304,23 @@ def disagreement(shapes: Shapes, observed: Observed, theta: Theta, perceived: Pe
     unit = shapes.diagonal[0] * theta.log_scale[0].mean().exp()
     apart = torch.linalg.vector_norm(fitted / unit - perceived.canonical[0, : len(part)], dim=-1)
     return float(apart.median())
+
+
+def astray(theta: Theta, seen_from: tuple[float, float] | None) -> Tensor:
+    """(B,) whether objects would be seen from outside a range of azimuths, see :attr:`EstimatorOptions.seen_from`."""
+    if seen_from is None:
+        return torch.zeros(len(theta), dtype=torch.bool, device=theta.state.device)
+    low, high = np.deg2rad(seen_from)
+    x, y, z = rotate(theta.rotation.mT, theta.translation).unbind(-1)  # from the camera to the object, in its frame
+    flat = torch.hypot(x, y)
+    off = torch.remainder(torch.atan2(y, x) - 0.5 * (low + high) + np.pi, 2.0 * np.pi) - np.pi
+    outside: Tensor = (off.abs() - 0.5 * (high - low)).clamp(min=0.0) * flat > _ASTRAY * torch.hypot(flat, z)
+    return outside
+
+
+def turned_round(theta: Theta) -> Theta:
+    """Objects that stand where they stood, by half a turn about their verticals."""
+    return replace(theta, rotation=theta.rotation * theta.rotation.new_tensor([-1.0, -1.0, 1.0]))
 
 
 def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:

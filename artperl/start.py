@@ -19,6 +19,8 @@ from artsim.camera import look_at_transform
 _ROUNDS = 4
 _LEAST = 8.0
 """Points from which a part's own pose is trusted; with fewer it stands as at rest against the root."""
+_HIDDEN = 0.25
+"""Share of the points of another part below which the root hardly shows."""
 _FEW = 3
 """Points that tell the state of a joint."""
 
@@ -99,6 +101,50 @@ def start(clouds: Clouds, perceived: Perceived, references: Shapes, count: int) 
     source = own.canonical * metres - origin
     target = (clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]).repeat_interleave(count, dim=0)
     return shapes, _follow(shapes, theta, source, target, trust(own)[:, :rows])
+
+
+def by_another_part(clouds: Clouds, perceived: Perceived, shapes: Shapes, theta: Theta, states: int) -> Theta | None:
+    """Starts of one object whose root hardly shows: where the part with most points lets the root be.
+
+    A base that is hidden behind its lid has no pose of its own to start from; but the lid is somewhere, and the base is
+    hinged to it.
+
+    Parameters
+    ----------
+    clouds : Clouds
+    perceived : Perceived
+    shapes : Shapes
+    theta : Theta
+        All of one object, the last two as :func:`start` gives them.
+    states : int
+        Of the joint in between, from one limit to the other.
+
+    Returns
+    -------
+    Theta or None
+        Of so many rows; None where the root shows.
+    """
+    trees, weight = shapes.trees, trust(perceived)[:, : shapes.trees.num_rows]
+    count = (weight > 0).sum(2)[0]
+    joint = trees.free & (trees.depth == 1) & torch.isfinite(trees.upper - trees.lower)
+    k = int(count.masked_fill(~joint[0], -1).argmax())
+    if not joint[0, k] or count[0] > _HIDDEN * count[k]:
+        return None
+    many, grid = shapes.repeat(states), torch.linspace(0.0, 1.0, states).to(theta.state)
+    state = theta.state.repeat(states, 1)
+    state[:, k] = trees.lower[0, k] + grid * (trees.upper - trees.lower)[0, k]
+    theta = replace(theta.repeat(states), state=state)
+    posed = pose_parts(many.trees, theta, many.box_center)
+    rotation, center, _ = (pose[:, k] for pose in part_poses(clouds, perceived))
+    turn = rotation @ posed.rotation[:, k].mT
+    theta = replace(
+        theta, rotation=turn @ theta.rotation, translation=center + rotate(turn, theta.translation - posed.center[:, k])
+    )
+    metres = (perceived.log_diagonal.exp() * clouds.radius)[:, None, None]
+    source = perceived.canonical * metres - (perceived.box_center[:, :1] * metres - shapes.box_center[:, :1])
+    target = clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]
+    every = [values.expand(states, -1, -1) for values in (source, target, weight)]
+    return _follow(many, theta, *every)
 
 
 def _follow(shapes: Shapes, theta: Theta, source: Tensor, target: Tensor, weight: Tensor) -> Theta:

@@ -26,11 +26,11 @@ PUBLISHED: dict[str, dict[str, tuple[float, ...]]] = {
 """Means of ArtPERL on the original ArtImage, by part (its table 1)."""
 
 
-def find_estimator(folder: Path | None, category: str) -> Estimator:
+def find_estimator(folder: Path | None, category: str, **changes: Any) -> Estimator:
     """The estimator of a category in a folder of them (or of training runs); the one that comes with the package."""
     folder = folder or WEIGHTS
     run = folder / category / "best"
-    return load_estimator(run if run.is_dir() else folder / category)
+    return load_estimator(run if run.is_dir() else folder / category, **changes)
 
 
 def run_rows(
@@ -44,6 +44,7 @@ def run_rows(
     num_points: int = NUM_POINTS,
     progress: bool = False,
     say: Callable[[str], None] = print,
+    seen_from: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     """Evaluate, and print each row as it comes.
 
@@ -61,6 +62,8 @@ def run_rows(
     progress : bool
     say : callable
         Gets the lines.
+    seen_from : (float, float), optional
+        See :class:`artperl.search.EstimatorOptions`.
 
     Returns
     -------
@@ -80,7 +83,8 @@ def run_rows(
             if not samples:
                 say(f"{category}: no object")
                 continue
-            estimator = find_estimator(real_weights if row == "real_trained" else weights, category)
+            folder = real_weights if row == "real_trained" else weights
+            estimator = find_estimator(folder, category, seen_from=seen_from)
             figures = summary(evaluate(estimator, samples, progress))
             figures[category]["objects"] = len({sample.object_id for sample in samples})
             result[row] |= figures

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 import artsim
 from artperl import metrics
@@ -45,9 +47,12 @@ from artperl.evaluation import (
 )
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perceived, Perception, Votes
+from artperl.pose import Theta
 from artperl.retrieval import ShapeBase
-from artperl.search import EstimatorOptions, evened
-from artsim.errors import ArtsimError, DatasetError
+from artperl.search import EstimatorOptions, astray, evened, turned_round
+from artperl.shapes import Shapes
+from artsim.camera import look_at_transform
+from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.sample import Sample
 from tests.artperl.worlds import true_votes
 
@@ -261,6 +266,37 @@ def test_damaged_folders_are_refused(base: ShapeBase, tmp_path: Path, spoiled: s
 def test_a_missing_estimator_says_which_there_are() -> None:
     with pytest.raises(DatasetError, match="come"):
         load_estimator("no-such-category")
+
+
+def test_options_change_as_an_estimator_is_loaded(base: ShapeBase, tmp_path: Path) -> None:
+    save_estimator(Estimator(Perception(2, 16), base), tmp_path, {})
+    assert load_estimator(tmp_path, seen_from=(-75.0, 75.0), squared=False).options == EstimatorOptions(
+        seen_from=(-75.0, 75.0), squared=False
+    )
+    with pytest.raises(ConfigError, match="sene_from"):
+        load_estimator(tmp_path, sene_from=(-75.0, 75.0))
+    with pytest.raises(ConfigError, match="LOW HIGH"):
+        load_estimator(tmp_path, seen_from=(75.0, -75.0))
+
+
+@given(
+    azimuth=st.floats(-180.0, 180.0), elevation=st.floats(-60.0, 60.0), middle=st.floats(-180.0, 180.0),
+    half=st.floats(0.0, 120.0),
+)  # fmt: skip
+def test_what_is_seen_from_elsewhere_is_told(azimuth: float, elevation: float, middle: float, half: float) -> None:
+    """By the arc on a sphere about the object, from the camera to the nearest meridian of the range."""
+    side, up = np.deg2rad([azimuth, elevation])
+    eye = np.array([-np.cos(side) * np.cos(up), -np.sin(side) * np.cos(up), np.sin(up)])
+    T = np.linalg.inv(look_at_transform(eye, np.zeros(3)))
+    trees = Shapes.from_objects([artsim.make("laptop", 1)], 8, dtype=torch.float64).trees
+    theta = replace(
+        Theta.at_rest(trees), rotation=torch.from_numpy(T[None, :3, :3]), translation=torch.from_numpy(T[None, :3, 3])
+    )
+    arc = max(abs((azimuth - middle + 180.0) % 360.0 - 180.0) - half, 0.0) * np.cos(up)
+    assume(abs(arc - 15.0) > 1e-6)
+    assert bool(astray(theta, (middle - half, middle + half))) == (arc > 15.0)
+    assert not astray(theta, None)
+    assert bool(astray(turned_round(theta), (azimuth - 10.0, azimuth + 10.0))) == (170.0 * np.cos(up) > 15.0)
 
 
 def test_a_perfect_estimate_has_no_error(estimator: Estimator, sample: Sample) -> None:

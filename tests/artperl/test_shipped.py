@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from artperl import metrics
 from artperl.benchmarks.artimage import real_objects
 from artperl.benchmarks.basin import basin_problem, run_basin
 from artperl.categories import ARTIMAGE
 from artperl.checkpoint import WEIGHTS, folder_of, load_estimator, read_settings
 from artperl.evaluation import evaluate, frozen_samples, samples_of
 from artsim.plan import SampleOptions
-from artsim.sampling import ViewOptions
+from artsim.sampling import StateOptions, ViewOptions
 
 _SEEDS = 1_200_000
 """Neither of streams and bases, nor of the test and validation sets."""
@@ -48,6 +49,20 @@ def test_objects_are_found_from_behind(category: str) -> None:
     behind = SampleOptions(views=ViewOptions(azimuth=(105.0, 255.0)))
     scored = evaluate(load_estimator(category), frozen_samples([category], 8, 2, behind, first_seed=_SEEDS))
     assert np.mean([one.right for one in scored]) > 0.6
+
+
+def test_who_knows_where_the_camera_is_gets_no_other_answer() -> None:
+    """A shut laptop looks much the same from in front and from behind, but for whom knows."""
+    shut = SampleOptions(states=StateOptions(mode="rest"))
+    samples = frozen_samples(["laptop"], 8, 2, shut, first_seed=_SEEDS)
+    in_front, behind = (load_estimator("laptop", seen_from=(middle - 75.0, middle + 75.0)) for middle in (0.0, 180.0))
+    for sample in samples:
+        rotation = in_front(sample.points).T_camera_part[0, :3, :3]
+        assert metrics.rotation_error(rotation, sample.T_camera_part[0, :3, :3]) < 20.0
+    for sample in samples[::4]:
+        T = behind(sample.points).T_camera_part[0]
+        x, y, _ = T[:3, :3].T @ T[:3, 3]  # from the camera to the object
+        assert abs(np.degrees(np.arctan2(-y, -x))) < 90.0
 
 
 @pytest.mark.parametrize("category", [name for name in ARTIMAGE if name != "scissors"])

@@ -17,7 +17,7 @@ from artperl.problems import part_truth
 from artperl.retrieval import ShapeBase
 from artperl.rotations import rotation_from_vector
 from artperl.shapes import Shapes
-from artperl.start import adapted, part_poses, procrustes, sized, start
+from artperl.start import adapted, by_another_part, part_poses, procrustes, sized, start
 from artsim.plan import SampleOptions
 from artsim.sample import Sample
 
@@ -164,3 +164,30 @@ def test_hardly_visible_parts_start_where_their_joints_let_them(
         seen = torch.bincount(known.part[0], minlength=rows) >= 3
         assert metrics.rotation_error(posed.rotation[0, :rows], rotation)[seen].max() < degrees
         assert metrics.translation_error(posed.center[0, :rows], center, samples[b].diagonal)[seen].max() < diagonals
+
+
+def test_a_root_that_hardly_shows_starts_where_another_part_lets_it_be() -> None:
+    """A base behind its lid: every start has the lid where it is, and one of them has the base almost where it is."""
+    samples, clouds, truth = scene("laptop", 4)
+    base = ShapeBase.of([artsim.make("laptop", seed) for seed in range(30)], 32)
+    for b, sample in enumerate(samples):
+        lid, root = ((truth.part[b] == k).nonzero()[:, 0] for k in (1, 0))
+        assert len(lid) > 50
+        for visible, hidden in ((3, True), (len(lid), False)):
+            kept = torch.cat([lid, root[:visible]])
+            alone = Clouds(clouds.points[b : b + 1, kept], clouds.center[b : b + 1], clouds.radius[b : b + 1])
+            own = truth[b : b + 1]
+            known = knowing(replace(own, part=own.part[:, kept], canonical=own.canonical[:, kept]))
+            shapes, theta = start(alone, known, base.shapes[[0]], 1)
+            starts = by_another_part(alone, known, shapes, theta, 16)
+            assert (starts is not None) == (hidden or len(root) < len(lid) // 4)
+            if starts is not None:
+                many = shapes.repeat(16)
+                posed = pose_parts(many.trees, starts, many.box_center)
+                _, rotation, center, *_ = part_truth(sample, 2)
+                off = metrics.rotation_error(posed.rotation, rotation)
+                away = metrics.translation_error(posed.center, center, sample.diagonal)
+                assert off[:, 1].max() < 3.0
+                assert away[:, 1].max() < 0.03
+                assert off[:, 0].min() < 8.0
+                assert away[off[:, 0].argmin(), 0] < 0.08
