@@ -283,7 +283,7 @@ class Estimate:
     """Metres of one unit of a depth image of whole numbers."""
     seen_from: tuple[float, float] | None = None
     """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
-    a robot that stands before a cabinet. By default it may be anywhere."""
+    a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
 
     def run(self) -> None:
         from artperl.checkpoint import load_estimator

@@ -49,6 +49,8 @@ _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
 _ASTRAY = np.deg2rad(15.0)
 """Arc that a camera may be away from where it is known to be: an estimate need not have it to the degree."""
+_BELOW = np.deg2rad(10.0)
+"""Below the horizon, from where no standing object is seen."""
 _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
@@ -89,7 +91,8 @@ class EstimatorOptions:
     """In the end, parts turn until their flat surfaces face along their axes: :mod:`artperl.squaring`."""
     seen_from: tuple[float, float] | None = None
     """Azimuths that the camera is known to be within, degrees about the object's vertical: 0 in front of it, 90 to its
-    right (its -Y side), as for :class:`artsim.sampling.ViewOptions`. None: it may be anywhere."""
+    right (its -Y side), as for :class:`artsim.sampling.ViewOptions`; then the object stands, and is not seen from
+    below. None: the camera may be anywhere."""
 
     def __post_init__(self) -> None:
         if self.seen_from is not None and not self.seen_from[0] <= self.seen_from[1]:
@@ -307,7 +310,7 @@ def disagreement(shapes: Shapes, observed: Observed, theta: Theta, perceived: Pe
 
 
 def astray(theta: Theta, seen_from: tuple[float, float] | None) -> Tensor:
-    """(B,) whether objects would be seen from outside a range of azimuths, see :attr:`EstimatorOptions.seen_from`."""
+    """(B,) whether objects would be seen from below or outside a range, see :attr:`EstimatorOptions.seen_from`."""
     if seen_from is None:
         return torch.zeros(len(theta), dtype=torch.bool, device=theta.state.device)
     low, high = np.deg2rad(seen_from)
@@ -315,7 +318,7 @@ def astray(theta: Theta, seen_from: tuple[float, float] | None) -> Tensor:
     flat = torch.hypot(x, y)
     off = torch.remainder(torch.atan2(y, x) - 0.5 * (low + high) + np.pi, 2.0 * np.pi) - np.pi
     outside: Tensor = (off.abs() - 0.5 * (high - low)).clamp(min=0.0) * flat > _ASTRAY * torch.hypot(flat, z)
-    return outside
+    return outside | (torch.atan2(z, flat) > _BELOW + _ASTRAY)
 
 
 def turned_round(theta: Theta) -> Theta:
