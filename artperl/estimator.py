@@ -67,14 +67,17 @@ class Calibration:
     The defaults are guesses; :func:`artperl.evaluation.calibrate` fits them to a validation set.
     """
 
-    bias: float = 4.0
+    bias: float = 2.0
     residual: float = -100.0
     """Weight of the residual, in diagonals."""
     disagreement: float = -30.0
     """Weight of the median distance between where perception and the fit place the points in the rest frame."""
+    visibility: float = 10.0
+    """Weight of the share of the surface that shows, of the part that shows least: what shows of others fits as well
+    where that one is wrong."""
 
-    def __call__(self, residual: float, disagreement: float) -> float:
-        score = self.bias + self.residual * residual + self.disagreement * disagreement
+    def __call__(self, residual: float, disagreement: float, visibility: float) -> float:
+        score = self.bias + self.residual * residual + self.disagreement * disagreement + self.visibility * visibility
         return float(1.0 / (1.0 + np.exp(-score)))
 
 
@@ -298,6 +301,7 @@ class Estimator:
         posed = pose_parts(trees, theta, shapes.box_center)
         axis, origin = joint_axes(trees, posed)
         poses = [_transforms(shapes, step)[:K] for step in found.path]
+        shows = visibility(shapes, observed, posed)[:K]
         rotation, center = _numpy(posed.rotation)[:K], _numpy(posed.center)[:K]
         translation, size = widen(rotation, center, _numpy(shapes.box_size * posed.scale)[:K], points, part)
         return Estimate(
@@ -314,8 +318,8 @@ class Estimator:
             reference=f"{self.base.categories[reference]}:{self.base.object_ids[reference]}",
             residual=found.residual,
             disagreement=found.disagreement,
-            visibility=visibility(shapes, observed, posed)[:K],
-            confidence=self.calibration(found.residual, found.disagreement),
+            visibility=shows,
+            confidence=self.calibration(found.residual, found.disagreement, shows.min()),
             trajectory=np.stack(poses),
             milliseconds=clock.milliseconds,
         )

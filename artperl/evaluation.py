@@ -62,6 +62,8 @@ class Scored:
         Share of points with the right part.
     failed : bool
     residual, disagreement, confidence : float
+    visibility : float
+        Of the part that shows least.
     milliseconds : float
     """
 
@@ -79,6 +81,7 @@ class Scored:
     residual: float
     disagreement: float
     confidence: float
+    visibility: float
     milliseconds: float
 
     @property
@@ -168,6 +171,7 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float) -> Scored:
         residual=estimate.residual,
         disagreement=estimate.disagreement,
         confidence=estimate.confidence,
+        visibility=float(estimate.visibility.min()),
         milliseconds=milliseconds,
     )
 
@@ -217,13 +221,17 @@ def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]
         {name: _middle([column(s)[k] for s in own if len(s.rotation) > k]) for name, column in columns.items()}
         for k in range(max(len(s.rotation) for s in own))
     ]
+    right, confidence = np.array([s.right for s in own]), np.array([s.confidence for s in own])
     return {
         "parts": parts,
         "instances": len(own),
         "failures": sum(s.failed for s in own),
-        "right": float(np.mean([s.right for s in own])),
+        "right": float(right.mean()),
         "parts_found": float(np.mean([s.found for s in own])),
         "segmentation": float(np.mean([s.segmentation for s in own])),
+        "confidence_of_right": _median(confidence[right]),
+        "confidence_of_wrong": _median(confidence[~right]),
+        "confidence_auroc": metrics.auroc(confidence, right),
         "ms_per_instance": float(np.median([s.milliseconds for s in own])),
     }
 
@@ -251,6 +259,11 @@ def table(figures: dict[str, Any]) -> str:
             f"{100 * figure['segmentation']:.1f} % of points right, "
             f"{figure['ms_per_instance']:.0f} ms"
         )
+        if figure["confidence_auroc"] is not None:
+            lines.append(
+                f"{'':14s}confidence of right ones {100 * figure['confidence_of_right']:.0f} %, of wrong ones "
+                f"{100 * figure['confidence_of_wrong']:.0f} % in the median, AUROC {figure['confidence_auroc']:.2f}"
+            )
     return "\n".join(lines)
 
 
@@ -291,19 +304,20 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
     Clouds of other things count as much, all together, as those of the category. Estimates with a part too many or too
     few are wrong ones.
 
-    Weights of the residual and of the disagreement are kept from rising above 0, so that nothing that fits badly is
-    ever trusted more for it, however far it lies from what was seen here.
+    Weights of the residual and of the disagreement are kept from rising above 0, and that of the visibility from
+    falling below, so that nothing that fits badly or hardly shows is ever trusted more for it, however far it lies from
+    what was seen here.
     """
     own, others = ([s for s in some if np.isfinite(s.residual)] for some in (scored, foreign))
     known = own + others
     default = Calibration()
     if not known:
         return default
-    prior = np.array([default.bias, default.residual, default.disagreement])
-    features = np.array([[1.0, s.residual, s.disagreement] for s in known])
+    prior = np.array([default.bias, default.residual, default.disagreement, default.visibility])
+    features = np.array([[1.0, s.residual, s.disagreement, s.visibility] for s in known])
     right = np.array([s.right for s in known], dtype=np.float64)
     count = np.array([1.0] * len(own) + [len(own) / len(others) for _ in others])
-    loose = np.array([0.1, 0.01, 0.03]) ** 2  # precision of the prior
+    loose = np.array([0.1, 0.01, 0.03, 0.1]) ** 2  # precision of the prior
 
     def cost(scaled: Array) -> tuple[float, Array]:
         weights = scaled * np.abs(prior)
@@ -314,7 +328,7 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
         slope = features.T @ (count * (chance - right)) + loose * off
         return float(value), slope * np.abs(prior)
 
-    bounds = [(None, None), (None, -0.1), (None, -0.1)]
+    bounds = [(None, None), (None, -0.1), (None, -0.1), (0.0, None)]
     weights = minimize(cost, np.sign(prior), jac=True, bounds=bounds).x * np.abs(prior)
     return Calibration(*(float(w) for w in weights))
 
@@ -332,6 +346,7 @@ def _wrong(sample: Sample, estimate: Estimate, milliseconds: float) -> Scored:
     return replace(
         _failed(sample, milliseconds), found=found(estimate, sample), residual=estimate.residual,
         disagreement=estimate.disagreement, confidence=estimate.confidence,
+        visibility=float(estimate.visibility.min()),
     )  # fmt: skip
 
 
@@ -343,8 +358,12 @@ def _failed(sample: Sample, milliseconds: float) -> Scored:
     state = metrics.state_error(np.zeros(K), np.where(np.isfinite(high - low), high - low, np.pi), sample.joint_type)
     return Scored(
         sample.category, rotation, far, none, none, none, np.where(children, state, 0.0),
-        np.where(children, 90.0, 0.0), 0.0, 0.0, True, np.inf, np.inf, 0.0, milliseconds,
+        np.where(children, 90.0, 0.0), 0.0, 0.0, True, np.inf, np.inf, 0.0, 0.0, milliseconds,
     )  # fmt: skip
+
+
+def _median(values: Array) -> float | None:
+    return float(np.median(values)) if len(values) else None
 
 
 def _middle(values: Sequence[float]) -> dict[str, float]:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import rankdata
 
 from artperl.boxes import iou, iou_aligned, iou_omad_legacy
 
@@ -180,3 +181,21 @@ def state_error(estimate: ArrayLike, truth: ArrayLike, joint_type: Sequence[str]
     error = np.where(np.isin(kinds, ("revolute", "continuous", "screw")), np.rad2deg(error), error)
     result: Array = np.where(kinds == "free", 0.0, error)
     return result
+
+
+def auroc(score: ArrayLike, positive: ArrayLike) -> float | None:
+    """Chance that a positive has a higher score than a negative, ties counted half: the area under the ROC curve.
+
+    Parameters
+    ----------
+    score : (N,) float
+    positive : (N,) bool
+
+    Returns
+    -------
+    float or None
+        None where all are of one kind.
+    """
+    rank, own = rankdata(np.asarray(score)), np.asarray(positive, bool)
+    pairs = int(own.sum()) * int((~own).sum())
+    return float(rank[own].sum() - own.sum() * (own.sum() + 1) / 2) / pairs if pairs else None

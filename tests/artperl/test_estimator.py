@@ -243,7 +243,7 @@ def test_draws_take_every_point_before_any_twice() -> None:
 def test_an_estimator_comes_back_from_its_folder(base: ShapeBase, sample: Sample, tmp_path: Path) -> None:
     torch.manual_seed(0)
     options = EstimatorOptions(references=2, agent_steps=2)
-    made = Estimator(Perception(2, 16), base, Agent(16), options, Calibration(1.0, -2.0, -3.0))
+    made = Estimator(Perception(2, 16), base, Agent(16), options, Calibration(1.0, -2.0, -3.0, 4.0))
     save_estimator(made, tmp_path / "made", {"note": "untrained"})
     back = load_estimator(tmp_path / "made")
     assert (back.options, back.calibration) == (options, made.calibration)
@@ -380,24 +380,60 @@ def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:
     chance = 1.0 / (1.0 + np.exp(80.0 * (residual - 0.05)))
     right = rng.random(2000) < chance
     scored = [
-        replace(one, residual=r, disagreement=0.02, rotation=np.full(2, 1.0 if ok else 90.0))
+        replace(one, residual=r, disagreement=0.02, visibility=0.5, rotation=np.full(2, 1.0 if ok else 90.0))
         for r, ok in zip(residual, right, strict=True)
     ]
     fitted = calibrate(scored)
-    found = np.array([fitted(r, 0.02) for r in residual])
+    found = np.array([fitted(r, 0.02, 0.5) for r in residual])
     assert np.abs(found - chance).mean() < 0.05
-    assert fitted(0.3, 0.3) < 0.01
+    assert fitted(0.3, 0.3, 0.5) < 0.01
     assert calibrate([]) == Calibration()
+
+
+@pytest.mark.parametrize("better", [True, False])
+def test_confidence_takes_notice_of_what_does_not_show(estimator: Estimator, sample: Sample, better: bool) -> None:
+    """Where estimates of what hardly shows are wrong more often, it says by how much; it never trusts them more."""
+    one: Scored = evaluate(estimator, [sample])[0]
+    rng = np.random.default_rng(0)
+    shows = rng.uniform(0.0, 1.0, 2000)
+    chance = 1.0 / (1.0 + np.exp((-1.0 if better else 1.0) * 12.0 * (shows - 0.3)))
+    right = rng.random(2000) < chance
+    fitted = calibrate([
+        replace(one, residual=0.004, disagreement=0.02, visibility=v, rotation=np.full(2, 1.0 if ok else 90.0))
+        for v, ok in zip(shows, right, strict=True)
+    ])  # fmt: skip
+    found = np.array([fitted(0.004, 0.02, v) for v in np.linspace(0.0, 1.0, 11)])
+    assert (np.diff(found) >= 0.0).all()
+    if better:
+        assert np.abs(np.array([fitted(0.004, 0.02, v) for v in shows]) - chance).mean() < 0.05
+    else:
+        assert np.ptp(found) < 1e-3
+
+
+def test_a_summary_says_what_confidence_is_worth(estimator: Estimator, sample: Sample) -> None:
+    right, wrong = (
+        replace(
+            evaluate(estimator, [sample])[0], rotation=np.full(2, degrees), translation=np.zeros(2), confidence=sure
+        )
+        for degrees, sure in ((1.0, 0.9), (90.0, 0.2))
+    )
+    told = summary([right, right, wrong])["laptop"]
+    assert (told["confidence_of_right"], told["confidence_of_wrong"], told["confidence_auroc"]) == (0.9, 0.2, 1.0)
+    assert "AUROC 1.00" in table({"laptop": told})
+    told = summary([right])["laptop"]
+    assert (told["confidence_of_wrong"], told["confidence_auroc"]) == (None, None)
+    assert "AUROC" not in table({"laptop": told})
 
 
 def test_estimates_with_other_parts_are_wrong_whatever_they_fit(estimator: Estimator, sample: Sample) -> None:
     (other,) = evaluate(estimator, frozen_samples(["eyeglasses"], 1, 1))
     assert other.failed
     assert np.isfinite([other.residual, other.disagreement]).all()
-    right = [replace(evaluate(estimator, [sample])[0], residual=other.residual, disagreement=other.disagreement)]
+    told = {name: getattr(other, name) for name in ("residual", "disagreement", "visibility")}
+    right = [replace(evaluate(estimator, [sample])[0], **told)]
     among = calibrate(20 * right + 20 * [other])
-    assert among(other.residual, other.disagreement) == pytest.approx(0.5, abs=0.02)
-    assert calibrate(20 * right)(other.residual, other.disagreement) > 0.9
+    assert among(**told) == pytest.approx(0.5, abs=0.02)
+    assert calibrate(20 * right)(**told) > 0.9
 
 
 def test_whatever_is_said_of_another_category_is_wrong(estimator: Estimator) -> None:

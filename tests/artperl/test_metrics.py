@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
@@ -174,6 +176,14 @@ def test_joint_lines() -> None:
     assert metrics.line_distance(zero, x, [5.0, 0.3, 0.4], x) == pytest.approx(0.5)
     tilted = Rotation.from_euler("z", 1e-7).apply(x)
     assert metrics.line_distance(zero, x, [5.0, 0.3, 0.4], tilted) == pytest.approx(0.5, abs=1e-5)
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30))
+def test_area_under_the_curve_is_the_share_of_pairs_in_order(scored: list[tuple[int, bool]]) -> None:
+    own, others = ([score for score, kind in scored if kind is positive] for positive in (True, False))
+    pairs = [1.0 if a > b else 0.5 if a == b else 0.0 for a in own for b in others]
+    area = metrics.auroc([score for score, _ in scored], [kind for _, kind in scored])
+    assert area == (pytest.approx(np.mean(pairs)) if pairs else None)
 
 
 def test_states_of_joints() -> None:
