@@ -44,11 +44,13 @@ def test_unseen_procedural_objects_are_found(category: str) -> None:
     assert np.mean([one.segmentation for one in scored]) > 0.85
 
 
-@pytest.mark.parametrize("category", [name for name in ARTIMAGE if name != "drawer"])
+@pytest.mark.parametrize("category", ARTIMAGE)
 def test_objects_are_found_from_behind(category: str) -> None:
+    """Of a cabinet of drawers itself: its drawers do not show from there."""
     behind = SampleOptions(views=ViewOptions(azimuth=(105.0, 255.0)))
     scored = evaluate(load_estimator(category), frozen_samples([category], 8, 2, behind, first_seed=_SEEDS))
-    assert np.mean([one.right for one in scored]) > 0.6
+    right = [one.rotation[0] < 10.0 if category == "drawer" else one.right for one in scored]
+    assert np.mean(right) > 0.6
 
 
 def test_who_knows_where_the_camera_is_gets_no_other_answer() -> None:
