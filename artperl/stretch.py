@@ -20,6 +20,8 @@ _SPREAD = 0.35
 """Standard deviation of the logarithm of a factor: of two drawers one is, commonly, half as wide again."""
 _APART = 0.01
 """Edges that are nearer than that, in diagonals, are stretched together."""
+_SIDEWAYS = 1
+"""Axis of the rest frame along which furniture is, commonly, the same from either end."""
 _PARALLEL = 1e-3
 """Sine of the angle within which directions are the same."""
 _NEIGHBOURS = 12
@@ -31,8 +33,9 @@ _MOST_GROWTH = 4.0
 def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample:
     """The sample as if its object had been stretched along those axes of the rest frame that its joints do not mind.
 
-    Each range between the edges of parts' boxes gets a factor of its own, and the object stays as long as it is.
-    Only what training needs is stretched: points, ``npcs`` and boxes. What the camera would have seen behind the
+    Each range between the edges of parts' boxes gets a factor of its own, and the object stays as long as it is. What
+    is the same from its left and its right stays so: where a shut drawer ends is often told by the one at the other
+    end. Only what training needs is stretched: points, ``npcs`` and boxes. What the camera would have seen behind the
     stretched object is not looked up anew, nor are images.
 
     Parameters
@@ -48,7 +51,8 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
     rest = sample.rest_points
     moved = rest.copy()
     for axis in stretchable(sample):
-        along = _stretching(np.concatenate([low[:, axis], high[:, axis]]), _APART * sample.diagonal, rng)
+        edges = np.concatenate([low[:, axis], high[:, axis]])
+        along = _stretching(edges, _APART * sample.diagonal, axis == _SIDEWAYS, rng)
         for values in (low, high, moved):
             values[:, axis] = along(values[:, axis])
     center, whole = 0.5 * (low + high), high - low
@@ -86,13 +90,20 @@ def _spread_of_neighbours(before: Array, after: Array) -> Array:
     return np.clip(area(after) / area(before), 1.0 / _MOST_GROWTH, _MOST_GROWTH)
 
 
-def _stretching(edges: Array, apart: float, rng: np.random.Generator) -> Callable[[Array], Array]:
-    """A map of one coordinate that keeps the outermost edges, and is linear between the others and beyond."""
+def _stretching(edges: Array, apart: float, mirrored: bool, rng: np.random.Generator) -> Callable[[Array], Array]:
+    """A map of one coordinate that keeps the outermost edges, and is linear between the others and beyond.
+
+    With ``mirrored``, edges that are the same from either end stay so.
+    """
     edges = np.sort(edges)
     knots = edges[np.concatenate([[True], np.diff(edges) > apart])]
     if len(knots) < 2:
         return lambda values: values
-    lengths = np.diff(knots) * np.exp(_SPREAD * rng.standard_normal(len(knots) - 1))
+    logarithms = _SPREAD * rng.standard_normal(len(knots) - 1)
+    if mirrored and np.ptp(knots + knots[::-1]) < 2 * apart:
+        half = len(logarithms) // 2
+        logarithms[len(logarithms) - half :] = logarithms[:half][::-1]
+    lengths = np.diff(knots) * np.exp(logarithms)
     lengths *= (knots[-1] - knots[0]) / lengths.sum()
     goals = knots[0] + np.concatenate([[0.0], np.cumsum(lengths)])
 

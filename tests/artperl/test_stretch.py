@@ -70,11 +70,14 @@ def test_axes_are_those_that_hinges_lie_along_and_slides_across(category: str, a
     assert stretchable(made(category, 0)) == axes
 
 
-def test_equal_drawers_become_unequal() -> None:
-    before = next(s for s in (made("drawer", seed) for seed in range(40)) if _equal_row(s))
+def test_equal_drawers_become_unequal_but_furniture_stays_the_same_from_either_end() -> None:
+    before = next(s for s in (made("drawer", seed) for seed in range(400)) if _equal_row(s) and len(s.box_size) > 3)
     after = [stretch(before, 500, np.random.default_rng(draw)) for draw in range(20)]
     ratios = [float(s.box_size[1:, 1].max() / s.box_size[1:, 1].min()) for s in after]
     assert 1.2 < np.median(ratios) < 3.0
+    for s in after:
+        widths = s.box_size[1:, 1][np.argsort(s.box_center[1:, 1])]
+        np.testing.assert_allclose(widths, widths[::-1], rtol=0.02)
 
 
 def _equal_row(sample: Sample) -> bool:
