@@ -19,7 +19,8 @@ from tqdm import tqdm
 from artperl.batch import Batch, concatenate
 from artperl.checkpoint import save_tensors
 from artperl.data import carry_on
-from artperl.estimator import Estimator, brought_to_rest
+from artperl.estimate import brought_to_rest
+from artperl.estimator import Estimator
 from artperl.evaluation import true_poses
 from artperl.evidence import Evidence
 from artperl.networks.boxes import Boxes, box_losses

@@ -17,7 +17,8 @@ from tqdm import tqdm
 
 from artperl import metrics
 from artperl.categories import Parts, objects_of
-from artperl.estimator import Calibration, Estimate, Estimator, brought_to_rest
+from artperl.estimate import Calibration, Estimate, brought_to_rest
+from artperl.estimator import Estimator
 from artsim.errors import ArtsimError
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.estimator import Estimate, Estimator
+from artperl.estimate import Estimate
+from artperl.estimator import Estimator
 from artperl.evaluation import compare, true_poses
 from artsim.camera import Camera
 from artsim.errors import ArtsimError

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artperl.estimator import Estimate
+from artperl.estimate import Estimate
 from artsim.view import PALETTE
 
 _MOST = 6000

@@ -31,7 +31,8 @@ from artperl.benchmarks.artimage import real_objects
 from artperl.benchmarks.rows import find_estimator
 from artperl.categories import ARTIMAGE, objects_of
 from artperl.data import Clouds
-from artperl.estimator import Estimate, Estimator
+from artperl.estimate import Estimate
+from artperl.estimator import Estimator
 from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
 from artperl.networks.perception import Perceived
 from artperl.pictures import overlays

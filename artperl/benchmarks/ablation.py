@@ -11,9 +11,11 @@ import torch
 from numpy.typing import ArrayLike
 
 from artperl.batch import concatenate
+from artperl.cleaning import clean, draw
 from artperl.data import Clouds
 from artperl.embedding import box_embedding
-from artperl.estimator import Estimate, Estimator, clean, draw
+from artperl.estimate import Estimate
+from artperl.estimator import Estimator
 from artperl.evaluation import evaluate, summary
 from artperl.networks.agent import Agent
 from artperl.pose import Theta, pose_parts

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from artperl.checkpoint import load_estimator
-from artperl.estimator import Estimate
+from artperl.estimate import Estimate
 from artperl.evaluation import frozen_samples, true_poses
 from artsim.sample import Sample
 from benchmarks.errors import BINS, Told, in_bins, moving_parts

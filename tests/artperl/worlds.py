@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import torch
 
 import artsim
-from artperl.data import Truth
+from artperl.data import Truth, to_batch, training_rows
 from artperl.embedding import by_boxes
-from artperl.networks.perception import Votes
+from artperl.networks.perception import Perceived, Perception, Votes
 from artperl.problems import Problem, Problems
 from artperl.retrieval import ShapeBase
 from artsim.objects import ArticulatedObject
@@ -51,3 +52,25 @@ def true_votes(truth: Truth) -> Votes:
         joint=truth.of_points(truth.joint),
         level_logits=20.0 * level.float(),
     )  # fmt: skip
+
+
+class Oracle(Perception):
+    """Knows every point of one sample, by the nearest of its true points."""
+
+    def __init__(self, sample: Sample, rows: int):
+        super().__init__(rows, width=16)
+        self.sample = sample
+
+    def forward(self, points: torch.Tensor) -> Perceived:
+        rows = training_rows(self.sample, 2048, self.num_rows)
+        clouds, truth = to_batch({k: torch.from_numpy(np.asarray(v)[None]) for k, v in rows.items()})
+        nearest = torch.cdist(points, clouds.points).argmin(-1)[0]
+        return Perceived(
+            20.0 * torch.nn.functional.one_hot(truth.part[:, nearest], self.num_rows).float(),
+            truth.canonical[:, nearest],
+            torch.full((1, points.shape[1]), -3.0),
+            2.0 * truth.part_valid.float() - 1.0,
+            truth.box_center,
+            truth.box_size,
+            truth.diagonal.log(),
+        )

@@ -1,0 +1,31 @@
+"""One laptop, seen once, and an estimator that knows each of its points."""
+
+from __future__ import annotations
+
+import pytest
+
+import artsim
+from artperl.embedding import by_boxes
+from artperl.estimator import Estimator
+from artperl.evaluation import (
+    frozen_samples,
+)
+from artperl.retrieval import ShapeBase
+from artsim.sample import Sample
+from tests.artperl.worlds import Oracle
+
+
+@pytest.fixture(scope="module")
+def sample() -> Sample:
+    (one,) = frozen_samples(["laptop"], 1, 1)
+    return one
+
+
+@pytest.fixture(scope="module")
+def base() -> ShapeBase:
+    return by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(8)], 128))
+
+
+@pytest.fixture(scope="module")
+def estimator(base: ShapeBase, sample: Sample) -> Estimator:
+    return Estimator(Oracle(sample, 2), base)

@@ -1,0 +1,42 @@
+"""Which points of a cloud show the object."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from artperl.cleaning import clean, draw
+
+
+def test_outliers_are_left_out_and_the_object_is_not() -> None:
+    rng = np.random.default_rng(0)
+    cloud = rng.uniform(size=(3000, 3)) * [1.0, 1.0, 0.01]
+    kept = clean(np.concatenate([cloud, rng.uniform(5.0, 50.0, size=(30, 3))]))
+    assert (kept < 3000).all()
+    assert len(kept) > 2990
+
+
+@pytest.mark.parametrize("away", [3.0, 1e3, 1e9, 1e300])
+@pytest.mark.parametrize(("together", "kept"), [(1, False), (3, False), (4, True), (9, True)])
+def test_points_belong_to_the_object_from_four_together_however_far_away(
+    away: float, together: int, kept: bool
+) -> None:
+    rng = np.random.default_rng(0)
+    blob = rng.random((3000, 3))
+    few = np.full((together, 3), away) + (rng.random((together, 3)) * 0.01 if away < 1e9 else 0.0)
+    found = clean(np.concatenate([few, blob]))
+    assert np.isin(np.arange(together), found).all() == np.isin(np.arange(together), found).any() == kept
+    assert len(found) >= 2990
+
+
+def test_a_thin_leg_of_a_few_points_is_no_outlier() -> None:
+    plate = np.random.default_rng(0).uniform(size=(2000, 3)) * [1.0, 1.0, 0.0]
+    leg = np.array([0.5, 0.5, -0.06]) * [[1.0, 1.0, n] for n in range(1, 7)]
+    assert len(clean(np.concatenate([plate, leg]))) == 2006
+
+
+def test_draws_take_every_point_before_any_twice() -> None:
+    rng = np.random.default_rng(0)
+    assert sorted(draw(10, 10, rng)) == list(range(10))
+    assert np.bincount(draw(10, 25, rng)).tolist().count(3) == 5
+    assert len(set(draw(100, 30, rng))) == 30
