@@ -10,6 +10,9 @@ from collections.abc import Iterator, Sequence
 from itertools import count, islice
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
 from artsim.objects import MAX_PARTS, ArticulatedObject
@@ -25,15 +28,34 @@ ARTIMAGE: dict[str, tuple[str, ...]] = {
 """Joints of the moving parts of each category of ArtImage."""
 
 Parts = Literal["artimage", "any"]
-"""artimage: objects with the joints that their category has in ArtImage (any, for other categories); any: all, with
-their parts in the order in which they are seen."""
+"""artimage: objects with the joints that their category has in ArtImage (any, for other categories), whose drawers open
+to the front; any: all, with their parts in the order in which they are seen."""
 
 _ATTEMPTS = 200
+_BACKWARDS = 0.5
+"""Sum of drawers' directions along x from which a table has its drawers at the back."""
 
 
-def has_parts(category: str, joint_types: Sequence[str], parts: Parts = "artimage") -> bool:
-    """Whether an object with these joints, the root's among them, is one to learn from and to be tested on."""
-    return parts == "any" or category not in ARTIMAGE or tuple(joint_types[1:]) == ARTIMAGE[category]
+def has_parts(category: str, joint_types: Sequence[str], joint_axes: ArrayLike, parts: Parts = "artimage") -> bool:
+    """Whether an object with these joints, the root's among them, is one to learn from and to be tested on.
+
+    Parameters
+    ----------
+    category : str
+    joint_types : sequence of str
+    joint_axes : (K, 3) float
+        Rest frame.
+    parts : Parts
+    """
+    if parts == "any" or category not in ARTIMAGE:
+        return True
+    return tuple(joint_types[1:]) == ARTIMAGE[category] and not opens_to_the_back(joint_types, joint_axes)
+
+
+def opens_to_the_back(joint_types: Sequence[str], joint_axes: ArrayLike) -> bool:
+    """Whether its drawers are at the back of its frame: such a table is another one's, seen from behind."""
+    slides = np.array(joint_types) == "prismatic"
+    return bool(np.asarray(joint_axes)[slides, 0].sum() > _BACKWARDS)
 
 
 def arranged(obj: ArticulatedObject, parts: Parts) -> ArticulatedObject:
@@ -72,7 +94,7 @@ def _objects(first: FamilySource, parts: Parts, max_parts: int) -> Iterator[Arti
             obj = FamilySource(first.category, seed).load()
         except AssetError:
             continue  # a rare fault of the family, which artsim's audit reports
-        if len(obj) <= max_parts and has_parts(first.category, obj.tree.types, parts):
+        if len(obj) <= max_parts and has_parts(first.category, obj.tree.types, obj.tree.axes, parts):
             missed = 0
             yield arranged(obj, parts)
         elif (missed := missed + 1) > _ATTEMPTS:

@@ -160,10 +160,10 @@ class Samples:
         elsewhere = len(self.stream.categories) << 32  # of the same category, and no run gets there
         for attempt in range(_ATTEMPTS):
             try:
-                joints = self.stream.object(n + attempt * elsewhere).tree.types
+                tree = self.stream.object(n + attempt * elsewhere).tree
             except AssetError:
                 continue
-            if len(joints) <= self.num_rows and has_parts(category, joints, self.parts):
+            if len(tree) <= self.num_rows and has_parts(category, tree.types, tree.axes, self.parts):
                 return n + attempt * elsewhere
         raise ConfigError(
             f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts, or other ones, or cannot be made",
@@ -248,7 +248,7 @@ class Recorded:
     def _is_right(self, sample: Sample) -> bool:
         few_enough = len(sample.joint_type) <= self.num_rows
         return sample.category in self.categories and few_enough and has_parts(
-            sample.category, sample.joint_type, self.parts
+            sample.category, sample.joint_type, sample.joint_axis, self.parts
         )  # fmt: skip
 
 

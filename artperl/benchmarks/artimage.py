@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from artperl.categories import ARTIMAGE, Parts, objects_of
+from artperl.categories import ARTIMAGE, Parts, objects_of, opens_to_the_back
 from artperl.evaluation import NUM_POINTS, TEST_SEEDS, samples_of
 from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
@@ -140,10 +140,10 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     category : str
         That the object is to have.
     """
-    slides = [joint for joint in obj.native_tree.joints if joint.type == "prismatic"]
-    if "prismatic" in joint_types and sum(joint.axis[0] for joint in slides) > 0.5:
-        obj = turned_round(obj)
     tree = obj.native_tree
+    if "prismatic" in joint_types and opens_to_the_back(tree.types, [joint.axis for joint in tree.joints]):
+        obj = turned_round(obj)
+        tree = obj.native_tree
     owner = list(range(len(tree)))
     for k in range(1, len(tree)):
         if tree.types[k] not in joint_types:

@@ -16,7 +16,7 @@ from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, vari
 from artperl.benchmarks.artimage import SPLIT, as_known, real_objects, reduced, row_samples, turned_round
 from artperl.benchmarks.basin import ANGLES, _apart, basin_problem, run_basin, turned
 from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
-from artperl.categories import ARTIMAGE, objects_of
+from artperl.categories import ARTIMAGE, has_parts, objects_of
 from artperl.checkpoint import save_estimator
 from artperl.estimator import Estimator
 from artperl.evaluation import TEST_SEEDS, frozen_samples, true_poses
@@ -25,8 +25,7 @@ from artperl.networks.perception import Perception
 from artperl.order import in_reading_order
 from artperl.search import EstimatorOptions
 from artsim.errors import AssetError
-from tests.artperl.test_estimator import Oracle
-from tests.artperl.worlds import small_base, small_problem
+from tests.artperl.worlds import Oracle, small_base, small_problem
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -82,6 +81,16 @@ def test_files_are_tested_as_an_estimator_knows_them() -> None:
         known = as_known(behind, categories, parts)
         assert known.tree.joints[1].axis[0] == 1.0
         assert known.tree.types == behind.tree.types
+
+
+def test_drawers_as_artimage_has_them_open_to_the_front() -> None:
+    tree = artsim.make("drawer", 1_509_110).tree  # a table with three drawers at the back
+    assert tree.axes[1:, 0].tolist() == [1.0, 1.0, 1.0]
+    assert not has_parts("drawer", tree.types, tree.axes)
+    assert has_parts("drawer", tree.types, -tree.axes)
+    assert has_parts("drawer", tree.types, tree.axes, "any")
+    (next_one,) = objects_of(["drawer"], 1, 1_509_110)
+    assert next_one.object_id != "1509110"
 
 
 def test_rows_are_always_the_same_and_large_enough() -> None:
