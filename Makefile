@@ -31,6 +31,7 @@ bench: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.inference
 	$(PY) -m benchmarks.retrieval
 	$(PY) -m benchmarks.errors
+	$(PY) -m benchmarks.legacy_iou
 	$(PY) -m benchmarks.joint
 	$(PY) -m benchmarks.robot_arm
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from artperl import metrics
 from artperl.boxes import intersection_volume
+from benchmarks.legacy_iou import FRAMES
 
 Box = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
@@ -136,6 +137,18 @@ def test_published_sampler_is_off_elsewhere_by_as_much_as_reported() -> None:
     legacy = metrics.iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     exact = metrics.iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     assert 0.02 < np.abs(legacy - exact).mean() < 0.3
+
+
+def test_published_sampler_depends_on_the_frame_and_the_exact_overlap_does_not() -> None:
+    # A temple, a fiftieth as wide as it is long, that is a quarter of its width off.
+    center, size, off = np.array([0.0, 0.33, 0.0]), np.array([0.6, 0.02, 0.07]), np.array([0.0, 0.005, 0.0])
+    legacy = []
+    for R in FRAMES.values():
+        boxes = R @ center, np.abs(R) @ size, R @ (center + off), np.abs(R) @ size
+        assert metrics.iou_rest_exact(*boxes) == pytest.approx(0.6, abs=1e-12)
+        legacy.append(float(metrics.iou_omad_legacy(*boxes)))
+    assert max(legacy) == 1.0
+    assert min(legacy) == 0.0
 
 
 @pytest.mark.parametrize("degrees", [0.0, 1e-6, 1e-3, 5.0, 90.0, 179.9, 180.0])
