@@ -162,7 +162,8 @@ def iou_omad_legacy(
     Boxes are compared in the rest frame, so that pose does not enter, by counting points of a regular grid that spans
     both. Of the eight corners that the published code writes down for a box, the last one takes its x from the least
     z; the edge along y that is measured to it is skewed, and a point p is inside when ``0 < e . p < e . e`` holds for
-    the three edges e. The value depends on where the frame's origin is.
+    the three edges e. The value depends on where the frame's origin is, and on which way its axes point: ArtImage's
+    frames have y up.
 
     Parameters
     ----------

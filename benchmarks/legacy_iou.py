@@ -76,11 +76,11 @@ def overlaps(estimator: Estimator, samples: list[Sample]) -> dict[str, list[floa
                 values.append(np.zeros(len(sample.box_size)))
             continue
         center = rest_centers(estimate.translation, estimate.size, estimate.T_camera_part)
-        boxes["exact at rest"].append(iou_rest_exact(center, estimate.size, sample.box_center, sample.box_size))
+        pairs = (center, estimate.size), (sample.box_center, sample.box_size)
+        boxes["exact at rest"].append(iou_rest_exact(*pairs[0], *pairs[1]))
         for name, R in FRAMES.items():
-            middles, sizes = (center, sample.box_center), (estimate.size, sample.box_size)
-            (own, true), (own_size, true_size) = [m @ R.T for m in middles], [s @ np.abs(R).T for s in sizes]
-            boxes[name].append(iou_omad_legacy(own, own_size, true, true_size))
+            own, true = ((c @ R.T, s @ np.abs(R).T) for c, s in pairs)
+            boxes[name].append(iou_omad_legacy(*own, *true))
     return {name: np.mean(values, axis=0).round(4).tolist() for name, values in boxes.items()}
 
 

@@ -7,9 +7,7 @@ import pytest
 import artsim
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator
-from artperl.evaluation import (
-    frozen_samples,
-)
+from artperl.evaluation import frozen_samples
 from artperl.retrieval import ShapeBase
 from artsim.sample import Sample
 from tests.artperl.worlds import Oracle

@@ -20,12 +20,7 @@ from artperl.data import Clouds, to_batch, training_rows
 from artperl.embedding import by_boxes
 from artperl.estimate import Calibration
 from artperl.estimator import Estimator
-from artperl.evaluation import (
-    TEST_SEEDS,
-    frozen_samples,
-    score,
-    true_poses,
-)
+from artperl.evaluation import TEST_SEEDS, frozen_samples, score, true_poses
 from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception, Votes
 from artperl.pose import Theta
