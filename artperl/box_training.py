@@ -14,7 +14,6 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
-from tqdm import tqdm
 
 from artperl.batch import Batch, concatenate
 from artperl.checkpoint import save_tensors
@@ -25,6 +24,7 @@ from artperl.evaluation import true_poses
 from artperl.evidence import Evidence
 from artperl.networks.boxes import Boxes, box_losses
 from artperl.steps import Stop, one_cycle, set_rate
+from artsim.progress import track
 from artsim.sample import Sample
 
 _SAVE_VIEWS = 200
@@ -79,7 +79,7 @@ def record(
         When a stop is asked for, and what there is has been written down.
     """
     first, records = _load(file) if file.exists() else (0, [])
-    bar = tqdm(total=views, initial=first, desc="boxes", disable=not progress, smoothing=0.02)
+    bar = track("boxes", total=views, initial=first, unit="view", smoothing=0.02, shown=progress)
     loader = DataLoader(
         _Examined(estimator, samples), batch_size=None, sampler=range(first, views),
         num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=carry_on,
@@ -101,7 +101,7 @@ def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, pr
     torch.manual_seed(seed)
     boxes = Boxes(num_rows, width).to(records.center.device)
     optimizer = torch.optim.AdamW(boxes.parameters(), weight_decay=_DECAY)
-    bar = tqdm(range(steps), "moving faces", disable=not progress, smoothing=0.02)
+    bar = track("moving faces", range(steps), smoothing=0.02, shown=progress)
     for step in bar:
         set_rate(optimizer, _RATE * one_cycle(step, steps))
         batch = records[torch.randint(len(records), (_BATCH,))]

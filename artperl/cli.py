@@ -16,6 +16,7 @@ from artsim.cli import run_program
 from artsim.errors import ConfigError
 from artsim.files import atomic_file, write_atomic
 from artsim.plan import SampleOptions
+from artsim.progress import say
 from artsim.sampling import ViewOptions, ViewPreset
 
 _FILE_VIEWS = 40
@@ -141,7 +142,7 @@ class Train:
         )  # fmt: skip
         name = "-".join(category) or self.files[0].stem
         out = self.out or Path("out/train") / f"{name}-{self.preset}"
-        training = Training(options, out, self.workers, progress=sys.stderr.isatty())
+        training = Training(options, out, self.workers)
         try:
             training.run()
         except KeyboardInterrupt:
@@ -218,7 +219,7 @@ class Evaluate:
             print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
         return run_rows(
             rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
-            self.views or VIEWS, self.num_points, sys.stderr.isatty(), lambda line: print(line, flush=True),
+            self.views or VIEWS, self.num_points, True, say,
             self.seen_from,
         )  # fmt: skip
 
@@ -247,12 +248,11 @@ class Evaluate:
             from artperl.benchmarks.basin import basin_problem, run_basin
 
             agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
-            say = lambda line: print(line, flush=True)  # noqa: E731
-            result = run_ablation(variants(estimator, *agents), samples, say, sys.stderr.isatty())
+            result = run_ablation(variants(estimator, *agents), samples, say, True)
             if estimator.agent is not None and not self.files:
                 result["start"] = run_basin(estimator, basin_problem(estimator, categories, parts), say)
             return result
-        figures = summary(evaluate(estimator, samples, progress=sys.stderr.isatty()))
+        figures = summary(evaluate(estimator, samples, progress=True))
         print(table(figures))
         return figures
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment, minimize
-from tqdm import tqdm
 
 from artperl import metrics
 from artperl.categories import Parts, objects_of
@@ -22,6 +21,7 @@ from artperl.estimator import Estimator
 from artsim.errors import ArtsimError
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
+from artsim.progress import track
 from artsim.renderers import make_renderer
 from artsim.sample import Sample
 
@@ -128,7 +128,8 @@ def samples_of(
 
 def evaluate(estimator: Estimator, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
     """Score an estimator on samples, one at a time."""
-    return [score(estimator, sample) for sample in tqdm(samples, "evaluating", disable=not progress, leave=False)]
+    views = track("evaluating", samples, unit="view", leave=False, shown=progress)
+    return [score(estimator, sample) for sample in views]
 
 
 def mistake(estimator: Estimator, samples: Iterable[Sample]) -> list[Scored]:

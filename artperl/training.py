@@ -25,7 +25,6 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
-from tqdm import tqdm
 
 from artperl.benchmarks.artimage import real_train_objects
 from artperl.box_training import learn, record
@@ -65,6 +64,7 @@ from artsim.families import FAMILIES
 from artsim.files import write_atomic
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions
+from artsim.progress import say, track
 from artsim.sample import Sample
 from artsim.sources import find_sources
 
@@ -205,7 +205,7 @@ class Training:
             options.categories, self.perception.num_rows, num_points, batch_size, first, seed, self.workers,
             options.sample, options.parts, self.given, options.dataset, options.stretched, options.noisy,
         )  # fmt: skip
-        bar = tqdm(total=total, initial=first, desc="perception", disable=not self.progress, smoothing=0.02)
+        bar = track("perception", total=total, initial=first, smoothing=0.02, shown=self.progress)
         for step in range(first, total):
             clouds, truth = next(data)
             clouds, truth = clouds.to(self.device), truth.to(self.device)
@@ -243,7 +243,7 @@ class Training:
             given=self.given, views_per_object=_VIEWS, references=options.references,
             dataset=options.dataset,
         )  # fmt: skip
-        bar = tqdm(total=total, initial=first, desc="agent", disable=not self.progress, smoothing=0.1)
+        bar = track("agent", total=total, initial=first, smoothing=0.1, shown=self.progress)
         for n in range(first, total):
             generator = torch.Generator(self.device).manual_seed((options.seed << 32) + n)
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
@@ -284,7 +284,7 @@ class Training:
         self._stop_if(stop)
         self.done["boxes"] = options.box_views
         if learnt is None:
-            tqdm.write("boxes: no estimate fits its view; they stay as they are")
+            say("boxes: no estimate fits its view; they stay as they are")
         else:
             self._choose_boxes(best, learner, learnt.half().float(), board)  # as precise as files are
         self._save()
@@ -324,7 +324,7 @@ class Training:
         if mean_iou(after) > mean_iou(before):
             save_estimator(replace(best, boxes=boxes), self.out / "best", self._about({"validation": figures}))
         _write(board, "validation", _curves(figures), sum(self.done.values()))
-        tqdm.write(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
+        say(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
 
     def _stop_if(self, stop: Stop) -> None:
         if stop.asked:
@@ -347,7 +347,7 @@ class Training:
             best.options = replace(best.options, retry_residual=retry_residual(scored))
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()
-        tqdm.write(f"after {self.done}: score {score:.2f}\n{table(figures)}")
+        say(f"after {self.done}: score {score:.2f}\n{table(figures)}")
         sys.stdout.flush()
 
     def _foreign(self) -> list[Sample]:
@@ -385,7 +385,7 @@ class Training:
         try:
             write_report(self.out, best, samples, scored, table(figures))
         except ArtsimError as error:  # without matplotlib there are no pictures
-            tqdm.write(f"no report: {error}")
+            say(f"no report: {error}")
         return figures
 
     def _about(self, figures: dict[str, Any]) -> dict[str, Any]:

@@ -18,8 +18,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError, KinematicsError
 from artsim.files import write_atomic, write_error
 from artsim.plan import (
@@ -31,6 +29,7 @@ from artsim.plan import (
     check_shares,
     unique_keys,
 )
+from artsim.progress import track
 from artsim.sources import Source
 from artsim.team import Team, locked
 from artsim.worker import CompiledSource, compile_source, make_shard
@@ -215,7 +214,7 @@ def _new_plan(
     repeated: list[dict[str, str]] = []
     left_out: list[dict[str, str]] = []
     futures = [team.submit(compile_source, source, f"_staged_{i}.npz") for i, source in enumerate(sources)]
-    with tqdm(total=len(sources), desc="objects", unit="object", disable=not progress) as bar:
+    with track("objects", total=len(sources), unit="object", shown=progress) as bar:
         for source, future in zip(sources, futures, strict=True):
             entry = {"source": source.name, "source_sha256": source.sha256}
             try:
@@ -296,7 +295,7 @@ def _make_missing(
     made: dict[str, ShardRecord] = {}
     waiting = iter(missing)
     pending: set[Future[ShardRecord | None]] = set()
-    with tqdm(total=plan.num_samples, initial=before, desc="samples", unit="sample", disable=not progress) as bar:
+    with track("samples", total=plan.num_samples, initial=before, unit="sample", shown=progress) as bar:
         while len(made) < len(missing):
             pending |= {team.submit(make_shard, s) for s in itertools.islice(waiting, 2 * team.workers - len(pending))}
             done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)

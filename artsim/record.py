@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError, DatasetError
@@ -24,6 +23,7 @@ from artsim.files import write_atomic, write_error
 from artsim.kinematics import Array, invert_transform, transform_points
 from artsim.object_file import load_object, save_object
 from artsim.objects import ArticulatedObject
+from artsim.progress import track
 from artsim.sample import Sample
 from artsim.sampling import joint_intervals
 from artsim.shards import ShardReader, sample_key, write_shard
@@ -135,7 +135,7 @@ def record(
         raise write_error(error, folder) from error
     described = [
         _record_one(folder, episode, frames, seed, number)
-        for number in tqdm(range(motions), desc="motions", unit="motion", disable=not progress)
+        for number in track("motions", range(motions), unit="motion", shown=progress)
     ]
     episode.close()
     description = {

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tqdm import tqdm
 
 from artsim.camera import Camera
 from artsim.dataset import Dataset
@@ -18,6 +17,7 @@ from artsim.files import file_sha256
 from artsim.kinematics import Array, invert_transform, transform_points
 from artsim.objects import ArticulatedObject
 from artsim.plan import Plan, ShardRecord
+from artsim.progress import track
 from artsim.renderers.raycast import cast, pose
 from artsim.sample import Sample
 from artsim.sampling import Scale
@@ -62,7 +62,7 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
     dataset = Dataset(folder)
     problems = [*_listing_problems(dataset), *_object_problems(dataset)]
     unusable = {problem.where for problem in problems}
-    with tqdm(total=len(dataset), desc="verify", unit="sample", disable=not progress) as bar:
+    with track("verify", total=len(dataset), unit="sample", shown=progress) as bar:
         for shard in dataset.shards:
             problems += _shard_problems(dataset, shard, unusable)
             bar.update(shard.end - shard.first)

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from artsim import make_renderer
 from artsim.errors import RenderError
 from artsim.families import FAMILIES
 from artsim.objects import ArticulatedObject
+from artsim.progress import track
 from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.sources import Source, family_sources, find_sources
@@ -156,7 +156,7 @@ def main(options: Options) -> None:
             result[name] = None
             continue
         rows, total = [], Agreement()
-        for number, source in enumerate(tqdm(sources, desc=name, leave=False)):
+        for number, source in enumerate(track(name, sources, unit="object", leave=False)):
             one = compare(draw_scenes(source.load(), options.states, options.views, seed=number), renderer)
             rows.append((source.name, one))
             total.merge(one)

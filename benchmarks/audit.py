@@ -24,7 +24,6 @@ from typing import TypeVar
 import numpy as np
 import tyro
 from scipy.spatial import cKDTree
-from tqdm import tqdm
 
 from artsim import make
 from artsim.errors import ArtsimError
@@ -32,6 +31,7 @@ from artsim.export import export
 from artsim.families import FAMILIES
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
+from artsim.progress import track
 from artsim.sources import FamilySource, FileSource, Source, find_sources
 from artsim.validity import check_file
 
@@ -90,7 +90,7 @@ def main(options: Options) -> None:
 
 
 def _bar(items: Iterable[T], name: str, total: int) -> Iterable[T]:
-    return tqdm(items, desc=name, total=total, leave=False)
+    return track(name, items, total=total, unit="object", leave=False)
 
 
 GATES = ("strict URDF", "kinematics", "inertia", "collision free", "joined parts apart", "watertight",

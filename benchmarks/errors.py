@@ -24,7 +24,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from tqdm import tqdm
 
 from artperl import metrics
 from artperl.benchmarks.artimage import real_objects
@@ -40,6 +39,7 @@ from artperl.search import Clock
 from artsim.errors import ConfigError
 from artsim.files import atomic_file, write_atomic
 from artsim.objects import ArticulatedObject
+from artsim.progress import track
 from artsim.sample import Sample
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ def main(options: Options) -> None:
         estimator, objects = find_estimator(options.weights, category), objects_to_test(category, options)
         rows, roots, faces, fit = [], [], [], []
         samples = samples_of(objects, options.views, None, VALIDATION_SEEDS)
-        for sample in tqdm(samples, category, disable=None, leave=False):
+        for sample in track(category, samples, unit="view", leave=False):
             asked = Told(**vars(estimator), sample=sample) if options.true_labels else estimator
             estimate = asked(sample.points)
             own = moving_parts(estimate, sample) if len(estimate.size) == len(sample.box_size) else []

@@ -22,13 +22,13 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from tqdm import tqdm
 
 from artsim import Camera, StateOptions, ViewOptions, generate, load, make_renderer, observe, sample_state, sample_view
 from artsim.kinematics import Array
 from artsim.object_file import ObjectCache, save_object
 from artsim.objects import ArticulatedObject
 from artsim.plan import SampleOptions, draw_sample
+from artsim.progress import track
 from artsim.renderers.raycast import cast, pose
 from artsim.sample import draw_visible
 from artsim.sources import find_sources
@@ -78,7 +78,7 @@ def seconds_each(name: str, work: Callable[[Scene], object], scenes: list[Scene]
     for obj in dict.fromkeys(scene[0] for scene in scenes):
         work(next(scene for scene in scenes if scene[0] is obj))
     start = time.process_time()
-    for scene in tqdm(scenes, desc=name, leave=False):
+    for scene in track(name, scenes, leave=False):
         work(scene)
     return (time.process_time() - start) / len(scenes)
 
@@ -189,7 +189,7 @@ def worker_memory(options: Options) -> dict[str, float]:
 
 def _watch_memory(folder: Path, keys: list[str], samples: int) -> tuple[float, float, float]:
     cache, renderer, early = ObjectCache(folder), make_renderer("raycast"), 0.0
-    for i in tqdm(range(samples), desc="memory", leave=False):
+    for i in track("memory", range(samples), leave=False):
         # As a plan does: a few objects take turns for a while, then the next few.
         group, slot = divmod(i, 256)
         obj = cache[keys[(group * 16 + slot % 16) % len(keys)]]

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 import tyro
 from lxml import etree
-from tqdm import tqdm
 
 from artsim import load
 from artsim.kinematics import Array, invert_transform
 from artsim.objects import ArticulatedObject
+from artsim.progress import track
 from artsim.renderers.bullet import import_pybullet, silent
 from artsim.sampling import StateOptions, sample_state
 from artsim.simulators import LinkPoses, poses_in_file
@@ -85,7 +85,7 @@ def compare(files: Sequence[Path], states: int) -> tuple[dict[str, Comparison], 
     oracles = {"pybullet": pybullet_poses, "yourdfpy": poses_in_file}
     result = {name: Comparison() for name in oracles}
     failed = []
-    for file in tqdm(files, desc="objects"):
+    for file in track("objects", files, unit="object"):
         try:
             obj = load(file)
         except Exception as error:  # any failure of the loader is a finding

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from tqdm import tqdm
 
 from artperl.benchmarks.artimage import OBJECTS, Row, row_samples
 from artperl.benchmarks.rows import PUBLISHED, find_estimator
@@ -25,6 +24,7 @@ from artperl.categories import ARTIMAGE
 from artperl.estimator import Estimator
 from artperl.evaluation import rest_centers
 from artperl.metrics import iou_omad_legacy, iou_rest_exact
+from artsim.progress import track
 from artsim.sample import Sample
 
 FRAMES = {
@@ -69,7 +69,7 @@ def main(options: Options) -> None:
 def overlaps(estimator: Estimator, samples: list[Sample]) -> dict[str, list[float]]:
     """Mean of each part by definition; estimates with other parts count as 0."""
     boxes: dict[str, list[np.ndarray]] = {name: [] for name in ("exact at rest", *FRAMES)}
-    for sample in tqdm(samples, disable=None, leave=False):
+    for sample in track("estimating", samples, unit="view", leave=False):
         estimate = estimator(sample.points)
         if len(estimate.size) != len(sample.box_size):
             for values in boxes.values():

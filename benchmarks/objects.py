@@ -13,10 +13,10 @@ import time
 from dataclasses import dataclass, field
 
 import tyro
-from tqdm import tqdm
 
 from artsim import make
 from artsim.families import FAMILIES
+from artsim.progress import say, track
 from artsim.validity import check
 
 
@@ -36,7 +36,7 @@ def main(options: Options) -> None:
     print(f"{'category':20s}{'objects/s':>12s}{'with gates/s':>14s}{'parts':>8s}{'triangles':>11s}{'pieces':>8s}")
     table: dict[str, dict[str, float]] = {}
     total_make = total_check = 0.0
-    for category in tqdm(options.categories, leave=False):
+    for category in track("objects", options.categories, unit="category", leave=False):
         made, checked = measure(category, options.objects)
         objects = [make(category, seed) for seed in range(5)]
         rates = options.objects / made, options.objects / (made + checked)
@@ -44,7 +44,7 @@ def main(options: Options) -> None:
         parts = sum(map(len, objects)) / len(objects)
         triangles = sum(obj.num_faces for obj in objects) / len(objects)
         pieces = sum(len(p.body.pieces) for obj in objects for p in obj.parts if p.body) / len(objects)
-        tqdm.write(f"{category:20s}{rates[0]:12.1f}{rates[1]:14.1f}{parts:8.1f}{triangles:11.0f}{pieces:8.0f}")
+        say(f"{category:20s}{rates[0]:12.1f}{rates[1]:14.1f}{parts:8.1f}{triangles:11.0f}{pieces:8.0f}")
         total_make, total_check = total_make + made, total_check + checked
     count = options.objects * len(options.categories)
     result = {

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 import tyro
-from tqdm import tqdm
 
 from artsim import make
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES
 from artsim.kinematics import Array
+from artsim.progress import track
 from artsim.realism import (
     MEASURES,
     REAL,
@@ -100,7 +100,7 @@ def compare(
     batch = 10
     starts = range(0, objects, batch)
     tasks = [(category, range(s, min(s + batch, objects)), list(real.values())) for s in starts]
-    rows = tqdm(pool.map(_to_real, tasks), desc=category, total=len(tasks), leave=False)
+    rows = track(category, pool.map(_to_real, tasks), total=len(tasks), leave=False)
     return list(real), Realism(np.concatenate(list(rows)), between(yardstick))
 
 

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from tqdm import tqdm
 
 from artsim import Camera, make_renderer
 from artsim.doctor import Finding, examine
+from artsim.progress import track
 from artsim.renderers import RENDERERS, Renderer
 from benchmarks.agreement import choose, choose_procedural, draw_scenes
 from benchmarks.batches import measure_batches
@@ -85,7 +85,7 @@ def main(options: Options) -> None:
 def _rates(name: str, per_object: Sequence[Sequence[Scene]]) -> dict[str, float]:
     renderer = make_renderer(name)
     total = dict.fromkeys(_SIZES, (0, 0.0))
-    for scenes in tqdm(per_object, desc=name, leave=False):
+    for scenes in track(name, per_object, unit="object", leave=False):
         for size in _SIZES:
             frames, seconds = measure(renderer, sized(scenes, size))
             total[size] = total[size][0] + frames, total[size][1] + seconds

@@ -16,7 +16,6 @@ import numpy as np
 import torch
 import tyro
 from torch import Tensor
-from tqdm import trange
 
 from artperl.benchmarks.artimage import row_samples
 from artperl.benchmarks.rows import find_estimator
@@ -29,6 +28,7 @@ from artperl.networks.siamese import Siamese, contrastive_loss
 from artperl.shapes import Shapes
 from artperl.steps import one_cycle, set_rate
 from artsim.plan import SampleOptions
+from artsim.progress import track
 
 POINTS = 512
 VIEWS = 4
@@ -72,7 +72,7 @@ def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
     optimizer = torch.optim.AdamW(network.parameters(), weight_decay=1e-2)
     samples = Samples([category], SampleOptions(num_points=POINTS), 5, VIEWS, rows)
     generator = torch.Generator().manual_seed(0)
-    for step in trange(steps, desc=category, disable=None, leave=False):
+    for step in track(category, range(steps), leave=False):
         numbers = range(step * BATCH, (step + 1) * BATCH)
         batch = [samples[i] for i in numbers]
         objects = [samples.object(i).with_diagonal(1.0) for i in numbers[::VIEWS]]

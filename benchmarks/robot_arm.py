@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -68,7 +67,7 @@ def main(options: Options) -> None:
         PRESETS["joint"], categories=(), files=(str(arm),), parts="any", start_from=str(options.start_from),
         perception_steps=options.perception_steps, agent_rollouts=0, test_objects=40, sample=sample,
     )  # fmt: skip
-    training = Training(learning, options.out / "run", progress=sys.stderr.isatty())
+    training = Training(learning, options.out / "run")
     training.run()
     estimator = load_estimator(options.out / "run" / "best")
     samples = samples_of([load(arm)], options.views, sample)
@@ -76,7 +75,7 @@ def main(options: Options) -> None:
     table = variants(estimator) | {"no beam search": without_beam}
     result: dict[str, Any] = {}
     for name in _VARIANTS:
-        (result[name],) = summary(evaluate(table[name], samples, sys.stderr.isatty())).values()
+        (result[name],) = summary(evaluate(table[name], samples, progress=True)).values()
         parts = result[name]["parts"]
         diagonal = float(samples[0].diagonal)
         rotation = [(part["rotation_deg"]["median"], part["rotation_deg"]["mean"]) for part in parts]

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from tqdm import tqdm
 
 from artsim import make
 from artsim.export import export
 from artsim.families import FAMILIES
+from artsim.progress import say, track
 from artsim.simulators import AGREEMENT, Agreement, compare_simulators
 
 
@@ -37,14 +37,14 @@ def main(options: Options) -> None:
     """Print a table, what differs, and the JSON line."""
     found: dict[str, list[Agreement]] = defaultdict(list)
     categories = sorted(FAMILIES)
-    for i in tqdm(range(options.objects), leave=False):
+    for i in track("simulating", range(options.objects), unit="object", leave=False):
         category, seed = categories[i % len(categories)], options.first_seed + i // len(categories)
         with tempfile.TemporaryDirectory() as folder:
             export(make(category, seed), Path(folder))
             for agreement in compare_simulators(folder, options.states):
                 found[agreement.simulator].append(agreement)
                 if agreement.problem:
-                    tqdm.write(f"{category}:{seed} in {agreement.simulator}: {agreement.problem}")
+                    say(f"{category}:{seed} in {agreement.simulator}: {agreement.problem}")
     print(
         f"{options.objects} objects of {len(categories)} categories, {options.states} states; equal: counts the same,"
     )

@@ -20,12 +20,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
 from artsim.files import write_atomic, write_error
+from artsim.progress import track
 from artsim.team import Team, locked
 
 INDEX = "index.csv"
@@ -91,7 +90,7 @@ def generate_objects(
         found = {key: meta for key in wanted if (meta := _whole(_folder(folder, *key), formats)) is not None}
         missing = [key for key in wanted if key not in found]
         with (
-            tqdm(total=len(wanted), initial=len(found), desc="objects", unit="object", disable=not progress) as bar,
+            track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
             Team(folder, workers) as team,
         ):
             waiting = iter(missing)

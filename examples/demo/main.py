@@ -51,7 +51,7 @@ def main(out: Path) -> None:
     sheet, recording = view_path(made.folder, rerun=made.folder / "recording.rrd")
 
     # 6. ArtPERL: learn the poses of a laptop's parts from fresh objects, and test on unseen ones.
-    training = Training(PRESETS["quick"], out / "training", progress=sys.stderr.isatty())
+    training = Training(PRESETS["quick"], out / "training")
     print("\nlearning the poses of a laptop's parts, a few minutes ...", flush=True)
     training.run()
     print((training.out / "table.txt").read_text())

@@ -1,0 +1,99 @@
+"""Progress of long work: a bar where somebody watches, a line now and then where a log is kept."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Sized
+from time import monotonic
+from types import TracebackType
+from typing import Any, TypeAlias
+
+from tqdm import tqdm
+
+EVERY = 60.0
+"""Seconds between two lines of a log."""
+
+
+class Lines:
+    """As much of a tqdm bar as is used here, for a log: a line a minute on standard error, none of shorter work."""
+
+    def __init__(self, description: str, items: Iterable[Any] | None, total: int | None, initial: int, unit: str):
+        self.n: float = initial
+        self._items, self._postfix, self._said = items, "", False
+        self._start = self._last = monotonic()
+        self._shape = {"total": total, "initial": initial, "prefix": description, "unit": unit, "ncols": 0}
+
+    def __iter__(self) -> Iterator[Any]:
+        for item in self._items or ():
+            yield item
+            self.update()
+        self.close()
+
+    def __enter__(self) -> Lines:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def set_postfix_str(self, text: str) -> None:
+        """What the next line ends with."""
+        self._postfix = text
+
+    def update(self, n: float = 1) -> None:
+        """So much more is done."""
+        self.n += n
+        if monotonic() >= self._last + EVERY:
+            self._say()
+
+    def close(self) -> None:
+        """Say how far it came, if lines were said before."""
+        if self._said:
+            self._say()
+            self._said = False
+
+    def _say(self) -> None:
+        self._last, self._said = monotonic(), True
+        elapsed = self._last - self._start
+        line = tqdm.format_meter(n=self.n, elapsed=elapsed, postfix=self._postfix or None, **self._shape)
+        print(line.strip(), file=sys.stderr, flush=True)
+
+
+Progress: TypeAlias = "tqdm[Any] | Lines"
+
+
+def track(
+    description: str, items: Iterable[Any] | None = None, *, total: int | None = None, initial: int = 0,
+    unit: str = "it", smoothing: float = 0.3, leave: bool = True, shown: bool = True,
+) -> Progress:  # fmt: skip
+    """A bar on a terminal and in a notebook, lines elsewhere.
+
+    Parameters
+    ----------
+    description : str
+        What is done.
+    items : iterable, optional
+        What to go through; without, ``update`` says how much is done.
+    total, initial : int
+        How much there is to do, by default the number of items; how much was done before.
+    unit : str
+        What is counted.
+    smoothing : float
+        Of the rate on a bar: 0 is the mean so far, 1 that of the last step.
+    leave : bool
+        Whether a bar stays when all is done.
+    shown : bool
+        False says nothing anywhere.
+    """
+    if shown and not (sys.stderr.isatty() or "ipykernel" in sys.modules):
+        if total is None and isinstance(items, Sized):
+            total = len(items)
+        return Lines(description, items, total, initial, unit)
+    return tqdm(
+        items, description, total, initial=initial, unit=unit, smoothing=smoothing, leave=leave, disable=not shown
+    )
+
+
+def say(text: str) -> None:
+    """Print something at once, above the bars that there are."""
+    tqdm.write(text)
+    sys.stdout.flush()
