@@ -17,7 +17,7 @@ from artsim.errors import ConfigError
 from artsim.files import atomic_file, write_atomic
 from artsim.plan import SampleOptions
 from artsim.progress import say
-from artsim.sampling import ViewOptions, ViewPreset
+from artsim.sampling import StateMode, StateOptions, ViewOptions, ViewPreset
 
 _FILE_VIEWS = 40
 """Views of files, at least, that an estimator is tested with."""
@@ -81,6 +81,9 @@ class Train:
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
+    states: StateMode = "uniform"
+    """In which states objects are learnt and tested: anywhere within their limits; at rest; at the ends; or mixed,
+    every other object anywhere, the others at rest or at the ends, as things at home mostly are."""
     views: ViewPreset = "artimage"
     """From where objects are seen: from the front, as in ArtImage, from all round, or half of them each way."""
     device: Literal["cpu", "cuda"] | None = None
@@ -125,7 +128,9 @@ class Train:
             dataset=None if self.dataset is None else str(self.dataset),
             start_from=None if self.start_from is None else str(self.start_from),
             test_objects=max(preset.test_objects, _FILE_VIEWS) if self.files else preset.test_objects,
-            sample=SampleOptions(noise=self.noise, views=ViewOptions(preset=self.views)),
+            sample=SampleOptions(
+                states=StateOptions(self.states), noise=self.noise, views=ViewOptions(preset=self.views)
+            ),
             perception_steps=preset.perception_steps if steps is None else steps,
             dense_steps=preset.dense_steps if self.dense_steps is None else self.dense_steps,
             denser=preset.denser if self.denser is None else self.denser,
@@ -187,6 +192,9 @@ class Evaluate:
     front."""
     views: int | None = None
     """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
+    states: StateMode = "uniform"
+    """In which states objects are: anywhere within their limits, at rest (shut, but for eyeglasses), at the ends, or
+    mixed. A benchmark has them anywhere."""
     preset: ViewPreset = "artimage"
     """From where objects are seen."""
     seen_from: tuple[float, float] | None = None
@@ -233,7 +241,9 @@ class Evaluate:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
         estimator = load_estimator(self.estimator, seen_from=self.seen_from)
         learnt = read_settings(folder_of(self.estimator))["about"]["options"]
-        options = SampleOptions(self.num_points, views=ViewOptions(preset=self.preset), noise=self.noise)
+        options = SampleOptions(
+            self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
+        )
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:

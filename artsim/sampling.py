@@ -20,12 +20,16 @@ ViewSampler = Callable[[np.random.Generator, ArticulatedObject, Array], Camera]
 """Draws a camera for an object (in its rest frame, which is the world) in joint state q."""
 
 
+StateMode = Literal["uniform", "rest", "limits", "mixed"]
+
+
 @dataclass(frozen=True)
 class StateOptions:
     """How joint states are drawn. A continuous joint counts as limited to half a turn either way."""
 
-    mode: Literal["uniform", "rest", "limits"] = "uniform"
-    """uniform: anywhere within the limits; rest: the rest state; limits: one end or the other."""
+    mode: StateMode = "uniform"
+    """uniform: anywhere within the limits; rest: the rest state; limits: each joint at one end or the other; mixed:
+    each object in one of these ways by chance, every other one anywhere, a quarter at rest."""
     fraction_open: tuple[float, float] | None = None
     """Instead of the mode: open each joint by a fraction, drawn from this range, of the way from its rest state to its
     farther limit (0 = at rest, 1 = fully open)."""
@@ -141,6 +145,10 @@ def states_at(obj: ArticulatedObject, options: StateOptions, draw: Array) -> Arr
         q = np.broadcast_to(tree.rest, draw.shape).copy()
     elif options.mode == "limits":
         q = np.where(draw < 0.5, low, high)
+    elif options.mode == "mixed":
+        kind = draw[..., :1]  # the root has no joint to draw a state for
+        anywhere, at_end = low + draw * (high - low), np.where(draw < 0.5, low, high)
+        q = np.where(kind < 0.5, anywhere, np.where(kind < 0.75, tree.rest, at_end))
     else:
         q = low + draw * (high - low)
     for pattern, bounds in options.joint_range.items():

@@ -148,6 +148,21 @@ def test_state_options_do_what_they_say() -> None:
     assert -0.2 <= min(ranged) <= max(ranged) <= upper
 
 
+def test_mixed_states_are_anywhere_at_rest_or_at_the_ends() -> None:
+    obj, rng = artsim.load(ASSETS / "cabinet"), np.random.default_rng(0)
+    drawn = np.stack([sample_state(obj, StateOptions(mode="mixed"), rng) for _ in range(2000)])[:, 1:]
+    low, high = joint_intervals(obj)[1:].T
+    resting, rest = (drawn == obj.tree.rest[1:]).all(1), obj.tree.rest[1:]
+    at_ends = ((drawn == low) | (drawn == high)).all(1)
+    both = 0.5 ** (high > low).sum() * ((rest == low) | (rest == high)).all()  # ends that happen to be the rest state
+    assert resting.mean() == pytest.approx(0.25 * (1.0 + both), abs=0.03)
+    assert at_ends.mean() == pytest.approx(0.5 if both else 0.25, abs=0.03)
+    anywhere = drawn[~resting & ~at_ends]
+    assert len(anywhere) == pytest.approx(1000, abs=60)
+    assert np.allclose(anywhere.mean(axis=0), (low + high) / 2, atol=0.03 * (high - low))
+    assert np.allclose(anywhere.std(axis=0), (high - low) / np.sqrt(12), rtol=0.08)
+
+
 @pytest.mark.parametrize("preset", ["artimage", "sphere", "mixed"])
 def test_views_see_the_whole_object_from_the_preset_directions(preset: ViewPreset) -> None:
     obj = artsim.load(ASSETS / "dishwasher")
