@@ -217,6 +217,11 @@ class Evaluate:
         from artperl.benchmarks.rows import run_rows
         from artperl.categories import ARTIMAGE
 
+        if (self.states, self.preset, self.noise) != ("uniform", "artimage", "none"):
+            raise ConfigError(
+                "a benchmark has states, viewpoints and noise of its own", "states, preset, noise",
+                "leave them out, or name an estimator instead of the benchmark",
+            )  # fmt: skip
         rows = self.rows or tuple(
             row
             for row in ROWS
@@ -227,8 +232,7 @@ class Evaluate:
             print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
         return run_rows(
             rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
-            self.views or VIEWS, self.num_points, True, say,
-            self.seen_from,
+            self.views or VIEWS, self.num_points, True, say, self.seen_from,
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:

@@ -13,7 +13,6 @@ steps taken have to be kept.
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -348,7 +347,6 @@ class Training:
             save_estimator(best, self.out / "best", self._about({"validation": figures}))
         self._save()
         say(f"after {self.done}: score {score:.2f}\n{table(figures)}")
-        sys.stdout.flush()
 
     def _foreign(self) -> list[Sample]:
         """Objects of other categories, by which confidence is calibrated, too."""

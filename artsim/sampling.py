@@ -141,22 +141,27 @@ def states_at(obj: ArticulatedObject, options: StateOptions, draw: Array) -> Arr
         far = np.where(high - tree.rest >= tree.rest - low, high, low)
         start, end = options.fraction_open
         q = tree.rest + (start + draw * (end - start)) * (far - tree.rest)
-    elif options.mode == "rest":
-        q = np.broadcast_to(tree.rest, draw.shape).copy()
-    elif options.mode == "limits":
-        q = np.where(draw < 0.5, low, high)
-    elif options.mode == "mixed":
-        kind = draw[..., :1]  # the root has no joint to draw a state for
-        anywhere, at_end = low + draw * (high - low), np.where(draw < 0.5, low, high)
-        q = np.where(kind < 0.5, anywhere, np.where(kind < 0.75, tree.rest, at_end))
     else:
-        q = low + draw * (high - low)
+        q = _in_mode(options.mode, draw, low, high, tree.rest)
     for pattern, bounds in options.joint_range.items():
         for k in tree.free_joints:
             if fnmatch.fnmatchcase(tree.joints[k].name, pattern) or fnmatch.fnmatchcase(obj.parts[k].label, pattern):
                 first, last = np.clip(bounds, low[k], high[k])
                 q[..., k] = first + draw[..., k] * (last - first)
     return tree.complete_state(q)
+
+
+def _in_mode(mode: StateMode, draw: Array, low: Array, high: Array, rest: Array) -> Array:
+    if mode == "rest":
+        return np.broadcast_to(rest, draw.shape).copy()
+    if mode == "limits":
+        return np.where(draw < 0.5, low, high)
+    if mode == "mixed":
+        anywhere, at_rest, at_end = (_in_mode(m, draw, low, high, rest) for m in ("uniform", "rest", "limits"))
+        kind = draw[..., :1]  # the root has no joint to draw a state for
+        return np.where(kind < 0.5, anywhere, np.where(kind < 0.75, at_rest, at_end))
+    uniform: Array = low + draw * (high - low)
+    return uniform
 
 
 def sample_scale(obj: ArticulatedObject, scale: Scale, rng: np.random.Generator) -> ArticulatedObject:

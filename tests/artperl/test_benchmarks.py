@@ -11,7 +11,7 @@ import pytest
 import torch
 
 import artsim
-from artperl import metrics
+from artperl import cli, metrics
 from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
 from artperl.benchmarks.artimage import SPLIT, as_known, real_objects, reduced, row_samples, turned_round
 from artperl.benchmarks.basin import ANGLES, _apart, basin_problem, run_basin, turned
@@ -24,7 +24,7 @@ from artperl.networks.agent import Agent
 from artperl.networks.perception import Perception
 from artperl.order import in_reading_order
 from artperl.search import EstimatorOptions
-from artsim.errors import AssetError
+from artsim.errors import AssetError, ConfigError
 from tests.artperl.worlds import Oracle, small_base, small_problem
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -229,3 +229,9 @@ def test_buttons_do_not_turn_a_dishwasher_round(partnet_dir: Path) -> None:
     for half in ("train", "test"):
         for obj in real_objects("dishwasher", half, partnet_dir):  # type: ignore[arg-type]
             assert obj.box_center[1, 0] < -0.2 * obj.box_size[0, 0]  # the door is at the front
+
+
+@pytest.mark.parametrize("own", [{"states": "rest"}, {"preset": "sphere"}, {"noise": "d435"}])
+def test_a_benchmark_has_states_views_and_noise_of_its_own(own: dict[str, str]) -> None:
+    with pytest.raises(ConfigError, match="of its own"):
+        cli.Evaluate(benchmark="artimage", **own).run()
