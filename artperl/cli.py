@@ -273,7 +273,7 @@ class Evaluate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate the poses of the parts of an object, and print them as JSON.
+    """Estimate the poses of the parts of an object, and list them.
 
     From a cloud: artperl estimate cloud.ply --category laptop --view out.html
 
@@ -286,7 +286,7 @@ class Estimate:
     category: str = "laptop"
     """Folder of an estimator, or the name of one that comes with the package."""
     out: Path | None = None
-    """Write here, as .json or as .npz with the part of every point; by default print."""
+    """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list."""
     view: Path | None = None
     """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
     mask: Path | None = None
@@ -302,17 +302,22 @@ class Estimate:
     def run(self) -> None:
         from artperl.checkpoint import load_estimator
         from artperl.inputs import read_points
+        from artperl.view import listed, page
 
+        if self.out is not None and self.out != Path("-") and self.out.suffix not in (".json", ".npz"):
+            raise ConfigError(f"{self.out} is neither .json nor .npz", "out", "name one that is, or - for JSON")
         points = read_points(self.cloud, self.mask, self.intrinsics, self.depth_scale)
         estimate = load_estimator(self.category, seen_from=self.seen_from)(points)
         record = {name: _plain(value) for name, value in vars(estimate).items() if name != "part"}
         if self.view is not None:
-            from artperl.view import page
-
             write_atomic(self.view, page(estimate, points, f"{self.cloud.name}: {self.category}").encode())
-        if self.out is None:
+        if self.out == Path("-"):
             print(json.dumps(record, indent=1))
-        elif self.out.suffix == ".npz":
+            return
+        print(listed(estimate))
+        if self.out is None:
+            return
+        if self.out.suffix == ".npz":
             arrays = {name: np.asarray(v) for name, v in vars(estimate).items() if name != "milliseconds"}
             with atomic_file(self.out) as file:
                 np.savez(file, allow_pickle=False, **arrays)

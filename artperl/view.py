@@ -1,4 +1,4 @@
-"""One file that shows an estimate in any browser: the cloud by part, boxes and joint axes, and the way there."""
+"""An estimate to look at: a list for a terminal, and a file for any browser with the cloud by part, boxes and axes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from artperl.estimate import Estimate
 from artsim.view import PALETTE
 
 _MOST = 6000
 """Points that are drawn."""
+_HEAD = ("part", "joint", "state", "box centre, m", "rotation vector, deg", "box size, m", "seen")
 _CORNERS = np.array([[i & 1, i & 2, i & 4] for i in range(8)], dtype=bool) - 0.5
 
 
@@ -46,32 +48,47 @@ def page(estimate: Estimate, points: ArrayLike, title: str) -> str:
         "colours": [f"rgb({r},{g},{b})" for r, g, b in PALETTE.tolist()],
     }
     return _PAGE.format(
-        title=html.escape(title), summary=_summary(estimate), rows=_rows(estimate), data=json.dumps(data),
-        last=len(T) - 1,
+        title=html.escape(title), summary=html.escape(_summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
+        head="".join(f"<th>{name}</th>" for name in _HEAD), last=len(T) - 1,
     )  # fmt: skip
 
 
+def listed(estimate: Estimate) -> str:
+    """What it found, for a terminal: one line of the whole, and one for each part."""
+    rows = [_HEAD, *_cells(estimate)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return "\n".join([_summary(estimate), *lines])
+
+
 def _summary(estimate: Estimate) -> str:
-    return html.escape(
+    return (
         f"confidence {100 * estimate.confidence:.0f} %, residual {100 * estimate.residual:.2f} % of the diagonal, "
         f"reference {estimate.reference}, {sum(estimate.milliseconds.values()):.0f} ms"
     )
 
 
-def _rows(estimate: Estimate) -> str:
-    rows = []
+def _cells(estimate: Estimate) -> list[tuple[str, ...]]:
+    """What `_HEAD` names, of each part."""
+    cells: list[tuple[str, ...]] = []
     for k, kind in enumerate(estimate.joint_type):
         state = {"free": "", "prismatic": f"{100 * estimate.state[k]:.1f} cm"}.get(
             kind, f"{np.rad2deg(estimate.state[k]):.1f}°"
         )
-        cells = (
+        turn = Rotation.from_matrix(estimate.rotation[k]).as_rotvec(degrees=True)
+        cells.append((
             f"{k}", kind, state, " ".join(f"{x:.3f}" for x in estimate.translation[k]),
-            " x ".join(f"{x:.3f}" for x in estimate.size[k]), f"{100 * estimate.visibility[k]:.0f} %",
-        )  # fmt: skip
+            " ".join(f"{x:.1f}" for x in turn), " x ".join(f"{x:.3f}" for x in estimate.size[k]),
+            f"{100 * estimate.visibility[k]:.0f} %",
+        ))  # fmt: skip
+    return cells
+
+
+def _rows(estimate: Estimate) -> str:
+    rows = []
+    for k, (part, *cells) in enumerate(_cells(estimate)):
         colour = "rgb({},{},{})".format(*PALETTE[k % len(PALETTE)])
-        rows.append(
-            f'<tr><td style="color:{colour}">■ {cells[0]}</td>' + "".join(f"<td>{c}</td>" for c in cells[1:]) + "</tr>"
-        )
+        rows.append(f'<tr><td style="color:{colour}">■ {part}</td>' + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
     return "\n".join(rows)
 
 
@@ -95,7 +112,7 @@ label {{ margin-right: 1.5em; }} h1 {{ font-size: 1.3em; }}
 <label><input id="boxes" type="checkbox" checked> boxes</label>
 <label><input id="axes" type="checkbox" checked> joint axes</label>
 drag to turn, scroll to zoom, double-click for the camera's own view</p>
-<table><tr><th>part</th><th>joint</th><th>state</th><th>box centre, m</th><th>box size, m</th><th>seen</th></tr>
+<table><tr>{head}</tr>
 {rows}
 </table>
 <script>

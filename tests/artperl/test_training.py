@@ -172,20 +172,30 @@ def test_the_program_evaluates_and_estimates(
     )
     for name in ("cloud.npy", "cloud.npz", "cloud.ply"):
         monkeypatch.setattr(
-            "sys.argv", ["artperl", "estimate", str(tmp_path / name), "--category", str(whole / "best")]
+            "sys.argv", ["artperl", "estimate", str(tmp_path / name), "--category", str(whole / "best"), "--out", "-"]
         )
         cli.main()
-        assert len(json.loads(capsys.readouterr().out)["rotation"]) == 2
+        record = json.loads(capsys.readouterr().out)
+        assert len(record["rotation"]) == 2
     cli.Estimate(tmp_path / "cloud.npy", str(whole / "best"), tmp_path / "out.npz").run()
     with np.load(tmp_path / "out.npz") as arrays:
         assert arrays["part"].shape == (100,)
+    whole_line, head, *parts = capsys.readouterr().out.splitlines()
+    assert record["reference"] in whole_line
+    assert head.split()[:3] == ["part", "joint", "state"]
+    assert [line.split()[:2] for line in parts] == [["0", "free"], ["1", "revolute"]]
+    assert f"{np.degrees(record['state'][1]):.1f}°" in parts[1]
 
 
 def test_the_program_says_what_is_wrong(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "cloud.npy").write_bytes(b"nothing")
-    for argv in (["estimate", str(tmp_path / "cloud.npy"), "--category", "none"], ["train", "--category", "teapot"]):
+    for argv in (
+        ["estimate", str(tmp_path / "cloud.npy"), "--category", "none"],
+        ["estimate", str(tmp_path / "cloud.npy"), "--out", "pose.txt"],
+        ["train", "--category", "teapot"],
+    ):
         monkeypatch.setattr(
             "sys.argv", ["artperl", *argv, *(["--out", str(tmp_path / "t")] if "train" in argv else [])]
         )
