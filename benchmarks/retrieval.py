@@ -31,9 +31,10 @@ from artsim.plan import SampleOptions
 from artsim.progress import track
 
 POINTS = 512
+OBJECTS = 800
 VIEWS = 4
-BATCH = 16
-RATE = 1e-3
+BATCH = 24
+RATE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Options:
     weights: Path | None = None
     """Folder of estimators (or of training runs) by category; by default those that come with the package."""
     categories: tuple[str, ...] = tuple(ARTIMAGE)
-    steps: int = 400
+    steps: int = 4000
     """Batches that the Siamese network learns from."""
     objects: int = 40
     """Unseen objects of each category, two views of each."""
@@ -67,27 +68,23 @@ def main(options: Options) -> None:
 def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
     """A network for which a partial cloud is near to its own object at rest, and far from others."""
     torch.manual_seed(0)
-    rows = estimator.base.shapes.trees.num_rows
-    network = Siamese(rows)
+    base = estimator.base.shapes
+    network = Siamese(base.trees.num_rows)
     optimizer = torch.optim.AdamW(network.parameters(), weight_decay=1e-2)
-    samples = Samples([category], SampleOptions(num_points=POINTS), 5, VIEWS, rows)
+    samples = Samples([category], SampleOptions(num_points=POINTS), 5, VIEWS, base.trees.num_rows)
+    learnt = [samples[i] for i in track(f"{category}, clouds", range(OBJECTS * VIEWS), leave=False)]
+    objects = [samples.object(i).with_diagonal(1.0) for i in range(0, OBJECTS * VIEWS, VIEWS)]
+    # Others are of the same draw as an object itself: whatever told stored shapes from fresh ones would tell all pairs.
+    own = Shapes.from_objects(objects, base.points.shape[2], base.trees.num_rows)
+    observed = Clouds.of(torch.from_numpy(np.stack([sample.points for sample in learnt])).float()).points
+    part = torch.from_numpy(np.stack([sample.part for sample in learnt]).astype(np.int64))
     generator = torch.Generator().manual_seed(0)
     for step in track(category, range(steps), leave=False):
-        numbers = range(step * BATCH, (step + 1) * BATCH)
-        batch = [samples[i] for i in numbers]
-        objects = [samples.object(i).with_diagonal(1.0) for i in numbers[::VIEWS]]
-        own = Shapes.from_objects(objects, POINTS // rows, rows).repeat(VIEWS)
-        observed = torch.from_numpy(np.stack([sample.points for sample in batch])).float()
-        part = torch.from_numpy(np.stack([sample.part for sample in batch]).astype(np.int64))
-        negative = torch.rand(BATCH, generator=generator) < 0.5
-        others = torch.randint(len(estimator.base), (BATCH,), generator=generator)
-        same, different = canonical(own, generator), canonical(estimator.base.shapes[others], generator)
-        points = torch.where(negative[:, None, None], different[0], same[0])
-        labels = torch.where(negative[:, None], different[1], same[1])
+        chosen = torch.randperm(OBJECTS, generator=generator)[:BATCH]
+        view = chosen * VIEWS + torch.randint(VIEWS, (BATCH,), generator=generator)
+        vectors = network(*_normalised(canonical(own[chosen], generator)))
         set_rate(optimizer, RATE * one_cycle(step, steps))
-        loss = contrastive_loss(
-            network(Clouds.of(observed).points, part), network(Clouds.of(points).points, labels), negative
-        )
+        loss = contrastive_loss(network(observed[view], part[view]), vectors)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()

@@ -44,16 +44,20 @@ class Siamese(nn.Module):
         return self.head(torch.cat([mean.flatten(1), (count[..., 0] > 0).to(mean.dtype), cloud], dim=1))
 
 
-def contrastive_loss(vectors: Tensor, others: Tensor, negative: Tensor, margin: float = 1.0) -> Tensor:
+def contrastive_loss(vectors: Tensor, own: Tensor, margin: float = 1.0) -> Tensor:
     """Equation 2: pairs of the same object are drawn together, others pushed apart up to a margin.
+
+    The paper draws pairs at random; here all pairs of a batch count, those of the same object half.
 
     Parameters
     ----------
-    vectors, others : (B, E) float
-    negative : (B,) bool
-        Pairs of different objects (y = 1).
+    vectors : (B, E) float
+        Of observed clouds.
+    own : (B, E) float
+        Of their objects, all different, at rest.
     margin : float
     """
-    distance = torch.linalg.vector_norm(vectors - others + 1e-9, dim=-1)
+    distance = torch.linalg.vector_norm(vectors[:, None] - own + 1e-9, dim=-1)
+    same = torch.eye(len(own), dtype=torch.bool, device=own.device)
     apart = (margin - distance).clamp(min=0.0)
-    return 0.5 * torch.where(negative, apart.square(), distance.square()).mean()
+    return 0.25 * distance[same].square().mean() + 0.25 * apart[~same].square().mean()
