@@ -82,7 +82,7 @@ def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
     for step in track(category, range(steps), leave=False):
         chosen = torch.randperm(OBJECTS, generator=generator)[:BATCH]
         view = chosen * VIEWS + torch.randint(VIEWS, (BATCH,), generator=generator)
-        vectors = network(*_normalised(canonical(own[chosen], generator)))
+        vectors = network(*canonical(own[chosen], generator))
         set_rate(optimizer, RATE * one_cycle(step, steps))
         loss = contrastive_loss(network(observed[view], part[view]), vectors)
         optimizer.zero_grad()
@@ -92,12 +92,12 @@ def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
 
 
 def canonical(shapes: Shapes, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-    """Clouds (B, POINTS, 3) of whole objects at rest, in random order, and the parts of their points."""
+    """Clouds (B, POINTS, 3) of whole objects at rest, normalised, in random order, and the parts of their points."""
     B, P, M, _ = shapes.points.shape
     known = shapes.has_surface[..., None].expand(B, P, M).flatten(1).float()
     index = torch.multinomial(known, POINTS, replacement=True, generator=generator)
     points = shapes.points.flatten(1, 2).gather(1, index[..., None].expand(-1, -1, 3))
-    return points, index // M
+    return Clouds.of(points).points, index // M
 
 
 @torch.inference_mode()
@@ -109,7 +109,7 @@ def quality(category: str, estimator: Estimator, network: Siamese, objects: int)
     samples = row_samples("procedural", category, objects=objects, views=2 * objects)
     true = Shapes.from_objects([obj.with_diagonal(1.0) for obj in tested], base.shapes.points.shape[2], P)
     generator = torch.Generator().manual_seed(1)
-    vectors = network(*_normalised(canonical(base.shapes, generator)))
+    vectors = network(*canonical(base.shapes, generator))
     chamfer, boxes = differences(true, base.shapes)
     chosen: dict[str, list[int]] = {"boxes": [], "contrastive": []}
     for sample in samples:
@@ -130,10 +130,6 @@ def quality(category: str, estimator: Estimator, network: Siamese, objects: int)
     result["median"] = float(chamfer.median(1).values.mean()), float(boxes.median(1).values.mean())
     result["random"] = float(chamfer.mean()), float(boxes.mean())
     return result
-
-
-def _normalised(cloud: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-    return Clouds.of(cloud[0]).points, cloud[1]
 
 
 def differences(true: Shapes, base: Shapes) -> tuple[Tensor, Tensor]:
