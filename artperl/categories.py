@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from artperl.order import as_seen
 from artsim.errors import AssetError, ConfigError
+from artsim.loading.sources import FamilySource, family_sources
 from artsim.objects import MAX_PARTS, ArticulatedObject
-from artsim.sources import FamilySource, family_sources
 
 ARTIMAGE: dict[str, tuple[str, ...]] = {
     "laptop": ("revolute",),

@@ -13,9 +13,9 @@ import numpy as np
 import tyro
 
 from artsim.cli import run_program
+from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.files import atomic_file, write_atomic
-from artsim.plan import SampleOptions
 from artsim.progress import say
 from artsim.sampling import StateMode, StateOptions, ViewOptions, ViewPreset
 
@@ -239,7 +239,7 @@ class Evaluate:
         from artperl.benchmarks.artimage import as_known
         from artperl.checkpoint import folder_of, load_estimator, read_settings
         from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
-        from artsim.sources import find_sources
+        from artsim.loading.sources import find_sources
 
         if self.estimator is None:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")

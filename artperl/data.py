@@ -19,14 +19,14 @@ from artperl.batch import Batch
 from artperl.categories import Parts, arranged, has_parts
 from artperl.order import reordered_sample, visible_order
 from artperl.stretch import stretch
-from artsim.dataset import open_dataset
+from artsim.datasets.dataset import open_dataset
+from artsim.datasets.plan import SampleOptions, draw_sample
+from artsim.datasets.stream import FamilyStream
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.kinematics import ROTATING, Array
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import shared_renderer
 from artsim.sample import Sample
-from artsim.stream import FamilyStream
 
 _ATTEMPTS = 200
 _USES = 4

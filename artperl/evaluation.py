@@ -18,9 +18,9 @@ from artperl import metrics
 from artperl.categories import Parts, objects_of
 from artperl.estimate import Calibration, Estimate, brought_to_rest
 from artperl.estimator import Estimator
+from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ArtsimError
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions, draw_sample
 from artsim.progress import track
 from artsim.renderers import make_renderer
 from artsim.sample import Sample

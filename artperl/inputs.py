@@ -15,7 +15,7 @@ from artsim.errors import ArtsimError, ConfigError
 Array = NDArray[np.float64]
 
 IMAGES = (".png", ".tif", ".tiff", ".pgm")
-_MEND = "give (N, 3) points as .npy, .npz with 'points', or .ply, or a depth image with --intrinsics"
+_FIX = "give (N, 3) points as .npy, .npz with 'points', or .ply, or a depth image with --intrinsics"
 
 
 def points_of_depth(depth: ArrayLike, K: ArrayLike, mask: ArrayLike | None = None) -> Array:
@@ -125,7 +125,7 @@ def _read_cloud(path: Path) -> Array:
 
         return np.asarray(trimesh.load(path).vertices)
     except Exception as error:  # NumPy and trimesh fail in many ways on bytes that are not theirs
-        raise ConfigError(f"no cloud can be read ({error})", path, _MEND) from error
+        raise ConfigError(f"no cloud can be read ({error})", path, _FIX) from error
 
 
 def _read_array(path: Path) -> NDArray[Any]:
@@ -137,4 +137,4 @@ def _read_array(path: Path) -> NDArray[Any]:
         with Image.open(path) as image:
             return np.asarray(image)
     except Exception as error:  # so do NumPy and Pillow
-        raise ConfigError(f"no image can be read ({error})", path, _MEND) from error
+        raise ConfigError(f"no image can be read ({error})", path, _FIX) from error

@@ -98,7 +98,7 @@ class Trees(Batch):
             When there is no tree, or one has more parts than rows.
         """
         if not trees:
-            raise KinematicsError("a batch of no tree has no shape", mend="pass at least one tree")
+            raise KinematicsError("a batch of no tree has no shape", fix="pass at least one tree")
         largest = max(len(tree) for tree in trees)
         num_rows = num_rows or largest
         if num_rows < largest:

@@ -22,8 +22,8 @@ from artperl.pose import Theta, clamp_state, theta_from_parts
 from artperl.retrieval import ShapeBase
 from artperl.shapes import Observed, Shapes
 from artperl.start import adapted, sized
+from artsim.datasets.plan import SampleOptions
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions
 from artsim.sample import Sample
 
 References = Literal["retrieved", "deformed"]

@@ -108,7 +108,7 @@ class ShapeBase:
         There are ``num_rows`` rows for parts, by default as many as any object has.
         """
         if not objects:
-            raise ConfigError("a shape base needs objects", mend="pass at least one")
+            raise ConfigError("a shape base needs objects", fix="pass at least one")
         units = widened([obj.with_diagonal(1.0) for obj in objects])
         return ShapeBase(
             tuple(obj.object_id for obj in units),
@@ -169,7 +169,7 @@ class ShapeBase:
             When the base has no embeddings, or too few objects.
         """
         if self.embeddings is None:
-            raise ConfigError("the shape base has no embeddings", mend="give it some: with_embeddings")
+            raise ConfigError("the shape base has no embeddings", fix="give it some: with_embeddings")
         apart = torch.cdist(queries, self.embeddings.to(queries))
         if further is not None:
             apart = torch.hypot(apart, further)

@@ -8,7 +8,7 @@ from artperl.categories import Parts
 from artperl.fitting import FittingOptions
 from artperl.ppo import PPOOptions
 from artperl.problems import Labels, References, StartOptions
-from artsim.plan import SampleOptions
+from artsim.datasets.plan import SampleOptions
 
 
 @dataclass(frozen=True)

@@ -58,14 +58,14 @@ from artperl.retrieval import ShapeBase
 from artperl.search import EstimatorOptions
 from artperl.settings import TrainOptions
 from artperl.steps import Stop, autocast, one_cycle, set_rate
+from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.families import FAMILIES
 from artsim.files import write_atomic
+from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions
 from artsim.progress import say, track
 from artsim.sample import Sample
-from artsim.sources import find_sources
 
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from artsim.datasets.plan import SampleOptions
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
-from artsim.plan import SampleOptions
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
 
@@ -63,8 +63,8 @@ class Generate:
     """Leave out objects that do not load, and say which, instead of stopping."""
 
     def run(self) -> None:
-        from artsim.pipeline import generate
-        from artsim.sources import Source, family_sources, find_sources
+        from artsim.datasets.generate import generate
+        from artsim.loading.sources import Source, family_sources, find_sources
 
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
         sources += family_sources(_categories(self.categories), self.objects_per_category, self.first_object)
@@ -255,7 +255,7 @@ class Gallery:
     def run(self) -> None:
         from artsim.files import write_atomic
         from artsim.gallery import gallery
-        from artsim.sources import family_sources
+        from artsim.loading.sources import family_sources
 
         sources = family_sources(_categories(self.categories), self.objects, self.first_object)
         write_atomic(self.out, gallery([source.load() for source in sources], self.states))
@@ -275,7 +275,7 @@ class Inspect:
 
     def run(self) -> None:
         from artsim.inspect import describe
-        from artsim.urdf import load
+        from artsim.loading.urdf import load
 
         obj = load(self.path, package_roots=self.package_root)
         print(describe(obj))
@@ -295,7 +295,7 @@ class Verify:
     """Dataset folder."""
 
     def run(self) -> None:
-        from artsim.verify import verify
+        from artsim.datasets.verify import verify
 
         problems = verify(self.path)
         for problem in problems[:50]:

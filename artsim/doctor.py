@@ -26,7 +26,7 @@ import importlib.util, pybullet
 pybullet.connect(pybullet.DIRECT)
 pybullet.loadPlugin(importlib.util.find_spec("eglRenderer").origin, "_eglRendererPlugin")
 """  # the only way to learn the device is from what PyBullet prints
-_MENDS = {
+_FIXES = {
     "raycast": "pip install --force-reinstall embreex",
     "pybullet": "pip install 'artsim[pybullet]'",
     "pybullet-egl": "pip install 'artsim[pybullet]', then scripts/install-system.sh as root",
@@ -50,7 +50,7 @@ class Finding:
         What it runs on; empty if it does not.
     fps : float or None
         Pictures of a laptop (depth and part ids) per second; None where the backend makes none.
-    problem, mend : str
+    problem, fix : str
         What is wrong and what to do about it; empty if nothing is.
     """
 
@@ -59,7 +59,7 @@ class Finding:
     device: str = ""
     fps: float | None = None
     problem: str = ""
-    mend: str = ""
+    fix: str = ""
 
 
 def examine(backend: str) -> Finding:
@@ -92,8 +92,8 @@ def examine(backend: str) -> Finding:
     return _broken(backend, last)
 
 
-def _broken(backend: str, problem: str, mend: str = "") -> Finding:
-    return Finding(backend, works=False, problem=problem, mend=mend or _MENDS[backend])
+def _broken(backend: str, problem: str, fix: str = "") -> Finding:
+    return Finding(backend, works=False, problem=problem, fix=fix or _FIXES[backend])
 
 
 def table(findings: list[Finding]) -> str:
@@ -104,7 +104,7 @@ def table(findings: list[Finding]) -> str:
         rate = "" if finding.fps is None else f"{finding.fps:.0f}"
         lines.append(f"{finding.backend:<14}{'yes' if finding.works else 'no':<7}{finding.device:<{width + 2}}{rate}")
         if not finding.works:
-            lines.append(f"{'':<14}{finding.problem}\n{'':<14}mend: {finding.mend}")
+            lines.append(f"{'':<14}{finding.problem}\n{'':<14}fix: {finding.fix}")
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -227,7 +227,7 @@ def _answer(backend: str) -> Finding:
     try:
         device, fps = BACKENDS[backend]()
     except ArtsimError as error:
-        return _broken(backend, error.what, error.mend or "")
+        return _broken(backend, error.what, error.fix or "")
     except ImportError as error:
         return _broken(backend, f"cannot be imported ({error})")
     except Exception as error:  # backends fail in many ways

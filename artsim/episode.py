@@ -12,8 +12,10 @@ import tyro
 from numpy.typing import ArrayLike
 
 from artsim.camera import Camera
+from artsim.datasets.stream import STREAM_SEEDS
 from artsim.errors import ConfigError
 from artsim.kinematics import Array
+from artsim.loading.sources import FamilySource, Source, family_sources, find_sources
 from artsim.objects import ArticulatedObject
 from artsim.physics import Control, PhysicsOptions, Simulation
 from artsim.sample import Sample, observe
@@ -28,8 +30,6 @@ from artsim.sampling import (
     sample_view,
 )
 from artsim.sensor import find_sensor
-from artsim.sources import FamilySource, Source, family_sources, find_sources
-from artsim.stream import STREAM_SEEDS
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The one family of errors that artsim raises on purpose.
 
-Every message says *what* went wrong, *where*, and *how to mend it*.
+Every message says *what* went wrong, *where*, and *how to fix it*.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ class ArtsimError(Exception):
         What went wrong, in one sentence.
     where : str or Path, optional
         File, element or option concerned.
-    mend : str, optional
+    fix : str, optional
         What the user can do about it.
     """
 
-    def __init__(self, what: str, where: str | Path | None = None, mend: str | None = None):
+    def __init__(self, what: str, where: str | Path | None = None, fix: str | None = None):
         self.what = what
         self.where = None if where is None else str(where)
-        self.mend = mend
+        self.fix = fix
         super().__init__(str(self))
 
     def __str__(self) -> str:
         text = self.what if self.where is None else f"{self.where}: {self.what}"
-        return text if self.mend is None else f"{text} (mend: {self.mend})"
+        return text if self.fix is None else f"{text.rstrip('.')}. Fix: {self.fix}"
 
     def __reduce__(self) -> tuple[type, tuple[str, str | None, str | None]]:
         # Errors cross process boundaries (generation workers).
-        return type(self), (self.what, self.where, self.mend)
+        return type(self), (self.what, self.where, self.fix)
 
 
 class AssetError(ArtsimError):

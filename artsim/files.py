@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import json
 import os
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +91,49 @@ def read_bounded(path: Path, max_bytes: int, what: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise AssetError(f"cannot read {what} ({error.strerror})", path, "check the path and its rights") from error
+
+
+MAX_JSON_BYTES = 64_000_000
+"""The description of a dataset of 100,000 objects takes half of it."""
+
+
+def read_json(path: Path, what: str, error: type[ArtsimError] = AssetError, max_bytes: int = MAX_JSON_BYTES) -> Any:
+    """The content of an untrusted JSON file, bounded in size and in depth.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What the file is, for messages.
+    error : type of ArtsimError
+        Raised when the file cannot be used.
+    max_bytes : int
+
+    Raises
+    ------
+    ArtsimError
+        Of the type ``error``: when the file is missing, too large, nested too deeply, or not JSON.
+    """
+    try:
+        return parse_json(read_bounded(path, max_bytes, what))
+    except ValueError as problem:
+        raise error(f"{what} is not usable JSON ({problem})", path, "restore the file, or make it again") from problem
+    except AssetError as problem:
+        raise error(problem.what, problem.where, problem.fix) from problem
+
+
+def parse_json(data: bytes) -> Any:
+    """The value of a JSON text.
+
+    Raises
+    ------
+    ValueError
+        When it is not JSON in UTF-8, or is nested too deeply.
+    """
+    try:
+        return json.loads(data.decode("utf-8"))
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
 
 
 def read_npz(path: Path) -> dict[str, NDArray[np.generic]]:

@@ -220,7 +220,7 @@ class KinematicTree:
         if q.ndim == 0 or q.shape[-1] != len(self):
             raise KinematicsError(
                 f"a state of shape {q.shape} does not fit a tree of {len(self)} parts",
-                mend=f"pass (..., {len(self)}): one state per part, the root's entry (ignored) first",
+                fix=f"pass (..., {len(self)}): one state per part, the root's entry (ignored) first",
             )
         q[..., 0] = 0.0
         for k, mimic in self._mimics_in_order:

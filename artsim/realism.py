@@ -32,10 +32,10 @@ from scipy.spatial import cKDTree
 
 from artsim.errors import AssetError
 from artsim.kinematics import Array, invert_transform, transform_points
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject
 from artsim.sample import observe
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
-from artsim.urdf import load
 
 MEASURES = ("surface", "parts", "boxes", "joints", "ranges")
 

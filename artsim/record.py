@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.datasets.shards import ShardReader, sample_key, write_shard
 from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.files import write_atomic, write_error
@@ -26,7 +27,6 @@ from artsim.objects import ArticulatedObject
 from artsim.progress import track
 from artsim.sample import Sample
 from artsim.sampling import joint_intervals
-from artsim.shards import ShardReader, sample_key, write_shard
 
 FORMAT = 1
 _GOAL_SECONDS = 2.0  # a joint heads for a goal for so long, then for another

@@ -28,10 +28,10 @@ from lxml import etree
 
 from artsim.errors import ArtsimError, ConfigError
 from artsim.kinematics import Array, invert_transform, transform_points
+from artsim.loading.urdf import find_urdf, load
 from artsim.objects import ArticulatedObject
 from artsim.renderers.bullet import import_pybullet, silent
 from artsim.sampling import StateOptions, sample_state
-from artsim.urdf import find_urdf, load
 
 AGREEMENT = 1e-6
 """Metres by which places of parts may differ; for objects larger than 1 m, share of their diagonal."""
@@ -211,7 +211,7 @@ def _compare(
         with silent():
             loaded = SIMULATORS[name](file)
     except ImportError as error:
-        raise ConfigError(f"{name} is not installed", mend="pip install 'artsim[pybullet,sim,sapien]'") from error
+        raise ConfigError(f"{name} is not installed", fix="pip install 'artsim[pybullet,sim,sapien]'") from error
     except ArtsimError:
         raise
     except Exception as error:  # a simulator may refuse a file in any way it likes

@@ -17,10 +17,10 @@ from scipy.spatial import ConvexHull, QhullError
 from artsim.errors import ArtsimError
 from artsim.files import read_bounded
 from artsim.kinematics import Array
-from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
+from artsim.loading.urdf import find_urdf
+from artsim.loading.urdf_xml import MOVING_TYPES, SHAPES, safe_xml
 from artsim.objects import ArticulatedObject
-from artsim.urdf import find_urdf
-from artsim.urdf_xml import MOVING_TYPES, SHAPES, safe_xml
 
 TOLERANCE = 1e-6
 """By which an axis's length may differ from 1, a mimic joint may leave its limits, and a piece fall short of its hull

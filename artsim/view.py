@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.camera import Camera
-from artsim.dataset import Dataset
+from artsim.datasets.dataset import Dataset
 from artsim.errors import ArtsimError
 from artsim.files import write_atomic
 from artsim.kinematics import Array, transform_points
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, render
 from artsim.sample import Sample, observe
 from artsim.sampling import StateOptions, ViewOptions, joint_intervals, sample_state, sample_view
-from artsim.urdf import load
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

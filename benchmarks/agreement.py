@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from artsim import make_renderer
 from artsim.errors import RenderError
 from artsim.families import FAMILIES
+from artsim.loading.sources import Source, family_sources, find_sources
 from artsim.objects import ArticulatedObject
 from artsim.progress import track
 from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
-from artsim.sources import Source, family_sources, find_sources
 from benchmarks.differences import CLASSES, Scene, classify, near_edge
 
 LIMITS = {

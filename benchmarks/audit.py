@@ -30,9 +30,9 @@ from artsim.errors import ArtsimError
 from artsim.export import export
 from artsim.families import FAMILIES
 from artsim.kinematics import Array
+from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
 from artsim.objects import ArticulatedObject
 from artsim.progress import track
-from artsim.sources import FamilySource, FileSource, Source, find_sources
 from artsim.validity import check_file
 
 NEAR = 0.01

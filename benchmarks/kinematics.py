@@ -22,12 +22,12 @@ from lxml import etree
 
 from artsim import load
 from artsim.kinematics import Array, invert_transform
+from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.progress import track
 from artsim.renderers.bullet import import_pybullet, silent
 from artsim.sampling import StateOptions, sample_state
 from artsim.simulators import LinkPoses, poses_in_file
-from artsim.sources import find_sources
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def _rates(name: str, per_object: Sequence[Sequence[Scene]]) -> dict[str, float]
 
 def _row(finding: Finding, rates: dict[str, float] | None) -> str:
     if rates is None:
-        return f"{finding.backend:14s}{'-':>10s}{'-':>10s}  not measured: {finding.problem} (mend: {finding.mend})"
+        return f"{finding.backend:14s}{'-':>10s}{'-':>10s}  not measured: {finding.problem} (fix: {finding.fix})"
     return f"{finding.backend:14s}" + "".join(f"{rate:10.1f}" for rate in rates.values()) + f"  {finding.device}"
 
 

@@ -27,7 +27,7 @@ from artperl.evaluation import TEST_SEEDS
 from artperl.networks.siamese import Siamese, contrastive_loss
 from artperl.shapes import Shapes
 from artperl.steps import one_cycle, set_rate
-from artsim.plan import SampleOptions
+from artsim.datasets.plan import SampleOptions
 from artsim.progress import track
 
 POINTS = 512

@@ -26,9 +26,9 @@ from artperl.checkpoint import load_estimator
 from artperl.evaluation import evaluate, samples_of, summary
 from artperl.settings import PRESETS
 from artperl.training import Training
+from artsim.datasets.plan import SampleOptions
 from artsim.files import write_atomic
-from artsim.plan import SampleOptions
-from artsim.urdf import load
+from artsim.loading.urdf import load
 
 PUBLISHED = {
     "ArtPERL": ((5.7, 5.9, 5.8, 8.4, 10.1, 12.5, 19.6), (0.008, 0.012, 0.014, 0.037, 0.058, 0.136, 0.225)),

@@ -18,14 +18,14 @@ import webdataset
 
 import artsim
 from artsim import StateOptions, observe, sample_state
-from artsim.dataset import pad_sample
+from artsim.datasets.dataset import pad_sample
+from artsim.datasets.plan import SampleOptions
+from artsim.datasets.shards import sample_from_members, sample_members
 from artsim.errors import ConfigError, DatasetError
 from artsim.kinematics import JOINT_TYPES
+from artsim.loading.sources import find_sources
 from artsim.object_file import ObjectCache
-from artsim.plan import SampleOptions
 from artsim.sample import Sample
-from artsim.shards import sample_from_members, sample_members
-from artsim.sources import find_sources
 from tests.conftest import ASSETS, DEMO, in_another_process
 
 

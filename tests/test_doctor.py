@@ -18,11 +18,11 @@ from tests.conftest import absent
 def test_installed_renderers_are_found_to_work(backend: str) -> None:
     finding = examine(backend)
     if not finding.works:
-        absent(f"{finding.problem}; {finding.mend}")
+        absent(f"{finding.problem}; {finding.fix}")
     assert finding.device
     assert finding.fps is not None
     assert finding.fps > 1
-    assert finding.problem == finding.mend == ""
+    assert finding.problem == finding.fix == ""
 
 
 def test_every_renderer_is_examined() -> None:
@@ -48,7 +48,7 @@ def test_what_is_not_installed_is_named_with_its_mend(
     finding = examine(backend)
     assert not finding.works
     assert finding.problem
-    assert mend in finding.mend
+    assert mend in finding.fix
 
 
 def test_a_backend_that_crashes_its_process_is_survived(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,15 +77,15 @@ def test_without_a_vulkan_driver_sapien_names_the_script(monkeypatch: pytest.Mon
     monkeypatch.setenv("VK_ICD_FILENAMES", "/nonexistent")
     finding = examine("sapien")
     assert not finding.works
-    assert "install" in finding.mend
+    assert "install" in finding.fix
 
 
 def test_the_table_has_a_mend_below_each_backend_that_does_not_work() -> None:
-    text = table([Finding("raycast", True, "CPU", 1234.5), Finding("sapien", False, problem="no driver", mend="do it")])
+    text = table([Finding("raycast", True, "CPU", 1234.5), Finding("sapien", False, problem="no driver", fix="do it")])
     lines = text.splitlines()
     assert lines[1].split() == ["raycast", "yes", "CPU", "1234"]
     assert lines[2].split() == ["sapien", "no"]
-    assert [line.strip() for line in lines[3:]] == ["no driver", "mend: do it"]
+    assert [line.strip() for line in lines[3:]] == ["no driver", "fix: do it"]
 
 
 def test_the_program_prints_the_table() -> None:

@@ -14,6 +14,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 import artsim.envs
 from artsim.camera import Camera
+from artsim.datasets.verify import sample_problems
 from artsim.envs.articulated import ArticulatedEnv
 from artsim.episode import openness
 from artsim.errors import ArtsimError, ConfigError
@@ -21,7 +22,6 @@ from artsim.families import make
 from artsim.kinematics import invert_transform
 from artsim.objects import ArticulatedObject
 from artsim.sampling import ViewOptions
-from artsim.verify import sample_problems
 from tests.conftest import ASSETS
 
 ID = "artsim/Articulated-v0"

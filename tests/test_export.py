@@ -18,10 +18,10 @@ from artsim.export.usd import frame_along, principal_axes
 from artsim.families import FAMILIES, make
 from artsim.inertia import part_inertia
 from artsim.kinematics import Array, KinematicTree, transform_points
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject
 from artsim.solids import box
 from artsim.strict import strict_kinematics, strict_urdf
-from artsim.urdf import load
 from tests.conftest import ASSETS, installed, valve
 
 rng = np.random.default_rng(0)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import artsim
+from artsim.datasets.stream import FamilyStream
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
-from artsim.sources import FamilySource
-from artsim.stream import FamilyStream
+from artsim.loading.sources import FamilySource
 from artsim.validity import check
 from benchmarks.audit import Outcome, audit
 from tests.conftest import in_another_process
@@ -102,8 +102,8 @@ def test_a_stream_never_ends_and_repeats_itself_exactly() -> None:
 
 
 def test_a_dataset_of_made_objects_is_sound(tmp_path: Path) -> None:
-    from artsim.sources import family_sources
-    from artsim.verify import verify
+    from artsim.datasets.verify import verify
+    from artsim.loading.sources import family_sources
 
     sources = family_sources(["drawer", "scissors"], 3)
     artsim.generate(sources, tmp_path / "out", num_samples=60, shard_size=20, progress=False)

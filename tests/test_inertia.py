@@ -11,9 +11,9 @@ from artsim.assembly import Assembly, prismatic
 from artsim.errors import AssetError
 from artsim.families import FAMILIES, make
 from artsim.inertia import joined_inertia, part_inertia
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject
 from artsim.solids import Solid, box
-from artsim.urdf import load
 from tests.conftest import ASSETS, valve
 
 

@@ -17,10 +17,10 @@ from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
 from artsim.inertia import joined_inertia, part_inertia
 from artsim.kinematics import Array, KinematicTree
+from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.renderers.bullet import import_pybullet
-from artsim.sources import find_sources
 from tests.conftest import DEMO
 
 FREE = PhysicsOptions(damping=0.0, friction=0.0)

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 
 import artsim
+from artsim.datasets.plan import SampleOptions
+from artsim.datasets.verify import verify
 from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError
 from artsim.kinematics import Array
-from artsim.plan import SampleOptions
+from artsim.loading.sources import Source, find_sources
 from artsim.sampling import sample_view
-from artsim.sources import Source, find_sources
-from artsim.verify import verify
 from tests.conftest import ASSETS, BOX_LAPTOP
 
 OPTIONS = SampleOptions(num_points=128)
@@ -41,7 +41,7 @@ def sources(tmp_path: Path) -> list[Source]:
     return find_sources([tmp_path / "objects"])
 
 
-def make(sources: list[Source], out: Path, **options: object) -> artsim.pipeline.GenerateResult:
+def make(sources: list[Source], out: Path, **options: object) -> artsim.datasets.generate.GenerateResult:
     defaults = {"num_samples": 60, "sample": OPTIONS, "shard_size": 10, "progress": False, "splits": (1, 1, 1)}
     return artsim.generate(sources, out, **{**defaults, **options})  # type: ignore[arg-type]
 

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
+from artsim.datasets.plan import SPLITS, Plan, PlannedObject, SampleOptions, assign_splits, draw_sample, unique_keys
 from artsim.errors import ConfigError
-from artsim.plan import SPLITS, Plan, PlannedObject, SampleOptions, assign_splits, draw_sample, unique_keys
 from artsim.renderers import make_renderer
 from artsim.sampling import StateOptions, ViewOptions
 from tests.conftest import ASSETS

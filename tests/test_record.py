@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from artsim.camera import Camera
+from artsim.datasets.verify import sample_problems
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError
 from artsim.record import Motion, carried, open_motions, record
 from artsim.sampling import ViewOptions
-from artsim.verify import sample_problems
 from tests.conftest import ASSETS
 
 OPTIONS = EpisodeOptions(

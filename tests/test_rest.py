@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import artsim
 from artsim.kinematics import Joint, KinematicTree, transform_points
+from artsim.loading.rest_state import canonical_category, rest_state
+from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
-from artsim.rest import canonical_category, rest_state
-from artsim.sources import find_sources
 from tests.conftest import ASSETS, solid
 
 

@@ -12,13 +12,13 @@ from trimesh.proximity import closest_point
 
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
+from artsim.datasets.verify import sample_problems
 from artsim.kinematics import invert_transform, transform_points
+from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND
 from artsim.sample import Sample
 from artsim.sampling import ViewPreset, bounding_sphere, joint_intervals, sample_scale
-from artsim.sources import find_sources
-from artsim.verify import sample_problems
 from tests.conftest import ASSETS, DEMO
 
 REAL = ("Laptop", "Eyeglasses", "Dishwasher", "StorageFurniture", "Box", "Oven", "Faucet", "Knife")
@@ -222,11 +222,11 @@ def test_scales_are_diagonals() -> None:
         lambda: ViewOptions(fill=(0, 1)),
         lambda: StateOptions(fraction_open=(0.5, 1.5)),
         lambda: StateOptions(joint_range={"lid": (1.0, 0.0)}),
-        lambda: artsim.plan.SampleOptions(num_points=0),
-        lambda: artsim.plan.SampleOptions(scale=(1.0, 0.5)),
-        lambda: artsim.plan.SampleOptions(images=("rgb",)),
+        lambda: artsim.datasets.plan.SampleOptions(num_points=0),
+        lambda: artsim.datasets.plan.SampleOptions(scale=(1.0, 0.5)),
+        lambda: artsim.datasets.plan.SampleOptions(images=("rgb",)),
     ],
 )
 def test_options_that_make_no_sense_are_refused(options: object) -> None:
-    with pytest.raises(artsim.ArtsimError, match="mend:"):
+    with pytest.raises(artsim.ArtsimError, match="Fix:"):
         options()  # type: ignore[operator]

@@ -17,6 +17,7 @@ from PIL import Image
 
 from artsim import Camera, make
 from artsim.appearance import Lights, Material, Sun, plain_coat
+from artsim.datasets.shards import sample_from_members
 from artsim.errors import ConfigError
 from artsim.kinematics import transform_points
 from artsim.renderers import BACKGROUND, Renderer
@@ -27,7 +28,6 @@ from artsim.scenes.props import DISTRACTORS, distractor, placed
 from artsim.scenes.sample import SceneView, observe_scene, write_view
 from artsim.scenes.scene import Scene, Thing, rigid
 from artsim.scenes.view import overview
-from artsim.shards import sample_from_members
 from artsim.solids import box
 from benchmarks.agreement import LIMITS
 from tests.conftest import backend

@@ -15,9 +15,9 @@ import trimesh
 import artsim
 from artsim.errors import ArtsimError, AssetError
 from artsim.kinematics import transform_points
-from artsim.meshes import LoadLimits
+from artsim.loading.meshes import LoadLimits
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject
-from artsim.urdf import load
 from tests.conftest import ASSETS, BOX_LAPTOP
 
 QUIRKS = ASSETS / "quirks"
@@ -303,7 +303,7 @@ def test_bad_input_gives_an_error_that_says_what_and_where(case: str, tmp_path: 
         load(path)
     if case != "mimic loop":
         assert str(tmp_path) in str(error.value)
-        assert "mend:" in str(error.value)
+        assert "Fix:" in str(error.value)
 
 
 def test_limits_hold(tmp_path: Path, box_laptop: Path) -> None:

@@ -14,8 +14,8 @@ import pytest
 import trimesh
 
 from artsim.kinematics import Array
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject, Part
-from artsim.urdf import load
 from tests.conftest import ASSETS, DEMO
 
 INF, QUARTER = np.inf, np.pi / 2

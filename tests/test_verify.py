@@ -14,11 +14,11 @@ import pytest
 
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
-from artsim.plan import SampleOptions
+from artsim.datasets.plan import SampleOptions
+from artsim.datasets.shards import ShardReader, write_shard
+from artsim.datasets.verify import sample_problems, verify
+from artsim.loading.sources import find_sources
 from artsim.sample import Sample
-from artsim.shards import ShardReader, write_shard
-from artsim.sources import find_sources
-from artsim.verify import sample_problems, verify
 from tests.conftest import ASSETS
 
 

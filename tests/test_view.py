@@ -12,9 +12,9 @@ from scipy.spatial import ConvexHull, Delaunay
 
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
+from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError
-from artsim.plan import SampleOptions
-from artsim.sources import find_sources
+from artsim.loading.sources import find_sources
 from artsim.view import (
     PALETTE,
     axis_segment,

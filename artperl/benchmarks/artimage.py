@@ -24,13 +24,13 @@ import numpy as np
 from artperl.categories import ARTIMAGE, Parts, objects_of, opens_to_the_back
 from artperl.evaluation import NUM_POINTS, TEST_SEEDS, samples_of
 from artperl.order import as_seen
+from artsim.datasets.plan import SampleOptions
 from artsim.errors import AssetError, ConfigError
 from artsim.kinematics import KinematicTree
+from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject, Part
-from artsim.plan import SampleOptions
 from artsim.sample import Sample
 from artsim.sampling import ViewOptions, ViewPreset
-from artsim.urdf import load
 
 SPLIT = Path(__file__).with_suffix(".json")
 """Real objects: ``{category: {"train" or "test": {"Folder/id": SHA-256 of the URDF file}}}``."""

@@ -16,13 +16,13 @@ from PIL import Image as Pictures
 
 from artsim.appearance import Coat, Colour, Material
 from artsim.appearance.textures import Image
-from artsim.bodies import merge_fixed_links
 from artsim.errors import AssetError
 from artsim.files import read_bounded
-from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError
+from artsim.loading.bodies import merge_fixed_links
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
+from artsim.loading.partnet import read_side_files
+from artsim.loading.urdf_xml import parse_robot
 from artsim.objects import ArticulatedObject
-from artsim.partnet import read_side_files
-from artsim.urdf_xml import parse_robot
 
 _MAX_PICTURE_BYTES = 50_000_000
 _MAX_PICTURE_PIXELS = 64_000_000

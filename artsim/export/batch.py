@@ -20,12 +20,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from artsim.datasets.team import Team, locked
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
 from artsim.files import write_atomic, write_error
 from artsim.progress import track
-from artsim.team import Team, locked
 
 INDEX = "index.csv"
 _COLUMNS = ("folder", "category", "object_id", "parts", "joints", "free_joints", "mass_kg", "size_m", "sha256")

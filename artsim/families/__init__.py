@@ -81,8 +81,8 @@ def make(category: str, seed: int = 0) -> ArticulatedObject:
         When there is no such category, or the seed is negative.
     """
     if category not in FAMILIES:
-        raise ConfigError(f"there is no category {category!r}", mend=f"use one of {', '.join(sorted(FAMILIES))}")
+        raise ConfigError(f"there is no category {category!r}", fix=f"use one of {', '.join(sorted(FAMILIES))}")
     if seed < 0:
-        raise ConfigError(f"seed {seed} is negative", mend="use 0 or more")
+        raise ConfigError(f"seed {seed} is negative", fix="use 0 or more")
     rng = np.random.default_rng([zlib.crc32(category.encode()), seed])
     return FAMILIES[category](rng).build(category, str(seed))

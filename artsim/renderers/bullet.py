@@ -31,7 +31,7 @@ from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 # As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
 _MAX_WORLDS = {"pybullet": 16, "pybullet-egl": 1}
-_EGL_MEND = "install libegl1 libegl-mesa0 libgl1-mesa-dri (Debian/Ubuntu), or use --renderer raycast"
+_EGL_FIX = "install libegl1 libegl-mesa0 libgl1-mesa-dri (Debian/Ubuntu), or use --renderer raycast"
 # OpenGL's camera looks along -z with y up.
 _GL_FROM_CV = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -144,11 +144,11 @@ class _World:
     def _start_egl(self) -> None:
         spec = importlib.util.find_spec("eglRenderer")
         if spec is None or spec.origin is None:
-            raise RenderError("this PyBullet has no EGL plugin", "pybullet-egl", _EGL_MEND)
+            raise RenderError("this PyBullet has no EGL plugin", "pybullet-egl", _EGL_FIX)
         with silent():
             plugin = self._bullet.loadPlugin(spec.origin, "_eglRendererPlugin", physicsClientId=self._client)
         if plugin < 0:
-            raise RenderError("EGL does not start", "pybullet-egl", _EGL_MEND)
+            raise RenderError("EGL does not start", "pybullet-egl", _EGL_FIX)
 
     def _load(self, solid: _Solid, folder: Path) -> Iterator[int]:
         """Bodies that show a solid: one, or one for each of its materials."""

@@ -24,8 +24,8 @@ from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 _MAX_STAGES = 16  # as many objects as take turns in a plan
 _PROBE_TIMEOUT = 120.0  # seconds
-_EXTRA_MEND = "pip install 'artsim[sapien]'"
-_DRIVER_MEND = (
+_EXTRA_FIX = "pip install 'artsim[sapien]'"
+_DRIVER_FIX = (
     "run scripts/install-vulkan.sh as root (Mesa's lavapipe >= 24.3 renders on a CPU) or install the GPU's Vulkan "
     "driver; or use --renderer raycast"
 )
@@ -146,12 +146,12 @@ def import_sapien() -> ModuleType:
     try:
         probe = subprocess.run(command, capture_output=True, text=True, timeout=_PROBE_TIMEOUT)
     except subprocess.TimeoutExpired as error:
-        raise RenderError("SAPIEN's driver gives no answer", "sapien", _DRIVER_MEND) from error
+        raise RenderError("SAPIEN's driver gives no answer", "sapien", _DRIVER_FIX) from error
     if probe.returncode != 0:
         said = (probe.stderr.strip().splitlines() or [f"the probe ended with {probe.returncode}"])[-1]
         if "No module named 'sapien'" in said:
-            raise RenderError("SAPIEN is not installed", "sapien", _EXTRA_MEND)
-        raise RenderError(f"SAPIEN cannot render here ({said})", "sapien", _DRIVER_MEND)
+            raise RenderError("SAPIEN is not installed", "sapien", _EXTRA_FIX)
+        raise RenderError(f"SAPIEN cannot render here ({said})", "sapien", _DRIVER_FIX)
     import sapien
 
     return sapien

@@ -25,7 +25,7 @@ from artsim.renderers.base import Frame
 from artsim.renderers.bullet import silent
 from artsim.renderers.views import Clouds, Images, Views
 
-_MEND = "pip install 'artsim[warp]'"
+_FIX = "pip install 'artsim[warp]'"
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,12 +279,12 @@ def import_warp() -> ModuleType:
     try:
         import warp
     except ImportError as error:
-        raise RenderError("Warp is not installed", "warp", _MEND) from error
+        raise RenderError("Warp is not installed", "warp", _FIX) from error
     warp.config.log_level = warp.LOG_WARNING
     try:
         with silent():  # on a machine without a GPU it says so, in C, in every process
             warp.init()
     except OSError as error:
-        mend = "set WARP_CACHE_PATH to a folder that can be written"
-        raise RenderError(f"Warp has no place for its compiled kernels ({error})", "warp", mend) from error
+        fix = "set WARP_CACHE_PATH to a folder that can be written"
+        raise RenderError(f"Warp has no place for its compiled kernels ({error})", "warp", fix) from error
     return warp

@@ -17,12 +17,12 @@ from artsim.camera import Camera
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.kinematics import Array
+from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.sampling import StateOptions, sample_state
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
 from artsim.scenes.scene import Scene, Thing
-from artsim.sources import find_sources
 
 _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from artsim.camera import Camera
+from artsim.datasets.shards import npy_bytes, sample_members
 from artsim.errors import ConfigError
 from artsim.files import write_atomic
 from artsim.kinematics import Array
@@ -24,7 +25,6 @@ from artsim.renderers.scenes import render_scene
 from artsim.sample import ARTSIM_VERSION, Sample, observe
 from artsim.scenes.scene import Scene, SceneFrame, Thing
 from artsim.sensor import Sensor, find_sensor
-from artsim.shards import npy_bytes, sample_members
 
 
 @dataclass(frozen=True, eq=False)

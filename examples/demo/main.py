@@ -8,11 +8,11 @@ from pathlib import Path
 import artsim
 from artperl.settings import PRESETS
 from artperl.training import Training
+from artsim.datasets.plan import SampleOptions
+from artsim.datasets.verify import verify
 from artsim.families import FAMILIES
 from artsim.gallery import gallery
-from artsim.plan import SampleOptions
-from artsim.sources import family_sources, find_sources
-from artsim.verify import verify
+from artsim.loading.sources import family_sources, find_sources
 from artsim.view import view_path
 
 ASSETS = Path(__file__).resolve().parents[2] / "urdf_assets"

@@ -18,8 +18,8 @@ from artperl.pose import Theta, Trees, pose_parts
 from artperl.refine import RefineOptions, refine
 from artperl.rotations import rotation_from_vector
 from artperl.shapes import Observed, Shapes
+from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.kinematics import Joint, KinematicTree, Mimic
-from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import shared_renderer
 
 _RIGID = RefineOptions(sigma_scale=0.0, sigma_aspect=0.0, sigma_stretch=0.0, sigma_shift=0.0)

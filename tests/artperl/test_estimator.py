@@ -153,7 +153,7 @@ def test_damaged_folders_are_refused(base: ShapeBase, tmp_path: Path, spoiled: s
     folder = tmp_path / "made"
     save_estimator(Estimator(Perception(2, 16), base), folder, {})
     (folder / spoiled).write_bytes(b"damaged")
-    with pytest.raises(DatasetError, match="mend"):
+    with pytest.raises(DatasetError, match="Fix"):
         load_estimator(folder)
 
 

@@ -16,8 +16,8 @@ from artperl.evaluation import samples_of
 from artperl.inputs import points_of_depth, read_intrinsics, read_points
 from artperl.networks.perception import Perception
 from artperl.view import page
+from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError
-from artsim.plan import SampleOptions
 from artsim.renderers import BACKGROUND
 from artsim.sample import Sample
 from tests.artperl.worlds import small_base

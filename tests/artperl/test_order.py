@@ -11,8 +11,8 @@ import artsim
 from artperl.categories import objects_of
 from artperl.data import Samples
 from artperl.order import as_seen, reordered, reordered_sample, visible_order
+from artsim.datasets.plan import SampleOptions
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions
 from artsim.sampling import ViewOptions, sample_view
 
 _DRAWN = ("points", "part", "npcs", "visible_fraction")

@@ -14,7 +14,7 @@ from artperl.evaluation import VALIDATION_SEEDS, frozen_samples
 from artperl.neighbours import nearest_by_products, nearest_by_trees
 from artperl.networks.perception import Perceived, Perception, Votes, perception_figures, perception_losses
 from artperl.networks.pointnet2 import Neighbourhoods, interpolated, strongest
-from artsim.plan import SampleOptions
+from artsim.datasets.plan import SampleOptions
 from artsim.sample import Sample
 
 

@@ -13,7 +13,7 @@ from artperl.benchmarks.basin import basin_problem, run_basin
 from artperl.categories import ARTIMAGE
 from artperl.checkpoint import WEIGHTS, folder_of, load_estimator, read_settings
 from artperl.evaluation import evaluate, frozen_samples, samples_of
-from artsim.plan import SampleOptions
+from artsim.datasets.plan import SampleOptions
 from artsim.sampling import StateOptions, ViewOptions
 
 _SEEDS = 1_200_000

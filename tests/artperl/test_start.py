@@ -18,7 +18,7 @@ from artperl.retrieval import ShapeBase
 from artperl.rotations import rotation_from_vector
 from artperl.shapes import Shapes
 from artperl.start import adapted, by_another_part, part_poses, procrustes, sized, start
-from artsim.plan import SampleOptions
+from artsim.datasets.plan import SampleOptions
 from artsim.sample import Sample
 
 

@@ -27,12 +27,12 @@ from artperl.settings import PRESETS, TrainOptions
 from artperl.steps import one_cycle
 from artperl.training import BASE_SEEDS, Training
 from artsim import generate
-from artsim.dataset import open_dataset
+from artsim.datasets.dataset import open_dataset
+from artsim.datasets.plan import SampleOptions
+from artsim.datasets.stream import STREAM_SEEDS
 from artsim.errors import ConfigError, DatasetError
-from artsim.plan import SampleOptions
-from artsim.sources import family_sources
-from artsim.stream import STREAM_SEEDS
-from artsim.urdf import load
+from artsim.loading.sources import family_sources
+from artsim.loading.urdf import load
 
 TINY = TrainOptions(
     base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, stretched=0.5, batch_size=4,
@@ -202,7 +202,7 @@ def test_the_program_says_what_is_wrong(
         with pytest.raises(SystemExit) as stopped:
             cli.main()
         assert stopped.value.code == 2
-        assert "mend" in capsys.readouterr().err
+        assert "Fix:" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

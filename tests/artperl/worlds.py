@@ -13,8 +13,8 @@ from artperl.embedding import by_boxes
 from artperl.networks.perception import Perceived, Perception, Votes
 from artperl.problems import Problem, Problems
 from artperl.retrieval import ShapeBase
+from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import shared_renderer
 from artsim.sample import Sample
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from artsim.sources import find_sources
+from artsim.loading.sources import find_sources
 from benchmarks.kinematics import bullet_robots, compare
 from tests.conftest import ASSETS
 

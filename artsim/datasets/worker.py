@@ -13,12 +13,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from artsim.datasets.plan import Plan, Shard, ShardRecord, draw_sample, read_plan
+from artsim.datasets.shards import write_shard
+from artsim.loading.sources import Source
 from artsim.object_file import ObjectCache, save_object
-from artsim.plan import Plan, Shard, ShardRecord, draw_sample, read_plan
 from artsim.renderers import Renderer, make_renderer
 from artsim.sample import Sample
-from artsim.shards import write_shard
-from artsim.sources import Source
 
 _STEP = 16  # samples between two reports
 

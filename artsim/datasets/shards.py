@@ -30,7 +30,7 @@ _OTHER = (*_CLOUD, *_PNG, "depth", "noise", *_STRINGS, *_SCALARS)
 _ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in _OTHER)
 
 _MAX_MEMBER = 1 << 30
-_MEND = "delete the shard and run the same generate command again"
+_FIX = "delete the shard and run the same generate command again"
 
 
 def sample_members(sample: Sample) -> dict[str, bytes]:
@@ -86,7 +86,7 @@ def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
                 values[name] = np.asarray(Image.open(io.BytesIO(members[f"{name}.png"])))
         return Sample(**values)
     except Exception as error:  # NumPy, Pillow and json fail in many ways on bytes that are not theirs
-        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, _MEND) from error
+        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, _FIX) from error
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
@@ -172,11 +172,11 @@ class ShardReader:
                 for info in tar:
                     key, _, suffix = info.name.partition(".")
                     if not info.isreg() or not 0 <= info.size <= _MAX_MEMBER:
-                        raise DatasetError(f"unexpected member {info.name!r}", path, _MEND)
+                        raise DatasetError(f"unexpected member {info.name!r}", path, _FIX)
                     self._members.setdefault(key, {})[suffix] = (info.offset_data, info.size)
             self._file = path.open("rb")
         except (tarfile.TarError, OSError, EOFError, ValueError) as error:
-            raise DatasetError(f"cannot read the shard ({error})", path, _MEND) from error
+            raise DatasetError(f"cannot read the shard ({error})", path, _FIX) from error
 
     def __len__(self) -> int:
         return len(self._members)
@@ -189,13 +189,13 @@ class ShardReader:
         """One sample by its key."""
         members = self._members.get(key)
         if members is None:
-            raise DatasetError(f"holds no sample {key}", self.path, _MEND)
+            raise DatasetError(f"holds no sample {key}", self.path, _FIX)
         contents = {}
         for suffix, (offset, size) in members.items():
             self._file.seek(offset)
             contents[suffix] = self._file.read(size)
             if len(contents[suffix]) != size:
-                raise DatasetError("the shard is cut short", self.path, _MEND)
+                raise DatasetError("the shard is cut short", self.path, _FIX)
         return sample_from_members(contents, f"{self.path}: sample {key}")
 
     def close(self) -> None:

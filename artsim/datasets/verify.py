@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.camera import Camera
-from artsim.dataset import Dataset
+from artsim.datasets.dataset import Dataset
+from artsim.datasets.plan import Plan, ShardRecord
+from artsim.datasets.shards import ShardReader, sample_key
 from artsim.errors import ArtsimError, DatasetError
 from artsim.files import file_sha256
 from artsim.kinematics import Array, invert_transform, transform_points
 from artsim.objects import ArticulatedObject
-from artsim.plan import Plan, ShardRecord
 from artsim.progress import track
 from artsim.renderers.raycast import cast, pose
 from artsim.sample import Sample
 from artsim.sampling import Scale
-from artsim.shards import ShardReader, sample_key
 
 _TOLERANCE = 1e-4
 """Of the object's diagonal: points are stored in single precision."""

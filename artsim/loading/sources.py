@@ -11,9 +11,9 @@ from pathlib import Path
 from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make
 from artsim.files import read_bounded
-from artsim.meshes import LoadLimits
+from artsim.loading.meshes import LoadLimits
+from artsim.loading.urdf import find_urdf, load
 from artsim.objects import ArticulatedObject
-from artsim.urdf import find_urdf, load
 
 
 @dataclass(frozen=True)

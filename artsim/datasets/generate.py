@@ -18,9 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError, KinematicsError
-from artsim.files import write_atomic, write_error
-from artsim.plan import (
+from artsim.datasets.plan import (
     Plan,
     PlannedObject,
     SampleOptions,
@@ -29,10 +27,12 @@ from artsim.plan import (
     check_shares,
     unique_keys,
 )
+from artsim.datasets.team import Team, locked
+from artsim.datasets.worker import CompiledSource, compile_source, make_shard
+from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError, KinematicsError
+from artsim.files import write_atomic, write_error
+from artsim.loading.sources import Source
 from artsim.progress import track
-from artsim.sources import Source
-from artsim.team import Team, locked
-from artsim.worker import CompiledSource, compile_source, make_shard
 
 CONVENTIONS = (
     "Metres, radians. Camera frame OpenCV (x right, y down, z forward); depth is z-depth, 0 = no return; pixel centres "
@@ -71,7 +71,7 @@ def generate(
     Parameters
     ----------
     sources : sequence of Source
-        The objects; see :func:`artsim.sources.find_sources` and :func:`artsim.sources.family_sources`.
+        The objects; see :func:`artsim.loading.sources.find_sources` and :func:`artsim.loading.sources.family_sources`.
     out : path
         Folder of the dataset; made if missing.
     num_samples, seed : int
@@ -138,7 +138,7 @@ def _check_options(
         raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
     check_shares(splits)
     if not sources:
-        raise AssetError("no objects to show", mend="name categories to make, or URDF files or folders that hold some")
+        raise AssetError("no objects to show", fix="name categories to make, or URDF files or folders that hold some")
 
 
 def _remove_leftovers(folder: Path) -> None:
@@ -229,7 +229,7 @@ def _new_plan(
         raise AssetError(
             f"{len(left_out)} of {len(sources)} objects do not load:\n  "
             + "\n  ".join(entry["why"] for entry in left_out[:20]),
-            mend="mend them, or leave them out with --skip-broken",
+            fix="mend them, or leave them out with --skip-broken",
         )
     keys = unique_keys(list(loaded))
     splits = assign_splits(

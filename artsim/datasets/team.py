@@ -13,9 +13,9 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+from artsim.datasets.worker import start_worker
 from artsim.errors import DatasetError
 from artsim.files import write_error
-from artsim.worker import start_worker
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, transform_points
-from artsim.urdf_xml import safe_xml
+from artsim.loading.urdf_xml import safe_xml
 
 if TYPE_CHECKING:
     import yourdfpy

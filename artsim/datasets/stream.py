@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ConfigError
+from artsim.loading.sources import family_sources
 from artsim.objects import ArticulatedObject
-from artsim.plan import SampleOptions, draw_sample
 from artsim.renderers import Renderer, make_renderer
 from artsim.sample import Sample
-from artsim.sources import family_sources
 
 STREAM_SEEDS = (1 << 31, 1 << 32)
 """Seeds of a stream's objects: none that a person would choose for a test set."""
@@ -51,11 +51,11 @@ class FamilyStream:
         step: int = 1,
     ):
         if not categories:
-            raise ConfigError("a stream needs categories", mend="name at least one")
+            raise ConfigError("a stream needs categories", fix="name at least one")
         if min(seed, start) < 0 or min(views_per_object, step) < 1:
             raise ConfigError(
                 f"a stream has no seed {seed}, {views_per_object} views per object, start {start}, step {step}",
-                mend="count from 0 upwards; views and step from 1",
+                fix="count from 0 upwards; views and step from 1",
             )
         family_sources(categories, 1)  # raises where there is none
         self.categories = list(categories)

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.datasets.plan import FORMAT, SPLITS, Plan, ShardRecord, draw_sample
+from artsim.datasets.shards import ShardReader, sample_key
 from artsim.errors import ConfigError, DatasetError
 from artsim.kinematics import JOINT_TYPES
 from artsim.object_file import ObjectCache
 from artsim.objects import ArticulatedObject
-from artsim.plan import FORMAT, SPLITS, Plan, ShardRecord, draw_sample
 from artsim.renderers import Renderer, make_renderer
 from artsim.sample import Sample
-from artsim.shards import ShardReader, sample_key
 
 _OPEN_SHARDS = 64
 _FAR = 1_000_000_007
@@ -49,7 +49,7 @@ class Dataset:
         self.folder = Path(folder)
         self.plan, shards = _read_description(self.folder)
         if split is not None and split not in SPLITS:
-            raise ConfigError(f"there is no split {split!r}", mend=f"use one of {', '.join(SPLITS)}")
+            raise ConfigError(f"there is no split {split!r}", fix=f"use one of {', '.join(SPLITS)}")
         self.split = split
         self.shards = [s for s in shards if split in (None, s.split)]
         self._ends = np.cumsum([s.end - s.first for s in self.shards]).tolist()
@@ -190,9 +190,9 @@ class SampleStream:
 
     def __init__(self, plan: Plan, folder: Path, split: str = "train", seed: int = 1, start: int = 0, step: int = 1):
         if split not in SPLITS or not plan.objects_of[split]:
-            raise ConfigError(f"split {split!r} has no objects", mend="choose one that has, or other shares")
+            raise ConfigError(f"split {split!r} has no objects", fix="choose one that has, or other shares")
         if seed < 0 or start < 0 or step < 1:
-            raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", mend="count from 0 upwards")
+            raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", fix="count from 0 upwards")
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
         self.objects = ObjectCache(Path(folder) / "objects")
         self._renderer: Renderer | None = None

@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from artsim.bodies import (
+from artsim.errors import AssetError
+from artsim.files import read_bounded
+from artsim.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
+from artsim.loading.bodies import (
     RigidBody,
     axis_in_base,
     in_order,
@@ -22,15 +25,12 @@ from artsim.bodies import (
     stretch,
     without_empty_leaves,
 )
-from artsim.errors import AssetError
-from artsim.files import read_bounded
-from artsim.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
-from artsim.meshes import LoadLimits, MeshReader, UnusableMeshError, merged
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, merged
+from artsim.loading.partnet import read_side_files
+from artsim.loading.rest_state import canonical_category, rest_state
+from artsim.loading.urdf_xml import parse_robot
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
-from artsim.partnet import read_side_files
-from artsim.rest import canonical_category, rest_state
-from artsim.urdf_xml import parse_robot
 
 if TYPE_CHECKING:
     import yourdfpy

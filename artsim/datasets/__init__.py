@@ -1,0 +1,1 @@
+"""Samples on disk: planned, made by workers, written as shards, read back, verified."""

@@ -1,0 +1,1 @@
+"""Objects from files: URDF documents, their meshes, and the side files of PartNet-Mobility."""
