@@ -1,6 +1,6 @@
 """Stored clouds with what the shipped estimators say of them: whatever changes an estimate shows here first.
 
-``python -m tests.artperl.golden`` estimates the clouds anew and writes ``estimates.json``; ``--clouds`` draws the clouds
+``python -m tests.artperl.golden`` estimates the clouds anew and writes ``estimates.json``; ``--clouds`` draws them
 anew, too. Both change what later versions are compared with: say why in the commit.
 
 Clouds of procedural objects are stored. Those of real ones may not be, and are drawn from the files of
