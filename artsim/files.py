@@ -13,6 +13,7 @@ import io
 import json
 import math
 import os
+import re
 import stat
 import warnings
 import zipfile
@@ -165,7 +166,13 @@ _MAX_JSON_DEPTH = 64
 """Python itself fails at about 1,000, later and elsewhere: when such a value is printed, for one."""
 
 
-def read_json(path: Path, what: str, error: type[ArtsimError] = AssetError, max_bytes: int = MAX_JSON_BYTES) -> Any:
+def read_json(
+    path: Path,
+    what: str,
+    error: type[ArtsimError] = AssetError,
+    max_bytes: int = MAX_JSON_BYTES,
+    finite: bool = True,
+) -> Any:
     """The content of an untrusted JSON file, bounded in size and in depth.
 
     Parameters
@@ -176,6 +183,8 @@ def read_json(path: Path, what: str, error: type[ArtsimError] = AssetError, max_
     error : type of ArtsimError
         Raised when the file cannot be used.
     max_bytes : int
+    finite : bool
+        Refuse Python's ``NaN`` and ``Infinity``, which are not JSON, and numbers that no float holds.
 
     Raises
     ------
@@ -184,13 +193,13 @@ def read_json(path: Path, what: str, error: type[ArtsimError] = AssetError, max_
     """
     data = read_bounded(path, max_bytes, what, error, fix="restore the file, or make it again")
     try:
-        return parse_json(data)
+        return parse_json(data, finite)
     except ValueError as problem:
         raise error(f"{what} is not usable JSON ({problem})", path, "restore the file, or make it again") from problem
 
 
-def parse_json(data: bytes) -> Any:
-    """The value of a JSON text. Its numbers are finite and fit a float, its whole numbers fit 64 bits.
+def parse_json(data: bytes, finite: bool = True) -> Any:
+    """The value of a JSON text. Its whole numbers fit 64 bits, and with ``finite``, all its numbers are finite.
 
     Raises
     ------
@@ -201,11 +210,17 @@ def parse_json(data: bytes) -> Any:
     if data.count(b",") + data.count(b"[") + data.count(b"{") > _MAX_JSON_VALUES:
         raise ValueError(f"it holds over {_MAX_JSON_VALUES:,} values")
     try:
-        value = json.loads(
-            data.decode("utf-8-sig"), parse_int=_whole, parse_float=_real, parse_constant=_refuse_constant
-        )
+        text = data.decode("utf-8-sig")
+        if finite:
+            value = json.loads(text, parse_int=_whole, parse_float=_real, parse_constant=_refuse_constant)
+        else:
+            value = json.loads(text, parse_int=_whole)
+        if re.search(rb"\\u[dD][89a-fA-F]", data):  # half of a pair, alone, is no text: nothing can be written with it
+            json.dumps(value, ensure_ascii=False).encode()
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    except (UnicodeDecodeError, UnicodeEncodeError) as error:
+        raise ValueError(f"it is not text in UTF-8: {error.reason}") from None
     level = [value]
     for _ in range(_MAX_JSON_DEPTH):
         level = [
