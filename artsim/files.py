@@ -132,12 +132,12 @@ def read_bounded(
                 raise error(
                     f"{what} of {status.st_size / 1e6:.0f} MB is over the limit of {max_bytes / 1e6:.0f} MB", path, fix
                 )
-            data = file.read(max_bytes + 1)
+            data = file.read(status.st_size + 1)
     except (OSError, ValueError, RuntimeError) as problem:  # a null in the name is a ValueError, links in a circle
         reason = getattr(problem, "strerror", None) or problem  # are a RuntimeError before Python 3.13
         raise error(f"cannot read {what} ({reason})", path, "check the path and its rights") from problem
-    if len(data) > max_bytes:
-        raise error(f"{what} grows over the limit of {max_bytes / 1e6:.3g} MB while it is read", path, fix)
+    if len(data) > status.st_size:
+        raise error(f"{what} grows while it is read", path, "try again once it is whole")
     return data
 
 
