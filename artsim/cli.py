@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import sys
@@ -15,7 +16,7 @@ import tyro
 from artsim.datasets.plan import SampleOptions
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
-from artsim.names import printable
+from artsim.names import PrintableStream, printable
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
 
@@ -356,10 +357,12 @@ def generate_main() -> None:
 
 def run_program(verb: Any, program: str, description: str | None = None) -> None:
     """Read the command line as one of some verbs, and run it; errors are one line, and exit with 2."""
-    if isinstance(sys.stdout, io.TextIOWrapper):  # names of files, and in them, need not be text in any encoding
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not know every character
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        tyro.cli(verb, prog=program, description=description).run()
+        chosen = tyro.cli(verb, prog=program, description=description)
+        with contextlib.redirect_stdout(PrintableStream(sys.stdout)):  # names out of files are in what is printed
+            chosen.run()
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()
     except (ArtsimError, OSError) as error:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import re
+from typing import TextIO
 
 _MAX_NAME = 60
 """Characters of a file name: of four bytes each in UTF-8 at worst, they fit the 255 that file systems take."""
@@ -29,9 +31,39 @@ def printable(text: object, most: int = 120) -> str:
     if len(text) > most:
         half = (most - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
+    return _escaped(text)
+
+
+def _escaped(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+class PrintableStream(io.TextIOBase):
+    """A text stream that lets line breaks through and, of all else, what is :func:`printable`.
+
+    Parameters
+    ----------
+    stream : text stream
+        What is written to.
+    """
+
+    def __init__(self, stream: TextIO):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text, escaped."""
+        self._stream.write("\n".join(map(_escaped, text.split("\n"))))
+        return len(text)
+
+    def flush(self) -> None:
+        """Pass on what was written."""
+        self._stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether somebody watches."""
+        return self._stream.isatty()
 
 
 def safe_name(text: object, fallback: str = "object") -> str:

@@ -116,8 +116,8 @@ def _parts(arrays: Mapping[str, NDArray[Any]], names: Sequence[str], labels: Seq
             raise ValueError(f"its {what} are {array.dtype} of shape {array.shape}")
     if not (np.abs(vertices) <= _LARGEST).all():
         raise ValueError("a vertex is not finite, or out of range")
-    if len(faces) == 0:
-        raise ValueError("it has no triangle")
+    if len(faces) == 0 or not np.ptp(vertices, axis=0).any():
+        raise ValueError("it has no triangle, or no extent")
     ends = []
     for name, total in (("vertex_counts", len(vertices)), ("face_counts", len(faces))):
         counts = arrays[name]

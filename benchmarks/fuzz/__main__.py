@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -33,7 +35,10 @@ CHUNK = 1000
 """Inputs between two notes of how far a run is."""
 
 HANG_S = 10.0
-"""Seconds after which an input hangs."""
+"""Seconds of processor time after which an input hangs."""
+
+STILL_S = 120.0
+"""Seconds after which one hangs that takes no processor time: a busy machine may hold a worker up for some."""
 
 START_S = 180.0
 """Seconds in which a worker must have read its first input: it makes the seeds, and imports what reads them."""
@@ -162,7 +167,7 @@ class _Hand:
         )
         self._process.start()
         theirs.close()
-        self._seen, self._since, self._started = -1, time.monotonic(), False
+        self._seen, self._since, self._spent, self._started = -1, time.monotonic(), 0.0, False
 
     def begin(self, first: int, end: int) -> None:
         """Give it a range."""
@@ -184,10 +189,14 @@ class _Hand:
 
     def watch(self) -> Report | None:
         """Look after a worker that says nothing; as :meth:`answer`."""
-        now, current = time.monotonic(), self._current.value
+        now, spent, current = time.monotonic(), _processor_time(self._process.pid), self._current.value
         if current != self._seen:
-            self._seen, self._since, self._started = current, now, self._started or current >= 0
-        if now - self._since > (HANG_S if self._started else START_S):
+            self._seen, self._since, self._spent = current, now, spent
+            self._started = self._started or current >= 0
+        hangs = self._started and spent - self._spent > HANG_S
+        if hangs or now - self._since > (STILL_S if self._started else START_S):
+            os.kill(self._process.pid or 0, signal.SIGUSR1)  # it writes into its log where it is
+            time.sleep(0.5)
             return self._replaced("hang", f"no answer in {now - self._since:.0f} s")
         return None
 
@@ -208,6 +217,15 @@ class _Hand:
         self._process.kill()
         self._process.join()
         self.pipe.close()
+
+
+def _processor_time(pid: int | None) -> float:
+    """Seconds of processor time that a process has taken; of the clock where the system does not say."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return time.monotonic()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def run(options: Options) -> State:

@@ -6,6 +6,7 @@ import faulthandler
 import gc
 import os
 import resource
+import signal
 import tempfile
 import time
 import traceback
@@ -90,9 +91,9 @@ def examine(index: int, given: Input, desk: Desk) -> tuple[float, Finding | None
     if error is not None:
         return spent, Finding(index, "raw", _cause(error), "".join(traceback.format_exception(error)))
     if spent > SLOW_S:
-        return spent, Finding(index, "slow", given.file_name, f"{spent:.1f} s of processor time")
+        return spent, Finding(index, "slow", f"slow {given.file_name}", f"{spent:.1f} s of processor time")
     if peak_mb() > LARGE_MB >= before:
-        return spent, Finding(index, "large", given.file_name, f"{peak_mb():.0f} MB, {before:.0f} MB before")
+        return spent, Finding(index, "large", f"large {given.file_name}", f"{peak_mb():.0f} MB, {before:.0f} MB before")
     return spent, None
 
 
@@ -118,6 +119,7 @@ def work(
         os.dup2(file.fileno(), 1)  # libraries print what they think of a file
         os.dup2(file.fileno(), 2)
         faulthandler.enable(file)
+        faulthandler.register(signal.SIGUSR1, file)
         warnings.simplefilter("ignore")
         np.seterr(all="ignore")
         desk = Desk(root)
