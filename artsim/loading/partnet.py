@@ -119,4 +119,4 @@ def _word(text: str | int) -> str:
 
 
 def _names(value: object) -> tuple[str, ...]:
-    return tuple(name for name in value if isinstance(name, str)) if isinstance(value, list) else ()
+    return tuple(str(name)[:_MAX_NAME] for name in value) if isinstance(value, list) else ()
