@@ -7,25 +7,28 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load as load_tensors
+from safetensors.torch import save_file
 from torch import Tensor, nn
 
+from artperl.embedding import EMBEDDED
 from artperl.estimate import Calibration
 from artperl.estimator import Estimator
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perception
-from artperl.refine import RefineOptions
 from artperl.retrieval import ShapeBase
 from artperl.search import EstimatorOptions
 from artsim.errors import ConfigError, DatasetError
-from artsim.files import write_atomic
+from artsim.files import read_bounded, read_json, write_atomic
+from artsim.names import printable
+from artsim.objects import MAX_PARTS
+from artsim.plain import from_plain
 
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
@@ -94,24 +97,106 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
     folder = folder_of(name)
     settings = read_settings(folder)
     try:
-        tensors = load_file(folder / _TENSORS)
-        perception = Perception(**settings["perception"])
-        perception.load_state_dict(_under(tensors, "perception."))
-        agent = None if settings["agent"] is None else Agent(**settings["agent"])
-        if agent is not None:
-            agent.load_state_dict(_under(tensors, "agent."))
-            agent.to(device)
-        boxes = None if settings.get("boxes") is None else Boxes(**settings["boxes"])
-        if boxes is not None:
-            boxes.load_state_dict(_under(tensors, "boxes."))
-        options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings["options"].items()}
-        options["refine"] = RefineOptions(**options["refine"])
-        return Estimator(
-            perception.to(device), ShapeBase.load(folder / _BASE), agent, EstimatorOptions(**(options | changes)),
-            Calibration(**settings["calibration"]), boxes,
-        )  # fmt: skip
-    except (OSError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
-        raise DatasetError(f"the estimator does not load: {error}", folder, "train it again") from error
+        sizes = _Sizes(
+            from_plain(_PerceptionSize, settings.get("perception")),
+            None if settings.get("agent") is None else from_plain(_AgentSize, settings["agent"]),
+            None if settings.get("boxes") is None else from_plain(_BoxesSize, settings["boxes"]),
+        )
+        options = replace(from_plain(EstimatorOptions, settings.get("options")), **changes)
+        calibration = from_plain(Calibration, settings.get("calibration"))
+    except ValueError as error:
+        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, "train it again") from error
+    tensors = read_tensors(folder / _TENSORS)
+    with torch.device("meta"):  # a forged width takes no memory before it is known to be that of the weights
+        _check_fit(sizes.networks(), tensors, folder)
+    networks = sizes.networks()
+    for key, network in networks.items():
+        network.load_state_dict(_under(tensors, f"{key}."))
+        network.to(device)
+    base = ShapeBase.load(folder / _BASE)
+    if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
+        raise DatasetError("its embeddings are not of its objects", folder / _BASE, "train it again")
+    perception, agent, boxes = networks["perception"], networks.get("agent"), networks.get("boxes")
+    assert isinstance(perception, Perception)
+    assert isinstance(agent, Agent | None)
+    assert isinstance(boxes, Boxes | None)
+    return Estimator(perception, base, agent, options, calibration, boxes)
+
+
+_MAX_ROWS, _MAX_WIDTH = MAX_PARTS, 2048
+
+
+def _check_size(value: int, most: int, what: str) -> None:
+    if not 1 <= value <= most:
+        raise ValueError(f"{what} is {value}, not 1 to {most}")
+
+
+@dataclass(frozen=True)
+class _PerceptionSize:
+    num_rows: int
+    width: int = 48
+    votes: bool = False
+
+    def __post_init__(self) -> None:
+        _check_size(self.num_rows, _MAX_ROWS, "num_rows")
+        _check_size(self.width, _MAX_WIDTH, "width")
+
+
+@dataclass(frozen=True)
+class _AgentSize:
+    width: int = 64
+
+    def __post_init__(self) -> None:
+        _check_size(self.width, _MAX_WIDTH, "width")
+
+
+@dataclass(frozen=True)
+class _BoxesSize:
+    num_rows: int
+    width: int = 80
+
+    def __post_init__(self) -> None:
+        _check_size(self.num_rows, _MAX_ROWS, "num_rows")
+        _check_size(self.width, _MAX_WIDTH, "width")
+
+
+@dataclass(frozen=True)
+class _Sizes:
+    """Sizes of an estimator's networks."""
+
+    perception: _PerceptionSize
+    agent: _AgentSize | None
+    boxes: _BoxesSize | None
+
+    def networks(self) -> dict[str, nn.Module]:
+        """New networks of these sizes, by name."""
+        networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
+        if self.agent is not None:
+            networks["agent"] = Agent(**asdict(self.agent))
+        if self.boxes is not None:
+            networks["boxes"] = Boxes(**asdict(self.boxes))
+        return networks
+
+
+def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor], folder: Path) -> None:
+    """Refuse tensors that are not exactly those of the networks, or are not finite.
+
+    Raises
+    ------
+    DatasetError
+    """
+    wanted = {f"{key}.{name}": t.shape for key, net in networks.items() for name, t in net.state_dict().items()}
+    problem = None
+    if wanted.keys() != tensors.keys():
+        problem = f"{printable(min(wanted.keys() ^ tensors.keys()))} is in only one of {_SETTINGS} and {_TENSORS}"
+    else:
+        for name, tensor in tensors.items():
+            if tensor.shape != wanted[name] or not tensor.dtype.is_floating_point:
+                problem = f"{name} is {tensor.dtype} of shape {tuple(tensor.shape)}, not {tuple(wanted[name])}"
+            elif not bool(torch.isfinite(tensor).all()):
+                problem = f"{name} is not finite"
+    if problem is not None:
+        raise DatasetError(f"the estimator does not load: {problem}", folder, "train it again")
 
 
 def folder_of(name: str | Path) -> Path:
@@ -128,16 +213,41 @@ def read_settings(folder: Path) -> dict[str, Any]:
     DatasetError
         When there is none, or it was written by another version.
     """
-    try:
-        settings: dict[str, Any] = json.loads((folder / _SETTINGS).read_text())
-    except (OSError, ValueError) as error:
+    if not (folder / _SETTINGS).exists():
         shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{_SETTINGS}"))) or "none"
         raise DatasetError(
             "there is no estimator", folder, f"train one, or use one that comes with the package: {shipped}"
-        ) from error
+        )
+    # An option, or a figure of its training, may be infinite.
+    settings = read_json(folder / _SETTINGS, _SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
+    if not isinstance(settings, dict) or not isinstance(settings.get("about"), dict):
+        raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, "train it again")
     if settings.get("format") != _FORMAT:
-        raise DatasetError(f"format {settings.get('format')} is not {_FORMAT}", folder, "train it again")
+        raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, "train it again")
     return settings
+
+
+_MAX_SETTINGS_BYTES = 16_000_000
+_MAX_TENSOR_BYTES = 4_000_000_000
+_MAX_TENSOR_HEADER = 4_000_000
+"""Bytes of JSON that name the tensors: some hundred of them take a tenth."""
+
+
+def read_tensors(path: Path) -> dict[str, Tensor]:
+    """Tensors of a safetensors file.
+
+    Raises
+    ------
+    DatasetError
+        When the file is missing, damaged or too large.
+    """
+    data = read_bounded(path, _MAX_TENSOR_BYTES, "weights", DatasetError, fix="train it again")
+    if int.from_bytes(data[:8], "little") > _MAX_TENSOR_HEADER:
+        raise DatasetError("weights cannot be read (the header says that it is huge)", path, "train it again")
+    try:
+        return load_tensors(data)
+    except Exception as error:  # safetensors raises what its parser and torch stumble on in bytes that are not theirs
+        raise DatasetError(f"weights cannot be read ({error})", path, "train it again") from error
 
 
 def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:

@@ -10,6 +10,9 @@ from artperl.retrieval import ShapeBase
 _MISSING = 4.0
 """Distance, in diagonals, between objects of which one has a part that the other lacks."""
 
+EMBEDDED = 7
+"""Numbers of each part in an embedding."""
+
 
 def box_embedding(valid: Tensor, box_center: Tensor, box_size: Tensor) -> Tensor:
     """Euclidean distance between embeddings is the difference of the parts' boxes, root of the sum of squares.

@@ -15,6 +15,7 @@ from artperl.estimator import Estimator
 from artperl.evaluation import compare, true_poses
 from artsim.camera import Camera
 from artsim.errors import ArtsimError
+from artsim.names import printable
 from artsim.sample import Sample
 from artsim.view import PALETTE
 
@@ -82,7 +83,7 @@ def overlays(estimator: Estimator, samples: Sequence[Sample], columns: int = 4) 
         try:
             _overlay(axes, sample, estimator(sample.points))
         except ArtsimError as error:
-            axes.set_title(str(error), fontsize=7)
+            axes.set_title(str(error), fontsize=7, parse_math=False)
     figure.tight_layout()
     return _png(figure)
 
@@ -98,12 +99,13 @@ def _overlay(axes: Axes, sample: Sample, estimate: Estimate) -> None:
     for k in range(len(estimate.state)):
         colour = tuple(PALETTE[k % len(PALETTE)] / 255)
         _box(axes, camera, estimate.rotation[k], estimate.translation[k], estimate.size[k], color=colour, linewidth=1.1)
-    title = f"{sample.category} {sample.object_id}, confidence {100 * estimate.confidence:.0f} %"
+    name = printable(f"{sample.category} {sample.object_id}", 60)
+    title = f"{name}, confidence {100 * estimate.confidence:.0f} %"
     if len(estimate.state) == len(sample.joint_type):
         error = compare(estimate, sample, 0.0)
         title += "\n" + " ".join(f"{x:.1f}°" for x in error.rotation)
         title += "   " + " ".join(f"{100 * x:.1f}" for x in error.translation) + " %"
-    axes.set_title(title, fontsize=7)
+    axes.set_title(title, fontsize=7, parse_math=False)  # a dollar sign in a name begins no formula
     axes.set_aspect("equal")
     axes.invert_yaxis()
     axes.set_axis_off()

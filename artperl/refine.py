@@ -56,7 +56,7 @@ class RefineOptions:
     """Relative decrease of the energy, made by a step or promised by one that failed, below which an object is done."""
 
     def __post_init__(self) -> None:
-        if self.iterations < 0 or not 0.0 < self.robust_end <= self.robust_start:
+        if not 0 <= self.iterations <= 10_000 or not 0.0 < self.robust_end <= self.robust_start:
             raise ConfigError("refinement needs a number of iterations and 0 < robust_end <= robust_start")
 
 

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.data import joint_rows
 from artperl.pose import KINDS, Trees
 from artperl.refine import AxisPrior
 from artperl.shapes import Shapes
-from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artsim.errors import ConfigError, DatasetError, KinematicsError
+from artsim.files import parse_json, read_npz
 from artsim.kinematics import Joint, KinematicTree
-from artsim.objects import ArticulatedObject
+from artsim.objects import MAX_PARTS, ArticulatedObject
 
 FORMAT = 2
 _ALIKE = 0.02
@@ -281,28 +284,91 @@ class ShapeBase:
         DatasetError
             When it is missing, damaged or of another format.
         """
+        arrays = read_npz(Path(path), "shape base", DatasetError)
         try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            description = json.loads(arrays.pop("description").tobytes())
-            if description["format"] != FORMAT:
-                raise DatasetError(f"format {description['format']} is not {FORMAT}", path, "build the base again")
-            trees = tuple(KinematicTree.from_dict(tree) for tree in description["trees"])
-            embeddings = arrays.pop("embeddings", None)
-            tensors = {name: torch.from_numpy(arrays[name].astype(np.float32)) for name in _CLOUDS}
-            tensors["normals"] = torch.nn.functional.normalize(tensors["normals"], dim=-1)
-            stacked = Trees.stack(trees, tensors["box_size"].shape[1], torch.float32)
-        except DatasetError:
-            raise
-        except (OSError, ValueError, KeyError, TypeError, ArtsimError) as error:
-            raise DatasetError(f"no shape base can be read ({error})", path, "build it again") from error
-        return ShapeBase(
-            tuple(description["object_ids"]),
-            tuple(description["categories"]),
-            trees,
-            Shapes(trees=stacked, **tensors),
-            None if embeddings is None else torch.from_numpy(embeddings),
-        )
+            return _base(arrays)
+        except (ValueError, KinematicsError) as error:
+            reason = error.what if isinstance(error, KinematicsError) else error
+            raise DatasetError(f"no shape base can be read ({reason})", path, "build it again") from error
+
+
+_MAX_PAIRS = 30_000_000
+"""Bytes of the pairs of parts of all objects, of which one carries the other: 460 objects of 254 parts."""
+
+_LARGEST = 1e6
+"""Objects have a diagonal of 1, and a half-precision number reaches 65504."""
+
+
+def _base(arrays: Mapping[str, NDArray[Any]]) -> ShapeBase:
+    """The base that the arrays of a file describe; a ValueError or KinematicsError says why there is none."""
+    lacking = {"description", *_CLOUDS} - arrays.keys()
+    if lacking:
+        raise ValueError(f"it lacks {', '.join(sorted(lacking))}")
+    description = parse_json(arrays["description"].tobytes())
+    if not isinstance(description, dict):
+        raise ValueError("its description is not a set of named values")
+    if description.get("format") != FORMAT:
+        raise ValueError(f"its format is {description.get('format')!r:.20}, not {FORMAT}")
+    ids, categories, trees = (description.get(name) for name in ("object_ids", "categories", "trees"))
+    if not (isinstance(ids, list) and isinstance(categories, list) and isinstance(trees, list)):
+        raise ValueError("its objects are no lists")
+    if not len(ids) == len(categories) == len(trees) > 0 or not all(isinstance(n, str) for n in [*ids, *categories]):
+        raise ValueError("its lists of objects do not fit each other")
+    tensors = _clouds(arrays, len(ids))
+    num_rows = tensors["box_size"].shape[1]
+    if num_rows > MAX_PARTS or len(ids) * num_rows**2 > _MAX_PAIRS:
+        raise ValueError(f"{len(ids)} objects of {num_rows} parts are too many")
+    known = tuple(KinematicTree.from_dict(tree) for tree in trees)
+    embeddings = arrays.get("embeddings")
+    if embeddings is not None:
+        embeddings = _checked(embeddings, (len(ids), None), "embeddings")
+    return ShapeBase(
+        tuple(ids),
+        tuple(categories),
+        known,
+        Shapes(trees=Trees.stack(known, num_rows, torch.float32), **tensors),
+        None if embeddings is None else torch.from_numpy(embeddings),
+    )
+
+
+def _clouds(arrays: Mapping[str, NDArray[Any]], count: int) -> dict[str, Tensor]:
+    """Boxes and clouds of the parts of ``count`` objects, checked."""
+    points = arrays["points"]
+    if points.ndim != 4 or 0 in points.shape:
+        raise ValueError(f"its points are of shape {points.shape}")
+    B, P, M, _ = points.shape
+    shapes = {
+        "box_center": (B, P, 3),
+        "box_size": (B, P, 3),
+        "points": (B, P, M, 3),
+        "normals": (B, P, M, 3),
+        "spacing": (B, P),
+        "diagonal": (B,),
+    }
+    if count != B:
+        raise ValueError(f"it has points of {B} objects, and names {count}")
+    if arrays["spacing"].dtype.kind != "f":
+        raise ValueError(f"its spacing is {arrays['spacing'].dtype}")
+    # Parts without a surface have no spacing: it is infinite.
+    unbounded = arrays["spacing"] == np.inf
+    finite = dict(arrays) | {"spacing": np.where(unbounded, 1.0, arrays["spacing"])}
+    checked = {name: _checked(finite[name], shape, name) for name, shape in shapes.items()}
+    if not (checked["diagonal"] > 0).all() or not (checked["spacing"] >= 0).all() or (checked["box_size"] < 0).any():
+        raise ValueError("a length is negative")
+    checked["spacing"][unbounded] = np.inf
+    tensors = {name: torch.from_numpy(values) for name, values in checked.items()}
+    tensors["normals"] = torch.nn.functional.normalize(tensors["normals"], dim=-1)
+    return tensors
+
+
+def _checked(values: NDArray[Any], shape: tuple[int | None, ...], name: str) -> NDArray[np.float32]:
+    """Finite numbers of that shape (None: any length), in single precision."""
+    fits = len(shape) == values.ndim and all(want in (None, has) for want, has in zip(shape, values.shape, strict=True))
+    if not fits or values.dtype.kind not in "iuf":
+        raise ValueError(f"its {name} are {values.dtype} of shape {values.shape}")
+    if not (np.abs(values.astype(np.float64)) <= _LARGEST).all():
+        raise ValueError(f"its {name} are not finite, or out of range")
+    return values.astype(np.float32)
 
 
 def moves(joint: Tensor) -> Tensor:

@@ -55,6 +55,11 @@ _LABEL_DISTANCE = 0.03
 """Distance from the fitted part, in diagonals, that weighs as much against a label as odds of 1 to e."""
 
 
+_COUNTS = ("num_points", "early_points", "fit_points", "references"), 1, 1_000_000
+_STEPS = ("early_iterations", "beam", "agent_steps"), 0, 10_000
+"""Options, and their least and largest values: larger ones take memory, or time, without end."""
+
+
 @dataclass(frozen=True)
 class EstimatorOptions:
     """The pipeline."""
@@ -95,6 +100,12 @@ class EstimatorOptions:
     below. None: the camera may be anywhere."""
 
     def __post_init__(self) -> None:
+        for names, least, most in (_COUNTS, _STEPS):
+            for name in names:
+                if not least <= getattr(self, name) <= most:
+                    raise ConfigError(f"{getattr(self, name)} is not within {least} to {most}", name)
+        if not self.azimuths or not np.isfinite([*self.azimuths, self.elevation]).all():
+            raise ConfigError("starts need finite azimuths and an elevation", "azimuths", "write -50 0 50")
         if self.seen_from is not None and not self.seen_from[0] <= self.seen_from[1]:
             raise ConfigError(f"{self.seen_from} is not a range", "seen_from", "write LOW HIGH, such as -75 75")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import sys
 from collections.abc import Mapping
@@ -14,6 +16,7 @@ import tyro
 from artsim.datasets.plan import SampleOptions
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
+from artsim.names import PrintableStream, printable
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
 
@@ -354,12 +357,16 @@ def generate_main() -> None:
 
 def run_program(verb: Any, program: str, description: str | None = None) -> None:
     """Read the command line as one of some verbs, and run it; errors are one line, and exit with 2."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not know every character
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        tyro.cli(verb, prog=program, description=description).run()
+        chosen = tyro.cli(verb, prog=program, description=description)
+        with contextlib.redirect_stdout(PrintableStream(sys.stdout)):  # names out of files are in what is printed
+            chosen.run()
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()
     except (ArtsimError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {printable(error, 4000)}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -7,6 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from artsim.names import printable
+
+_MAX_TEXT = 1200
+"""Characters of each part of a message: names out of files may be of any length."""
+
 
 class ArtsimError(Exception):
     """Base of every deliberate error.
@@ -28,8 +33,11 @@ class ArtsimError(Exception):
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        text = self.what if self.where is None else f"{self.where}: {self.what}"
-        return text if self.fix is None else f"{text.rstrip('.')}. Fix: {self.fix}"
+        # Each part may quote names out of files, which hold anything.
+        text = printable(self.what, _MAX_TEXT)
+        if self.where is not None:
+            text = f"{printable(self.where, _MAX_TEXT)}: {text}"
+        return text if self.fix is None else f"{text.rstrip('.')}. Fix: {printable(self.fix, _MAX_TEXT)}"
 
     def __reduce__(self) -> tuple[type, tuple[str, str | None, str | None]]:
         # Errors cross process boundaries (generation workers).

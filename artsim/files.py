@@ -1,21 +1,33 @@
-"""Reading untrusted files and writing whole ones."""
+"""Reading untrusted files and writing whole ones.
+
+Every size is known, and refused when it is too large, before anything is expanded: bytes of a file, values of a JSON
+text, arrays of an archive, pixels of an image.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import hashlib
+import io
 import json
+import math
 import os
+import re
+import stat
+import warnings
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from artsim.errors import ArtsimError, AssetError, ConfigError
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 
 def write_atomic(path: Path, data: bytes) -> None:
@@ -72,32 +84,95 @@ def file_sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def read_bounded(path: Path, max_bytes: int, what: str) -> bytes:
-    """The content of a file, refused above a size.
+_RAISE_LIMITS = "raise the limit with artsim.load(..., limits=LoadLimits(...)) if you trust the file"
+
+
+def read_bounded(
+    path: Path,
+    max_bytes: int,
+    what: str,
+    error: type[ArtsimError] = AssetError,
+    inside: Path | None = None,
+    fix: str = _RAISE_LIMITS,
+) -> bytes:
+    """The content of a regular file, refused above a size.
+
+    Pipes and devices are refused without waiting for them.
+
+    Parameters
+    ----------
+    path : Path
+    max_bytes : int
+    what : str
+        What the file is, for messages.
+    error : type of ArtsimError
+        Raised when the file cannot be used.
+    inside : Path, optional
+        Folder that the file must lie in once every link is followed. The folder itself may be reached through links.
+    fix : str
+        What a user can do about a file that is too large.
 
     Raises
     ------
-    AssetError
-        When the file is missing, unreadable or larger than ``max_bytes``.
+    ArtsimError
+        Of the type ``error``: when the file is missing, unreadable, no regular file, outside ``inside``, or larger than
+        ``max_bytes``.
     """
     try:
-        size = path.stat().st_size
-        if size > max_bytes:
-            raise AssetError(
-                f"{what} of {size / 1e6:.0f} MB is over the limit of {max_bytes / 1e6:.0f} MB",
-                path,
-                "raise the limit with artsim.load(..., limits=LoadLimits(...)) if you trust the file",
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise AssetError(f"cannot read {what} ({error.strerror})", path, "check the path and its rights") from error
+        if inside is not None and not path.resolve().is_relative_to(inside.resolve()):
+            raise error(f"{what} is a link that leads out of the folder", path, "put the file itself there")
+        # Without O_NONBLOCK, opening a pipe waits for somebody to write to it.
+        flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        with os.fdopen(os.open(path, flags), "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+                raise error(f"{what} is {kind}", path, "pass a file")
+            if status.st_size > max_bytes:
+                raise error(
+                    f"{what} of {status.st_size / 1e6:.0f} MB is over the limit of {max_bytes / 1e6:.0f} MB", path, fix
+                )
+            data = file.read(status.st_size + 1)
+    except (OSError, ValueError, RuntimeError) as problem:  # a null in the name is a ValueError, links in a circle
+        reason = getattr(problem, "strerror", None) or problem  # are a RuntimeError before Python 3.13
+        raise error(f"cannot read {what} ({reason})", path, "check the path and its rights") from problem
+    if len(data) > status.st_size:
+        raise error(f"{what} grows while it is read", path, "try again once it is whole")
+    return data
+
+
+def read_text(path: Path, what: str, error: type[ArtsimError] = AssetError, max_bytes: int = 16_000_000) -> str:
+    """The content of a text file in UTF-8, with or without a byte order mark; any line end becomes a newline.
+
+    Raises
+    ------
+    ArtsimError
+        Of the type ``error``: when the file cannot be read, is too large or is not UTF-8.
+    """
+    data = read_bounded(path, max_bytes, what, error, fix="split it, or store it in a binary format")
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as problem:
+        raise error(f"{what} is not text in UTF-8 ({problem.reason})", path, "save it as UTF-8") from problem
 
 
 MAX_JSON_BYTES = 64_000_000
 """The description of a dataset of 100,000 objects takes half of it."""
 
+_MAX_JSON_VALUES = 3_000_000
+"""About 100 bytes each in memory."""
 
-def read_json(path: Path, what: str, error: type[ArtsimError] = AssetError, max_bytes: int = MAX_JSON_BYTES) -> Any:
+_MAX_JSON_DEPTH = 64
+"""Python itself fails at about 1,000, later and elsewhere: when such a value is printed, for one."""
+
+
+def read_json(
+    path: Path,
+    what: str,
+    error: type[ArtsimError] = AssetError,
+    max_bytes: int = MAX_JSON_BYTES,
+    finite: bool = True,
+) -> Any:
     """The content of an untrusted JSON file, bounded in size and in depth.
 
     Parameters
@@ -108,44 +183,246 @@ def read_json(path: Path, what: str, error: type[ArtsimError] = AssetError, max_
     error : type of ArtsimError
         Raised when the file cannot be used.
     max_bytes : int
+    finite : bool
+        Refuse Python's ``NaN`` and ``Infinity``, which are not JSON, and numbers that no float holds.
 
     Raises
     ------
     ArtsimError
         Of the type ``error``: when the file is missing, too large, nested too deeply, or not JSON.
     """
+    data = read_bounded(path, max_bytes, what, error, fix="restore the file, or make it again")
     try:
-        return parse_json(read_bounded(path, max_bytes, what))
+        return parse_json(data, finite)
     except ValueError as problem:
         raise error(f"{what} is not usable JSON ({problem})", path, "restore the file, or make it again") from problem
-    except AssetError as problem:
-        raise error(problem.what, problem.where, problem.fix) from problem
 
 
-def parse_json(data: bytes) -> Any:
-    """The value of a JSON text.
+def parse_json(data: bytes, finite: bool = True) -> Any:
+    """The value of a JSON text. Its whole numbers fit 64 bits, and with ``finite``, all its numbers are finite.
 
     Raises
     ------
     ValueError
-        When it is not JSON in UTF-8, or is nested too deeply.
+        When it is not JSON in UTF-8, is nested too deeply, or holds too many values or a number out of range.
     """
+    # Each value follows one of these; strings may hold some too, which only makes the bound stricter.
+    if data.count(b",") + data.count(b"[") + data.count(b"{") > _MAX_JSON_VALUES:
+        raise ValueError(f"it holds over {_MAX_JSON_VALUES:,} values")
     try:
-        return json.loads(data.decode("utf-8"))
+        text = data.decode("utf-8-sig")
+        if finite:
+            value = json.loads(text, parse_int=_whole, parse_float=_real, parse_constant=_refuse_constant)
+        else:
+            value = json.loads(text, parse_int=_whole)
+        if re.search(rb"\\u[dD][89a-fA-F]", data):  # half of a pair, alone, is no text: nothing can be written with it
+            json.dumps(value, ensure_ascii=False).encode()
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    except (UnicodeDecodeError, UnicodeEncodeError) as error:
+        raise ValueError(f"it is not text in UTF-8: {error.reason}") from None
+    level = [value]
+    for _ in range(_MAX_JSON_DEPTH):
+        level = [
+            child
+            for one in level
+            if isinstance(one, (dict, list))
+            for child in (one.values() if isinstance(one, dict) else one)
+        ]
+        if not level:
+            return value
+    raise ValueError("it is nested too deeply")
 
 
-def read_npz(path: Path) -> dict[str, NDArray[np.generic]]:
-    """All arrays of an ``.npz`` file, never unpickling.
+def _whole(text: str) -> int:
+    if len(text) > 20 or not -(1 << 63) <= (value := int(text)) < 1 << 64:
+        raise ValueError("it holds a whole number of over 64 bits")
+    return value
+
+
+def _real(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError("it holds a number that is out of range")
+    return value
+
+
+def _refuse_constant(text: str) -> float:
+    raise ValueError(f"{text} is no number in JSON")
+
+
+MAX_ARRAY_BYTES = 256_000_000
+"""Arrays of one archive, expanded."""
+
+_FREE_BYTES, _MAX_RATIO = 64_000_000, 100
+"""An archive may expand to so many bytes at any rate, and beyond them to so many times its own size: clouds and weights
+shrink to a third at best, and only bombs by a thousand."""
+
+_MAX_MEMBERS = 10_000
+_MAX_NPY_HEADER = 4096
+"""The header of a plain array takes 128 bytes."""
+
+
+def read_npz(
+    path: Path,
+    what: str = "archive",
+    error: type[ArtsimError] = AssetError,
+    max_bytes: int = MAX_ARRAY_BYTES,
+) -> dict[str, NDArray[Any]]:
+    """All arrays of an ``.npz`` file, never unpickling, bounded before they are expanded.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What the file is, for messages.
+    error : type of ArtsimError
+        Raised when the file cannot be used.
+    max_bytes : int
+        Of the file, and of all arrays together.
 
     Raises
     ------
-    AssetError
-        When the file is missing or damaged.
+    ArtsimError
+        Of the type ``error``: when the file is missing, damaged, too large or holds Python objects.
     """
+    data = read_bounded(path, max_bytes, what, error, fix="make it again with less in it")
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile) as error:
-        raise AssetError(f"cannot read the archive ({error})", path, "make it again") from error
+        return parse_npz(data, max_bytes)
+    except ValueError as problem:
+        raise error(f"{what} cannot be read ({problem})", path, "restore the file, or make it again") from problem
+
+
+def parse_npz(data: bytes, max_bytes: int = MAX_ARRAY_BYTES) -> dict[str, NDArray[Any]]:
+    """All arrays of the bytes of an ``.npz`` file, as :func:`read_npz`.
+
+    Raises
+    ------
+    ValueError
+        When they are damaged, too large when expanded, or hold Python objects.
+    """
+    # The list of members is as long as it says; it is counted by its marks before it is read.
+    if data.count(b"PK\x01\x02") > _MAX_MEMBERS:
+        raise ValueError(f"it has over {_MAX_MEMBERS} members")
+    left = min(max_bytes, max(_FREE_BYTES, _MAX_RATIO * len(data)))
+    arrays: dict[str, NDArray[Any]] = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            for member in archive.infolist():
+                name = member.filename.removesuffix(".npy")
+                if name in arrays:
+                    raise ValueError(f"two members are called {name!r}")
+                left -= member.file_size
+                if left < 0:
+                    raise ValueError("it expands to more than the limit")
+                with archive.open(member) as stream:
+                    arrays[name] = _npy(stream, member.file_size)  # type: ignore[arg-type]  # has read()
+                    stream.read(1)  # at its end, the checksum is compared
+    except Exception as problem:  # zipfile and zlib raise whatever they stumble on in bytes that are not theirs
+        raise ValueError(str(problem) or type(problem).__name__) from problem
+    return arrays
+
+
+def read_npy(
+    path: Path, what: str = "array", error: type[ArtsimError] = AssetError, max_bytes: int = MAX_ARRAY_BYTES
+) -> NDArray[Any]:
+    """The array of an ``.npy`` file, never unpickling.
+
+    Raises
+    ------
+    ArtsimError
+        Of the type ``error``: when the file is missing, damaged, too large or holds Python objects.
+    """
+    data = read_bounded(path, max_bytes, what, error, fix="make it again with less in it")
+    try:
+        return parse_npy(data)
+    except ValueError as problem:
+        raise error(f"{what} cannot be read ({problem})", path, "restore the file, or make it again") from problem
+
+
+def parse_npy(data: bytes) -> NDArray[Any]:
+    """The array of the bytes of an ``.npy`` file.
+
+    Raises
+    ------
+    ValueError
+        When they are damaged or hold Python objects.
+    """
+    return _npy(io.BytesIO(data), len(data))
+
+
+def _npy(stream: BinaryIO, size: int) -> NDArray[Any]:
+    """One array in NumPy's format out of ``size`` bytes: its header is compared with them before memory is taken."""
+    start = stream.read(12)
+    length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
+    if start[:6] != b"\x93NUMPY" or length > _MAX_NPY_HEADER:
+        raise ValueError("it is no array in NumPy's format")
+    offset = 10 if start[6:7] == b"\x01" else 12
+    header = io.BytesIO(start[8:] + stream.read(length - (12 - offset)))
+    read_header = np.lib.format.read_array_header_1_0 if offset == 10 else np.lib.format.read_array_header_2_0
+    try:
+        shape, fortran, dtype = read_header(header, max_header_size=_MAX_NPY_HEADER)
+    except Exception as problem:  # NumPy lets through what Python's parser raises on a text that is not its own
+        raise ValueError("the header of an array is damaged") from problem
+    if dtype.hasobject:
+        raise ValueError("it holds Python objects, which are never read")
+    wanted = math.prod(shape) * dtype.itemsize
+    if any(side < 0 for side in shape) or not 0 <= wanted <= size - offset - length or dtype.itemsize == 0:
+        raise ValueError(f"an array says that it takes {wanted} bytes, but there are {size - offset - length}")
+    content = stream.read(wanted)
+    if len(content) != wanted:
+        raise ValueError("an array ends too early")
+    flat = np.frombuffer(bytearray(content), dtype=dtype)  # a bytearray can be written to, as what np.load returns
+    return flat.reshape(shape, order="F" if fortran else "C")
+
+
+MAX_IMAGE_PIXELS = 32_000_000
+"""More than 6,500 x 4,900: four bytes each, and once more when they become an array."""
+
+_IMAGE_FORMATS = ("PNG", "TIFF", "PPM", "JPEG", "BMP", "WEBP")
+"""Pillow knows others, some of which start programs."""
+
+
+def open_image(
+    source: Path | bytes,
+    what: str = "image",
+    error: type[ArtsimError] = ConfigError,
+    max_pixels: int = MAX_IMAGE_PIXELS,
+    where: str | Path | None = None,
+) -> Image.Image:
+    """An image, decoded; its size is taken from its header and refused before it is decoded.
+
+    Parameters
+    ----------
+    source : Path or bytes
+        A file, or its content.
+    what : str
+        What it is, for messages.
+    error : type of ArtsimError
+        Raised when the image cannot be used.
+    max_pixels : int
+    where : str or Path, optional
+        Where bytes come from, for messages.
+
+    Raises
+    ------
+    ArtsimError
+        Of the type ``error``: when there is no image, or it is damaged or too large.
+    """
+    from PIL import Image
+
+    if isinstance(source, Path):
+        where = source
+        source = read_bounded(source, 8 * max_pixels, what, error, fix="make it smaller")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow warns of what is refused just below
+            image = Image.open(io.BytesIO(source), formats=_IMAGE_FORMATS)
+            pixels = image.width * image.height
+            if pixels <= max_pixels:
+                image.load()
+    except Exception as problem:  # Pillow raises whatever it stumbles on in bytes that are not an image's
+        raise error(f"{what} cannot be read ({problem})", where, "save it as PNG") from problem
+    if pixels > max_pixels:
+        raise error(f"{what} of {image.width} x {image.height} pixels is too large", where, "make it smaller")
+    return image

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.kinematics import Array
+from artsim.names import printable
 from artsim.objects import ArticulatedObject
 from artsim.renderers import render
 from artsim.sampling import ViewOptions, joint_intervals, sample_view
@@ -37,7 +38,8 @@ def gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_r
     for number, obj in enumerate(objects):
         row, column = divmod(number, objects_per_row)
         x, y = column * states * _TILE, row * (_TILE + _HEADER)
-        draw.text((x + 6, y + 2), f"{obj.category} {obj.object_id}: {len(obj)} parts", "black", font)
+        title = printable(f"{obj.category} {obj.object_id}: {len(obj)} parts")
+        draw.text((x + 6, y + 2), title, "black", font)
         for i, q in enumerate(opened_states(obj, states)):
             sheet.paste(Image.fromarray(portrait(obj, q)), (x + i * _TILE, y + _HEADER))
     buffer = io.BytesIO()

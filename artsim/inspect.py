@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.kinematics import Joint
+from artsim.names import printable
 from artsim.objects import ArticulatedObject
 
 
@@ -12,7 +13,7 @@ def describe(obj: ArticulatedObject) -> str:
     """Several lines of text: tree with joints and limits, boxes, and what was mended while loading."""
     size = obj.bounds[1] - obj.bounds[0]
     lines = [
-        f"{obj.category} {obj.object_id}  ({obj.source})",
+        f"{printable(obj.category)} {printable(obj.object_id)}  ({printable(obj.source, 1000)})",
         f"{len(obj)} parts, {len(obj.tree.free_joints)} free joints, {obj.num_faces} triangles",
         f"box {_lengths(size)} m, diagonal {obj.diagonal:.4g} m, sha256 {obj.sha256[:16]}",
         "",
@@ -20,7 +21,9 @@ def describe(obj: ArticulatedObject) -> str:
     ]
     depths = obj.tree.depths
     for k, (part, joint) in enumerate(zip(obj.parts, obj.tree.joints, strict=True)):
-        label = part.name if part.label == part.name else f"{part.label} ({part.name})"
+        label = printable(part.label)
+        if part.label != part.name:
+            label += f" ({printable(part.name)})"
         lines.append(f"  {'   ' * int(depths[k])}{'└─ ' if k else ''}{k} {label}{_joint_text(joint)}")
     lines += ["", "boxes in the rest frame: centre / size, m"]
     for k, part in enumerate(obj.parts):
@@ -43,7 +46,7 @@ def _joint_text(joint: Joint) -> str:
         limits = f"{np.rad2deg(joint.lower):.1f} to {np.rad2deg(joint.upper):.1f} deg"
     else:
         limits = "turns freely"
-    text = f"   {joint.type} {joint.name!r}, axis {_lengths(np.array(joint.axis))}, {limits}"
+    text = f"   {joint.type} '{printable(joint.name)}', axis {_lengths(np.array(joint.axis))}, {limits}"
     if joint.rest:
         rest = f"{joint.rest:.4g} m" if joint.type == "prismatic" else f"{np.rad2deg(joint.rest):.1f} deg"
         text += f", rest {rest}"

@@ -351,29 +351,71 @@ class KinematicTree:
         return {"joints": [describe(j) for j in self.joints]}
 
     @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> KinematicTree:
-        """Rebuild a tree from :meth:`to_dict`."""
+    def from_dict(data: object) -> KinematicTree:
+        """Rebuild a tree from :meth:`to_dict`.
 
-        def build(d: Mapping[str, Any]) -> Joint:
-            return Joint(
-                name=str(d["name"]),
-                type=str(d["type"]),
-                parent=int(d["parent"]),
-                axis=_triple(d["axis"]),
-                origin=_triple(d["origin"]),
-                lower=-np.inf if d["lower"] is None else float(d["lower"]),
-                upper=np.inf if d["upper"] is None else float(d["upper"]),
-                rest=float(d["rest"]),
-                pitch=float(d["pitch"]),
-                mimic=None if d["mimic"] is None else Mimic(int(d["mimic"][0]), *map(float, d["mimic"][1:])),
-            )
-
-        return KinematicTree([build(d) for d in data["joints"]])
+        Raises
+        ------
+        KinematicsError
+            When ``data`` is anything else, or describes no tree.
+        """
+        joints = data.get("joints") if isinstance(data, Mapping) else None
+        if not isinstance(joints, list) or len(joints) > _MAX_JOINTS:
+            raise KinematicsError("a tree has no list of joints", fix="make the file again")
+        return KinematicTree([_joint(d, f"joint {k}") for k, d in enumerate(joints)])
 
 
-def _triple(values: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = values
-    return float(x), float(y), float(z)
+_MAX_JOINTS = 1000
+"""Objects have 254 parts at most."""
+
+_LARGEST = 1e9
+"""Metres or radians: squares of larger numbers, and their products, soon overflow."""
+
+
+def _joint(data: object, where: str) -> Joint:
+    """A joint as :meth:`KinematicTree.to_dict` describes it."""
+
+    def number(value: object, name: str, largest: float = _LARGEST) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= largest:
+            raise KinematicsError(f"{name} is {value!r:.60}, which is no number in range", where)
+        return float(value)
+
+    def index(value: object, name: str) -> int:
+        if type(value) is not int or not -1 <= value < _MAX_JOINTS:
+            raise KinematicsError(f"{name} is {value!r:.60}, which is no number of a joint", where)
+        return value
+
+    def items(value: object, name: str) -> list[object]:
+        if not isinstance(value, list) or len(value) != 3:
+            raise KinematicsError(f"{name} is {value!r:.60}, which is not three values", where)
+        return value
+
+    if not isinstance(data, Mapping) or not data.keys() >= _FIELDS:
+        raise KinematicsError("lacks a field", where)
+    if not isinstance(data["name"], str) or not isinstance(data["type"], str):
+        raise KinematicsError("name and type are texts", where)
+    x, y, z = (number(value, "axis") for value in items(data["axis"], "axis"))
+    u, v, w = (number(value, "origin") for value in items(data["origin"], "origin"))
+    mimic = None
+    if data["mimic"] is not None:
+        source, multiplier, offset = items(data["mimic"], "mimic")
+        mimic = Mimic(index(source, "mimic"), number(multiplier, "mimic"), number(offset, "mimic"))
+    return Joint(
+        name=data["name"],
+        type=data["type"],
+        parent=index(data["parent"], "parent"),
+        axis=(x, y, z),
+        origin=(u, v, w),
+        # Files of other programs have limits of any size, which are only ever compared.
+        lower=-np.inf if data["lower"] is None else number(data["lower"], "lower", np.finfo(np.float64).max),
+        upper=np.inf if data["upper"] is None else number(data["upper"], "upper", np.finfo(np.float64).max),
+        rest=number(data["rest"], "rest"),
+        pitch=number(data["pitch"], "pitch"),
+        mimic=mimic,
+    )
+
+
+_FIELDS = {"name", "type", "parent", "axis", "origin", "lower", "upper", "rest", "pitch", "mimic"}
 
 
 def cross_matrix(vectors: ArrayLike) -> Array:

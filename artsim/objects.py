@@ -13,9 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.kinematics import Array, KinematicTree
+from artsim.names import printable
 
 if TYPE_CHECKING:
     import trimesh
+
+_MAX_REPAIR = 1000
+"""Characters of a repair as text: names out of files may be of any length."""
 
 MAX_PARTS = 254
 """Part ids are stored in a byte; 255 marks the background."""
@@ -37,7 +41,7 @@ class Repair:
     what: str
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.what}"
+        return printable(f"{self.where}: {self.what}", _MAX_REPAIR)
 
 
 Mesh = tuple[Array, NDArray[np.int32]]

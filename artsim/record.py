@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from artsim.datasets.shards import ShardReader, sample_key, write_shard
 from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError, DatasetError
-from artsim.files import write_atomic, write_error
+from artsim.files import read_json, write_atomic, write_error
 from artsim.kinematics import Array, invert_transform, transform_points
+from artsim.names import safe_name
 from artsim.object_file import load_object, save_object
 from artsim.objects import ArticulatedObject
 from artsim.progress import track
@@ -195,21 +196,28 @@ def open_motions(folder: str | Path) -> list[Motion]:
     """
     folder = Path(folder)
     path = folder / "motions.json"
-    if not path.is_file():
+    if not path.exists():
         raise DatasetError("no recorded motions here (no motions.json)", folder, "record some: artsim record")
     try:
-        description = json.loads(path.read_text())
+        description = read_json(path, "motions.json", DatasetError)
         if description["format"] != FORMAT:
-            raise DatasetError(f"format {description['format']} is not {FORMAT}", folder, "record it again")
-        return [_open_one(folder, entry, float(description["control_step"])) for entry in description["motions"]]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+            raise DatasetError(f"format {description['format']!r:.20} is not {FORMAT}", folder, "record it again")
+        step = float(description["control_step"])
+        if not 0.0 < step <= 1e6:
+            raise ValueError(f"its control step is {step}")
+        return [_open_one(folder, entry, step) for entry in description["motions"]]
+    except (ValueError, KeyError, TypeError) as error:
         raise DatasetError(f"motions.json is damaged ({error})", folder, "record it again") from error
 
 
 def _open_one(folder: Path, entry: dict[str, Any], control_step: float) -> Motion:
-    name = str(entry["name"])
+    name = entry["name"]
+    if not isinstance(name, str) or name != safe_name(name):
+        raise DatasetError(f"motions.json names a motion {name!r:.60}", folder, "record it again")
     shard, obj = ShardReader(folder / f"{name}.tar"), load_object(folder / "objects" / f"{name}.npz")
     state, velocity = (np.array(entry[key], dtype=np.float64) for key in ("joint_state", "joint_velocity"))
+    if not (np.isfinite(state).all() and np.isfinite(velocity).all()):
+        raise DatasetError(f"motions.json holds states of {name} that are not finite", folder, "record it again")
     if not state.shape == velocity.shape == (len(shard), len(obj)):
         raise DatasetError(f"holds {len(shard)} frames instead of {len(velocity)}", shard.path, "record it again")
     return Motion(name, obj, np.asarray(np.arange(len(shard)) * control_step, np.float64), state, velocity, shard)

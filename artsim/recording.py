@@ -10,6 +10,7 @@ import numpy as np
 from artsim.errors import ArtsimError
 from artsim.files import write_error
 from artsim.kinematics import transform_points
+from artsim.names import printable
 from artsim.renderers import BACKGROUND
 from artsim.view import PALETTE, Shown, axis_segment
 
@@ -48,7 +49,7 @@ def write_recording(shown: Sequence[Shown], path: Path) -> None:
                 half_sizes=0.5 * sample.box_size,
                 quaternions=rotations,
                 colors=colours,
-                labels=list(sample.part_names),
+                labels=[printable(name) for name in sample.part_names],
                 show_labels=False,
             ),
         )

@@ -17,6 +17,7 @@ from artsim.errors import ArtsimError
 from artsim.files import write_atomic
 from artsim.kinematics import Array, transform_points
 from artsim.loading.urdf import load
+from artsim.names import printable, safe_name
 from artsim.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, render
 from artsim.sample import Sample, observe
@@ -68,7 +69,7 @@ def view_path(
     else:
         obj = load(path)
         shown = list(show_states(obj, samples))
-        out = out or Path(f"{obj.category}-{obj.object_id}.png")
+        out = out or Path(f"{safe_name(f'{obj.category}-{obj.object_id}')}.png")
     if not shown:
         raise ArtsimError("there is no sample to draw", path, "choose another split, or ask for at least one")
     write_atomic(out, contact_sheet(shown))
@@ -95,7 +96,7 @@ def show_sample(sample: Sample, obj: ArticulatedObject) -> Shown:
     else:
         camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
         frame = render(obj, sample.joint_state, camera, sample.T_world_camera @ sample.T_camera_part[0])
-    return Shown(sample, frame, f"{sample.category} {sample.object_id}   sample {sample.index}\n{state_text(sample)}")
+    return Shown(sample, frame, _title(sample, f"sample {sample.index}"))
 
 
 def show_states(obj: ArticulatedObject, count: int) -> Iterator[Shown]:
@@ -110,7 +111,11 @@ def show_states(obj: ArticulatedObject, count: int) -> Iterator[Shown]:
         camera = sample_view(obj, q, options, rng)
         sample = observe(obj, q, camera, rng=rng)
         frame = render(obj, q, camera)
-        yield Shown(sample, frame, f"{obj.category} {obj.object_id}   {name}\n{state_text(sample)}")
+        yield Shown(sample, frame, _title(sample, name))
+
+
+def _title(sample: Sample, what: str) -> str:
+    return f"{printable(sample.category, 40)} {printable(sample.object_id, 40)}   {what}\n{state_text(sample)}"
 
 
 def state_text(sample: Sample, most: int = 4) -> str:
@@ -119,7 +124,7 @@ def state_text(sample: Sample, most: int = 4) -> str:
     for k in range(1, len(sample.joint_type)):
         value = sample.joint_state[k] - sample.joint_rest[k]
         text = f"{100 * value:.1f} cm" if sample.joint_type[k] == "prismatic" else f"{np.rad2deg(value):.0f}°"
-        texts.append(f"{sample.part_names[k]} {text}")
+        texts.append(f"{printable(sample.part_names[k], 40)} {text}")
     more = f", and {len(texts) - most} more" if len(texts) > most else ""
     return ", ".join(texts[:most]) + more or "rigid"
 
@@ -144,7 +149,8 @@ def contact_sheet(shown: Sequence[Shown]) -> bytes:
         draw_depth(axes[0], one)
         draw_parts(axes[1], one)
         draw_cloud(axes[2], one)
-        axes[0].set_title(one.title, fontsize=9, loc="left", linespacing=1.3, pad=3)
+        # Names are names: a dollar sign in one must not begin a formula.
+        axes[0].set_title(one.title, fontsize=9, loc="left", linespacing=1.3, pad=3, parse_math=False)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
     return buffer.getvalue()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 import shutil
 import time
@@ -24,10 +23,11 @@ from artsim.datasets.team import Team, locked
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
-from artsim.files import write_atomic, write_error
+from artsim.files import read_json, write_atomic, write_error
 from artsim.progress import track
 
 INDEX = "index.csv"
+_MAX_META = 1_000_000
 _COLUMNS = ("folder", "category", "object_id", "parts", "joints", "free_joints", "mass_kg", "size_m", "sha256")
 
 
@@ -134,10 +134,11 @@ def _whole(folder: Path, formats: Sequence[str]) -> dict[str, Any] | None:
     A folder is whole if it is there at all.
     """
     try:
-        meta: dict[str, Any] = json.loads((folder / "meta.json").read_text())
+        meta: dict[str, Any] = read_json(folder / "meta.json", "meta.json", max_bytes=_MAX_META)
         own = meta["artsim"]
         same = own["version"] == version("artsim") and set(own["formats"]) == set(formats)
-    except (OSError, ValueError, KeyError, TypeError):
+        _row((folder.parent.name, 0), meta)  # what index.csv takes from it
+    except (AssetError, ValueError, KeyError, TypeError):
         return None
     return meta if same and all((folder / FORMATS[name]).is_file() for name in formats) else None
 
@@ -167,19 +168,23 @@ def _index_text(objects: Sequence[tuple[tuple[str, int], dict[str, Any]]]) -> st
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(_COLUMNS)
-    for (category, seed), meta in objects:
-        own = meta["artsim"]
-        writer.writerow(
-            [
-                f"{category}/{seed}",
-                meta["model_cat"],
-                meta["anno_id"],
-                " ".join(own["parts"]),
-                " ".join(own["joints"]),
-                own["free_joints"],
-                f"{own['mass_kg']:.6g}",
-                " ".join(f"{side:.6g}" for side in own["size_m"]),
-                own["sha256"],
-            ]
-        )
+    for key, meta in objects:
+        writer.writerow(_row(key, meta))
     return file.getvalue()
+
+
+def _row(key: tuple[str, int], meta: dict[str, Any]) -> list[Any]:
+    """What stands in the index of one object; KeyError, ValueError or TypeError where its ``meta.json`` is damaged."""
+    category, seed = key
+    own = meta["artsim"]
+    return [
+        f"{category}/{seed}",
+        meta["model_cat"],
+        meta["anno_id"],
+        " ".join(own["parts"]),
+        " ".join(own["joints"]),
+        own["free_joints"],
+        f"{own['mass_kg']:.6g}",
+        " ".join(f"{side:.6g}" for side in own["size_m"]),
+        own["sha256"],
+    ]

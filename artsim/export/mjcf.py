@@ -26,7 +26,7 @@ def mjcf_text(robot: Robot) -> str:
     AssetError
         When MuJoCo refuses the model.
     """
-    root = etree.Element("mujoco", model=f"{robot.obj.category}_{robot.obj.object_id}")
+    root = etree.Element("mujoco", model=robot.name)
     # Fused, a root that no joint moves would become part of the world.
     etree.SubElement(root, "compiler", angle="radian", meshdir="meshes", autolimits="true", fusestatic="false")
     default = etree.SubElement(root, "default")

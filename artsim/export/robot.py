@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from artsim.errors import AssetError
 from artsim.inertia import Inertia, joined_inertia, part_inertia
 from artsim.kinematics import Array, Joint
+from artsim.names import safe_name
 from artsim.objects import ArticulatedObject, Mesh
 
 GRAVITY = 9.81
@@ -118,6 +119,11 @@ class Robot:
     joints: tuple[LinkJoint, ...]
 
     @property
+    def name(self) -> str:
+        """Category and id, as any file format can hold them."""
+        return safe_name(f"{self.obj.category}_{self.obj.object_id}")
+
+    @property
     def meshes(self) -> list[MeshShape]:
         """Every mesh that needs a file."""
         shapes = [s for link in self.links for s in (link.visual, *link.collision)]
@@ -147,10 +153,10 @@ def as_robot(obj: ArticulatedObject) -> Robot:
     """
     tree = obj.tree
     where = f"{obj.category} {obj.object_id}"
-    for part in obj.parts:
-        for word in (part.name, part.label):
-            if not _NAME.fullmatch(word):
-                raise AssetError(f"cannot write the name {word!r}", where, "use letters, digits and _ only")
+    words = [word for part in obj.parts for word in (part.name, part.label)] + [joint.name for joint in tree.joints]
+    for word in words:
+        if not _NAME.fullmatch(word):
+            raise AssetError(f"cannot write the name {word!r}", where, "use letters, digits and _ only")
     if np.any(tree.rest):
         raise AssetError("is not at rest at q = 0", where, "only procedural objects (artsim.make) can be exported")
     own = [part_inertia(obj, k) for k in range(len(obj))]

@@ -16,7 +16,7 @@ _KINDS = {"free": "free", "revolute": "hinge", "continuous": "hinge", "prismatic
 
 def urdf_text(robot: Robot) -> str:
     """The object as a URDF document; its meshes lie in ``meshes/``."""
-    root = etree.Element("robot", name=f"{robot.obj.category}_{robot.obj.object_id}")
+    root = etree.Element("robot", name=robot.name)
     # Read by MuJoCo alone: keep every link, every visual and the folders of the meshes.
     compiler = {"fusestatic": "false", "discardvisual": "false", "strippath": "false", "balanceinertia": "false"}
     etree.SubElement(etree.SubElement(root, "mujoco"), "compiler", compiler)

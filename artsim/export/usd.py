@@ -23,7 +23,7 @@ def usd_text(robot: Robot) -> str:
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
-    name = Tf.MakeValidIdentifier(f"{robot.obj.category}_{robot.obj.object_id}")
+    name = Tf.MakeValidIdentifier(robot.name)
     root = UsdGeom.Xform.Define(stage, f"/{name}")
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root.GetPrim()).SetKind(Kind.Tokens.component)

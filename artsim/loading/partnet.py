@@ -6,14 +6,19 @@ help to build a screw. Such objects are at rest at their file's zero.
 
 from __future__ import annotations
 
-import json
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from artsim.files import read_bounded
+from artsim.errors import AssetError
+from artsim.files import parse_json, read_bounded
 from artsim.objects import Repair
 
-_MAX_SIDE_FILE = 32_000_000
+_MAX_SIDE_FILE = 8_000_000
+"""Those of PartNet-Mobility take some hundred thousand bytes at most."""
+
+_MAX_NAME = 200
+"""Characters of an id, a category, or a label."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +57,22 @@ _STILL = ("free", "static", "heavy", "fixed", "junk")
 
 
 def read_side_files(folder: Path) -> SideFiles:
-    """Read ``meta.json``, ``semantics.txt`` and ``mobility_v2.json`` where they exist; broken ones are reported."""
+    """Read ``meta.json``, ``semantics.txt`` and ``mobility_v2.json`` where they exist; broken ones are reported.
+
+    A link that leads out of the folder is reported, not followed.
+    """
     contents: list[bytes] = []
     repairs: list[Repair] = []
 
     def content(name: str) -> bytes | None:
         path = folder / name
-        if not path.is_file():
+        if not os.path.lexists(path):
             return None
-        contents.append(read_bounded(path, _MAX_SIDE_FILE, name))
+        try:
+            contents.append(read_bounded(path, _MAX_SIDE_FILE, name, inside=folder))
+        except AssetError as error:
+            repairs.append(Repair(name, f"ignored: {error.what}"))
+            return None
         return contents[-1]
 
     def parsed(name: str) -> object:
@@ -68,8 +80,8 @@ def read_side_files(folder: Path) -> SideFiles:
         if data is None:
             return None
         try:
-            return json.loads(data)
-        except (ValueError, RecursionError) as error:
+            return parse_json(data)
+        except ValueError as error:
             repairs.append(Repair(name, f"ignored: not JSON ({error})"))
             return None
 
@@ -81,7 +93,7 @@ def read_side_files(folder: Path) -> SideFiles:
 
     rows = [line.split() for line in (content("semantics.txt") or b"").decode("utf-8", "replace").splitlines()]
     rows = [row for row in rows if len(row) >= 3]
-    labels = {row[0]: row[2] for row in rows}
+    labels = {row[0]: _word(row[2]) for row in rows}
     num_movable = sum(row[1] not in _STILL for row in rows) if rows else None
 
     mobility = parsed("mobility_v2.json")
@@ -90,8 +102,8 @@ def read_side_files(folder: Path) -> SideFiles:
         num_movable = sum(bool(kind) and kind not in _STILL for kind in kinds)
 
     return SideFiles(
-        object_id=None if object_id is None else str(object_id),
-        category=None if category is None else str(category),
+        object_id=_word(object_id) if isinstance(object_id, (str, int)) else None,
+        category=_word(category) if isinstance(category, str) else None,
         labels=labels,
         num_movable=num_movable,
         parts=_names(own.get("parts")),
@@ -101,5 +113,10 @@ def read_side_files(folder: Path) -> SideFiles:
     )
 
 
+def _word(text: str | int) -> str:
+    """A text cut to a length that fits a line."""
+    return str(text)[:_MAX_NAME]
+
+
 def _names(value: object) -> tuple[str, ...]:
-    return tuple(map(str, value)) if isinstance(value, list) else ()
+    return tuple(str(name)[:_MAX_NAME] for name in value) if isinstance(value, list) else ()

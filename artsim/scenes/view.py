@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw
 
 from artsim.camera import Camera
 from artsim.files import write_atomic
+from artsim.names import printable
 from artsim.renderers import BACKGROUND
 from artsim.sample import Sample
 from artsim.scenes.sample import SceneView, png_bytes, write_view
@@ -90,7 +91,7 @@ def instances_picture(view: SceneView) -> NDArray[np.uint8]:
         colour = _colour(i)
         left, top, right, bottom = (int(v) * _OVER for v in view.boxes[i])
         draw.rectangle((left, top, right - 1, bottom - 1), outline=colour, width=2 * _OVER)
-        text = f"{i} {thing.obj.category.replace('_', ' ')} {100 * view.visible_fraction[i]:.0f}%"
+        text = f"{i} {printable(thing.obj.category.replace('_', ' '), 40)} {100 * view.visible_fraction[i]:.0f}%"
         size = 7 * _OVER + canvas.height // 90
         place = (left + 4, max(top - size - 6, 2))
         draw.rectangle(draw.textbbox(place, text, font_size=size), fill=colour)

@@ -1,0 +1,89 @@
+"""Text out of files that nobody vouches for, made safe to print and to name files after."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+from typing import TextIO
+
+_MAX_NAME = 60
+"""Characters of a file name: of four bytes each in UTF-8 at worst, they fit the 255 that file systems take."""
+
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+"""Names that Windows takes for devices."""
+
+
+def printable(text: object, most: int = 120) -> str:
+    r"""Text as one line that a terminal shows as it is, whatever the text holds.
+
+    Control characters (an escape sequence may rewrite a terminal), marks that turn the direction of writing, line
+    breaks and lone surrogates become escapes such as ``\x1b``. What is longer than ``most`` loses its middle.
+
+    Parameters
+    ----------
+    text : object
+        Anything that has a ``str()``.
+    most : int
+        Characters that are kept.
+    """
+    text = str(text)
+    if len(text) > most:
+        half = (most - 5) // 2
+        text = f"{text[:half]} ... {text[-half:]}"
+    return _escaped(text)
+
+
+def _escaped(text: str) -> str:
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+class PrintableStream(io.TextIOBase):
+    """A text stream that lets line breaks through and, of all else, what is :func:`printable`.
+
+    Parameters
+    ----------
+    stream : text stream
+        What is written to.
+    """
+
+    def __init__(self, stream: TextIO):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text, escaped."""
+        self._stream.write("\n".join(map(_escaped, text.split("\n"))))
+        return len(text)
+
+    def flush(self) -> None:
+        """Pass on what was written."""
+        self._stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether somebody watches."""
+        return self._stream.isatty()
+
+
+def safe_name(text: object, fallback: str = "object") -> str:
+    """A file name for a thing that is called ``text``: never a path, nor hidden, nor longer than file systems take.
+
+    Letters, digits, ``_``, ``-`` and dots inside stay. A name that had to be changed ends in a digest of the original,
+    so that different things keep different names.
+
+    Parameters
+    ----------
+    text : object
+        Anything that has a ``str()``.
+    fallback : str
+        What stands for a name of which nothing is left.
+    """
+    text = str(text)
+    # Dots at the ends would hide a file, climb a folder, or be dropped by Windows.
+    name = re.sub(r"(?:[^\w.-]|\.{2,})+", "_", text).strip("._-")[:_MAX_NAME].rstrip("._-")
+    if not name or _RESERVED.fullmatch(name):
+        name = fallback
+    if name == text:
+        return name
+    return f"{name}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"

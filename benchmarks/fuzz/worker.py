@@ -1,0 +1,141 @@
+"""A process that reads thousands of inputs, and says what came of them; it may crash, and is watched from outside."""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import os
+import resource
+import signal
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.sharedctypes import Synchronized
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.fuzz.corpus import Seed
+from benchmarks.fuzz.inputs import Desk, Input, input_at
+from benchmarks.fuzz.targets import fails
+
+HEADROOM = 2 << 30
+"""Bytes of address space that a worker may take beyond what its libraries take."""
+
+SLOW_S, LARGE_MB = 2.0, 500.0
+"""Processor time of one input, and memory of a worker, from which on an input is a finding."""
+
+
+@dataclass
+class Finding:
+    """An input that ends in anything but success or an error of our own.
+
+    Attributes
+    ----------
+    index : int
+    sort : str
+        ``raw``, ``slow``, ``large``, ``crash`` or ``hang``.
+    cause : str
+        What findings of one cause share.
+    text : str
+        Traceback, or figures.
+    """
+
+    index: int
+    sort: str
+    cause: str
+    text: str
+
+
+@dataclass
+class Report:
+    """What a worker found in inputs ``first`` to ``end`` (exclusive)."""
+
+    first: int
+    end: int
+    slowest_s: float = 0.0
+    peak_mb: float = 0.0
+    findings: list[Finding] = field(default_factory=list)
+
+
+def peak_mb() -> float:
+    """Most memory that this process has ever had, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def warm_up(kinds: Sequence[str], corpus: Sequence[Seed], desk: Desk) -> None:
+    """Read every seed once, so that imports count for no input."""
+    for seed in corpus:
+        if seed.kind in kinds:
+            error = fails(seed.kind, desk.lay_out(Input(seed, seed.files[seed.member])))
+            if error is not None:
+                raise error
+
+
+def scratch() -> Path:
+    """A new folder in memory, where there is such a place."""
+    shared = Path("/dev/shm")
+    return Path(tempfile.mkdtemp(prefix="fuzz-", dir=shared if os.access(shared, os.W_OK) else None))
+
+
+def examine(index: int, given: Input, desk: Desk) -> tuple[float, Finding | None]:
+    """Processor time of reading an input, seconds; and what is wrong with it."""
+    folder = desk.lay_out(given)
+    before, start = peak_mb(), time.process_time()
+    error = fails(given.seed.kind, folder)
+    spent = time.process_time() - start
+    if error is not None:
+        return spent, Finding(index, "raw", _cause(error), "".join(traceback.format_exception(error)))
+    if spent > SLOW_S:
+        return spent, Finding(index, "slow", f"slow {given.file_name}", f"{spent:.1f} s of processor time")
+    if peak_mb() > LARGE_MB >= before:
+        return spent, Finding(index, "large", f"large {given.file_name}", f"{peak_mb():.0f} MB, {before:.0f} MB before")
+    return spent, None
+
+
+def _cause(error: BaseException) -> str:
+    """Type of an error, and the last line of our own that it came through."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "/benchmarks/fuzz/" not in f.filename]
+    own = [f for f in frames if "/artsim/" in f.filename or "/artperl/" in f.filename]
+    where = (own or frames)[-1] if frames else None
+    return type(error).__name__ + (f" {Path(where.filename).name}:{where.lineno}" if where else "")
+
+
+def work(
+    seed: int,
+    kinds: Sequence[str],
+    corpus: Sequence[Seed],
+    pipe: Connection,
+    current: Synchronized[int],
+    log: Path,
+    root: Path,
+) -> None:
+    """Take ranges of inputs from a pipe and answer with reports, until there is None."""
+    with log.open("a") as file:
+        os.dup2(file.fileno(), 1)  # libraries print what they think of a file
+        os.dup2(file.fileno(), 2)
+        faulthandler.enable(file)
+        faulthandler.register(signal.SIGUSR1, file)
+        warnings.simplefilter("ignore")
+        np.seterr(all="ignore")
+        desk = Desk(root)
+        warm_up(kinds, corpus, desk)
+        gc.freeze()
+        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (taken + HEADROOM, taken + HEADROOM))
+        while (wanted := pipe.recv()) is not None:
+            report = Report(*wanted)
+            for index in range(*wanted):
+                given = input_at(seed, index, kinds, corpus)
+                current.value = index
+                spent, finding = examine(index, given, desk)
+                report.slowest_s = max(report.slowest_s, spent)
+                if finding is not None:
+                    report.findings.append(finding)
+            current.value = -1
+            report.peak_mb = peak_mb()
+            pipe.send(report)
