@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ArtsimError
+from artsim.extras import explained
 from artsim.kinematics import Array, invert_transform, transform_points
 from artsim.loading.urdf import find_urdf, load
 from artsim.objects import ArticulatedObject
@@ -211,7 +212,7 @@ def _compare(
         with silent():
             loaded = SIMULATORS[name](file)
     except ImportError as error:
-        raise ConfigError(f"{name} is not installed", fix="pip install 'artsim[pybullet,sim,sapien]'") from error
+        raise explained(error, name, extra="pybullet,sim,sapien") from error
     except ArtsimError:
         raise
     except Exception as error:  # a simulator may refuse a file in any way it likes
