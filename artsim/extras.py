@@ -35,7 +35,6 @@ MODULES = {
     "yaml": ("PyYAML", "train"),
     "hypothesis": ("hypothesis", "dev"),
     "pytest": ("pytest", "dev"),
-    "shapely": ("shapely", "dev"),
     "stable_baselines3": ("stable-baselines3", "dev"),
     "webdataset": ("webdataset", "dev"),
 }
