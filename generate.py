@@ -1,6 +1,14 @@
 """Generate a dataset of labelled partial point clouds: ``python generate.py --help``."""
 
-from artsim.cli import generate_main
+import sys
+from pathlib import Path
+
+try:
+    from artsim.cli import generate_main
+except ModuleNotFoundError as missing:  # a clone in which nothing has been installed yet
+    fix = f"pip install -e '{Path(__file__).resolve().parent}'"
+    print(f"error: {missing.name} is not installed. Fix: {fix}", file=sys.stderr)
+    sys.exit(2)
 
 if __name__ == "__main__":
     generate_main()

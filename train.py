@@ -1,6 +1,14 @@
 """Train and test a pose estimator in one loop: ``python train.py --help``."""
 
-from artperl.cli import train_main
+import sys
+from pathlib import Path
+
+try:
+    from artperl.cli import train_main
+except ModuleNotFoundError as missing:  # a clone in which nothing has been installed yet
+    fix = f"pip install -e '{Path(__file__).resolve().parent}[train]'"
+    print(f"error: {missing.name} is not installed. Fix: {fix}", file=sys.stderr)
+    sys.exit(2)
 
 if __name__ == "__main__":
     train_main()

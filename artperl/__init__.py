@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from artsim.extras import needs
+
 if TYPE_CHECKING:
     from artperl.estimator import Estimator
 
@@ -24,10 +26,11 @@ def load_estimator(name: str | Path, **changes: Any) -> Estimator:
     Raises
     ------
     ConfigError
-        When there is no such option.
+        When there is no such option, or torch is not installed.
     DatasetError
         When there is no such estimator, or its files are damaged.
     """
-    from artperl.checkpoint import load_estimator as load  # torch takes seconds to import
+    with needs("artperl"):
+        from artperl.checkpoint import load_estimator as load  # torch takes seconds to import
 
     return load(name, **changes)

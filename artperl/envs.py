@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
-import torch
-from gymnasium import spaces
 from numpy.typing import NDArray
+
+from artsim.extras import needs
+
+with needs("artperl.envs", extra="train"):
+    import gymnasium as gym
+    import torch
+    from gymnasium import spaces
 
 from artperl.actions import NOTHING, NUM_AXES, NUM_BINS
 from artperl.categories import objects_of

@@ -15,6 +15,7 @@ from artperl.estimator import Estimator
 from artperl.evaluation import compare, true_poses
 from artsim.camera import Camera
 from artsim.errors import ArtsimError
+from artsim.extras import needs
 from artsim.names import printable
 from artsim.sample import Sample
 from artsim.view import PALETTE
@@ -45,7 +46,8 @@ def curves(events: Path) -> bytes:
     events : Path
         Its folder ``events``.
     """
-    from tensorboard.backend.event_processing import event_accumulator  # type: ignore[import-untyped]
+    with needs("curves"):
+        from tensorboard.backend.event_processing import event_accumulator  # type: ignore[import-untyped]
 
     log = event_accumulator.EventAccumulator(str(events), size_guidance={"scalars": 0})
     log.Reload()
@@ -120,11 +122,9 @@ def _box(axes: Axes, camera: Camera, rotation: Array, center: Array, size: Array
 
 
 def _figure(width: float, height: float) -> Figure:
-    try:
+    with needs("pictures"):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ArtsimError("matplotlib is not installed", "pictures", "pip install 'artsim[view]'") from error
     figure = Figure(figsize=(width, height), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     return figure

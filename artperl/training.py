@@ -20,10 +20,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import torch
-from safetensors.torch import load_file
-from torch import Tensor, nn
-from torch.utils.tensorboard import SummaryWriter
+from artsim.extras import needs
+
+with needs("training"):
+    import torch
+    from safetensors.torch import load_file
+    from torch import Tensor, nn
+    from torch.utils.tensorboard import SummaryWriter
 
 from artperl.benchmarks.artimage import real_train_objects
 from artperl.box_training import learn, record

@@ -14,8 +14,10 @@ from artsim.kinematics import KinematicTree
 from artsim.loading.urdf import load
 from artsim.objects import ArticulatedObject
 from artsim.renderers import Frame, make_renderer, render, render_cameras
-from artsim.sample import Sample, observe
+from artsim.sample import ARTSIM_VERSION, Sample, observe
 from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
+
+__version__ = ARTSIM_VERSION
 
 __all__ = [
     "ArticulatedObject",
@@ -27,6 +29,7 @@ __all__ = [
     "Sample",
     "StateOptions",
     "ViewOptions",
+    "__version__",
     "generate",
     "load",
     "make",

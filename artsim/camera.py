@@ -35,6 +35,14 @@ class Camera:
     height: int
     T_world_camera: Array
 
+    def __repr__(self) -> str:
+        fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
+        x, y, z = self.T_world_camera[:3, 3]
+        return (
+            f"<Camera {self.width} x {self.height}, focal lengths {fx:.1f} {fy:.1f}, centre {cx:.1f} {cy:.1f}, "
+            f"at {x:.3g} {y:.3g} {z:.3g}>"
+        )
+
     @cached_property
     def T_camera_world(self) -> Array:
         """(4, 4) inverse of ``T_world_camera``."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 import os
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +18,7 @@ import tyro
 from artsim.datasets.plan import SampleOptions
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
+from artsim.extras import explained, of_ours
 from artsim.names import PrintableStream, printable
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
@@ -355,16 +358,29 @@ def generate_main() -> None:
     run_program(Generate, "generate.py")
 
 
+def _told(verb: Any, description: str | None) -> str:
+    """What ``--help`` begins with."""
+    return f"{inspect.cleandoc(description or verb.__doc__ or '')}\n\n--version prints the version."
+
+
 def run_program(verb: Any, program: str, description: str | None = None) -> None:
     """Read the command line as one of some verbs, and run it; errors are one line, and exit with 2."""
+    if sys.argv[1:] == ["--version"]:
+        print(f"{program} {version('artsim')}")
+        return
     if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not know every character
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        chosen = tyro.cli(verb, prog=program, description=description)
+        chosen = tyro.cli(verb, prog=program, description=_told(verb, description))
         with contextlib.redirect_stdout(PrintableStream(sys.stdout)):  # names out of files are in what is printed
             chosen.run()
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()
+    except ImportError as error:  # the net below every import of an optional dependency
+        if of_ours(error):
+            raise
+        print(f"error: {printable(explained(error, program), 4000)}", file=sys.stderr)
+        sys.exit(2)
     except (ArtsimError, OSError) as error:
         print(f"error: {printable(error, 4000)}", file=sys.stderr)
         sys.exit(2)

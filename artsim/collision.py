@@ -7,15 +7,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
-import fcl
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from artsim.extras import needs
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
 from artsim.sampling import joint_intervals
+
+with needs("collision checks"):
+    import fcl
 
 PENETRATION = 1e-6
 """Metres by which parts that no joint connects may overlap."""

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 from artsim.errors import ArtsimError, ConfigError, RenderError
+from artsim.extras import explained, install_command
 
 SIZE = 128
 """Width and height of the pictures that rates are measured with, pixels."""
@@ -28,13 +29,13 @@ pybullet.loadPlugin(importlib.util.find_spec("eglRenderer").origin, "_eglRendere
 """  # the only way to learn the device is from what PyBullet prints
 _FIXES = {
     "raycast": "pip install --force-reinstall embreex",
-    "pybullet": "pip install 'artsim[pybullet]'",
-    "pybullet-egl": "pip install 'artsim[pybullet]', then scripts/install-system.sh as root",
-    "sapien": "pip install 'artsim[sapien]', then scripts/install-vulkan.sh as root",
-    "maniskill": "pip install 'artsim[maniskill]', then scripts/install-vulkan.sh as root",
-    "warp": "pip install 'artsim[warp]'",
+    "pybullet": install_command("pybullet"),
+    "pybullet-egl": f"{install_command('pybullet')}, then scripts/install-system.sh as root",
+    "sapien": f"{install_command('sapien')}, then scripts/install-vulkan.sh as root",
+    "maniskill": f"{install_command('maniskill')}, then scripts/install-vulkan.sh as root",
+    "warp": install_command("warp"),
     "ray": "none needed: artsim's own processes make its data; pip install ray to spread code of yours over machines",
-    "torch": "pip install 'artsim[train]'",
+    "torch": install_command("train"),
 }
 
 
@@ -229,7 +230,8 @@ def _answer(backend: str) -> Finding:
     except ArtsimError as error:
         return _broken(backend, error.what, error.fix or "")
     except ImportError as error:
-        return _broken(backend, f"cannot be imported ({error})")
+        told = explained(error, backend)
+        return _broken(backend, told.what, "" if isinstance(error, ModuleNotFoundError) else told.fix or "")
     except Exception as error:  # backends fail in many ways
         return _broken(backend, f"{type(error).__name__}: {error}")
     return Finding(backend, works=True, device=device, fps=fps)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from artsim.describe import brief, object_line, object_text
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.kinematics import Array, KinematicTree
 from artsim.names import printable
@@ -63,6 +64,8 @@ class Body:
     pieces: tuple[Mesh, ...]
     density: float
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -87,6 +90,8 @@ class Part:
     vertices: Array
     faces: NDArray[np.int32]
     body: Body | None = None
+
+    __repr__ = brief
 
     @cached_property
     def bounds(self) -> Array:
@@ -157,6 +162,12 @@ class ArticulatedObject:
 
     def __len__(self) -> int:
         return len(self.parts)
+
+    def __str__(self) -> str:
+        return object_text(self)
+
+    def __repr__(self) -> str:
+        return object_line(self)
 
     @cached_property
     def tree(self) -> KinematicTree:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from artsim.errors import ArtsimError
+from artsim.extras import needs
 from artsim.files import write_error
 from artsim.kinematics import transform_points
 from artsim.names import printable
@@ -23,10 +23,8 @@ def write_recording(shown: Sequence[Shown], path: Path) -> None:
     ArtsimError
         When rerun is not installed, or the file cannot be written.
     """
-    try:
+    with needs("artsim view --rerun"):
         import rerun as rr
-    except ImportError as error:
-        raise ArtsimError("rerun-sdk is not installed", "artsim view --rerun", "pip install 'artsim[view]'") from error
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         recording = rr.RecordingStream("artsim")

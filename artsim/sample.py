@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
+from artsim.describe import sample_line, sample_text
 from artsim.errors import ConfigError, RenderError
 from artsim.kinematics import Array
 from artsim.noise import Look, View
@@ -105,6 +106,12 @@ class Sample:
     depth: NDArray[np.float32] | None = None
     part_mask: NDArray[np.uint8] | None = None
     rgb: NDArray[np.uint8] | None = None
+
+    def __str__(self) -> str:
+        return sample_text(self)
+
+    def __repr__(self) -> str:
+        return sample_line(self)
 
     @property
     def rest_points(self) -> Array:

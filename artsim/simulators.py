@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ArtsimError
+from artsim.extras import needs
 from artsim.kinematics import Array, invert_transform, transform_points
 from artsim.loading.urdf import find_urdf, load
 from artsim.objects import ArticulatedObject
@@ -105,7 +106,8 @@ def _bullet_client() -> int:
 
 def in_mujoco(file: Path) -> Loaded:
     """Load a URDF or MJCF file in MuJoCo."""
-    import mujoco
+    with needs("mujoco"):
+        import mujoco
 
     spec = mujoco.MjSpec.from_file(str(file))
     spec.compiler.fusestatic = False
@@ -148,7 +150,8 @@ def in_sapien(file: Path) -> Loaded:
 def _sapien() -> Any:
     with warnings.catch_warnings():  # about graphics, which are not used
         warnings.simplefilter("ignore")
-        import sapien
+        with needs("sapien"):
+            import sapien
     return sapien
 
 
@@ -210,8 +213,6 @@ def _compare(
     try:
         with silent():
             loaded = SIMULATORS[name](file)
-    except ImportError as error:
-        raise ConfigError(f"{name} is not installed", fix="pip install 'artsim[pybullet,sim,sapien]'") from error
     except ArtsimError:
         raise
     except Exception as error:  # a simulator may refuse a file in any way it likes

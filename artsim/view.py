@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from artsim.camera import Camera
 from artsim.datasets.dataset import Dataset
 from artsim.errors import ArtsimError
+from artsim.extras import needs
 from artsim.files import write_atomic
 from artsim.kinematics import Array, transform_points
 from artsim.loading.urdf import load
@@ -131,11 +132,9 @@ def state_text(sample: Sample, most: int = 4) -> str:
 
 def contact_sheet(shown: Sequence[Shown]) -> bytes:
     """PNG with, for each sample: depth; parts with boxes and joint axes; the cloud from another side."""
-    try:
+    with needs("contact sheets"):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ArtsimError("matplotlib is not installed", "artsim view", "pip install 'artsim[view]'") from error
     rows = -(-len(shown) // _SAMPLES_PER_ROW)
     columns = min(len(shown), _SAMPLES_PER_ROW)
     figure = Figure(figsize=(9.6 * columns, 2.75 * rows), dpi=100, facecolor="white")

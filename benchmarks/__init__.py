@@ -1,1 +1,27 @@
-"""Benchmarks: ``python -m benchmarks.<name>``; each prints one JSON object as its last line."""
+"""Programs that print the figures of README and docs: ``python -m benchmarks.NAME --help``."""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+
+from artsim.errors import ArtsimError
+from artsim.extras import explained, of_ours
+
+
+def _one_line(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Print an error that is the user's to mend as one line, and exit with 2, as the other programs do."""
+    if isinstance(error, ImportError) and not of_ours(error):
+        error = explained(error, "benchmarks")
+    if not isinstance(error, ArtsimError):
+        sys.__excepthook__(kind, error, trace)
+        return
+    print(f"error: {error}", file=sys.stderr)
+    sys.stdout.flush()
+    raise SystemExit(2)
+
+
+# Modules of benchmarks import what they measure at their top, before any code of theirs could catch an error. While
+# "python -m benchmarks.NAME" is looking for NAME, and only then, the program is called -m.
+if sys.argv[0] == "-m":
+    sys.excepthook = _one_line

@@ -27,6 +27,7 @@ from artsim.renderers.warp import WarpRenderer
 from benchmarks.agreement import Agreement, draw_scenes
 from benchmarks.differences import Scene
 from tests.conftest import ASSETS, DEMO, absent, installed, rigid, solid, valve
+from tests.without import environment
 
 
 @pytest.fixture(scope="module")
@@ -261,17 +262,16 @@ def test_an_unknown_device_is_refused_with_those_there_are(device: str, warp: Mo
         WarpRenderer(device)
 
 
-@pytest.mark.parametrize(("missing", "mend"), [("warp", "artsim[warp]"), ("cache", "WARP_CACHE_PATH")])
+@pytest.mark.parametrize(("missing", "mend"), [("warp", "[warp]"), ("cache", "WARP_CACHE_PATH")])
 def test_what_warp_lacks_is_said_with_the_mend(missing: str, mend: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path / "file" / "cache")}
+    variables = {**os.environ, "WARP_CACHE_PATH": str(tmp_path / "file" / "cache")}
     if missing == "warp":
-        (tmp_path / "warp.py").write_text("raise ModuleNotFoundError(\"No module named 'warp'\")\n")
-        environment["PYTHONPATH"] = str(tmp_path)
+        variables["PYTHONPATH"] = environment(tmp_path, ["warp"])["PYTHONPATH"]
     program = (
         "import artsim\ntry:\n    artsim.make_renderer('warp')\nexcept artsim.ArtsimError as error:\n    print(error)"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, timeout=120)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=variables, timeout=120)
     assert done.returncode == 0, done.stderr
     assert mend in done.stdout
 

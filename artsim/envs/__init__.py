@@ -7,13 +7,11 @@
 from __future__ import annotations
 
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
-from artsim.errors import ArtsimError
+from artsim.extras import needs
 
-try:
+with needs("artsim.envs"):
     import gymnasium
-except ImportError as error:
-    raise ArtsimError("gymnasium is not installed", "artsim.envs", "pip install 'artsim[envs]'") from error
-from gymnasium.envs.registration import WrapperSpec
+    from gymnasium.envs.registration import WrapperSpec
 
 gymnasium.register(id="artsim/Articulated-v0", entry_point="artsim.envs.articulated:ArticulatedEnv")
 # As ManiSkill's register_env does, which would have to import it: its own time limit knows batches.

@@ -8,6 +8,7 @@ from lxml import etree
 from artsim.errors import AssetError
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers, obj_text
+from artsim.extras import needs
 
 STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 """How stiffly joints follow others. MuJoCo weighs a metre of the one like a radian of the other, which by its default
@@ -103,7 +104,8 @@ def _add_equalities(root: etree._Element, robot: Robot) -> None:
 
 
 def _compile(text: str, robot: Robot) -> None:
-    import mujoco
+    with needs("MJCF files"):  # a file that MuJoCo does not compile is not written
+        import mujoco
 
     files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
     try:

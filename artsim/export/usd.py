@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
+from artsim.extras import needs
 from artsim.kinematics import Array
 
 
@@ -17,7 +18,8 @@ def usd_text(robot: Robot) -> str:
     object stands freely: add a fixed joint between the world and its root link to hold it. UsdPhysics knows no joints
     that follow others: such a joint carries ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres).
     """
-    from pxr import Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
+    with needs("USD files"):
+        from pxr import Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
+from artsim.describe import brief
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
 
@@ -37,6 +38,8 @@ class Frame:
     part_ids: NDArray[np.uint8]
     amodal_pixels: NDArray[np.int64] | None = None
     rgb: NDArray[np.uint8] | None = None
+
+    __repr__ = brief
 
 
 class Renderer(Protocol):

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 from artsim.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.camera import Camera
 from artsim.errors import RenderError
+from artsim.extras import needs
 from artsim.kinematics import Array, transform_points
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
@@ -296,11 +297,8 @@ def import_pybullet() -> ModuleType:
     RenderError
         When it is not installed.
     """
-    try:
-        with silent():
-            import pybullet
-    except ImportError as error:
-        raise RenderError("PyBullet is not installed", "pybullet", "pip install 'artsim[pybullet]'") from error
+    with needs("pybullet", RenderError), silent():
+        import pybullet
     return pybullet
 
 

@@ -15,6 +15,7 @@ from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.appearance.painted import painted_coats
 from artsim.camera import Camera
 from artsim.errors import RenderError
+from artsim.extras import install_command
 from artsim.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND, Frame, depth_range
 from artsim.renderers.kept import Kept
@@ -24,7 +25,6 @@ from artsim.scenes.scene import Scene, SceneFrame, split_ids
 
 _MAX_STAGES = 16  # as many objects as take turns in a plan
 _PROBE_TIMEOUT = 120.0  # seconds
-_EXTRA_FIX = "pip install 'artsim[sapien]'"
 _DRIVER_FIX = (
     "run scripts/install-vulkan.sh as root (Mesa's lavapipe >= 24.3 renders on a CPU) or install the GPU's Vulkan "
     "driver; or use --renderer raycast"
@@ -150,7 +150,7 @@ def import_sapien() -> ModuleType:
     if probe.returncode != 0:
         said = (probe.stderr.strip().splitlines() or [f"the probe ended with {probe.returncode}"])[-1]
         if "No module named 'sapien'" in said:
-            raise RenderError("SAPIEN is not installed", "sapien", _EXTRA_FIX)
+            raise RenderError("SAPIEN is not installed", "sapien", install_command("sapien"))
         raise RenderError(f"SAPIEN cannot render here ({said})", "sapien", _DRIVER_FIX)
     import sapien
 

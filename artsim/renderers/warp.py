@@ -19,13 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
 from artsim.errors import ConfigError, RenderError
+from artsim.extras import needs
 from artsim.kinematics import ROTATING, Array
 from artsim.objects import ArticulatedObject, Part
 from artsim.renderers.base import Frame
 from artsim.renderers.bullet import silent
 from artsim.renderers.views import Clouds, Images, Views
-
-_FIX = "pip install 'artsim[warp]'"
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,10 +275,8 @@ def import_warp() -> ModuleType:
     RenderError
         When it is not installed, or cannot write its cache.
     """
-    try:
+    with needs("warp", RenderError):
         import warp
-    except ImportError as error:
-        raise RenderError("Warp is not installed", "warp", _FIX) from error
     warp.config.log_level = warp.LOG_WARNING
     try:
         with silent():  # on a machine without a GPU it says so, in C, in every process

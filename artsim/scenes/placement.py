@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from artsim.appearance import Coat
-from artsim.errors import ConfigError
+from artsim.extras import needs
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
 from artsim.scenes.scene import Thing, used_vertices
@@ -253,8 +253,6 @@ def _model(obj: ArticulatedObject, k: int) -> Any:
 
 
 def _import_fcl() -> ModuleType:
-    try:
+    with needs("scene"):
         import fcl
-    except ImportError as error:
-        raise ConfigError("python-fcl is not installed", "scene", "pip install 'artsim[sim]'") from error
     return fcl

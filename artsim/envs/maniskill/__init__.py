@@ -17,7 +17,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from artsim.errors import ConfigError
+from artsim.extras import needs
 
 ENV_ID = "ArtSimArticulated-v1"
 EPISODE_LENGTH = 100
@@ -32,10 +32,6 @@ def make(**options: Any) -> Any:
     ConfigError
         When ManiSkill is not installed, or an option makes no sense.
     """
-    try:
+    with needs(ENV_ID, extra="maniskill"):
         task = importlib.import_module("artsim.envs.maniskill.task")
-    except ImportError as error:
-        raise ConfigError(
-            f"ManiSkill cannot be imported ({error})", ENV_ID, "pip install 'artsim[maniskill]'"
-        ) from error
     return task.ArticulatedTask(**options)
