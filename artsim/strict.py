@@ -17,9 +17,10 @@ from scipy.spatial import ConvexHull, QhullError
 from artsim.errors import ArtsimError
 from artsim.files import read_bounded
 from artsim.kinematics import Array
+from artsim.loading.joint_xml import MOVING_TYPES
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
 from artsim.loading.urdf import find_urdf
-from artsim.loading.urdf_xml import MOVING_TYPES, SHAPES, safe_xml
+from artsim.loading.urdf_xml import safe_xml
 from artsim.objects import ArticulatedObject
 
 TOLERANCE = 1e-6
@@ -27,6 +28,8 @@ TOLERANCE = 1e-6
 (as a share of the volume)."""
 ROUNDING = 1e-8
 """Metres by which a file may have rounded a vertex."""
+_SHAPES = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere": {"radius": 1}, "mesh": {}}
+"""Geometries that every simulator reads: attribute -> count of its numbers. Capsules are not among them."""
 
 
 def strict_urdf(path: str | Path) -> list[str]:
@@ -200,17 +203,16 @@ def _origin_problems(element: etree._Element) -> list[str]:
 
 def _shape_problems(element: etree._Element, reader: MeshReader) -> list[str]:
     geometry = element.find("geometry")
-    shape = None if geometry is None else next((s for s in geometry if s.tag in SHAPES), None)
+    shape = None if geometry is None else next((s for s in geometry if s.tag in _SHAPES), None)
     if shape is None:
-        return ["has no geometry"]
+        return ["has no geometry that every simulator reads"]
     if shape.tag == "mesh":
         try:
             reader.resolve(shape.get("filename") or "")
         except (UnusableMeshError, ArtsimError) as problem:
             return [str(problem)]
         return []
-    attributes = {SHAPES[shape.tag][0]: SHAPES[shape.tag][1], **({"length": 1} if shape.tag == "cylinder" else {})}
-    sizes = [_numbers(shape, attribute, count) for attribute, count in attributes.items()]
+    sizes = [_numbers(shape, attribute, count) for attribute, count in _SHAPES[shape.tag].items()]
     return [] if all(s is not None and (s > 0).all() for s in sizes) else [f"<{shape.tag}> has no size above 0"]
 
 

@@ -79,10 +79,10 @@ def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
     for body in merge_fixed_links(robot, file, repairs):
         paths = []
         for name in body.links:
-            for visual in links[name].visuals:
-                if visual.geometry.mesh is None:
+            for shape in links[name].shapes:
+                if shape.geometry.mesh is None:
                     raise UnusableMeshError("primitives have no material file")
-                paths.append(reader.resolve(visual.geometry.mesh.filename))
+                paths.append(reader.resolve(shape.geometry.mesh.filename))
         found[tuple(body.links)] = paths
     return found
 

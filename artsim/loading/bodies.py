@@ -6,17 +6,14 @@ from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from artsim.errors import AssetError
 from artsim.kinematics import Array
+from artsim.loading.robot import Robot, RobotJoint
 from artsim.objects import Part, Repair
-
-if TYPE_CHECKING:
-    import yourdfpy
 
 
 @dataclass(eq=False)
@@ -24,13 +21,13 @@ class RigidBody:
     """Links that never move against each other, in the base link's frame at the file's zero state."""
 
     links: list[str]
-    joint: yourdfpy.Joint | None  # the moving joint that carries the body; None for the root
+    joint: RobotJoint | None  # the moving joint that carries the body; None for the root
     parent: RigidBody | None
     T_base_joint: Array
     T_base_link: dict[str, Array]
     vertices: Array
     faces: NDArray[np.int32]
-    slide: yourdfpy.Joint | None = None  # screws: the prismatic joint merged into this one
+    slide: RobotJoint | None = None  # screws: the prismatic joint merged into this one
     slide_rate: float = 0.0  # screws: value of the slide joint for each radian
     pitch: float = 0.0  # screws: metres along the turning axis for each radian
 
@@ -40,14 +37,15 @@ class RigidBody:
         return Part(solid, label or solid, self.vertices, self.faces)
 
 
-def merge_fixed_links(robot: yourdfpy.Robot, file: Path, repairs: list[Repair]) -> list[RigidBody]:
+def merge_fixed_links(robot: Robot, file: Path, repairs: list[Repair]) -> list[RigidBody]:
     """Bodies of the tree, root first, parents before children, siblings in the file's order."""
-    children: dict[str, list[yourdfpy.Joint]] = defaultdict(list)
+    children: dict[str, list[RobotJoint]] = defaultdict(list)
     for joint in robot.joints:
         children[joint.parent].append(joint)
     root = _root_link(robot, children, file, repairs)
+    solid = {link.name for link in robot.links if link.shapes or link.unusable}
 
-    def new_body(link: str, joint: yourdfpy.Joint | None, parent: RigidBody | None, T: Array) -> RigidBody:
+    def new_body(link: str, joint: RobotJoint | None, parent: RigidBody | None, T: Array) -> RigidBody:
         return RigidBody([link], joint, parent, T, {link: T}, np.zeros((0, 3)), np.zeros((0, 3), np.int32))
 
     bodies = [new_body(root, None, None, np.eye(4))]
@@ -59,16 +57,16 @@ def merge_fixed_links(robot: yourdfpy.Robot, file: Path, repairs: list[Repair]) 
         if body.links[0] == link and body is not bodies[0]:
             bodies.append(body)
         for joint in children[link]:
-            T = body.T_base_link[link] @ (np.eye(4) if joint.origin is None else joint.origin)
-            if joint.type == "fixed" or _places_root(joint, link, root, children, repairs):
+            T = body.T_base_link[link] @ joint.origin
+            if joint.type == "fixed" or _places_root(joint, link, root, children, solid, repairs):
                 body.links.append(joint.child)
                 body.T_base_link[joint.child] = T
                 body_of[joint.child] = body
             elif joint.type == "floating":
                 raise AssetError(
-                    "a floating joint inside the object is not supported",
+                    f"a floating joint inside the object is not supported: link {joint.child!r} flies free of {link!r}",
                     f"{file}: joint {joint.name!r}",
-                    "split the file into one object per floating part",
+                    'write type="fixed" to hold it there, or keep each floating object in a file of its own',
                 )
             else:
                 body_of[joint.child] = new_body(joint.child, joint, body, T)
@@ -83,7 +81,7 @@ def merge_fixed_links(robot: yourdfpy.Robot, file: Path, repairs: list[Repair]) 
 
 
 def _root_link(
-    robot: yourdfpy.Robot, children: Mapping[str, list[yourdfpy.Joint]], file: Path, repairs: list[Repair]
+    robot: Robot, children: Mapping[str, list[RobotJoint]], file: Path, repairs: list[Repair]
 ) -> str:
     carried_by: dict[str, str] = {}
     for joint in robot.joints:
@@ -97,7 +95,7 @@ def _root_link(
     roots = [link for link in robot.links if link.name not in carried_by]
     if not roots:
         raise AssetError("every link has a parent: the joints form a cycle", file, "remove the joint that closes it")
-    used = [r for r in roots if r.visuals or r.collisions or children.get(r.name)] or roots[:1]
+    used = [r for r in roots if r.shapes or r.unusable or children.get(r.name)] or roots[:1]
     if len(used) > 1:
         names = ", ".join(r.name for r in used[:5])
         raise AssetError(f"{len(used)} links have no parent: {names}", file, "join them with a fixed joint")
@@ -108,14 +106,15 @@ def _root_link(
 
 
 def _places_root(
-    joint: yourdfpy.Joint,
+    joint: RobotJoint,
     link: str,
     root: str,
-    children: Mapping[str, list[yourdfpy.Joint]],
+    children: Mapping[str, list[RobotJoint]],
+    solid: Collection[str],
     repairs: list[Repair],
 ) -> bool:
     """Whether a floating joint only places the whole object in its world: the object's own pose covers that."""
-    if joint.type != "floating" or link != root or len(children[root]) != 1:
+    if joint.type != "floating" or link != root or root in solid or len(children[root]) != 1:
         return False
     repairs.append(Repair(f"joint {joint.name!r}", "floats the whole object: left to the object's pose"))
     return True
@@ -156,7 +155,7 @@ def join_screws(bodies: list[RigidBody], known: Collection[str], repairs: list[R
         others = [b.joint.mimic.joint for b in bodies if b not in (helper, body) and b.joint and b.joint.mimic]
         if slide.joint is None or turn.joint is None or slide.joint.name in others:
             continue
-        pitch = rate * stretch(slide.joint) * float(np.sign(along))
+        pitch = rate * float(np.sign(along))
         body.links = body.links + helper.links
         if helper.links[0] not in known:
             repairs.append(
@@ -188,8 +187,8 @@ def in_order(bodies: list[RigidBody], order: Sequence[str], repairs: list[Repair
 
 def axis_in_base(body: RigidBody) -> Array:
     """Unit axis of a body's joint in the base link's frame."""
-    axis = np.asarray(body.joint.axis, dtype=np.float64)  # type: ignore[union-attr]
-    direction: Array = body.T_base_joint[:3, :3] @ (axis / np.linalg.norm(axis))
+    assert body.joint is not None
+    direction: Array = body.T_base_joint[:3, :3] @ body.joint.axis
     return direction / np.linalg.norm(direction)
 
 
@@ -199,10 +198,5 @@ def _slide_rate(turn: RigidBody, slide: RigidBody) -> float:
     assert slide.joint is not None
     if slide.joint.mimic is not None and slide.joint.mimic.joint == turn.joint.name:
         mimic = slide.joint.mimic
-        return 0.0 if mimic.offset else float(1.0 if mimic.multiplier is None else mimic.multiplier)
-    return float(slide.joint.limit.upper - slide.joint.limit.lower) / (2.0 * np.pi)
-
-
-def stretch(joint: yourdfpy.Joint) -> float:
-    """Metres of travel for each unit of a prismatic joint's value; 1 for joints that turn."""
-    return float(np.linalg.norm(joint.axis)) if joint.type == "prismatic" else 1.0
+        return 0.0 if mimic.offset else mimic.multiplier
+    return (slide.joint.upper - slide.joint.lower) / (2.0 * np.pi)

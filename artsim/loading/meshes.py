@@ -10,8 +10,8 @@ import io
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, transform_points
+from artsim.loading.packages import AssetPaths, MissingFileError
+from artsim.loading.robot import Geometry, MeshFile
 from artsim.loading.urdf_xml import safe_xml
-
-if TYPE_CHECKING:
-    import yourdfpy
 
 FORMATS = (".obj", ".stl", ".dae", ".glb", ".ply")
 
@@ -63,7 +62,7 @@ class MeshReader:
     contents: list[bytes] = field(default_factory=list)
     num_faces: int = 0
 
-    def shape(self, geometry: yourdfpy.Geometry) -> tuple[Array, NDArray[np.int32]]:
+    def shape(self, geometry: Geometry) -> tuple[Array, NDArray[np.int32]]:
         """Vertices (V, 3) and triangles (F, 3) of a URDF geometry in its own frame.
 
         Raises
@@ -79,56 +78,36 @@ class MeshReader:
             mesh = trimesh.creation.box(extents=geometry.box.size)
         elif geometry.cylinder is not None:
             mesh = trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length, sections=64)
+        elif geometry.capsule is not None:
+            mesh = trimesh.creation.capsule(geometry.capsule.length, geometry.capsule.radius)
         elif geometry.sphere is not None:
             mesh = trimesh.creation.icosphere(subdivisions=4, radius=geometry.sphere.radius)
         else:
+            assert geometry.mesh is not None
             return self._file(geometry.mesh)
         return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int32)
 
+    @cached_property
+    def paths(self) -> AssetPaths:
+        """Where the files are that the URDF names."""
+        return AssetPaths(self.folder, self.package_roots)
+
     def resolve(self, filename: str) -> Path:
-        """Absolute path of a mesh name, confined to the asset's folder and the declared package roots.
+        """Path of a mesh by its name, confined to the asset's folders; see :mod:`artsim.loading.packages`.
 
         Raises
         ------
         UnusableMeshError
-            When no such file exists.
+            When no such file exists; caused by a :class:`~artsim.loading.packages.MissingFileError`.
         AssetError
             When the file would lie outside the allowed folders.
         """
-        name = filename.replace("\\", "/").removeprefix("file://")
-        roots = [self.folder, *self.package_roots.values()]
-        if name.startswith("package://") or name.startswith("model://"):
-            package, _, rest = name.split("://", 1)[1].partition("/")
-            own = self._own_package(package)
-            if own is not None:
-                roots.append(own)
-            declared = self.package_roots.get(package, own)
-            candidates = [declared / rest] if declared is not None else []
-            candidates += [self.folder / rest, self.folder / package / rest]
-        else:
-            candidates = [self.folder / name]  # an absolute name replaces the folder
-        allowed = [root.resolve() for root in roots]
-        inside = [c for c in candidates if any(c.resolve().is_relative_to(root) for root in allowed)]
-        if not inside:
-            raise AssetError(
-                f"mesh {filename!r} lies outside the asset's folder",
-                self.folder,
-                "move it inside, or declare its folder: package_roots={'name': folder} or --package-root NAME=FOLDER",
-            )
-        for candidate in inside:
-            if candidate.is_file():
-                return candidate
-        raise UnusableMeshError(f"mesh {filename!r} is missing")
+        try:
+            return self.paths.resolve(filename)
+        except MissingFileError as error:
+            raise UnusableMeshError(str(error)) from error
 
-    def _own_package(self, package: str) -> Path | None:
-        """The ROS package that holds the URDF file itself, when it has the wanted name."""
-        for ancestor in list(self.folder.resolve().parents)[:4]:
-            if ancestor.name == package and (ancestor / "package.xml").is_file():
-                return ancestor
-        here = self.folder.resolve()
-        return here if here.name == package else None
-
-    def _file(self, reference: yourdfpy.Mesh) -> tuple[Array, NDArray[np.int32]]:
+    def _file(self, reference: MeshFile) -> tuple[Array, NDArray[np.int32]]:
         path = self.resolve(reference.filename)
         kind = path.suffix.lower()
         if kind not in FORMATS:

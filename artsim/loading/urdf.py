@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artsim.errors import AssetError
 from artsim.files import read_bounded
@@ -22,18 +22,16 @@ from artsim.loading.bodies import (
     in_order,
     join_screws,
     merge_fixed_links,
-    stretch,
     without_empty_leaves,
 )
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, merged
+from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_state import canonical_category, rest_state
+from artsim.loading.robot import Link, Robot, RobotJoint
 from artsim.loading.urdf_xml import parse_robot
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
-
-if TYPE_CHECKING:
-    import yourdfpy
 
 
 def load(
@@ -73,13 +71,14 @@ def load(
     data = read_bounded(file, limits.max_urdf_bytes, "URDF file")
     side = read_side_files(file.parent)
     robot, repairs = parse_robot(data, file, limits.max_links, side.helpers)
-    roots = {name: Path(folder) for name, folder in (package_roots or {}).items()}
+    roots = _roots(package_roots or {})
     reader = MeshReader(file.parent, roots, limits)
 
     repairs += side.repairs
     category = canonical_category(category or side.category or "unknown")
     bodies = merge_fixed_links(robot, file, repairs)
     _read_geometry(bodies, robot, reader, file, repairs)
+    repairs += reader.paths.repairs
     bodies = join_screws(without_empty_leaves(bodies, repairs), side.helpers, repairs)
     bodies, exported = in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
@@ -128,6 +127,14 @@ def find_urdf(path: Path) -> Path:
     raise AssetError(f"the folder holds {len(found)} URDF files", path, f"pass one of them, such as {found[0].name}")
 
 
+def _roots(declared: Mapping[str, str | Path]) -> dict[str, Path]:
+    roots = {name: Path(folder).expanduser().absolute() for name, folder in declared.items()}
+    for name, folder in roots.items():
+        if not folder.is_dir():
+            raise AssetError("no such folder", f"package root {name}={folder}", "name the folder of the package")
+    return roots
+
+
 def _object_id(file: Path, annotated: str | None) -> str:
     """PartNet-Mobility's own number is the folder's name; ``meta.json`` may carry an older one."""
     if file.stem != "mobility":
@@ -137,38 +144,73 @@ def _object_id(file: Path, annotated: str | None) -> str:
 
 
 def _read_geometry(
-    bodies: list[RigidBody], robot: yourdfpy.Robot, reader: MeshReader, file: Path, repairs: list[Repair]
+    bodies: list[RigidBody], robot: Robot, reader: MeshReader, file: Path, repairs: list[Repair]
 ) -> None:
-    """Fill in every body's surface from its links' visuals (or collisions, when the file has no visual at all)."""
+    """Fill in every body's surface from the shapes of its links."""
     links = {link.name: link for link in robot.links}
-    use_collisions = not any(link.visuals for link in robot.links)
-    if use_collisions:
-        repairs.append(Repair("file", "has no <visual>: its collision geometry is shown"))
     for body in bodies:
-        shapes = []
+        surfaces = []
+        unusable = []
         for name in body.links:
-            elements = links[name].collisions if use_collisions else links[name].visuals
-            problems = []
-            for element in elements:
-                T_base_shape = body.T_base_link[name] @ (np.eye(4) if element.origin is None else element.origin)
-                try:
-                    vertices, faces = reader.shape(element.geometry)
-                except UnusableMeshError as problem:
-                    problems.append(str(problem))
-                    continue
-                shapes.append((vertices, faces, T_base_shape))
+            found, problems = _surfaces(links[name], body.T_base_link[name], reader, file)
+            surfaces += found
+            unusable += [f"link {name!r}: {problem}" for problem in problems]
             repairs += [Repair(f"link {name!r}", f"{problem}: left out") for problem in problems]
-            if problems and len(problems) == len(elements):
-                raise AssetError(
-                    f"none of the {len(elements)} meshes of link {name!r} can be used: {problems[0]}",
-                    file,
-                    "restore the mesh files; an object with an invisible part would give wrong data",
-                )
-        body.vertices, body.faces = merged(shapes)
+        if unusable and not surfaces:
+            raise AssetError(
+                f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
+            )
+        body.vertices, body.faces = merged(surfaces)
     for name, count in reader.dropped_faces.items():
         repairs.append(Repair(f"mesh {name!r}", f"{count} triangles left out: not finite or out of range"))
     if not any(len(body.faces) for body in bodies):
         raise AssetError("no link has any geometry", file, "add <visual> elements")
+
+
+def _surfaces(
+    link: Link, T_base_link: Array, reader: MeshReader, file: Path
+) -> tuple[list[tuple[Array, NDArray[np.int32], Array]], list[str]]:
+    """Vertices, triangles and transform into the base frame of each shape of a link, and why others are left out.
+
+    Raises
+    ------
+    AssetError
+        When the link has a mesh, or a geometry of a kind that is not read, and nothing of it is left.
+    """
+    surfaces = []
+    problems: list[str] = [*link.unusable]
+    fix = None
+    for shape in link.shapes:
+        try:
+            vertices, faces = reader.shape(shape.geometry)
+            if _is_thin(vertices, faces):
+                raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line")
+        except UnusableMeshError as problem:
+            problems.append(str(problem))
+            if isinstance(problem.__cause__, MissingFileError):
+                fix = fix or problem.__cause__.fix
+            continue
+        surfaces.append((vertices, faces, T_base_link @ shape.origin))
+    if problems and not surfaces and (link.shapes or not all("no extent" in problem for problem in problems)):
+        count = len(problems)
+        raise AssetError(
+            f"none of the {count} meshes of link {link.name!r} can be used: {problems[0]}",
+            file,
+            fix or "restore the mesh files; an object with an invisible part would give wrong data",
+        )
+    return surfaces, problems
+
+
+def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
+    """Whether a surface is a point or a line; one that is flat is not."""
+    used = vertices[np.unique(faces)]
+    if len(used) == 0:
+        return True
+    extent = np.linalg.svd(used - used.mean(axis=0), compute_uv=False) if len(used) < 4 else None
+    if extent is None:
+        from_middle = used - used.mean(axis=0)
+        extent = np.sqrt(np.linalg.eigvalsh(from_middle.T @ from_middle)[::-1].clip(0.0))
+    return bool(len(extent) < 2 or extent[1] <= 1e-7 * extent[0])
 
 
 def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:
@@ -184,16 +226,14 @@ def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str,
         lower, upper = -np.inf, np.inf
         kind = joint.type
         if kind in ("revolute", "prismatic"):
-            lower, upper = float(joint.limit.lower), float(joint.limit.upper)
+            lower, upper = joint.lower, joint.upper
         if body.slide is not None:
             kind = "screw"
             lower, upper = sorted(
-                float(v) / body.slide_rate + 0.0 for v in (body.slide.limit.lower, body.slide.limit.upper)
+                v / body.slide_rate + 0.0 for v in (body.slide.lower, body.slide.upper)
             )
             source_joints[body.slide.name] = (k, body.slide_rate)
-        # Simulators move a prismatic joint by its value times its axis, whatever the axis's length.
-        lower, upper = lower * stretch(joint), upper * stretch(joint)
-        source_joints[joint.name] = (k, 1.0 / stretch(joint))
+        source_joints[joint.name] = (k, 1.0)
         joints.append(
             Joint(
                 name=joint.name,
@@ -204,7 +244,7 @@ def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str,
                 lower=lower,
                 upper=upper,
                 pitch=body.pitch,
-                mimic=_mimic(joint, bodies, index, file),
+                mimic=_mimic(joint, index, file),
             )
         )
     return KinematicTree(joints), source_joints
@@ -215,7 +255,7 @@ def _triple(vector: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _mimic(joint: yourdfpy.Joint, bodies: list[RigidBody], index: Mapping[str, int], file: Path) -> Mimic | None:
+def _mimic(joint: RobotJoint, index: Mapping[str, int], file: Path) -> Mimic | None:
     if joint.mimic is None:
         return None
     source = index.get(joint.mimic.joint)
@@ -225,10 +265,7 @@ def _mimic(joint: yourdfpy.Joint, bodies: list[RigidBody], index: Mapping[str, i
             f"{file}: joint {joint.name!r}",
             "name a moving joint of the file",
         )
-    multiplier = 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
-    offset = 0.0 if joint.mimic.offset is None else float(joint.mimic.offset)
-    unit = stretch(joint)
-    return Mimic(source, multiplier * unit / stretch(bodies[source].joint), offset * unit)
+    return Mimic(source, joint.mimic.multiplier, joint.mimic.offset)
 
 
 def _to_rest_frame(tree: KinematicTree, parts: list[Part], rest: Array) -> tuple[KinematicTree, list[Part], Array]:

@@ -1,29 +1,26 @@
-"""From the bytes of a URDF file to a checked ``yourdfpy`` robot.
+"""From the bytes of a URDF file to a checked :class:`~artsim.loading.robot.Robot`.
 
-The file is untrusted: no document type, no entities, bounded size, every number finite. What can be mended
-is mended in the XML tree and recorded; what cannot raises an error that names the element.
+The file is untrusted: no document type, no entities, bounded size, every number finite. What can be mended is mended
+and recorded; what cannot raises an error that names the element.
 """
 
 from __future__ import annotations
 
-import io
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from lxml import etree
 
 from artsim.errors import AssetError
+from artsim.loading.joint_xml import read_joint
+from artsim.loading.robot import Box, Capsule, Cylinder, Geometry, Link, MeshFile, Robot, Shape, Sphere
+from artsim.loading.xml_repair import readable_xml, use_plain_names
+from artsim.loading.xml_values import Element
 from artsim.objects import Repair
 
-if TYPE_CHECKING:
-    import yourdfpy
-
-MOVING_TYPES = ("revolute", "continuous", "prismatic")
-KNOWN_TYPES = (*MOVING_TYPES, "fixed", "floating")
-SHAPES = {"box": ("size", 3), "cylinder": ("radius", 1), "sphere": ("radius", 1), "mesh": ("filename", 0)}
+SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
 
 
 def safe_xml(data: bytes, where: Path) -> etree._Element:
@@ -50,8 +47,8 @@ def safe_xml(data: bytes, where: Path) -> etree._Element:
 
 def parse_robot(
     data: bytes, where: Path, max_links: int, shapeless: Collection[str] = ()
-) -> tuple[yourdfpy.Robot, list[Repair]]:
-    """Check and mend a URDF document, then let yourdfpy read it.
+) -> tuple[Robot, list[Repair]]:
+    """Read, check and mend a URDF document.
 
     Parameters
     ----------
@@ -66,7 +63,7 @@ def parse_robot(
 
     Returns
     -------
-    robot : yourdfpy.Robot
+    robot : Robot
     repairs : list of Repair
 
     Raises
@@ -74,14 +71,10 @@ def parse_robot(
     AssetError
         Naming the file and the element that cannot be used.
     """
-    import yourdfpy  # takes most of a second, which only loading should pay for
-
+    data, repairs = readable_xml(data, where)
     root = safe_xml(data, where)
-    if root.tag != "robot":
-        raise AssetError(f"the top element is <{root.tag}>, not <robot>", where, "pass a URDF file")
-    repairs: list[Repair] = []
+    repairs += use_plain_names(root, where)
     if not root.get("name"):
-        root.set("name", where.stem)
         repairs.append(Repair("<robot>", f"has no name: called {where.stem!r}"))
     links, joints = root.findall("link"), root.findall("joint")
     if not links:
@@ -90,19 +83,17 @@ def parse_robot(
         raise AssetError(f"{len(links)} links are over the limit of {max_links}", where, "raise LoadLimits.max_links")
     _check_names(links, "link", where)
     _check_names(joints, "joint", where)
-    for link in links:
-        _check_link(link, where, repairs)
-    names = {link.get("name") for link in links}
-    for joint in joints:
-        _check_joint(joint, names, where, repairs)
+    shown = "visual" if any(link.find("visual/geometry") is not None for link in links) else "collision"
+    if shown == "collision" and any(link.find("collision/geometry") is not None for link in links):
+        repairs.append(Repair("file", "has no <visual>: its collision geometry is shown"))
+    read = tuple(_read_link(link, shown, where, repairs) for link in links)
+    names = {link.name for link in read}
+    robot = Robot(read, tuple(read_joint(joint, names, where, repairs) for joint in joints))
     _summarise_missing(links, shapeless, repairs)
-    robot = yourdfpy.URDF.load(
-        io.BytesIO(etree.tostring(root)), build_scene_graph=False, load_meshes=False, filename_handler=lambda f: f
-    ).robot
     return robot, repairs
 
 
-def _check_names(elements: list[etree._Element], tag: str, where: Path) -> None:
+def _check_names(elements: Sequence[etree._Element], tag: str, where: Path) -> None:
     counts = Counter(e.get("name") for e in elements)
     for name, count in counts.items():
         if not name:
@@ -111,125 +102,90 @@ def _check_names(elements: list[etree._Element], tag: str, where: Path) -> None:
             raise AssetError(f"{count} {tag}s are called {name!r}", where, "give each its own name")
 
 
-def _numbers(element: etree._Element, attribute: str, count: int, where: str, default: str | None = None) -> np.ndarray:
-    """The finite numbers of an attribute; ``where`` names the file and the element in errors."""
-    text = element.get(attribute, default)
-    if text is None:
-        raise AssetError(f"<{element.tag}> has no {attribute!r}", where, f"write {count} numbers")
-    try:
-        values = np.array([float(v) for v in text.split()])
-    except ValueError:
-        raise AssetError(f"{attribute}={text!r} of <{element.tag}> is not numbers", where, "write numbers") from None
-    if len(values) != count:
-        raise AssetError(f"{attribute}={text!r} of <{element.tag}> is not {count} numbers", where, "mend the attribute")
-    if not np.isfinite(values).all():
-        raise AssetError(f"{attribute}={text!r} of <{element.tag}> is not finite", where, "mend the attribute")
-    return values
-
-
-def _check_origin(parent: etree._Element, where: str) -> None:
-    origin = parent.find("origin")
-    if origin is not None:
-        _numbers(origin, "xyz", 3, where, "0 0 0")
-        _numbers(origin, "rpy", 3, where, "0 0 0")
-
-
-def _check_link(link: etree._Element, file: Path, repairs: list[Repair]) -> None:
-    name = f"link {link.get('name')!r}"
-    where = f"{file}: {name}"
-    for inertial in link.findall("inertial"):
-        link.remove(inertial)  # not used for geometry or kinematics, and a broken one must not stop the loader
-    for visual in [*link.findall("visual"), *link.findall("collision")]:
-        _check_origin(visual, where)
-        geometry = visual.find("geometry")
-        shape = next((s for s in geometry if s.tag in SHAPES), None) if geometry is not None else None
-        if shape is None:
-            kinds = [s.tag for s in geometry] if geometry is not None else []
-            link.remove(visual)
-            repairs.append(Repair(name, f"<{visual.tag}> left out: geometry {kinds} is not one of {list(SHAPES)}"))
+def _read_link(link: etree._Element, shown: str, file: Path, repairs: list[Repair]) -> Link:
+    """A link with the shapes that it shows, its ``<visual>`` or ``<collision>`` elements; inertia is not read."""
+    element = Element(f"link {link.get('name')!r}", file, repairs)
+    if link.find("origin") is not None or link.find("pose") is not None:
+        element.say("an <origin> of the link itself is not URDF, and is not read")
+    shapes, unusable = [], []
+    for found in link.findall(shown):
+        try:
+            shape = _read_shape(found, element)
+        except UnusableShapeError as problem:
+            unusable.append(str(problem))
             continue
-        for material in visual.findall("material"):
-            visual.remove(material)
-        attribute, count = SHAPES[shape.tag]
-        if shape.tag == "mesh":
-            if not shape.get("filename"):
-                link.remove(visual)
-                repairs.append(Repair(name, f"<{visual.tag}> left out: its mesh has no filename"))
-            elif shape.get("scale") is not None:
-                size = len(shape.get("scale").split())
-                _numbers(shape, "scale", 1 if size == 1 else 3, where)
-            continue
-        sizes = _numbers(shape, attribute, count, where)
-        if shape.tag == "cylinder":
-            sizes = np.append(sizes, _numbers(shape, "length", 1, where))
-        if not (sizes > 0).all():
-            link.remove(visual)
-            repairs.append(Repair(name, f"<{visual.tag}> left out: <{shape.tag}> has a size of {sizes.min():g}"))
+        if shape is not None:
+            shapes.append(shape)
+    return Link(str(link.get("name")), tuple(shapes), tuple(unusable))
 
 
-def _check_joint(joint: etree._Element, links: set[str | None], file: Path, repairs: list[Repair]) -> None:
-    name = f"joint {joint.get('name')!r}"
-    where = f"{file}: {name}"
-    kind = joint.get("type")
-    if kind not in KNOWN_TYPES:
-        raise AssetError(f"joint type {kind!r} is not supported", where, f"use one of {', '.join(KNOWN_TYPES)}")
-    for end in ("parent", "child"):
-        element = joint.find(end)
-        link = None if element is None else element.get("link")
-        if link not in links:
-            raise AssetError(f"its {end} link {link!r} does not exist", where, "name a link of the file")
-    _check_origin(joint, where)
-    mimic = joint.find("mimic")
-    if mimic is not None:
-        _numbers(mimic, "multiplier", 1, where, "1")
-        _numbers(mimic, "offset", 1, where, "0")
-    if kind not in MOVING_TYPES:
-        return
-    axis = joint.find("axis")
-    direction = _numbers(axis, "xyz", 3, where, "1 0 0") if axis is not None else np.array([1.0, 0.0, 0.0])
-    length = np.linalg.norm(direction)
-    if length < 1e-9:
-        joint.set("type", "fixed")
-        repairs.append(Repair(name, "has a zero axis, along which nothing moves: read as fixed"))
-        return
-    if abs(length - 1.0) > 1e-6:
-        stretched = ", its travel and limits multiplied by it as simulators do" if kind == "prismatic" else ""
-        repairs.append(Repair(name, f"axis of length {length:.6g} normalised{stretched}"))
-    _check_limit(joint, kind, name, where, repairs)
+class UnusableShapeError(Exception):
+    """One shape cannot be used, and why; the loader leaves it out and says so."""
 
 
-def _check_limit(joint: etree._Element, kind: str, name: str, where: str, repairs: list[Repair]) -> None:
-    limit = joint.find("limit")
-    if kind == "continuous":
-        if limit is not None:
-            if limit.get("lower") is not None or limit.get("upper") is not None:
-                repairs.append(Repair(name, "is continuous: its limits are ignored"))
-            joint.remove(limit)
-        return
-    if limit is None:
-        if kind == "revolute":
-            joint.set("type", "continuous")
-            repairs.append(Repair(name, "is revolute without a limit: read as continuous"))
-            return
-        limit = etree.SubElement(joint, "limit")
-        repairs.append(Repair(name, "is prismatic without a limit: held at 0"))
-    for attribute in ("effort", "velocity"):
-        if limit.get(attribute) is not None:
-            limit.attrib.pop(attribute)  # not kinematics; some files carry text here
-    lower = float(_numbers(limit, "lower", 1, where, "0")[0])
-    upper = float(_numbers(limit, "upper", 1, where, "0")[0])
-    if any(
-        text.strip().startswith("-0") and float(text) == 0 for text in (limit.get("lower", ""), limit.get("upper", ""))
-    ):
-        repairs.append(Repair(name, "limit -0 read as 0"))
-    if lower > upper:
-        repairs.append(Repair(name, f"limits {lower:g} and {upper:g} swapped"))
-        lower, upper = upper, lower
-    limit.set("lower", repr(lower + 0.0))
-    limit.set("upper", repr(upper + 0.0))
+def _read_shape(visual: etree._Element, element: Element) -> Shape | None:
+    """A shape; None where the element has none."""
+    geometry = element.child(visual, "geometry")
+    shapes = [] if geometry is None else [s for s in geometry if isinstance(s.tag, str) and s.tag != "origin"]
+    if geometry is None or not shapes:
+        element.say(f"<{visual.tag}> left out: it has no geometry")
+        return None
+    if geometry.find("origin") is not None:
+        element.say("an <origin> inside <geometry> is not URDF, and is not read")
+    shape = next((s for s in shapes if etree.QName(s).localname in SHAPES), shapes[0])
+    kind = etree.QName(shape).localname
+    if len(shapes) > 1:
+        element.say(f"<{visual.tag}> has {len(shapes)} geometries: its first <{kind}> counts")
+    if kind not in SHAPES:
+        raise UnusableShapeError(f"geometry <{kind}> is not one of {', '.join(SHAPES)}")
+    return Shape(_read_geometry(shape, kind, element), element.origin(visual))
 
 
-def _summarise_missing(links: list[etree._Element], shapeless: Collection[str], repairs: list[Repair]) -> None:
+def _read_geometry(shape: etree._Element, kind: str, element: Element) -> Geometry:
+    if kind == "mesh":
+        return Geometry(mesh=_read_mesh(shape, element))
+    if kind == "box":
+        size = element.finite(shape, "size", 3, own=True)
+        if (size < 0).any() or (size > 0).sum() < 2:  # a flat one is a surface
+            raise UnusableShapeError(f"<box> of size {' '.join(f'{s:g}' for s in size)} has no extent")
+        return Geometry(box=Box(size))
+    radius = float(element.finite(shape, "radius", 1)[0])
+    length = 0.0 if kind == "sphere" else float(element.finite(shape, "length", 1)[0])
+    if not (radius > 0 and length >= 0):
+        raise UnusableShapeError(f"<{kind}> of radius {radius:g} and length {length:g} has no extent")
+    if kind == "sphere":
+        return Geometry(sphere=Sphere(radius))
+    if kind == "capsule" and length > 0:
+        return Geometry(capsule=Capsule(radius, length))
+    return Geometry(cylinder=Cylinder(radius, length)) if kind == "cylinder" else Geometry(sphere=Sphere(radius))
+
+
+def _read_mesh(mesh: etree._Element, element: Element) -> MeshFile:
+    names = [element.text(mesh, name) for name in ("filename", "uri", "url")]
+    filename = next((name for name in [*names, (mesh.text or "").strip()] if name and name.strip()), None)
+    if filename is None:
+        raise UnusableShapeError("its mesh has no filename")
+    if names[0] is None:
+        element.say("<mesh> has its file's name elsewhere than in filename: read")
+    text = element.text(mesh, "scale")
+    if text is None or not text.strip():
+        return MeshFile(filename)
+    words = len(text.replace(",", " ").split())
+    what = f"scale={text[:60]!r} of <mesh>"
+    scale = element.parsed(text, what, (1, 3, *range(4, 17)))
+    if words > 3:
+        element.say(f"{what} has {words} numbers: the first three count")
+    scale = np.broadcast_to(scale[:3], 3)
+    if not np.isfinite(scale).all():
+        raise element.error(f"{what} is not finite", 'write scale="1 1 1"')
+    if (scale == 0).any():
+        raise element.error(
+            f"mesh {filename!r} has scale={text!r}, which leaves nothing of it", 'write scale="1 1 1", or its true size'
+        )
+    return MeshFile(filename, scale)
+
+
+def _summarise_missing(links: Sequence[etree._Element], shapeless: Collection[str], repairs: list[Repair]) -> None:
     empty = [link.get("name") for link in links if link.find("visual") is None and link.find("collision") is None]
     empty = [name for name in empty if name not in shapeless]
     if empty:

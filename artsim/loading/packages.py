@@ -1,0 +1,286 @@
+"""Where the meshes are that a URDF names: ``package://``, ``../`` and the like become paths, none of them outside.
+
+A file may be read below an *allowed* folder only:
+
+1. the URDF's own folder;
+2. the asset's root: the nearest folder above the URDF that holds ``package.xml`` (at most six levels up); without one,
+   the parent of the URDF's folder where that is called ``urdf``, ``robots`` or the like, and a folder ``meshes`` beside
+   the URDF's folder;
+3. without a ``package.xml``, a folder at most three levels above the URDF whose name is that of the package;
+4. folders that the user declares as package roots.
+
+A home folder, what holds homes, the top of the file system and the folder of temporary files are never an asset's root.
+Links are followed before it is judged where a file lies.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from urllib.parse import unquote
+
+from lxml import etree
+
+from artsim.errors import AssetError
+from artsim.objects import Repair
+
+_MANIFEST_LEVELS, _NAME_LEVELS = 6, 3
+_MAX_MANIFEST_BYTES = 1_000_000
+_MAX_LISTED = 100_000
+_URDF_FOLDERS = frozenset("urdf urdfs robot robots model models xacro description descriptions".split())
+_MESH_FOLDERS = ("meshes", "mesh")
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
+_DRIVE = re.compile(r"[A-Za-z]:/")
+
+
+class MissingFileError(Exception):
+    """No such file in any folder that may be read, and what to do about it."""
+
+    def __init__(self, what: str, fix: str):
+        super().__init__(what)
+        self.fix = fix
+
+
+@dataclass
+class AssetPaths:
+    """Resolves the file names of one URDF.
+
+    Attributes
+    ----------
+    folder : Path
+        The URDF file's folder: the root of relative names.
+    declared : mapping of str to Path
+        Folder of each declared package.
+    repairs : list of Repair
+        What was assumed so far.
+    """
+
+    folder: Path
+    declared: Mapping[str, Path]
+    repairs: list[Repair] = field(default_factory=list)
+    _said: set[str] = field(default_factory=set)
+
+    def resolve(self, filename: str) -> Path:
+        """Path of an existing file, confined to the allowed folders.
+
+        Raises
+        ------
+        MissingFileError
+            When no such file exists.
+        AssetError
+            When it would lie outside the allowed folders, or is on the web.
+        """
+        package, rest = self._split(filename)
+        tried = []
+        for name in dict.fromkeys((rest, unquote(rest))):
+            tried += list(self._candidates(package, name))
+        inside = [candidate for candidate in tried if self._is_inside(candidate.path, package)]
+        for respelt in (False, True):
+            for candidate in inside:
+                path = _with_case_of_disk(candidate.path) if respelt else candidate.path
+                if path is not None and _is_file(path) and self._is_inside(path, package):
+                    self._say(candidate.assumed)
+                    self._say(f"{filename!r} is {path.name!r} on disk: read" if respelt else "")
+                    return path
+        found_outside = next((c.path for c in tried if c not in inside and _is_file(c.path)), None)
+        if found_outside is not None or not inside:
+            raise AssetError(
+                f"mesh {filename!r} lies outside the asset's folder",
+                self.folder,
+                self._fix_outside(package, rest, found_outside),
+            )
+        raise MissingFileError(f"mesh {filename!r} is missing", self._fix_missing(package, rest))
+
+    @cached_property
+    def root(self) -> Path:
+        """The asset's root: the folder of the package, or of the URDF; see the module."""
+        return self._manifest_root or self._usual_root or self._own
+
+    @cached_property
+    def _own(self) -> Path:
+        return self.folder.resolve()
+
+    @cached_property
+    def _manifest_root(self) -> Path | None:
+        for level, ancestor in enumerate([self._own, *self._own.parents]):
+            if level > _MANIFEST_LEVELS or _is_shared(ancestor):
+                return None
+            if _is_file(ancestor / "package.xml"):
+                return ancestor
+        return None
+
+    @cached_property
+    def _usual_root(self) -> Path | None:
+        parent = self._own.parent
+        return parent if self._own.name.lower() in _URDF_FOLDERS and not _is_shared(parent) else None
+
+    @cached_property
+    def _manifest_name(self) -> str | None:
+        """The name that the package's own manifest gives it."""
+        if self._manifest_root is None:
+            return None
+        path = self._manifest_root / "package.xml"
+        try:
+            if path.stat().st_size > _MAX_MANIFEST_BYTES:
+                return None
+            parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
+            return (etree.fromstring(path.read_bytes(), parser).findtext("name") or "").strip() or None
+        except (OSError, etree.XMLSyntaxError, ValueError):  # a manifest that is not read names nothing
+            return None
+
+    def _of_name(self, package: str) -> list[Path]:
+        """Folders from the URDF's own upwards that are the package of a name."""
+        if self._manifest_root is not None:
+            levels = [a for a in [self._own, *self._own.parents] if a.is_relative_to(self._manifest_root)]
+            named = [a for a in levels if a.name == package]
+            return [*named, self._manifest_root] if self._manifest_name == package else named
+        levels = [self._own, *self._own.parents][: _NAME_LEVELS + 1]
+        return [a for a in levels if a.name == package and not _is_shared(a) and len(a.parts) > 2]
+
+    @cached_property
+    def _allowed(self) -> list[Path]:
+        beside = [] if _is_shared(self._own.parent) else [self._own.parent / name for name in _MESH_FOLDERS]
+        folders = [self._own, self.root, *beside, *self.declared.values()]
+        return [folder.resolve() for folder in folders]
+
+    def _is_inside(self, path: Path, package: str | None) -> bool:
+        allowed = self._allowed if package is None else [*self._allowed, *self._of_name(package)]
+        try:
+            real = path.resolve()
+        except (OSError, RuntimeError):  # links that go round in a circle
+            return False
+        return any(real.is_relative_to(folder) for folder in allowed)
+
+    def _split(self, filename: str) -> tuple[str | None, str]:
+        """Package (None for a plain path) and the rest of a name."""
+        name = filename.strip().replace("\\", "/")
+        scheme = _SCHEME.fullmatch(name)
+        if scheme is None or _DRIVE.match(name):
+            return None, str(Path(name).expanduser()) if name.startswith("~/") else name
+        kind, rest = scheme[1].lower(), scheme[2]
+        if kind in ("package", "model"):
+            package, _, rest = rest.partition("/")
+            return package, rest.lstrip("/")
+        if kind == "file":  # two slashes and a relative path is not what the standard says, but what people write
+            absolute = name[len("file:") :].startswith(("///", "//localhost/")) and not _DRIVE.match(rest)
+            return None, f"/{rest.removeprefix('localhost/')}" if absolute else rest
+        raise AssetError(
+            f"mesh {filename!r} is not a file", self.folder, "download it, and write its path from the URDF's folder on"
+        )
+
+    def _candidates(self, package: str | None, name: str) -> Iterator[_Candidate]:
+        """Where a file may be, in the order in which it is looked for."""
+        parts = [part for part in name.split("/") if part not in ("", ".")]
+        if package is None:
+            yield _Candidate(self.folder / name)  # an absolute name replaces the folder
+            if PurePosixPath(name).is_absolute() or _DRIVE.match(name):
+                yield from self._below_own_name(parts)
+                return
+            for folder in dict.fromkeys((self.root, *self.declared.values())):
+                yield _Candidate(folder / name, f"names are read from {folder.name!r} on, not from the URDF's folder")
+            return
+        if package in self.declared:
+            yield _Candidate(self.declared[package] / name)
+        for folder in self._of_name(package):
+            yield _Candidate(folder / name)
+        if self._sibling(package, name) is not None:
+            return  # that package is there, but may not be read: a file of the same name here is another one
+        for base in dict.fromkeys((self.root, self._own)):
+            yield _Candidate(base / package / name, f"package {package!r} is taken for a folder in {base.name!r}")
+            yield _Candidate(base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own")
+        yield from self._below_own_name([package, *parts])
+
+    def _below_own_name(self, parts: list[str]) -> Iterator[_Candidate]:
+        """A path written on another machine, or from another root, goes on from where it names the asset's folder."""
+        for folder in dict.fromkeys((self.root, self._own)):
+            for i in reversed(range(len(parts) - 1)):
+                if parts[i] == folder.name:
+                    said = f"names that start elsewhere are read from {folder.name!r} on, which they pass through"
+                    yield _Candidate(folder.joinpath(*parts[i + 1 :]), said)
+
+    def _say(self, what: str) -> None:
+        if what and what not in self._said:
+            self._said.add(what)
+            self.repairs.append(Repair("file names", what))
+
+    def _sibling(self, package: str, name: str) -> Path | None:
+        """A package beside this one that holds the file; it is never read unless it is declared."""
+        if self._manifest_root is None or package in self.declared:
+            return None
+        beside = self._manifest_root.parent / package
+        return beside if beside != self._manifest_root and _is_file(beside / name) else None
+
+    def _fix_missing(self, package: str | None, rest: str) -> str:
+        if package is None:
+            name = PurePosixPath(rest).parent.name or "meshes"
+            return f"put it there, or name the folder that {rest!r} starts from: {option(name, None)}"
+        sibling = self._sibling(package, rest)
+        if sibling is not None:
+            return f"allow the package beside this one: {option(package, sibling)}"
+        return f"say where the package is: {option(package, None)}"
+
+    def _fix_outside(self, package: str | None, rest: str, found: Path | None) -> str:
+        if package is not None and package not in self.declared:
+            return f"move it inside, or say where the package is: {option(package, self._sibling(package, rest))}"
+        path = Path(os.path.normpath(self.folder / rest if found is None else found))
+        common = Path(os.path.commonpath([self._own, path]))
+        folder = path.parent if _is_shared(common) or len(common.parts) <= 2 else common
+        return f"move it inside, or allow its folder if you trust the URDF: {option(folder.name, folder)}"
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A path to look at, and what is assumed by it."""
+
+    path: Path
+    assumed: str = ""
+
+
+def option(name: str, folder: Path | None) -> str:
+    """The option that declares a package, ready to paste."""
+    name = name if name.isprintable() and name else "NAME"
+    value = f"/path/to/{name}" if folder is None or not str(folder).isprintable() else str(folder)
+    return f"--package-root {shlex.quote(f'{name}={value}')}"
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name too long for the file system, or with a zero byte
+        return False
+
+
+def _is_shared(folder: Path) -> bool:
+    """Whether a folder holds more than one asset for sure: a home, what holds homes, the top, temporary files."""
+    if folder == Path(tempfile.gettempdir()).resolve() or folder.parent in (Path("/home"), Path("/Users")):
+        return True
+    return Path(os.path.expanduser("~")).resolve().is_relative_to(folder) or folder == Path(folder.anchor)
+
+
+def _with_case_of_disk(path: Path) -> Path | None:
+    """The path of an existing file whose name differs in capital letters alone, if there is one."""
+    missing = []
+    here = path
+    while not here.is_dir():
+        missing.append(here.name)
+        if here.parent == here or len(missing) > 20:
+            return None
+        here = here.parent
+    for name in reversed(missing):
+        if name == "..":
+            return None
+        try:
+            with os.scandir(here) as entries:
+                found = sorted(e.name for _, e in zip(range(_MAX_LISTED), entries) if e.name.lower() == name.lower())
+        except OSError:
+            return None
+        if not found:
+            return None
+        here = here / found[0]
+    return here
