@@ -1,9 +1,9 @@
-"""The points of a cloud that show the object: finite ones, and none on their own."""
+"""The points of a cloud that show the object: measured ones, and none on their own."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from artsim.errors import ArtsimError
@@ -21,19 +21,46 @@ _CLEANED = 4096
 """Points that are looked at for outliers."""
 _FEWEST = 8
 """Points below which there is nothing to fit."""
+_FARTHEST = 1e9
+"""Coordinates beyond stand for no measurement, as the largest float does for some sensors; squares of them overflow."""
+_SMALLEST = 1e-6
+"""Extent below which single precision, in which networks work, hardly tells points from each other."""
+
+
+def as_cloud(points: ArrayLike) -> Array:
+    """(N, 3) points in double precision.
+
+    Raises
+    ------
+    ArtsimError
+        When they are no numbers, or of another shape.
+    """
+    try:
+        cloud = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArtsimError(f"this is no cloud ({error})", "points", "pass (N, 3) points in metres") from error
+    if cloud.ndim != 2 or cloud.shape[1] != 3:
+        raise ArtsimError(f"an array of shape {cloud.shape} is no cloud", "points", "pass (N, 3) points in metres")
+    return cloud
+
+
+def measured(points: Array) -> NDArray[np.bool_]:
+    """(N,) which points a sensor can have measured: finite, not beyond all reach, and not at exactly 0 0 0.
+
+    The origin is the camera itself; sensors and exporters write it where nothing came back.
+    """
+    return np.logical_and((np.abs(points) < _FARTHEST).all(axis=1), points.any(axis=1))
 
 
 def clean(points: Array) -> NDArray[np.int64]:
-    """Indices of the points that show the object: finite, and not on their own.
+    """Indices of the points that show the object: measured, and not on their own.
 
     Raises
     ------
     ArtsimError
         When the array is no cloud, or hardly a point is left.
     """
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise ArtsimError(f"an array of shape {points.shape} is no cloud", "points", "pass (N, 3) points in metres")
-    good = np.flatnonzero(np.isfinite(points).all(axis=1))
+    good = np.flatnonzero(measured(as_cloud(points)))
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = cKDTree(points[known])
@@ -43,7 +70,7 @@ def clean(points: Array) -> NDArray[np.int64]:
         apart = tree.query(points[good[alone]], [_FEW_NEIGHBOURS + 1], distance_upper_bound=within)[0][:, 0]
         alone[alone] = ~np.isfinite(apart)
         good = good[~alone]
-    if len(good) < _FEWEST or not np.ptp(points[good], axis=0).any():
+    if len(good) < _FEWEST or np.ptp(points[good], axis=0).max() < _SMALLEST:
         raise ArtsimError(
             f"{len(good)} of {len(points)} points show an object", "points", "pass a cloud of the object, in metres"
         )

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import tyro
 
+from artperl.estimate_command import Estimate
 from artsim.cli import run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
-from artsim.files import atomic_file, write_atomic
+from artsim.files import write_atomic
 from artsim.progress import say
 from artsim.sampling import StateMode, StateOptions, ViewOptions, ViewPreset
 
@@ -269,64 +269,6 @@ class Evaluate:
         figures = summary(evaluate(estimator, samples, progress=True))
         print(table(figures))
         return figures
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Estimate the poses of the parts of an object, and list them.
-
-    From a cloud: artperl estimate cloud.ply --category laptop --view out.html
-
-    From a depth image: artperl estimate depth.png --mask mask.png --intrinsics camera.json --category laptop
-    """
-
-    cloud: tyro.conf.Positional[Path]
-    """PLY or other mesh file with vertices, .npy with (N, 3), or .npz with an array 'points': camera frame, metres.
-    With --intrinsics, a depth image: .png of whole numbers, or .npy of metres."""
-    category: str = "laptop"
-    """Folder of an estimator, or the name of one that comes with the package."""
-    out: Path | None = None
-    """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list."""
-    view: Path | None = None
-    """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
-    mask: Path | None = None
-    """Image that is not 0 where the object is in the depth image."""
-    intrinsics: Path | None = None
-    """JSON with fx, fy, cx, cy, or with a matrix K, in pixels."""
-    depth_scale: float = 0.001
-    """Metres of one unit of a depth image of whole numbers."""
-    seen_from: tuple[float, float] | None = None
-    """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
-    a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
-
-    def run(self) -> None:
-        from artperl.checkpoint import load_estimator
-        from artperl.inputs import read_points
-        from artperl.view import listed, page
-
-        if self.out is not None and self.out != Path("-") and self.out.suffix not in (".json", ".npz"):
-            raise ConfigError(f"{self.out} is neither .json nor .npz", "out", "name one that is, or - for JSON")
-        points = read_points(self.cloud, self.mask, self.intrinsics, self.depth_scale)
-        estimate = load_estimator(self.category, seen_from=self.seen_from)(points)
-        record = {name: _plain(value) for name, value in vars(estimate).items() if name != "part"}
-        if self.view is not None:
-            write_atomic(self.view, page(estimate, points, f"{self.cloud.name}: {self.category}").encode())
-        if self.out == Path("-"):
-            print(json.dumps(record, indent=1))
-            return
-        print(listed(estimate))
-        if self.out is None:
-            return
-        if self.out.suffix == ".npz":
-            arrays = {name: np.asarray(v) for name, v in vars(estimate).items() if name != "milliseconds"}
-            with atomic_file(self.out) as file:
-                np.savez(file, allow_pickle=False, **arrays)
-        else:
-            write_atomic(self.out, _json(record))
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _json(record: Any) -> bytes:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from artperl.listing import listed, short
 from artperl.pose import Posed
 from artperl.shapes import Observed, Shapes
 
@@ -79,6 +80,13 @@ class Estimate:
         ``T_camera_part`` at the start, after each step of the agent where it was needed, and in the end.
     milliseconds : dict
         By stage.
+    part_names : tuple of str, length K
+        Such as "base" and "lid"; ``part_<k>`` where they are unknown.
+    joint_limits : (K, 2) float
+        Least and largest state of each joint, as the reference has them: radians, and metres of slides at the
+        estimated size. Infinite for what turns without end, 0 for the root.
+    warnings : tuple of str
+        What looks wrong with the cloud, one sentence with its fix each.
     """
 
     rotation: Array
@@ -98,6 +106,21 @@ class Estimate:
     confidence: float
     trajectory: Array
     milliseconds: dict[str, float]
+    part_names: tuple[str, ...] = ()
+    joint_limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def state_unit(self) -> tuple[str, ...]:
+        """Unit of each part's state and limits, length K: "rad", "m", or "" for what does not move."""
+        units = {"free": "", "fixed": "", "prismatic": "m"}
+        return tuple(units.get(kind, "rad") for kind in self.joint_type)
+
+    def __str__(self) -> str:
+        return listed(self)
+
+    def __repr__(self) -> str:
+        return short(self)
 
 
 def slid(estimate: Estimate, farther: Array) -> Estimate:

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from artperl.cleaning import clean, draw
+from artperl.cleaning import as_cloud, clean, draw
+from artperl.cloud_checks import cloud_warnings
 from artperl.coherence import coherent
 from artperl.data import Clouds
 from artperl.estimate import Calibration, Estimate, brought_to_rest, labels_by_boxes, slid, visibility, widen
@@ -28,6 +29,7 @@ from artperl.hidden import uncovered
 from artperl.networks.agent import Agent
 from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perceived, Perception, Votes
+from artperl.part_names import part_names
 from artperl.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.retrieval import ShapeBase
 from artperl.search import Clock, EstimatorOptions, Found, find
@@ -124,7 +126,8 @@ class Estimator:
         Parameters
         ----------
         points : (N, 3) float
-            Camera frame, metres, any N. Points that are not finite and outliers are left out.
+            Camera frame, metres, any N. Points that are not finite, or at exactly 0 0 0, and outliers are left out.
+            What looks wrong with the cloud, such as its unit, is said in ``Estimate.warnings``.
 
         Raises
         ------
@@ -135,7 +138,7 @@ class Estimator:
         estimate, seen = self._fit(points, clock)
         if self.boxes is None:
             return estimate
-        cloud, T, part = np.asarray(points, dtype=np.float64), estimate.T_camera_part, estimate.part
+        cloud, T, part = as_cloud(points), estimate.T_camera_part, estimate.part
         with clock("boxes"):
             for _ in range(_LOOKS):
                 evidence, unit = _evidence(cloud, replace(estimate, part=part), seen, self.boxes.num_rows)
@@ -168,9 +171,10 @@ class Estimator:
     def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Seen]:
         """The estimate whose boxes are the reference's, and what it goes by."""
         options = self.options
-        points = np.asarray(points, dtype=np.float64)
+        points = as_cloud(points)
         with clock("clean"):
             good = clean(points)
+            warnings = cloud_warnings(points, good)
             chosen = draw(len(good), options.num_points, np.random.default_rng(0))
             cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None].to(self.perception.device)
             clouds = Clouds.of(cloud)
@@ -196,7 +200,7 @@ class Estimator:
                 roughness(torch.from_numpy(points[few].astype(np.float32))),
                 _numpy(trees.lower * reach(trees, found.refined.theta.log_scale))[: int(trees.valid[0].sum())],
             )  # fmt: skip
-            return self._report(points, part, found, clock), seen
+            return replace(self._report(points, part, found, clock), warnings=warnings), seen
 
     def _report(self, points: Array, part: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
         """Everything about one fitted reference and labelled points, as arrays."""
@@ -207,6 +211,8 @@ class Estimator:
         axis, origin = joint_axes(trees, posed)
         poses = [_transforms(shapes, step)[:K] for step in found.path]
         shows = visibility(shapes, observed, posed)[:K]
+        limits = torch.stack([trees.lower, trees.upper], dim=-1)
+        limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
         rotation, center = _numpy(posed.rotation)[:K], _numpy(posed.center)[:K]
         translation, size = widen(rotation, center, _numpy(shapes.box_size * posed.scale)[:K], points, part)
         return Estimate(
@@ -227,6 +233,8 @@ class Estimator:
             confidence=self.calibration(found.residual, found.disagreement, shows.min()),
             trajectory=np.stack(poses),
             milliseconds=clock.milliseconds,
+            part_names=part_names(self.base, reference, shapes),
+            joint_limits=_numpy(limits)[:K],
         )
 
 

@@ -1,4 +1,4 @@
-"""An estimate to look at: a list for a terminal, and a file for any browser with the cloud by part, boxes and axes."""
+"""An estimate to look at: a file for any browser with the cloud by part, boxes and axes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
+from artperl.cleaning import measured
 from artperl.estimate import Estimate
+from artperl.listing import HEAD, cells, summary
 from artsim.view import PALETTE
 
 _MOST = 6000
 """Points that are drawn."""
-_HEAD = ("part", "joint", "state", "box centre, m", "rotation vector, deg", "box size, m", "seen")
 _CORNERS = np.array([[i & 1, i & 2, i & 4] for i in range(8)], dtype=bool) - 0.5
 
 
@@ -30,7 +30,7 @@ def page(estimate: Estimate, points: ArrayLike, title: str) -> str:
     title : str
     """
     points = np.asarray(points, dtype=np.float64)
-    shown = np.flatnonzero(np.isfinite(points).all(axis=1))
+    shown = np.flatnonzero(measured(points))
     shown = np.random.default_rng(0).permutation(shown)[:_MOST]
     T = estimate.trajectory
     center = np.einsum(
@@ -48,47 +48,21 @@ def page(estimate: Estimate, points: ArrayLike, title: str) -> str:
         "colours": [f"rgb({r},{g},{b})" for r, g, b in PALETTE.tolist()],
     }
     return _PAGE.format(
-        title=html.escape(title), summary=html.escape(_summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
-        head="".join(f"<th>{name}</th>" for name in _HEAD), last=len(T) - 1,
+        title=html.escape(title), summary=html.escape(summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
+        warnings="\n".join(f"<p><b>Warning:</b> {html.escape(text)}</p>" for text in estimate.warnings),
+        head="".join(f"<th>{name}</th>" for name in HEAD), last=len(T) - 1,
     )  # fmt: skip
-
-
-def listed(estimate: Estimate) -> str:
-    """What it found, for a terminal: one line of the whole, and one for each part."""
-    rows = [_HEAD, *_cells(estimate)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([_summary(estimate), *lines])
-
-
-def _summary(estimate: Estimate) -> str:
-    return (
-        f"confidence {100 * estimate.confidence:.0f} %, residual {100 * estimate.residual:.2f} % of the diagonal, "
-        f"reference {estimate.reference}, {sum(estimate.milliseconds.values()):.0f} ms"
-    )
-
-
-def _cells(estimate: Estimate) -> list[tuple[str, ...]]:
-    """What `_HEAD` names, of each part."""
-    cells: list[tuple[str, ...]] = []
-    for k, kind in enumerate(estimate.joint_type):
-        state = {"free": "", "prismatic": f"{100 * estimate.state[k]:.1f} cm"}.get(
-            kind, f"{np.rad2deg(estimate.state[k]):.1f}°"
-        )
-        turn = Rotation.from_matrix(estimate.rotation[k]).as_rotvec(degrees=True)
-        cells.append((
-            f"{k}", kind, state, " ".join(f"{x:.3f}" for x in estimate.translation[k]),
-            " ".join(f"{x:.1f}" for x in turn), " x ".join(f"{x:.3f}" for x in estimate.size[k]),
-            f"{100 * estimate.visibility[k]:.0f} %",
-        ))  # fmt: skip
-    return cells
 
 
 def _rows(estimate: Estimate) -> str:
     rows = []
-    for k, (part, *cells) in enumerate(_cells(estimate)):
+    for k, (part, *values) in enumerate(cells(estimate)):
         colour = "rgb({},{},{})".format(*PALETTE[k % len(PALETTE)])
-        rows.append(f'<tr><td style="color:{colour}">■ {part}</td>' + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
+        rows.append(
+            f'<tr><td style="color:{colour}">■ {html.escape(part)}</td>'
+            + "".join(f"<td>{html.escape(c)}</td>" for c in values)
+            + "</tr>"
+        )
     return "\n".join(rows)
 
 
@@ -107,6 +81,7 @@ label {{ margin-right: 1.5em; }} h1 {{ font-size: 1.3em; }}
 </style></head><body>
 <h1>{title}</h1>
 <p>{summary}</p>
+{warnings}
 <canvas id="view"></canvas>
 <p><label>step <input id="step" type="range" min="0" max="{last}" value="{last}"> <span id="name"></span></label>
 <label><input id="boxes" type="checkbox" checked> boxes</label>

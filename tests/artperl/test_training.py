@@ -177,13 +177,13 @@ def test_the_program_evaluates_and_estimates(
         cli.main()
         record = json.loads(capsys.readouterr().out)
         assert len(record["rotation"]) == 2
-    cli.Estimate(tmp_path / "cloud.npy", str(whole / "best"), tmp_path / "out.npz").run()
+    cli.Estimate((tmp_path / "cloud.npy",), str(whole / "best"), tmp_path / "out.npz").run()
     with np.load(tmp_path / "out.npz") as arrays:
         assert arrays["part"].shape == (100,)
     whole_line, head, *parts = capsys.readouterr().out.splitlines()
     assert record["reference"] in whole_line
     assert head.split()[:3] == ["part", "joint", "state"]
-    assert [line.split()[:2] for line in parts] == [["0", "free"], ["1", "revolute"]]
+    assert [line.split()[:2] for line in parts] == [["base", "free"], ["lid", "revolute"]]
     assert f"{np.degrees(record['state'][1]):.1f}°" in parts[1]
 
 

@@ -1,0 +1,92 @@
+"""Picture files, bounded by their number of pixels before they are decoded."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artperl.inputs.bounds import guarded, read_file
+from artsim.errors import ConfigError
+
+MAX_PIXELS = 24_000_000
+"""A depth image of 24 megapixels is 192 MB as doubles."""
+MAX_PICTURE_BYTES = 100_000_000
+FORMATS = ("PNG", "TIFF", "PPM", "JPEG", "BMP", "WEBP", "GIF")
+"""Everything else that Pillow opens is neither a depth image nor a mask."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A decoded picture.
+
+    Attributes
+    ----------
+    values : (H, W) or (H, W, C)
+        Of a picture with a palette: the indices.
+    mode : str
+        As Pillow names it: "L", "I;16", "RGBA", "P" and so on.
+    format : str
+        One of :data:`FORMATS`.
+    palette : (256, 3) uint8 or None
+        Colours of the indices.
+    transparent : frozenset of int
+        Indices that are transparent.
+    """
+
+    values: NDArray[Any]
+    mode: str
+    format: str
+    palette: NDArray[np.uint8] | None = None
+    transparent: frozenset[int] = field(default_factory=frozenset)
+
+
+def read_picture(path: Path, what: str) -> Picture:
+    """Decode a picture.
+
+    Raises
+    ------
+    ConfigError
+        When it is missing, too large, damaged, or of another format.
+    """
+    return guarded(lambda: _read(path, what), path, what, f"save the {what} again, as PNG or .npy")
+
+
+def _read(path: Path, what: str) -> Picture:
+    from PIL import Image
+
+    data = read_file(path, what, MAX_PICTURE_BYTES)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a bomb is refused below, by a limit of our own; odd metadata is not used
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            if image.width * image.height > MAX_PIXELS:
+                raise ConfigError(
+                    f"a {what} of {image.width} x {image.height} pixels is over the limit of {MAX_PIXELS:,}", path,
+                    "crop it to the object",
+                )  # fmt: skip
+            name = image.format or ""
+            if image.mode not in ("P", "PA"):
+                return Picture(np.asarray(image), image.mode, name)
+            palette = np.zeros((256, 3), dtype=np.uint8)
+            colours = np.asarray(image.getpalette() or [], dtype=np.uint8).reshape(-1, 3)[:256]
+            palette[: len(colours)] = colours
+            transparent = _transparent(image.info)
+            if image.mode == "PA":
+                both = np.asarray(image)
+                return Picture(np.where(both[..., 1] > 0, both[..., 0], 256), "P", name, palette, frozenset({256}))
+            return Picture(np.asarray(image), "P", name, palette, transparent)
+
+
+def _transparent(info: Mapping[Any, Any]) -> frozenset[int]:
+    alpha = info.get("transparency")
+    if isinstance(alpha, int):
+        return frozenset({alpha})
+    return (
+        frozenset(index for index, value in enumerate(alpha) if value == 0) if isinstance(alpha, bytes) else frozenset()
+    )

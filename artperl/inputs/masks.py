@@ -1,0 +1,272 @@
+"""Masks of files: which pixels of a depth image show the object."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artperl.inputs.bounds import read_npy, read_npz
+from artperl.inputs.images import Picture, read_picture
+from artsim.errors import ConfigError
+
+MaskKind = Literal["auto", "binary", "parts"]
+"""binary: the object is what is not 0; parts: artsim's own part masks, where 255 is what shows no part and 0 is the
+root; auto: parts where the mask looks like one, binary otherwise."""
+
+MASK_FILES = (".png", ".bmp", ".gif", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".jpg", ".jpeg", ".webp", ".npy", ".npz")
+_FIX = "give a PNG that is black where the object is not, or .npy of (H, W)"
+_NONE = 255
+"""What artsim writes where no part, or no instance, is seen."""
+_MOST_PARTS = 64
+"""Parts that an object has, at most, in a mask of parts."""
+_LOSSY = ("JPEG", "WEBP")
+_OURS = ("part_mask", "part_ids")
+"""Names of artsim's own masks of parts."""
+_INSTANCES = "instance_ids"
+"""Name of artsim's own mask of the objects in a scene."""
+_LISTED = 12
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Where an object is, and what was assumed to tell.
+
+    Attributes
+    ----------
+    shown : (H, W) bool
+    notes, warnings : tuple of str
+    """
+
+    shown: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def read_mask(path: Path, mask_id: str | None = None, kind: MaskKind = "auto") -> Mask:
+    """The mask of a file.
+
+    Parameters
+    ----------
+    path : Path
+        A picture, ``.npy``, or ``.npz`` with an array 'mask', or only one that fits.
+    mask_id : str, optional
+        Which object, where several are in the mask: the number that its pixels have (with a palette: their index); the
+        colour, as "#ff8000" or "255,128,0"; of a stack of masks (N, H, W), the number of one.
+    kind : MaskKind
+
+    Raises
+    ------
+    ConfigError
+        When it cannot be read, or nothing in it has that number or colour.
+    """
+    ending = path.suffix.lower()
+    if ending in (".npy", ".npz"):
+        return _of_array(_read_array(path), path, mask_id, kind)
+    picture = read_picture(path, "mask")
+    values = picture.values
+    if picture.format in _LOSSY:
+        return _of_lossy(picture, path, mask_id)
+    if picture.mode == "P":
+        return _of_palette(picture, path, mask_id)
+    if picture.mode == "CMYK":
+        raise ConfigError("a mask in CMYK is not read", path, _FIX)
+    if values.ndim == 3 and values.shape[2] == 2:
+        return _with_alpha(values[..., :1], values[..., 1], path, mask_id, kind)
+    if values.ndim == 3 and values.shape[2] == 4:
+        return _with_alpha(values[..., :3], values[..., 3], path, mask_id, kind)
+    return _of_array(values, path, mask_id, kind)
+
+
+def _read_array(path: Path) -> NDArray[Any]:
+    if path.suffix.lower() == ".npy":
+        return read_npy(path, "mask", _FIX)
+    choice = read_npz(path, "mask", _FIX, lambda shape, dtype: len(shape) in (2, 3) and dtype.kind in "bfiu")
+    return choice.one_of(("mask", "masks", "segmentation", "part_mask"))[1]
+
+
+def _of_array(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
+    if values.dtype.kind not in "bfiu" or values.size == 0 or values.ndim not in (2, 3):
+        raise ConfigError(f"an array of shape {values.shape} and type {values.dtype} is no mask", path, _FIX)
+    if values.ndim == 2:
+        return _of_numbers(values, path, mask_id, kind)
+    if values.shape[2] == 1:
+        return _of_numbers(values[..., 0], path, mask_id, kind)
+    if values.shape[0] == 1:
+        return _of_numbers(values[0], path, mask_id, kind)
+    if values.shape[2] == 3:
+        return _of_colours(values, path, mask_id, kind)
+    if values.shape[2] == 4:
+        return _with_alpha(values[..., :3], values[..., 3], path, mask_id, kind)
+    if mask_id is None or not mask_id.isdigit() or int(mask_id) >= len(values):
+        raise ConfigError(
+            f"it is a stack of {len(values)} masks", path, f"choose one: --mask-id 0 to {len(values) - 1}"
+        )
+    return _of_numbers(values[int(mask_id)], path, None, "binary")
+
+
+def _of_numbers(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
+    """A mask of one channel."""
+    if values.dtype.kind == "b":
+        values = values.astype(np.uint8)
+    if values.dtype.kind == "f":
+        values = np.nan_to_num(values.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+        if mask_id is None and values.min() >= 0.0 and values.max() <= 1.0 and ((values > 0.0) & (values < 1.0)).any():
+            return Mask(values > 0.5, ("the mask holds probabilities: the object is where they are over 0.5",))
+    found = np.unique(values)
+    if mask_id is not None:
+        number = _number(mask_id, path)
+        shown: NDArray[np.bool_] = values == number
+        if not shown.any():
+            raise ConfigError(
+                f"no pixel has the number {mask_id} (it has {_listed(found)})", path, "choose one of these: --mask-id N"
+            )
+        return Mask(shown)
+    if kind == "auto" and _INSTANCES in path.name.lower():
+        raise ConfigError(f"it holds several objects (it has {_listed(found)})", path, "choose one: --mask-id N")
+    if kind == "parts" or (kind == "auto" and _is_of_parts(values, found, path)):
+        return _of_parts(values, path)
+    shown = values != 0
+    if kind == "auto" and len(found) > 2:
+        return Mask(shown, (), (
+            f"the mask holds the numbers {_listed(found)}: all but 0 are taken for the object. Fix: add --mask-id N to"
+            " choose one, or --mask-kind binary if it is right as it is",
+        ))  # fmt: skip
+    warnings: tuple[str, ...] = ()
+    if kind == "auto" and _on_border(shown) > 0.5 and not shown.all():
+        warnings = (
+            "the mask is not 0 along most of its border: is black the object? Fix: invert the mask; give --mask-kind"
+            " parts if it is a part mask of artsim, or --mask-kind binary if it is right",
+        )
+    return Mask(shown, (), warnings)
+
+
+def _is_of_parts(values: NDArray[Any], found: NDArray[Any], path: Path) -> bool:
+    """Whether it is a mask of parts as artsim writes it: 255 where there is none, as along most of the border."""
+    if values.dtype.kind == "f" or found[-1] != _NONE:
+        return False
+    small = bool((found[:-1] < _MOST_PARTS).all() and found[0] >= 0)
+    named = any(name in path.name.lower() for name in _OURS)
+    several = len(found) > 2 or (len(found) == 2 and found[0] > 0)
+    return small and (named or (several and _on_border(values == _NONE) > 0.5))
+
+
+def _of_parts(values: NDArray[Any], path: Path) -> Mask:
+    shown: NDArray[np.bool_] = values != _NONE
+    note = f"a part mask of artsim: the object is what is not {_NONE}, parts {_listed(np.unique(values[shown]))}"
+    warnings: tuple[str, ...] = ()
+    if "part_ids" in path.name.lower():
+        warnings = (
+            "part_ids.png holds the parts of all objects of a scene. Fix: give --mask instance_ids.png --mask-id N if"
+            " there are several",
+        )
+    return Mask(shown, (note,), warnings)
+
+
+def _of_colours(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
+    """A mask of three channels."""
+    if (values == values[..., :1]).all():  # grey
+        return _of_numbers(values[..., 0], path, mask_id, kind)
+    if mask_id is not None:
+        shown: NDArray[np.bool_] = (values == np.array(_colour(mask_id, path))).all(axis=2)
+        if not shown.any():
+            raise ConfigError(f"no pixel has the colour {mask_id}", path, f"choose one of {_colours(values)}")
+        return Mask(shown)
+    shown = (values != 0).any(axis=2)
+    several = len(np.unique(_packed(values)[shown])) > 1
+    text = f"the mask holds the colours {_colours(values)}: all but black are taken for the object."
+    return Mask(shown, (), (f"{text} Fix: add --mask-id with one of them",) if several and kind == "auto" else ())
+
+
+def _with_alpha(colour: NDArray[Any], alpha: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
+    """Alpha is no colour: what is black is not the object. But what is transparent is not there either."""
+    opaque = alpha != 0
+    if mask_id is None and not (colour != 0).any() and not opaque.all():
+        return Mask(opaque, ("the mask has no colour: the object is what is not transparent",))
+    mask = _of_colours(np.repeat(colour, 3, axis=2) if colour.shape[2] == 1 else colour, path, mask_id, kind)
+    if opaque.all():
+        return mask
+    return Mask(mask.shown & opaque, (*mask.notes, "what is transparent in the mask is not the object"), mask.warnings)
+
+
+def _of_palette(picture: Picture, path: Path, mask_id: str | None) -> Mask:
+    """A mask with a palette: black is not the object, whatever its index."""
+    indices, palette = picture.values, picture.palette
+    assert palette is not None
+    found = np.unique(indices)
+    if mask_id is not None and mask_id.isdigit():
+        return _of_numbers(indices, path, mask_id, "binary")
+    colours = np.vstack([palette, np.zeros((1, 3), dtype=np.uint8)])
+    if mask_id is not None:
+        return _of_colours(colours[indices], path, mask_id, "binary")
+    back = {index for index in range(256) if not palette[index].any()} | picture.transparent
+    note = ""
+    if not back & set(found.tolist()):
+        back, note = {0}, "no colour of the mask's palette is black: index 0 is taken for the background"
+    shown = ~np.isin(indices, list(back))
+    objects = [index for index in found.tolist() if index not in back]
+    warnings: tuple[str, ...] = ()
+    if len(objects) > 1:
+        warnings = (
+            f"the mask holds the indices {_listed(np.array(objects))}: all are taken for the object. Fix: add"
+            " --mask-id N to choose one",
+        )
+    return Mask(shown, (note,) if note else (), warnings)
+
+
+def _of_lossy(picture: Picture, path: Path, mask_id: str | None) -> Mask:
+    if mask_id is not None:
+        raise ConfigError(
+            f"a {picture.format} does not keep numbers exactly", path, "give the mask as PNG, or leave out --mask-id"
+        )
+    values = picture.values.astype(np.float64)
+    weights = {1: [1.0], 3: [0.299, 0.587, 0.114], 4: [0.299, 0.587, 0.114, 0.0]}  # ITU-R BT.601; alpha is no colour
+    light = values if values.ndim == 2 else values @ np.array(weights.get(values.shape[2], [0.0] * values.shape[2]))
+    if picture.mode == "CMYK":
+        raise ConfigError("a mask in CMYK is not read", path, _FIX)
+    return Mask(light > 127, (f"a {picture.format} mask: the object is what is lighter than 127 of 255",))
+
+
+def _on_border(chosen: NDArray[np.bool_]) -> float:
+    """Share of the pixels along the border."""
+    border = np.concatenate([chosen[0], chosen[-1], chosen[:, 0], chosen[:, -1]])
+    return float(border.mean())
+
+
+def _number(mask_id: str, path: Path) -> float:
+    try:
+        return float(mask_id)
+    except ValueError:
+        raise ConfigError(f"{mask_id} is no number, and the mask has no colours", path, "use --mask-id N") from None
+
+
+def _colour(mask_id: str, path: Path) -> tuple[int, int, int]:
+    if re.fullmatch(r"#?[0-9a-fA-F]{6}", mask_id):
+        red, green, blue = bytes.fromhex(mask_id.removeprefix("#"))
+        return red, green, blue
+    numbers = [int(word) for word in re.findall(r"\d+", mask_id)]
+    if len(numbers) != 3 or not re.fullmatch(r"[\d\s,()\[\]]+", mask_id):
+        raise ConfigError(
+            f"{mask_id} is no colour, and the mask is in colour", path, "use --mask-id R,G,B or --mask-id '#rrggbb'"
+        )
+    return numbers[0], numbers[1], numbers[2]
+
+
+def _packed(values: NDArray[Any]) -> NDArray[np.int64]:
+    red, green, blue = np.moveaxis(values.astype(np.int64), 2, 0)
+    return (red << 32) + (green << 16) + blue
+
+
+def _colours(values: NDArray[Any]) -> str:
+    numbers, counts = np.unique(_packed(values), return_counts=True)
+    most = numbers[np.argsort(-counts)][:_LISTED].tolist()
+    colours = [(n >> 32, n >> 16 & 0xFFFF, n & 0xFFFF) for n in most if n]
+    return " ".join(",".join(map(str, colour)) for colour in colours) + (" ..." if len(numbers) > _LISTED else "")
+
+
+def _listed(found: NDArray[Any]) -> str:
+    return ", ".join(f"{value:g}" for value in found[:_LISTED].tolist()) + (", ..." if len(found) > _LISTED else "")
