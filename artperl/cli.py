@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +16,7 @@ from artsim.cli import run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.files import write_atomic
+from artsim.loading.roots import PackageRoots
 from artsim.progress import say
 from artsim.sampling import StateMode, StateOptions, ViewOptions, ViewPreset
 
@@ -44,6 +45,8 @@ class Train:
     files: tuple[Path, ...] = ()
     """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
     and from other sides; for objects that were not learnt from use artperl evaluate --files."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families. By default the preset's."""
@@ -122,7 +125,8 @@ class Train:
         parts = "any" if self.files else self.parts or preset.parts
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
-            preset, categories=categories, files=tuple(map(str, self.files)), parts=parts, real=self.real,
+            preset, categories=categories, files=tuple(map(str, self.files)),
+            package_roots=tuple((name, str(root)) for name, root in self.package_root.items()), parts=parts, real=self.real,
             seed=self.seed,
             device=self.device or preset.device,
             dataset=None if self.dataset is None else str(self.dataset),
@@ -190,6 +194,8 @@ class Evaluate:
     """Instead of procedural objects: URDF files, object folders, or folders of them. An estimator of one category of
     ArtImage is tested on them as ArtImage has it: parts that move otherwise stay at rest, and drawers open to the
     front."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     views: int | None = None
     """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
     states: StateMode = "uniform"
@@ -251,7 +257,7 @@ class Evaluate:
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:
-            objects = (as_known(source.load(), categories, parts) for source in find_sources(self.files))
+            objects = (as_known(source.load(), categories, parts) for source in find_sources(self.files, self.package_root))
             samples = samples_of(objects, views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")

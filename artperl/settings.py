@@ -25,6 +25,8 @@ class TrainOptions:
     files: tuple[str, ...] = ()
     """URDF files, object folders, or folders of them: objects to learn from instead of categories, which are empty
     then."""
+    package_roots: tuple[tuple[str, str], ...] = ()
+    """Name and folder of the packages that these files name, where they are not found as they are."""
     real: bool = False
     """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
     dataset: str | None = None

@@ -438,7 +438,8 @@ def _given(options: TrainOptions) -> list[ArticulatedObject]:
     """
     if options.real:
         return real_train_objects(options.categories)
-    objects = [arranged(source.load(), options.parts) for source in find_sources(options.files)]
+    roots = {name: Path(folder) for name, folder in options.package_roots}
+    objects = [arranged(source.load(), options.parts) for source in find_sources(options.files, roots)]
     for obj in objects:
         if options.max_parts is not None and len(obj) > options.max_parts:
             raise ConfigError(

@@ -7,7 +7,6 @@ import inspect
 import io
 import os
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +18,7 @@ from artsim.datasets.plan import SampleOptions
 from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError
 from artsim.extras import explained, of_ours
+from artsim.loading.roots import PackageRoots
 from artsim.names import PrintableStream, printable
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
@@ -63,8 +63,8 @@ class Generate:
     """Shares of each category's objects in train, val and test: by object, never by view."""
     shard_size: int = 256
     """Samples of each tar file."""
-    package_root: Mapping[str, Path] = field(default_factory=dict)
-    """Folders of package:// names: NAME FOLDER ..."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
     skip_broken: bool = False
     """Leave out objects that do not load, and say which, instead of stopping."""
 
@@ -235,11 +235,13 @@ class View:
     """Draw from this split only."""
     rerun: Path | None = None
     """Also write a rerun recording (.rrd) to this file."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
         from artsim.view import view_path
 
-        for written in view_path(self.path, self.out, self.samples, self.split, self.rerun):
+        for written in view_path(self.path, self.out, self.samples, self.split, self.rerun, self.package_root):
             print(f"wrote {written}")
 
 
@@ -276,8 +278,8 @@ class Inspect:
     """URDF file or its folder."""
     gates: bool = False
     """Also pass the object through the sim-readiness gates, and list what each finds."""
-    package_root: Mapping[str, Path] = field(default_factory=dict)
-    """Folders of package:// names: NAME FOLDER ..."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
         from artsim.inspect import describe
@@ -289,7 +291,7 @@ class Inspect:
             from artsim.validity import check_file
 
             print("\ngates")
-            for gate in check_file(obj, self.path):
+            for gate in check_file(obj, self.path, self.package_root):
                 print(f"  {gate}")
 
 

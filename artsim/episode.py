@@ -15,6 +15,7 @@ from artsim.camera import Camera
 from artsim.datasets.stream import STREAM_SEEDS
 from artsim.errors import ConfigError
 from artsim.kinematics import Array
+from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import FamilySource, Source, family_sources, find_sources
 from artsim.objects import ArticulatedObject
 from artsim.physics import Control, PhysicsOptions, Simulation
@@ -40,6 +41,8 @@ class EpisodeOptions:
     """Procedural categories, such as drawer: every episode has a new object of one, unless objects are named."""
     objects: tuple[Path, ...] = ()
     """URDF files, object folders, or folders of them: every episode has one of these."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     obj: Annotated[ArticulatedObject | None, tyro.conf.Suppress] = None
     """The one object of every episode."""
     scale: Scale = "native"
@@ -93,7 +96,7 @@ class Episode:
         self.options, self.steps = options, 0
         self._sources: list[Source] = []
         if options.obj is None:
-            named = find_sources(options.objects)
+            named = find_sources(options.objects, options.package_root)
             self._sources = [*named] if options.objects else [*family_sources(options.categories, 1)]
         self._load = lru_cache(maxsize=16)(lambda number: self._sources[number].load())
         self._simulation: Simulation | None = None

@@ -7,6 +7,7 @@ files that leave something out (PartNet-Mobility's do) behave differently in eac
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ _SHAPES = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere":
 """Geometries that every simulator reads: attribute -> count of its numbers. Capsules are not among them."""
 
 
-def strict_urdf(path: str | Path) -> list[str]:
+def strict_urdf(path: str | Path, package_roots: Mapping[str, str | Path] | None = None) -> list[str]:
     """Problems of a URDF file.
 
     Strict means: one root link, and every other link carried by one joint; unique names; every link with a visual, a
@@ -44,6 +45,8 @@ def strict_urdf(path: str | Path) -> list[str]:
     ----------
     path : str or Path
         URDF file or its folder.
+    package_roots : mapping, optional
+        As for :func:`artsim.load`.
 
     Returns
     -------
@@ -59,7 +62,7 @@ def strict_urdf(path: str | Path) -> list[str]:
     links, joints = root.findall("link"), root.findall("joint")
     problems = _tree_problems(links, joints)
     helpers = _screw_helpers(joints)
-    reader = MeshReader(file.parent, {}, LoadLimits())
+    reader = MeshReader(file.parent, _paths(package_roots), LoadLimits())
     for link in links:
         problems += [f"link {link.get('name')!r}: {p}" for p in _link_problems(link, helpers, reader)]
     names = {joint.get("name"): joint for joint in joints}
@@ -77,14 +80,16 @@ def strict_inertia(path: str | Path) -> list[str]:
     return [f"link {link.get('name')!r}: {p}" for link in root.findall("link") for p in _inertial_problems(link)]
 
 
-def convex_collision_geometry(path: str | Path) -> list[str]:
+def convex_collision_geometry(
+    path: str | Path, package_roots: Mapping[str, str | Path] | None = None
+) -> list[str]:
     """Problems of a URDF file's collision geometry: every link needs some, of primitives and convex meshes."""
     try:
         file, root = _read(path)
     except ArtsimError as error:
         return [str(error)]
     helpers = _screw_helpers(root.findall("joint"))
-    reader = MeshReader(file.parent, {}, LoadLimits())
+    reader = MeshReader(file.parent, _paths(package_roots), LoadLimits())
     problems = []
     for link in root.findall("link"):
         shapes = link.findall("collision")
@@ -116,6 +121,10 @@ def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
     except QhullError:  # flat
         return False
     return bool(volume >= (1.0 - TOLERANCE) * hull.volume - ROUNDING * hull.area)
+
+
+def _paths(package_roots: Mapping[str, str | Path] | None) -> dict[str, Path]:
+    return {name: Path(folder) for name, folder in (package_roots or {}).items()}
 
 
 def _read(path: str | Path) -> tuple[Path, etree._Element]:

@@ -5,7 +5,7 @@ Every gate fails closed: what cannot be checked has failed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,16 +51,20 @@ def check(obj: ArticulatedObject) -> list[Gate]:
     return _run({**_geometry(obj), **physics})
 
 
-def check_file(obj: ArticulatedObject, path: str | Path) -> list[Gate]:
+def check_file(
+    obj: ArticulatedObject, path: str | Path, package_roots: Mapping[str, str | Path] | None = None
+) -> list[Gate]:
     """All gates of an object and the URDF file that it was loaded from, or exported to: the physics is the file's.
+
+    Package roots are those that it was loaded with.
 
     :mod:`artsim.simulators` adds a look by three simulators.
     """
     return _run(
         {
-            "strict URDF": lambda: strict_urdf(path),
+            "strict URDF": lambda: strict_urdf(path, package_roots),
             **_geometry(obj),
-            "convex collision geometry": lambda: convex_collision_geometry(path),
+            "convex collision geometry": lambda: convex_collision_geometry(path, package_roots),
             "inertia": lambda: strict_inertia(path),
         }
     )

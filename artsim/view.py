@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,12 @@ class Shown:
 
 
 def view_path(
-    path: Path, out: Path | None = None, samples: int = 12, split: str | None = None, rerun: Path | None = None
+    path: Path,
+    out: Path | None = None,
+    samples: int = 12,
+    split: str | None = None,
+    rerun: Path | None = None,
+    package_roots: Mapping[str, Path] | None = None,
 ) -> list[Path]:
     """Draw a dataset or an object; see :class:`artsim.cli.View`.
 
@@ -68,7 +73,7 @@ def view_path(
         shown = [show_sample(sample, dataset.object_of(sample)) for sample in (dataset[i] for i in chosen)]
         out = out or path / "contact_sheet.png"
     else:
-        obj = load(path)
+        obj = load(path, package_roots=package_roots)
         shown = list(show_states(obj, samples))
         out = out or Path(f"{safe_name(f'{obj.category}-{obj.object_id}')}.png")
     if not shown:

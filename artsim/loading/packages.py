@@ -184,9 +184,11 @@ class AssetPaths:
                 return
             for folder in dict.fromkeys((self.root, *self.declared.values())):
                 yield _Candidate(folder / name, f"names are read from {folder.name!r} on, not from the URDF's folder")
+            yield from self._below_own_name(parts)
             return
         if package in self.declared:
             yield _Candidate(self.declared[package] / name)
+            return  # what the user says is not guessed at
         for folder in self._of_name(package):
             yield _Candidate(folder / name)
         if self._sibling(package, name) is not None:
@@ -218,8 +220,9 @@ class AssetPaths:
 
     def _fix_missing(self, package: str | None, rest: str) -> str:
         if package is None:
-            name = PurePosixPath(rest).parent.name or "meshes"
-            return f"put it there, or name the folder that {rest!r} starts from: {option(name, None)}"
+            return f"put it there, or name the folder that {rest!r} starts from: {option(self._own.name, None)}"
+        if package in self.declared:
+            return f"put {rest!r} into {str(self.declared[package])!r}, or name another folder: {option(package, None)}"
         sibling = self._sibling(package, rest)
         if sibling is not None:
             return f"allow the package beside this one: {option(package, sibling)}"

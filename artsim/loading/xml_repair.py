@@ -131,9 +131,10 @@ def _without_tail(body: str, repairs: list[Repair]) -> str:
     """The document without stray text after its end; another element there stays, and is an error."""
     end = body.rfind(">") + 1
     tail = body[end:].strip("\0 \t\r\n")
-    if end == 0 or not tail or "<" in tail:
+    if end == 0:
         return body
-    repairs.append(Repair(WHERE, f"text after its top element left out: {tail[:40]!r}"))
+    if tail:
+        repairs.append(Repair(WHERE, f"text after its top element left out: {tail[:40]!r}"))
     return body[:end]
 
 

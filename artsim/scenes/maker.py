@@ -17,6 +17,7 @@ from artsim.camera import Camera
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.kinematics import Array
+from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.sampling import StateOptions, sample_state
@@ -76,6 +77,8 @@ class SceneOptions:
     objects: tuple[Path, ...] = ()
     """URDF files, object folders, or folders of them: every object is put into the scene, in a size that is usual for
     its category."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     place: Literal["auto", "table", "floor"] = "auto"
     """table or floor; auto: on the floor if any object is too large for a table."""
     distractors: int = 3
@@ -165,7 +168,8 @@ def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
     """The objects of a scene, files in a usual size."""
     rng = np.random.default_rng([seed, 0])
     made = [_drawn(category, options.place != "floor", rng) for category in options.categories]
-    loaded = [source.load() for source in find_sources(options.objects)] if options.objects else []
+    sources = find_sources(options.objects, options.package_root) if options.objects else []
+    loaded = [source.load() for source in sources]
     return [*made, *(_in_usual_size(obj, int(rng.integers(2**31))) for obj in loaded), *options.obj]
 
 
