@@ -126,8 +126,8 @@ class Train:
         steps, rollouts = self.perception_steps, self.agent_rollouts
         options = replace(
             preset, categories=categories, files=tuple(map(str, self.files)),
-            package_roots=tuple((name, str(root)) for name, root in self.package_root.items()), parts=parts, real=self.real,
-            seed=self.seed,
+            package_roots=tuple((name, str(root)) for name, root in self.package_root.items()),
+            parts=parts, real=self.real, seed=self.seed,
             device=self.device or preset.device,
             dataset=None if self.dataset is None else str(self.dataset),
             start_from=None if self.start_from is None else str(self.start_from),
@@ -257,7 +257,9 @@ class Evaluate:
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:
-            objects = (as_known(source.load(), categories, parts) for source in find_sources(self.files, self.package_root))
+            objects = (
+                as_known(source.load(), categories, parts) for source in find_sources(self.files, self.package_root)
+            )
             samples = samples_of(objects, views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")

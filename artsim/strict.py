@@ -80,9 +80,7 @@ def strict_inertia(path: str | Path) -> list[str]:
     return [f"link {link.get('name')!r}: {p}" for link in root.findall("link") for p in _inertial_problems(link)]
 
 
-def convex_collision_geometry(
-    path: str | Path, package_roots: Mapping[str, str | Path] | None = None
-) -> list[str]:
+def convex_collision_geometry(path: str | Path, package_roots: Mapping[str, str | Path] | None = None) -> list[str]:
     """Problems of a URDF file's collision geometry: every link needs some, of primitives and convex meshes."""
     try:
         file, root = _read(path)

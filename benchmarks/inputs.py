@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence

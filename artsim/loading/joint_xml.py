@@ -147,7 +147,8 @@ def _read_limits(joint: etree._Element, kind: str, element: Element) -> tuple[st
     if lower is None and upper is None:
         missing = "a limit" if limit is None else "lower and upper in its limit"
         if kind == "revolute":
-            element.say(f"is revolute without {missing}: read as continuous, as simulators do")
+            as_others = "" if limit is None else ", as PyBullet, MuJoCo and SAPIEN do (URDF's text would hold it at 0)"
+            element.say(f"is revolute without {missing}: read as continuous{as_others}")
             return free
         element.say(f"is prismatic without {missing}: held at 0")
         return kind, 0.0, 0.0
@@ -211,4 +212,3 @@ def _doubt_degrees(low: float, high: float, element: Element) -> None:
             f"limits {low:g} and {high:g} rad are {span / _TURN:.1f} turns: they look like degrees, and are taken as "
             f'radians; if they are degrees, write lower="{np.deg2rad(low):.6g}" upper="{np.deg2rad(high):.6g}"'
         )
-

@@ -21,7 +21,8 @@ import shlex
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
@@ -33,7 +34,7 @@ from artsim.objects import Repair
 _MANIFEST_LEVELS, _NAME_LEVELS = 6, 3
 _MAX_MANIFEST_BYTES = 1_000_000
 _MAX_LISTED = 100_000
-_URDF_FOLDERS = frozenset("urdf urdfs robot robots model models xacro description descriptions".split())
+_URDF_FOLDERS = ("urdf", "urdfs", "robot", "robots", "model", "models", "xacro", "description", "descriptions")
 _MESH_FOLDERS = ("meshes", "mesh")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
 _DRIVE = re.compile(r"[A-Za-z]:/")
@@ -162,7 +163,7 @@ class AssetPaths:
         name = filename.strip().replace("\\", "/")
         scheme = _SCHEME.fullmatch(name)
         if scheme is None or _DRIVE.match(name):
-            return None, str(Path(name).expanduser()) if name.startswith("~/") else name
+            return None, str(_home() / name[2:]) if name.startswith("~/") else name
         kind, rest = scheme[1].lower(), scheme[2]
         if kind in ("package", "model"):
             package, _, rest = rest.partition("/")
@@ -195,7 +196,9 @@ class AssetPaths:
             return  # that package is there, but may not be read: a file of the same name here is another one
         for base in dict.fromkeys((self.root, self._own)):
             yield _Candidate(base / package / name, f"package {package!r} is taken for a folder in {base.name!r}")
-            yield _Candidate(base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own")
+            yield _Candidate(
+                base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own"
+            )
         yield from self._below_own_name([package, *parts])
 
     def _below_own_name(self, parts: list[str]) -> Iterator[_Candidate]:
@@ -263,7 +266,15 @@ def _is_shared(folder: Path) -> bool:
     """Whether a folder holds more than one asset for sure: a home, what holds homes, the top, temporary files."""
     if folder == Path(tempfile.gettempdir()).resolve() or folder.parent in (Path("/home"), Path("/Users")):
         return True
-    return Path(os.path.expanduser("~")).resolve().is_relative_to(folder) or folder == Path(folder.anchor)
+    return folder == Path(folder.anchor) or _home().is_relative_to(folder)
+
+
+@cache
+def _home() -> Path:
+    try:
+        return Path.home().resolve()
+    except RuntimeError:  # a user that the system does not know
+        return Path("/root")
 
 
 def _with_case_of_disk(path: Path) -> Path | None:
@@ -280,7 +291,7 @@ def _with_case_of_disk(path: Path) -> Path | None:
             return None
         try:
             with os.scandir(here) as entries:
-                found = sorted(e.name for _, e in zip(range(_MAX_LISTED), entries) if e.name.lower() == name.lower())
+                found = sorted(e.name for e in islice(entries, _MAX_LISTED) if e.name.lower() == name.lower())
         except OSError:
             return None
         if not found:

@@ -35,13 +35,14 @@ _OTHER_FORMATS = {
     "sdf": "SDF", "gazebo": "SDF", "world": "SDF", "mujoco": "MJCF, MuJoCo's format", "html": "a web page",
     "collada": "a COLLADA mesh", "launch": "a ROS launch file", "package": "a ROS package manifest",
 }  # fmt: skip
-_ELEMENTS = frozenset(
-    "robot link joint visual collision inertial geometry origin axis limit mimic parent child box cylinder capsule "
-    "sphere mesh material".split()
-)
-_ATTRIBUTES = frozenset(
-    "name type xyz rpy quat_xyzw link joint lower upper multiplier offset size radius length filename scale".split()
-)
+_ELEMENTS = {
+    "robot", "link", "joint", "visual", "collision", "inertial", "geometry", "origin", "axis", "limit", "mimic",
+    "parent", "child", "box", "cylinder", "capsule", "sphere", "mesh", "material",
+}  # fmt: skip
+_ATTRIBUTES = {
+    "name", "type", "xyz", "rpy", "quat_xyzw", "link", "joint", "lower", "upper", "multiplier", "offset", "size",
+    "radius", "length", "filename", "scale",
+}  # fmt: skip
 
 
 def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
@@ -56,7 +57,9 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
     """
     if data.startswith(b"version https://git-lfs"):
         raise AssetError(
-            "is a pointer of Git LFS, not the file itself", where, f"cd {shlex.quote(str(where.parent))} && git lfs pull"
+            "is a pointer of Git LFS, not the file itself",
+            where,
+            f"cd {shlex.quote(str(where.parent))} && git lfs pull",
         )
     repairs: list[Repair] = []
     text = _decoded(data, repairs)
@@ -181,8 +184,8 @@ def use_plain_names(root: etree._Element, where: Path) -> list[Repair]:
             plain = plain.lower()
         if element.tag != plain:
             element.tag = plain
-        for key in element.keys() if plain in _ELEMENTS else ():
-            if key not in _ATTRIBUTES and key.lower() in _ATTRIBUTES and key.lower() not in element.keys():
+        for key in list(element.attrib) if plain in _ELEMENTS else ():
+            if key not in _ATTRIBUTES and key.lower() in _ATTRIBUTES and key.lower() not in element.attrib:
                 respelt[key] = None
                 element.set(key.lower(), element.attrib.pop(key))
     _refuse_other_formats(root, where)
@@ -216,7 +219,9 @@ def _refuse_unexpanded(root: etree._Element, where: Path) -> None:
 
 def _unexpanded(what: str, where: Path) -> AssetError:
     name = where.name.removesuffix(".xacro")
-    target = where.with_name(name if name.endswith(".urdf") and name != where.name else f"{Path(name).stem}_expanded.urdf")
+    target = where.with_name(
+        name if name.endswith(".urdf") and name != where.name else f"{Path(name).stem}_expanded.urdf"
+    )
     if where.name.endswith(".xacro") and not name.endswith(".urdf"):
         target = where.with_name(f"{name}.urdf")
     return AssetError(

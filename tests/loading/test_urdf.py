@@ -255,7 +255,7 @@ BAD: dict[str, tuple[Callable[[Path], Path], str]] = {
     "origin of text": (with_text('xyz="0.15 0 0.01"', 'xyz="a b c"'), "joint 'hinge': xyz='a b c'"),
     "origin of two numbers": (with_text('xyz="0.15 0 0.01"', 'xyz="0.15 0"'), "is not 3 numbers"),
     "origin not finite": (with_text('xyz="0.15 0 0.01"', 'xyz="nan 0 0"'), "is not finite"),
-    "limit not finite": (with_text('upper="2.2"', 'upper="1e400"'), "is not finite"),
+    "limit not a number": (with_text('upper="2.2"', 'upper="nan"'), "is not finite"),
     "limit of text": (with_text('upper="2.2"', 'upper="wide"'), "upper='wide'"),
     "axis of two numbers": (with_text('axis xyz="0 1 0"', 'axis xyz="0 1"'), "is not 3 numbers"),
     "box of text": (with_text('size="0.3 0.4 0.02"', 'size="big"'), "link 'base': size='big'"),
