@@ -135,6 +135,11 @@ class AssetPaths:
         except (OSError, etree.XMLSyntaxError, ValueError):  # a manifest that is not read names nothing
             return None
 
+    @cached_property
+    def _bases(self) -> list[Path]:
+        """Folders that a name may start from; above the URDF's folder, only what is allowed is found."""
+        return list(dict.fromkeys((self.root, self._own.parent, self._own)))
+
     def _of_name(self, package: str) -> list[Path]:
         """Folders from the URDF's own upwards that are the package of a name."""
         if self._manifest_root is not None:
@@ -183,7 +188,7 @@ class AssetPaths:
             if PurePosixPath(name).is_absolute() or _DRIVE.match(name):
                 yield from self._below_own_name(parts)
                 return
-            for folder in dict.fromkeys((self.root, *self.declared.values())):
+            for folder in dict.fromkeys((*self._bases, *self.declared.values())):
                 yield _Candidate(folder / name, f"names are read from {folder.name!r} on, not from the URDF's folder")
             yield from self._below_own_name(parts)
             return
@@ -194,12 +199,18 @@ class AssetPaths:
             yield _Candidate(folder / name)
         if self._sibling(package, name) is not None:
             return  # that package is there, but may not be read: a file of the same name here is another one
-        for base in dict.fromkeys((self.root, self._own)):
+        for base in self._bases:
             yield _Candidate(base / package / name, f"package {package!r} is taken for a folder in {base.name!r}")
             yield _Candidate(
                 base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own"
             )
         yield from self._below_own_name([package, *parts])
+        for i in range(1, len(parts) - 1):  # a folder and a name are left: a name alone may be that of another mesh
+            for base in self._bases:
+                said = (
+                    f"package {package!r} is not declared: from {parts[i]!r} on, its names are read from {base.name!r}"
+                )
+                yield _Candidate(base.joinpath(*parts[i:]), said)
 
     def _below_own_name(self, parts: list[str]) -> Iterator[_Candidate]:
         """A path written on another machine, or from another root, goes on from where it names the asset's folder."""
