@@ -231,6 +231,9 @@ def poses_in_file(file: Path) -> LinkPoses:
     import yourdfpy
 
     robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)
+    for joint in robot.robot.joints:
+        if joint.type == "prismatic":  # yourdfpy multiplies travel by the length of the axis, which is but a direction
+            joint.axis = joint.axis / np.linalg.norm(joint.axis)
     names = [link.name for link in robot.robot.links]
 
     def poses(values: dict[str, float]) -> dict[str, Array]:

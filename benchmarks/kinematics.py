@@ -1,8 +1,9 @@
 """Kinematics against independent oracles: ``python -m benchmarks.kinematics``.
 
 For every real object, part transforms at random states are compared with PyBullet's and yourdfpy's own kinematics of
-the same, unrepaired file. PyBullet reads a copy without meshes and inertias, which do not enter kinematics. The last
-line is one JSON object.
+the same, unrepaired file. PyBullet reads a copy without meshes and inertias, which do not enter kinematics. Both
+multiply the travel of a slide by the length of its axis, which URDF and MuJoCo take for a direction: both are given
+unit axes. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -134,12 +135,20 @@ def _client() -> int:
 
 
 def pybullet_poses(file: Path) -> LinkPoses:
-    """PyBullet's own forward kinematics of a file without meshes and inertias; valid until the next call."""
+    """PyBullet's own forward kinematics of a file without meshes and inertias, slides' axes made unit vectors.
+
+    Valid until the next call.
+    """
     bullet = import_pybullet()
     root = etree.parse(str(file)).getroot()
     for link in root.findall("link"):
         for child in list(link):
             link.remove(child)
+    for joint in root.iterfind("joint[@type='prismatic']"):
+        axis = joint.find("axis")
+        if axis is not None:
+            direction = np.array(axis.get("xyz", "1 0 0").split(), dtype=np.float64)
+            axis.set("xyz", " ".join(map(repr, (direction / np.linalg.norm(direction)).tolist())))
     client = _client()
     bullet.resetSimulation(physicsClientId=client)
     with tempfile.NamedTemporaryFile(suffix=".urdf") as bare, silent():
@@ -147,13 +156,13 @@ def pybullet_poses(file: Path) -> LinkPoses:
         bare.flush()
         body = bullet.loadURDF(bare.name, useFixedBase=True, physicsClientId=client)
     infos = [bullet.getJointInfo(body, j, physicsClientId=client) for j in range(bullet.getNumJoints(body, client))]
-    joints = {info[1].decode(): info[0] for info in infos}
+    numbers = {info[1].decode(): info[0] for info in infos}
     links = {info[12].decode(): info[0] for info in infos}
     base = bullet.getBodyInfo(body, physicsClientId=client)[0].decode()
 
     def poses(state: dict[str, float]) -> dict[str, Array]:
-        for name, joint in joints.items():
-            bullet.resetJointState(body, joint, state.get(name, 0.0), physicsClientId=client)
+        for name, number in numbers.items():
+            bullet.resetJointState(body, number, state.get(name, 0.0), physicsClientId=client)
         found = {base: np.eye(4)}
         for name, link in links.items():
             at = bullet.getLinkState(body, link, computeForwardKinematics=True, physicsClientId=client)

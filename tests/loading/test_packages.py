@@ -26,9 +26,8 @@ def place(folder: Path, urdf: str, filename: str, *files: str, **manifests: str)
         (folder / ("." if where == "_" else where) / "package.xml").write_text(MANIFEST.format(package))
     path = folder / urdf
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(
-        f'<robot name="r"><link name="a"><visual><geometry><mesh filename="{filename}"/></geometry></visual></link></robot>'
-    )
+    geometry = f'<geometry><mesh filename="{filename}"/></geometry>'
+    path.write_text(f'<robot name="r"><link name="a"><visual>{geometry}</visual></link></robot>')
     return path
 
 
@@ -41,7 +40,7 @@ def said(path: Path) -> str:
     [
         ("foo/urdf/r.urdf", "package://foo/meshes/m.obj", "foo/meshes/m.obj", {"foo": "foo"}, ""),
         ("foo/urdf/r.urdf", "package://foo/meshes/m.obj", "foo/meshes/m.obj", {}, ""),
-        ("foo-master/urdf/x/r.urdf", "package://foo/meshes/m.obj", "foo-master/meshes/m.obj", {"foo-master": "foo"}, ""),
+        ("main/urdf/x/r.urdf", "package://foo/meshes/m.obj", "main/meshes/m.obj", {"main": "foo"}, ""),
         ("repo/robots/a/urdf/r.urdf", "package://pkg/robots/a/m.obj", "repo/robots/a/m.obj", {"repo": "pkg"}, ""),
         ("foo/robots/v1/r.urdf", "package://foo/meshes/m.obj", "foo/meshes/m.obj", {}, ""),
         ("foo/r.urdf", "package://foo/meshes/m.obj", "foo/meshes/m.obj", {}, ""),
@@ -165,7 +164,7 @@ def test_where_it_is_not_found_the_option_names_the_package(tmp_path: Path) -> N
 def test_a_declared_root_is_where_its_package_is(tmp_path: Path) -> None:
     path = place(tmp_path, "x/r.urdf", "package://foo/m.obj", "x/m.obj", "elsewhere/m.obj")
     assert not load(path, package_roots={"foo": tmp_path / "elsewhere"}).repairs
-    with pytest.raises(AssetError, match="put 'm.obj' into"):  # not another of this name
+    with pytest.raises(AssetError, match=r"put 'm\.obj' into"):  # not another of this name
         load(path, package_roots={"foo": tmp_path})
     with pytest.raises(AssetError, match="no such folder"):
         load(path, package_roots={"foo": tmp_path / "nowhere"})
@@ -184,7 +183,7 @@ def test_roots_add_up_however_they_are_given() -> None:
 
 
 def test_an_address_on_the_web_is_told(tmp_path: Path) -> None:
-    with pytest.raises(AssetError, match="is not a file.*download it"):
+    with pytest.raises(AssetError, match=r"is not a file.*download it"):
         load(place(tmp_path, "x/r.urdf", "https://example.org/m.obj"))
 
 

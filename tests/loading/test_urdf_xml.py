@@ -1,4 +1,4 @@
-"""XML as people write it: what readers built on TinyXML take is read, and what is another format is called by its name."""
+"""XML as people write it: what readers built on TinyXML take is read, and other formats are called by their names."""
 
 from __future__ import annotations
 
