@@ -194,3 +194,37 @@ def test_a_broken_manifest_names_nothing_but_marks_its_folder(manifest: str, tmp
     path = place(tmp_path, "p/a/b/r.urdf", "../../m.obj", "p/m.obj")
     (tmp_path / "p" / "package.xml").write_text(manifest)
     assert len(load(path).parts) == 1
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
+    from artsim.cli import main
+
+    monkeypatch.setattr("sys.argv", ["artsim", *words])
+    main()
+
+
+def test_what_the_command_line_says_can_be_pasted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = place(tmp_path, "z/x/r.urdf", "../my parts/m.obj", "z/my parts/m.obj")
+    with pytest.raises(SystemExit):
+        run(monkeypatch, "inspect", str(path))
+    fix = shlex.split(capsys.readouterr().err)
+    run(monkeypatch, "inspect", str(path), *fix[fix.index("--package-root") :])
+    assert "1 parts, 0 free joints, 12 triangles" in capsys.readouterr().out
+
+
+def test_every_command_that_loads_objects_takes_package_roots() -> None:
+    import tyro
+
+    from artperl.cli import Evaluate, Train
+    from artsim.cli import Generate, Inspect, Record, Scene, View
+
+    roots = ["--package-root", "a=/x", "b=/y"]
+    expected = {"a": Path("/x"), "b": Path("/y")}
+    for verb, words in (
+        (Generate, ["--out", "o"]), (Inspect, ["o"]), (View, ["o"]), (Train, []), (Evaluate, []),
+    ):  # fmt: skip
+        assert tyro.cli(verb, args=[*words, *roots]).package_root == expected
+    assert tyro.cli(Record, args=["--out", "o", *roots]).episode.package_root == expected
+    assert tyro.cli(Scene, args=["--out", "o", *roots]).scene.package_root == expected
