@@ -93,7 +93,7 @@ def _root_link(robot: Robot, children: Mapping[str, list[RobotJoint]], file: Pat
     roots = [link for link in robot.links if link.name not in carried_by]
     if not roots:
         raise AssetError("every link has a parent: the joints form a cycle", file, "remove the joint that closes it")
-    used = [r for r in roots if r.shapes or r.unusable or children.get(r.name)] or roots[:1]
+    used = [r for r in roots if r.shapes or r.unusable or r.empty or children.get(r.name)] or roots[:1]
     if len(used) > 1:
         names = ", ".join(r.name for r in used[:5])
         raise AssetError(f"{len(used)} links have no parent: {names}", file, "join them with a fixed joint")

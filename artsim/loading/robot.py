@@ -87,11 +87,14 @@ class Link:
         What it shows.
     unusable : tuple of str
         Why other shapes of it cannot be shown.
+    empty : tuple of str
+        What shapes of it have no extent, so that there is nothing to show.
     """
 
     name: str
     shapes: tuple[Shape, ...] = ()
     unusable: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

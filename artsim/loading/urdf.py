@@ -33,6 +33,9 @@ from artsim.loading.urdf_xml import parse_robot
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
 
+_THIN = 1e-6
+"""Share of its length by which a surface is a line: squares of less are lost in double precision."""
+
 
 def load(
     path: str | Path,
@@ -191,26 +194,25 @@ def _surfaces(
                 fix = fix or problem.__cause__.fix
             continue
         surfaces.append((vertices, faces, T_base_link @ shape.origin))
-    if problems and not surfaces and (link.shapes or not all("no extent" in problem for problem in problems)):
+    if problems and not surfaces:
         count = len(problems)
         raise AssetError(
             f"none of the {count} meshes of link {link.name!r} can be used: {problems[0]}",
             file,
             fix or "restore the mesh files; an object with an invisible part would give wrong data",
         )
-    return surfaces, problems
+    return surfaces, [*problems, *link.empty]
 
 
 def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
     """Whether a surface is a point or a line; one that is flat is not."""
     used = vertices[np.unique(faces)]
-    if len(used) == 0:
+    if len(used) < 3:
         return True
-    extent = np.linalg.svd(used - used.mean(axis=0), compute_uv=False) if len(used) < 4 else None
-    if extent is None:
-        from_middle = used - used.mean(axis=0)
-        extent = np.sqrt(np.linalg.eigvalsh(from_middle.T @ from_middle)[::-1].clip(0.0))
-    return bool(len(extent) < 2 or extent[1] <= 1e-7 * extent[0])
+    from_middle = used - used.mean(axis=0)
+    # Second moments, smallest first: their roots are the extents along the principal axes.
+    extents = np.sqrt(np.linalg.eigvalsh(from_middle.T @ from_middle).clip(0.0))
+    return bool(extents[1] <= _THIN * extents[2])
 
 
 def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:

@@ -107,20 +107,27 @@ def _read_link(link: etree._Element, shown: str, file: Path, repairs: list[Repai
     element = Element(f"link {link.get('name')!r}", file, repairs)
     if link.find("origin") is not None or link.find("pose") is not None:
         element.say("an <origin> of the link itself is not URDF, and is not read")
-    shapes, unusable = [], []
+    shapes, unusable, empty = [], [], []
     for found in link.findall(shown):
         try:
             shape = _read_shape(found, element)
+        except EmptyShapeError as problem:
+            empty.append(str(problem))
+            continue
         except UnusableShapeError as problem:
             unusable.append(str(problem))
             continue
         if shape is not None:
             shapes.append(shape)
-    return Link(str(link.get("name")), tuple(shapes), tuple(unusable))
+    return Link(str(link.get("name")), tuple(shapes), tuple(unusable), tuple(empty))
 
 
 class UnusableShapeError(Exception):
     """One shape cannot be used, and why; the loader leaves it out and says so."""
+
+
+class EmptyShapeError(UnusableShapeError):
+    """A shape has no extent: files mark frames with boxes of size 0, which nobody misses where more is seen."""
 
 
 def _read_shape(visual: etree._Element, element: Element) -> Shape | None:
@@ -147,12 +154,12 @@ def _read_geometry(shape: etree._Element, kind: str, element: Element) -> Geomet
     if kind == "box":
         size = element.finite(shape, "size", 3, own=True)
         if (size < 0).any() or (size > 0).sum() < 2:  # a flat one is a surface
-            raise UnusableShapeError(f"<box> of size {' '.join(f'{s:g}' for s in size)} has no extent")
+            raise EmptyShapeError(f"<box> of size {' '.join(f'{s:g}' for s in size)} has no extent")
         return Geometry(box=Box(size))
     radius = float(element.finite(shape, "radius", 1)[0])
     length = 0.0 if kind == "sphere" else float(element.finite(shape, "length", 1)[0])
     if not (radius > 0 and length >= 0):
-        raise UnusableShapeError(f"<{kind}> of radius {radius:g} and length {length:g} has no extent")
+        raise EmptyShapeError(f"<{kind}> of radius {radius:g} and length {length:g} has no extent")
     if kind == "sphere":
         return Geometry(sphere=Sphere(radius))
     if kind == "capsule" and length > 0:
