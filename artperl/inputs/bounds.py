@@ -54,17 +54,17 @@ def open_file(path: Path, what: str, limit: int = MAX_BYTES) -> BinaryIO:
     """A file to read from; errors as :func:`read_file`."""
     try:
         if not path.exists():
-            raise ConfigError(f"there is no such {what}", path, "check the path")
+            raise ConfigError(f"no {what} here: there is no such file", path, "check the path")
         if not path.is_file():  # a folder, or a device that never ends
-            raise ConfigError(f"a {what} must be a file", path, "name a file")
+            raise ConfigError(f"no {what} here: it must be a file", path, "name a file")
         if (size := path.stat().st_size) > limit:
             raise ConfigError(
-                f"a {what} of {size / 1e6:.0f} MB is over the limit of {limit / 1e6:.0f} MB", path,
+                f"{what} of {size / 1e6:.0f} MB is over the limit of {limit / 1e6:.0f} MB", path,
                 "thin it out, or crop it to the object",
             )  # fmt: skip
         return path.open("rb")
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise ConfigError(f"this {what} cannot be read ({error})", path, "check the path and its rights") from error
+        raise ConfigError(f"no {what} can be read ({error})", path, "check the path and its rights") from error
 
 
 def guarded(read: Callable[[], Any], path: Path, what: str, fix: str) -> Any:

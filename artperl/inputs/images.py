@@ -59,12 +59,16 @@ def read_picture(path: Path, what: str) -> Picture:
 
 
 def _read(path: Path, what: str) -> Picture:
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     data = read_file(path, what, MAX_PICTURE_BYTES)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a bomb is refused below, by a limit of our own; odd metadata is not used
-        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+        try:
+            image = Image.open(io.BytesIO(data), formats=FORMATS)
+        except UnidentifiedImageError:
+            raise ValueError(f"it is none of {', '.join(FORMATS)}") from None
+        with image:
             if image.width * image.height > MAX_PIXELS:
                 raise ConfigError(
                     f"a {what} of {image.width} x {image.height} pixels is over the limit of {MAX_PIXELS:,}", path,

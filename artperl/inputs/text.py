@@ -85,7 +85,8 @@ def _head(data: bytes) -> tuple[int, str, str]:
         words = re.split(r"[;,\s]+", bare.strip(";,"))
         if not bare or (len(words) == 1 and not comment):  # a count of points, as .pts and some .xyz have it
             continue
-        if not comment and all(_is_number(word.strip("\"'")) for word in words):
+        named = {"x", "y", "z"} <= {_plain(word) for word in re.split(r"[;,\s]+", names)}
+        if not comment and (named or all(_is_number(word.strip("\"'")) for word in words)):  # labels may be words
             return number, names, bare
         text = bare.lstrip("#/%; ") if comment and not bare.startswith("//X") else bare
         if {"x", "y", "z"} <= {_plain(word) for word in re.split(r"[;,\s]+", text)} or not comment:
