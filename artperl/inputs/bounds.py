@@ -17,12 +17,18 @@ from numpy.typing import NDArray
 
 from artsim.errors import ArtsimError, ConfigError
 
-MAX_BYTES = 160_000_000
+MAX_BYTES = 80_000_000
 """Of a file: it is held beside its values as doubles."""
-MAX_VALUES = 24_000_000
-"""Of an array: as doubles 192 MB. It is 8 million points, or a depth image of 24 megapixels."""
+MAX_VALUES = 9_000_000
+"""Of an array: 3 million points, or a depth image of 9 megapixels, which are 72 MB as doubles."""
 MAX_TEXT_BYTES = 48_000_000
 """Of a file of text, which takes much longer to read than the same numbers in binary: a million points with colours."""
+MAX_LINES = 3_000_000
+"""Of numbers in text, of which a core reads two million a second."""
+MAX_LINE_BYTES = 20_000
+"""Of a line of numbers, whose words are all kept in memory for a moment."""
+MAX_VERTICES = 900_000
+"""Of a mesh in text, whose lines are looked for one by one."""
 MAX_DIRECTORY_BYTES = 1_000_000
 """Of the list of members of an archive; zipfile keeps a record of each of them."""
 _ZIP_END, _ZIP_END_BYTES = b"PK\x05\x06", 22

@@ -66,7 +66,7 @@ def _files() -> dict[str, bytes]:
         "ascii.ply": (head.format("ascii 1.0") + "1 2\n1 2\n" + swapped).replace("\r\n", "\n").encode(),
         "big.ply": head.format("binary_big_endian 1.0").encode() + bytes(18) + big.tobytes(),
         "mesh.ply": mesh.export(file_type="ply"),
-        "mesh.obj": ("# by hand\r\no a\r\n" + "".join(f" v\t{x} {y} {z}\r\n" for x, y, z in POINTS) + "f 1 2 3").encode(),
+        "mesh.obj": ("# a\r\no a\r\n" + "".join(f" v\t{x} {y} {z}\r\n" for x, y, z in POINTS) + "f 1 2 3").encode(),
         "mesh.off": mesh.export(file_type="off").encode(),
         "ascii.pcd": _pcd("ascii", _rows(" ", " 255").encode()),
         "binary.pcd": _pcd("binary", records.tobytes()),
