@@ -36,7 +36,7 @@ def as_cloud(points: ArrayLike) -> Array:
         When they are no numbers, or of another shape.
     """
     try:
-        cloud = np.asarray(points, dtype=np.float64)
+        cloud = np.asarray(points).astype(np.float64, casting="same_kind", copy=False)  # not of complex, or of text
     except (TypeError, ValueError) as error:
         raise ArtsimError(f"this is no cloud ({error})", "points", "pass (N, 3) points in metres") from error
     if cloud.ndim != 2 or cloud.shape[1] != 3:
@@ -60,7 +60,8 @@ def clean(points: Array) -> NDArray[np.int64]:
     ArtsimError
         When the array is no cloud, or hardly a point is left.
     """
-    good = np.flatnonzero(measured(as_cloud(points)))
+    points = as_cloud(points)
+    good = np.flatnonzero(measured(points))
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = cKDTree(points[known])

@@ -17,12 +17,18 @@ from numpy.typing import NDArray
 
 from artsim.errors import ArtsimError, ConfigError
 
-MAX_BYTES = 160_000_000
+MAX_BYTES = 80_000_000
 """Of a file: it is held beside its values as doubles."""
-MAX_VALUES = 24_000_000
-"""Of an array: as doubles 192 MB. It is 8 million points, or a depth image of 24 megapixels."""
+MAX_VALUES = 9_000_000
+"""Of an array: 3 million points, or a depth image of 9 megapixels, which are 72 MB as doubles."""
 MAX_TEXT_BYTES = 48_000_000
 """Of a file of text, which takes much longer to read than the same numbers in binary: a million points with colours."""
+MAX_LINES = 3_000_000
+"""Of numbers in text, of which a core reads two million a second."""
+MAX_LINE_BYTES = 20_000
+"""Of a line of numbers, whose words are all kept in memory for a moment."""
+MAX_VERTICES = 900_000
+"""Of a mesh in text, whose lines are looked for one by one."""
 MAX_DIRECTORY_BYTES = 1_000_000
 """Of the list of members of an archive; zipfile keeps a record of each of them."""
 _ZIP_END, _ZIP_END_BYTES = b"PK\x05\x06", 22
@@ -54,17 +60,17 @@ def open_file(path: Path, what: str, limit: int = MAX_BYTES) -> BinaryIO:
     """A file to read from; errors as :func:`read_file`."""
     try:
         if not path.exists():
-            raise ConfigError(f"there is no such {what}", path, "check the path")
+            raise ConfigError(f"no {what} here: there is no such file", path, "check the path")
         if not path.is_file():  # a folder, or a device that never ends
-            raise ConfigError(f"a {what} must be a file", path, "name a file")
+            raise ConfigError(f"no {what} here: it must be a file", path, "name a file")
         if (size := path.stat().st_size) > limit:
             raise ConfigError(
-                f"a {what} of {size / 1e6:.0f} MB is over the limit of {limit / 1e6:.0f} MB", path,
+                f"{what} of {size / 1e6:.0f} MB is over the limit of {limit / 1e6:.0f} MB", path,
                 "thin it out, or crop it to the object",
             )  # fmt: skip
         return path.open("rb")
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise ConfigError(f"this {what} cannot be read ({error})", path, "check the path and its rights") from error
+        raise ConfigError(f"no {what} can be read ({error})", path, "check the path and its rights") from error
 
 
 def guarded(read: Callable[[], Any], path: Path, what: str, fix: str) -> Any:

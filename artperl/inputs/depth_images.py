@@ -99,9 +99,8 @@ def _of_array(array: NDArray[Any], path: Path) -> DepthImage:
     else:
         saturated = (values == most) | (values == 65535)
         if saturated.any():
-            notes.append(
-                f"{int(saturated.sum())} pixels of {int(values[saturated].max())}, the most there is, hold no measurement"
-            )
+            count, value = int(saturated.sum()), int(values[saturated].max())
+            notes.append(f"{count} pixels of {value}, the largest number, are no measurement")
             depth[saturated] = 0.0
     return DepthImage(depth, True, tuple(notes), tuple(warnings))
 

@@ -12,12 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import guarded, read_file
+from artperl.inputs.bounds import MAX_VALUES, guarded, read_file
 from artsim.errors import ConfigError
 
-MAX_PIXELS = 24_000_000
-"""A depth image of 24 megapixels is 192 MB as doubles."""
-MAX_PICTURE_BYTES = 100_000_000
 FORMATS = ("PNG", "TIFF", "PPM", "JPEG", "BMP", "WEBP", "GIF")
 """Everything else that Pillow opens is neither a depth image nor a mask."""
 
@@ -59,15 +56,19 @@ def read_picture(path: Path, what: str) -> Picture:
 
 
 def _read(path: Path, what: str) -> Picture:
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
-    data = read_file(path, what, MAX_PICTURE_BYTES)
+    data = read_file(path, what)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a bomb is refused below, by a limit of our own; odd metadata is not used
-        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
-            if image.width * image.height > MAX_PIXELS:
+        try:
+            image = Image.open(io.BytesIO(data), formats=FORMATS)
+        except UnidentifiedImageError:
+            raise ValueError(f"it is none of {', '.join(FORMATS)}") from None
+        with image:
+            if image.width * image.height > MAX_VALUES:
                 raise ConfigError(
-                    f"a {what} of {image.width} x {image.height} pixels is over the limit of {MAX_PIXELS:,}", path,
+                    f"a {what} of {image.width} x {image.height} pixels is over the limit of {MAX_VALUES:,}", path,
                     "crop it to the object",
                 )  # fmt: skip
             name = image.format or ""

@@ -29,8 +29,8 @@ INTRINSICS_FILES = (".json", ".yaml", ".yml", ".txt", ".npy", ".npz")
 FIX = 'write {"fx": ..., "fy": ..., "cx": ..., "cy": ...} in pixels, or "K" of nine numbers'
 _MAX_BYTES = 8_000_000
 """Of a JSON file: scene_camera.json of a thousand images has 0.3 MB, transforms.json 2 MB."""
-_MAX_YAML_BYTES = 100_000
-"""PyYAML reads less than a megabyte a second, and a ROS CameraInfo has a thousand bytes."""
+_MAX_YAML_BYTES = 50_000
+"""PyYAML takes a second for so many brackets, and a ROS CameraInfo has a thousand bytes."""
 _NORMALISED = 10.0
 """Focal lengths below, in pixels, are of a matrix that is divided by the image's size."""
 _TINY = 20
@@ -173,13 +173,13 @@ def _upright(K: Array, path: Path) -> Array:
 def _content(path: Path) -> Any:
     ending = path.suffix.lower()
     if ending in (".yaml", ".yml"):
-        return _yaml(read_file(path, "camera", _MAX_YAML_BYTES), path)
+        return _yaml(read_file(path, "intrinsics", _MAX_YAML_BYTES), path)
     if ending == ".npy":
         return read_npy(path, "intrinsics", FIX)
     if ending == ".npz":
         choice = read_npz(path, "intrinsics", FIX, lambda s, t: s in ((3, 3), (4, 4), (3, 4)) and t.kind in "fiu")
         return choice.one_of(("k", "cam_k", "intrinsics", "intrinsic", "intrinsic_matrix", "camera_matrix"))[1]
-    data = read_file(path, "camera", _MAX_BYTES)
+    data = read_file(path, "intrinsics", _MAX_BYTES)
     if ending == ".txt" and not data.lstrip().startswith(b"{"):
         return _numbers(data, path)
     return parse_json(data.removeprefix(b"\xef\xbb\xbf"))

@@ -68,7 +68,9 @@ def _read(path: Path) -> tuple[Array, tuple[str, ...]]:
         if start + row.itemsize * vertex.count > len(data):
             raise _cut_off(vertex.count, path)
         records = np.frombuffer(data, row, vertex.count, start)
-        points = np.stack([records[f"{column}"].astype(np.float64) for column in columns], axis=1)
+        points = np.empty((vertex.count, 3))
+        for n, column in enumerate(columns):
+            points[:, n] = records[f"{column}"]
     if len(points) != vertex.count:
         raise _cut_off(vertex.count, path)
     return points, _unused(names, elements)

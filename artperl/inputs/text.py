@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import MAX_TEXT_BYTES, MAX_VALUES, guarded, read_file
+from artperl.inputs.bounds import MAX_LINE_BYTES, MAX_LINES, MAX_TEXT_BYTES, guarded, read_file
 from artsim.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -41,16 +42,24 @@ def parse_columns(
     ValueError
         When a line does not have them.
     """
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if comma:
         data = data.replace(b",", b".")
-    text = io.StringIO(data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n"))
-    most = MAX_VALUES // len(columns)
-    if not text.getvalue().strip():
+    if len(data) > MAX_TEXT_BYTES or (rows or data.count(b"\n")) > MAX_LINES:
+        raise ValueError(f"more than {MAX_LINES:,} lines, or {MAX_TEXT_BYTES // 1_000_000} MB, of text are not read")
+    ends = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n"))
+    if np.diff(ends, prepend=-1, append=len(data)).max() > MAX_LINE_BYTES:
+        raise ValueError(f"a line has more than {MAX_LINE_BYTES:,} characters")
+    text = io.StringIO(data.decode("latin-1"))
+    if not data.strip():
         return np.zeros((0, len(columns)))
-    return np.loadtxt(
-        text, delimiter=separator, usecols=columns, ndmin=2, skiprows=skip, max_rows=most if rows is None else rows,
-        comments="#", quotechar='"',
-    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of empty lines, which are no rows
+        return np.loadtxt(
+            text, delimiter=separator, usecols=columns, ndmin=2, skiprows=skip, max_rows=rows, comments="#",
+            quotechar='"',
+        )  # fmt: skip
 
 
 def _read(path: Path) -> tuple[Array, tuple[str, ...]]:
@@ -85,7 +94,8 @@ def _head(data: bytes) -> tuple[int, str, str]:
         words = re.split(r"[;,\s]+", bare.strip(";,"))
         if not bare or (len(words) == 1 and not comment):  # a count of points, as .pts and some .xyz have it
             continue
-        if not comment and all(_is_number(word.strip("\"'")) for word in words):
+        named = {"x", "y", "z"} <= {_plain(word) for word in re.split(r"[;,\s]+", names)}
+        if not comment and (named or all(_is_number(word.strip("\"'")) for word in words)):  # labels may be words
             return number, names, bare
         text = bare.lstrip("#/%; ") if comment and not bare.startswith("//X") else bare
         if {"x", "y", "z"} <= {_plain(word) for word in re.split(r"[;,\s]+", text)} or not comment:

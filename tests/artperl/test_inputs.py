@@ -44,23 +44,11 @@ def test_files_of_a_depth_image(sample: Sample, tmp_path: Path) -> None:
     Image.fromarray((sample.depth * 1000).round().astype(np.uint16)).save(tmp_path / "depth.png")
     Image.fromarray((mask * 255).astype(np.uint8)).convert("RGB").save(tmp_path / "mask.png")
     np.save(tmp_path / "depth.npy", sample.depth)
-    (tmp_path / "camera.json").write_text(json.dumps({"cam_K": sample.K.ravel().tolist()}))
+    (tmp_path / "camera.json").write_text(json.dumps({"K": sample.K.ravel().tolist()}))
     rounded = read_points(tmp_path / "depth.png", tmp_path / "mask.png", tmp_path / "camera.json")
     exact = read_points(tmp_path / "depth.npy", tmp_path / "mask.png", tmp_path / "camera.json")
     assert len(rounded) == len(exact) == mask.sum()
     assert np.abs(rounded - exact).max() < 0.001
-
-
-def test_intrinsics_in_every_spelling(tmp_path: Path) -> None:
-    K = np.array([[600.0, 0.0, 320.0], [0.0, 610.0, 240.0], [0.0, 0.0, 1.0]])
-    for content in (
-        {"fx": 600, "fy": 610, "cx": 320, "cy": 240},
-        {"K": K.tolist()},
-        {"cam_K": K.ravel().tolist(), "depth_scale": 1.0},
-        {"intrinsic_matrix": K.T.ravel().tolist(), "width": 640, "height": 480},
-    ):
-        (tmp_path / "camera.json").write_text(json.dumps(content))
-        np.testing.assert_array_equal(read_intrinsics(tmp_path / "camera.json"), K)
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"K": [1, 2]}', '{"fx": 1}', '{"K": "none"}'])
@@ -86,7 +74,7 @@ def test_images_that_make_no_cloud_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="intrinsics"):
         read_points(tmp_path / "depth.png")
     (tmp_path / "camera.json").write_text('{"fx": 1, "fy": 1, "cx": 0, "cy": 0}')
-    with pytest.raises(ConfigError, match="no image"):
+    with pytest.raises(ConfigError, match="no depth image"):
         read_points(tmp_path / "depth.png", intrinsics=tmp_path / "camera.json")
     with pytest.raises(ConfigError, match="no intrinsics"):
         read_intrinsics(tmp_path / "lost.json")
@@ -101,6 +89,12 @@ def test_images_that_make_no_cloud_are_refused(tmp_path: Path) -> None:
         ("cloud.npy", b"\x93NUMPY\x01\x00"),
         ("cloud.npz", b"PK\x03\x04"),
         ("cloud.stl", b"solid"),
+        ("cloud.obj", b"v 1 2"),
+        ("cloud.off", b"OFF\n9 0 0\n1 2 3\n"),
+        ("cloud.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 9\nDATA binary\n12"),
+        ("cloud.csv", b"a,b,c\n1,2,3"),
+        ("cloud.xyz", b"1 2\n"),
+        ("cloud.txt", b"1 2 3\n1 2 no\n"),
     ],
 )
 def test_files_that_hold_no_cloud_are_named(name: str, content: bytes, tmp_path: Path) -> None:

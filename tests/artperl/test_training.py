@@ -163,11 +163,11 @@ def test_the_program_evaluates_and_estimates(
     cli.Evaluate(whole / "best", objects=1, views=1, json=tmp_path / "figures.json").run()
     assert "laptop 0" in capsys.readouterr().out
     assert json.loads((tmp_path / "figures.json").read_text())["laptop"]["instances"] == 1
-    cloud = np.random.default_rng(0).normal(size=(100, 3)) * 0.1 + [0.0, 0.0, 1.0]
+    cloud = np.random.default_rng(0).normal(size=(200, 3)) * 0.1 + [0.0, 0.0, 1.0]
     np.save(tmp_path / "cloud.npy", cloud)
     np.savez(tmp_path / "cloud.npz", points=cloud)
     (tmp_path / "cloud.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        "ply\nformat ascii 1.0\nelement vertex 200\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
         + "\n".join(" ".join(map(str, p)) for p in cloud.tolist())
     )
     for name in ("cloud.npy", "cloud.npz", "cloud.ply"):
@@ -179,7 +179,7 @@ def test_the_program_evaluates_and_estimates(
         assert len(record["rotation"]) == 2
     cli.Estimate((tmp_path / "cloud.npy",), str(whole / "best"), tmp_path / "out.npz").run()
     with np.load(tmp_path / "out.npz") as arrays:
-        assert arrays["part"].shape == (100,)
+        assert arrays["part"].shape == (200,)
     whole_line, head, *parts = capsys.readouterr().out.splitlines()
     assert record["reference"] in whole_line
     assert head.split()[:3] == ["part", "joint", "state"]
