@@ -56,9 +56,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         networks["boxes"] = estimator.boxes
     tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
     save_tensors(tensors, folder / _TENSORS)
-    part = folder / f".{_BASE}"
-    estimator.base.save(part)
-    part.replace(folder / _BASE)
+    estimator.base.save(folder / _BASE)
     settings = {
         "format": _FORMAT,
         "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
