@@ -5,18 +5,17 @@ The network sees what it will see in use: references as they were found and fitt
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 
 from artperl.batch import Batch, concatenate
-from artperl.checkpoint import save_tensors
 from artperl.data import carry_on
 from artperl.estimate import brought_to_rest
 from artperl.estimator import Estimator
@@ -24,6 +23,8 @@ from artperl.evaluation import true_poses
 from artperl.evidence import Evidence
 from artperl.networks.boxes import Boxes, box_losses
 from artperl.steps import Stop, one_cycle, set_rate
+from artperl.tensor_files import read_tensors, write_tensors
+from artsim.errors import DatasetError
 from artsim.progress import track
 from artsim.sample import Sample
 
@@ -140,15 +141,25 @@ def _save(records: list[Records], views: int, file: Path) -> None:
         every: Records = concatenate(records)
         tensors |= {name: values for name, values in vars(every).items() if name != "evidence"}
         tensors |= {f"evidence.{name}": values for name, values in vars(every.evidence).items()}
-    save_tensors(tensors, file)
+    write_tensors(tensors, file)
 
 
 def _load(file: Path) -> tuple[int, list[Records]]:
-    """How many views were looked at, and what they gave."""
-    tensors = load_file(file)
-    views = int(tensors.pop("views"))
-    if not tensors:
-        return views, []
-    names = [name for name in tensors if name.startswith("evidence.")]
-    evidence = {name.removeprefix("evidence."): tensors.pop(name) for name in names}
-    return views, [Records(Evidence(**evidence), **tensors)]
+    """How many views were looked at, and what they gave.
+
+    Raises
+    ------
+    DatasetError
+        When the file is damaged.
+    """
+    fix = f"to look at these views again: rm {shlex.quote(str(file))}"
+    tensors, _ = read_tensors(file, "what boxes learn from", fix)
+    try:
+        views = int(tensors.pop("views"))
+        if not tensors:
+            return views, []
+        names = [name for name in tensors if name.startswith("evidence.")]
+        evidence = {name.removeprefix("evidence."): tensors.pop(name) for name in names}
+        return views, [Records(Evidence(**evidence), **tensors)]
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise DatasetError(f"what boxes learn from is damaged ({error})", file, fix) from error

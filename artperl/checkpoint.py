@@ -13,7 +13,6 @@ from typing import Any
 
 import torch
 from safetensors.torch import load as load_tensors
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from artperl.embedding import EMBEDDED
@@ -24,6 +23,7 @@ from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perception
 from artperl.retrieval import ShapeBase
 from artperl.search import EstimatorOptions
+from artperl.tensor_files import write_tensors
 from artsim.errors import ConfigError, DatasetError
 from artsim.files import read_bounded, read_json, write_atomic
 from artsim.names import printable
@@ -56,9 +56,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         networks["boxes"] = estimator.boxes
     tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
     save_tensors(tensors, folder / _TENSORS)
-    part = folder / f".{_BASE}"
-    estimator.base.save(part)
-    part.replace(folder / _BASE)
+    estimator.base.save(folder / _BASE)
     settings = {
         "format": _FORMAT,
         "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
@@ -252,9 +250,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 
 def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
     """Write tensors so that a stop halfway leaves the old file."""
-    part = path.with_name(f".{path.name}")
-    save_file({name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}, part)
-    part.replace(path)
+    write_tensors(tensors, path)
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -19,7 +19,7 @@ from artperl.pose import KINDS, Trees
 from artperl.refine import AxisPrior
 from artperl.shapes import Shapes
 from artsim.errors import ConfigError, DatasetError, KinematicsError
-from artsim.files import parse_json, read_npz
+from artsim.files import atomic_file, parse_json, read_npz
 from artsim.kinematics import Joint, KinematicTree
 from artsim.objects import MAX_PARTS, ArticulatedObject
 
@@ -272,7 +272,7 @@ class ShapeBase:
         if self.embeddings is not None:
             arrays["embeddings"] = self.embeddings.cpu().numpy()
         text = np.frombuffer(json.dumps(description).encode(), dtype=np.uint8)
-        with Path(path).open("wb") as file:
+        with atomic_file(Path(path)) as file:
             np.savez_compressed(file, description=text, **arrays)
 
     @staticmethod

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -24,14 +23,13 @@ from artsim.extras import needs
 
 with needs("training"):
     import torch
-    from safetensors.torch import load_file
     from torch import Tensor, nn
     from torch.utils.tensorboard import SummaryWriter
 
 from artperl.benchmarks.artimage import real_train_objects
 from artperl.box_training import learn, record
 from artperl.categories import arranged, objects_of
-from artperl.checkpoint import load_estimator, read_settings, save_estimator, save_tensors
+from artperl.checkpoint import load_estimator, read_settings, save_estimator
 from artperl.data import SENSOR, Recorded, Source, batches, samples_from
 from artperl.embedding import by_boxes
 from artperl.estimator import Estimator
@@ -58,13 +56,14 @@ from artperl.ppo import collect, update
 from artperl.problems import Problems
 from artperl.report import write_report
 from artperl.retrieval import ShapeBase
+from artperl.run_folder import RunFolder, differences
 from artperl.search import EstimatorOptions
 from artperl.settings import TrainOptions
 from artperl.steps import Stop, autocast, one_cycle, set_rate
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.families import FAMILIES
-from artsim.files import write_atomic
+from artsim.files import write_atomic, write_error
 from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.progress import say, track
@@ -72,7 +71,6 @@ from artsim.sample import Sample
 
 BASE_SEEDS = 2_000_000
 """Seed of the first object of a base: neither in streams nor in test sets."""
-_STATE = "state"
 _NOISY_EVERY = 4
 """Views of stage 3 of which one is seen by a sensor: boxes go by outermost points, which suffer most."""
 _VIEWS = 8
@@ -100,11 +98,12 @@ class Training:
     Raises
     ------
     DatasetError
-        When the folder holds a run with other options.
+        When the folder holds a run with other options, or a damaged one, or another process is training there.
     """
 
     def __init__(self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True):
         self.options, self.out, self.workers, self.progress = options, out, workers, progress
+        self.folder, self._known = RunFolder(out), ""
         if options.dataset is not None and (options.real or options.files):
             raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
         self.procedural = objects_of(
@@ -131,8 +130,9 @@ class Training:
         self.best = float("inf")
         self.history: list[dict[str, Any]] = []
         self._validation: list[Sample] = []
-        if (out / f"{_STATE}.json").exists():
-            self._load()
+        if self.folder.begun:
+            with self.folder.held():
+                self._load()
 
     def run(self) -> dict[str, Any]:
         """Train to the end and return the figures of the best estimator.
@@ -141,15 +141,21 @@ class Training:
         ------
         KeyboardInterrupt
             After Ctrl-C, once the step has come to its end and been written down. A second Ctrl-C does not wait.
+        ConfigError
+            When the folder cannot be written to, or the disk is full: the same call goes on from what was written.
+        DatasetError
+            When another process is training here.
         """
-        self.out.mkdir(parents=True, exist_ok=True)
-        with closing(SummaryWriter(str(self.out / "events"))) as board, Stop() as stop:
-            self._learn_to_perceive(board, stop)
-            self._learn_to_fit(board, stop)
-            if not (self.out / "best").is_dir():  # nothing was learnt: what is known is calibrated
-                self._validate(board, 0)
-            self._learn_boxes(board, stop)
-        return self._finish()
+        with self.folder.held():
+            if self.folder.begun:  # another process may have trained here meanwhile
+                self._load()
+            with self.folder.curves() as board, Stop() as stop:
+                self._learn_to_perceive(board, stop)
+                self._learn_to_fit(board, stop)
+                if not self.history:  # nothing was learnt: what is known is calibrated
+                    self._validate(board, 0)
+                self._learn_boxes(board, stop)
+            return self._finish()
 
     def estimator(self) -> Estimator:
         """The estimator as it stands."""
@@ -274,7 +280,7 @@ class Training:
         options = self.options
         if self.done["boxes"] >= options.box_views:
             return
-        best = learner = load_estimator(self.out / "best", self.device)
+        best = learner = self._best(self.device)
         if self._mixed:  # a given object is its own best reference, as none will be in use
             learner = replace(best, base=self._base_of(self.procedural))
         file = self.out / "boxes.safetensors"
@@ -290,6 +296,19 @@ class Training:
         else:
             self._choose_boxes(best, learner, learnt.half().float(), board)  # as precise as files are
         self._save()
+
+    def _best(self, device: torch.device | str = "cpu") -> Estimator:
+        """The best estimator so far.
+
+        Raises
+        ------
+        DatasetError
+            When its files are damaged or missing.
+        """
+        try:
+            return load_estimator(self.out / "best", device)
+        except DatasetError as error:
+            raise DatasetError(f"the best estimator is lost ({error.what})", error.where, self.folder.fix) from error
 
     def _box_samples(self) -> Callable[[int], Sample]:
         """Fresh views by number."""
@@ -374,7 +393,7 @@ class Training:
 
     def _finish(self) -> dict[str, Any]:
         """Test the best estimator on objects that had no say in which one that is."""
-        best = load_estimator(self.out / "best")
+        best = self._best()
         samples = self._unseen(self.options.test_views, TEST_SEEDS, self._as_tested)
         scored = evaluate(best, samples, self.progress)
         figures = summary(scored)
@@ -393,24 +412,37 @@ class Training:
         return {"options": _plain(self.options), "done": dict(self.done), **_rounded(figures)}
 
     def _save(self) -> None:
-        """Everything that going on needs. The tensors come first: the JSON names the steps that they belong to."""
+        """Everything that going on needs."""
         tensors: dict[str, Tensor] = {"done": torch.tensor(list(self.done.values()))}
         for name, network in (("perception", self.perception), ("agent", self.agent)):
             tensors |= {f"{name}.{key}": value for key, value in network.state_dict().items()}
             for number, moments in self.optimizers[name].state_dict()["state"].items():
                 tensors |= {f"{name}/{number}/{key}": value for key, value in moments.items()}
-        save_tensors(tensors, self.out / f"{_STATE}.safetensors")
         state = {"options": _plain(self.options), "best": self.best, "history": self.history}
-        write_atomic(self.out / f"{_STATE}.json", (json.dumps(state, indent=1) + "\n").encode())
+        self._known = self.folder.write(state, tensors)
 
     def _load(self) -> None:
-        state = json.loads((self.out / f"{_STATE}.json").read_text())
+        state, tensors, digest = self.folder.read()
+        if digest and digest == self._known:
+            return
         # An option that was not known yet when the run was begun has its default.
         begun_with = _completed(json.loads(json.dumps(_plain(TrainOptions()))), state["options"])
-        if begun_with != json.loads(json.dumps(_plain(self.options))):
-            raise DatasetError("a run with other options is here", self.out, "give the same options, or another folder")
-        self.best, self.history = state["best"], state["history"]
-        tensors = load_file(self.out / f"{_STATE}.safetensors")
+        changed = differences(begun_with, json.loads(json.dumps(_plain(self.options))))
+        if changed:
+            raise DatasetError(
+                f"a run with other options is here: {changed}", self.out, "give the same options, or another --out"
+            )
+        try:
+            self._take_up(state, tensors)
+        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise DatasetError(
+                f"the state of the run does not fit this version ({error})", self.out, self.folder.fix
+            ) from error
+        self._known = digest
+
+    def _take_up(self, state: dict[str, Any], tensors: dict[str, Tensor]) -> None:
+        """Go on from what was written down."""
+        self.best, self.history = float(state["best"]), list(state["history"])
         self.done |= dict(zip(self.done, tensors["done"].tolist(), strict=False))  # older runs had fewer stages
         for name, network in (("perception", self.perception), ("agent", self.agent)):
             own = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
@@ -474,8 +506,11 @@ def _rounded(figures: Any) -> Any:
 
 
 def _write(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:
-    for name, value in figures.items():
-        board.add_scalar(f"{group}/{name}", value, step)
+    try:
+        for name, value in figures.items():
+            board.add_scalar(f"{group}/{name}", value, step)
+    except OSError as error:  # of the thread that writes: the disk may be full
+        raise write_error(error, Path(board.log_dir)) from error
 
 
 def _curves(figures: dict[str, Any]) -> dict[str, float]:

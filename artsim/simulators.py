@@ -1,6 +1,6 @@
 """One URDF file in three simulators: PyBullet, MuJoCo and SAPIEN must load it and agree with artsim's kinematics.
 
-Each simulator is imported when first used (``pip install 'artsim[pybullet,sim,sapien]'``) and told to change nothing
+Each simulator is imported when first used (``pip install -e '.[pybullet,sim,sapien]'``) and told to change nothing
 about the file:
 
 - PyBullet: ``useFixedBase=True`` and ``URDF_USE_INERTIA_FROM_FILE``.

@@ -3,7 +3,7 @@
 Every fourth episode has a new procedural desk; the gripper sees states. On a GPU ManiSkill simulates thousands of
 sub-scenes at once; on a CPU each process simulates one:
 
-    pip install 'artsim[maniskill]' stable-baselines3 matplotlib
+    pip install -e '.[maniskill]' stable-baselines3 matplotlib
     python examples/maniskill/main.py out/maniskill            # a few minutes
     python examples/maniskill/main.py out/maniskill --help     # other objects, goals and robots
 """
