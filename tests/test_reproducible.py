@@ -25,7 +25,8 @@ import artsim
 from artsim import elementary, products
 from artsim.families import CATEGORIES
 from artsim.kinematics import Array
-from artsim.loading.primitives import cylinder, origin_transform, sphere
+from artsim.loading.primitives import capsule, cylinder, sphere
+from artsim.loading.xml_values import rotation_of
 from tests.reproduce import NUM_SAMPLES
 
 ROOT = Path(artsim.__file__).resolve().parent
@@ -189,15 +190,21 @@ def test_shapes_given_in_numbers_are_what_they_say() -> None:
     assert volume(*ball) == pytest.approx(4 / 3 * np.pi * 0.3**3, rel=5e-3)
     polygon = 32 * np.sin(2 * np.pi / 64) * 0.2**2
     assert volume(*cylinder(0.2, 0.7)) == pytest.approx(polygon * 0.7, rel=1e-12)
-    quarter = origin_transform(1, 2, 3, 0.5 * np.pi, 0, 0.5 * np.pi)
-    np.testing.assert_allclose(quarter, [[0, 0, 1, 1], [1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 0, 1]], atol=1e-15)
+    ends = volume(*capsule(0.2, 0.7)) - polygon * 0.7
+    assert ends == pytest.approx(4 / 3 * np.pi * 0.2**3, rel=1e-2)
+    assert np.abs(capsule(0.2, 0.7)[0]).max(axis=0) == pytest.approx([0.2, 0.2, 0.55])
+    quarters = rotation_of(np.array([0.5 * np.pi, 0.0, 0.5 * np.pi]))
+    np.testing.assert_allclose(quarters, [[0, 0, 1], [1, 0, 0], [0, 1, 0]], atol=1e-15)
 
 
 # --- nothing else is used --------------------------------------------------------------------------------------------
 
 PATH_OF_THE_BYTES = [
     *sorted((ROOT / "families").glob("*.py")),
-    *(ROOT / "loading" / name for name in ("bodies.py", "primitives.py", "rest_state.py", "urdf.py")),
+    *(
+        ROOT / "loading" / name
+        for name in ("bodies.py", "joint_xml.py", "meshes.py", "primitives.py", "rest_state.py", "xml_values.py")
+    ),
     *(ROOT / "scenes" / name for name in ("maker.py", "placement.py", "props.py", "scene.py")),
     *(ROOT / "renderers" / name for name in ("raycast.py", "views.py")),
     *(ROOT / f"{name}.py" for name in ("assembly", "camera", "elementary", "kinematics", "noise", "objects")),
