@@ -10,6 +10,7 @@ import numpy as np
 from artsim.errors import AssetError, KinematicsError
 from artsim.kinematics import Joint, KinematicTree, Mimic
 from artsim.objects import ArticulatedObject, Body, Part, content_sha256
+from artsim.products import unit
 from artsim.solids import Solid, Vector
 
 
@@ -136,8 +137,7 @@ class Assembly:
         name = self._parts[k].name
         if spec.parent not in index:
             raise KinematicsError(f"no part is called {spec.parent!r}", f"joint of {name!r}")
-        axis = np.asarray(spec.axis, dtype=np.float64)
-        x, y, z = (axis / np.linalg.norm(axis)).tolist()
+        x, y, z = unit(spec.axis).tolist()
         ox, oy, oz = (np.asarray(spec.origin, dtype=np.float64) - center).tolist()
         mimic = None if spec.mimic is None else Mimic(index[spec.mimic[0]], spec.mimic[1])
         return Joint(

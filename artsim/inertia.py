@@ -10,6 +10,7 @@ import numpy as np
 from artsim.errors import AssetError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
+from artsim.products import apply, dot
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Inertia:
     def about(self, point: Array, axis: Array) -> float:
         """Moment of inertia about an axis (unit, (3,)) through a point, kg m^2."""
         arm = np.cross(axis, self.center - point)
-        return float(axis @ self.tensor @ axis + self.mass * arm @ arm)
+        return float(dot(axis, apply(self.tensor, axis)) + self.mass * dot(arm, arm))
 
     def principal(self) -> tuple[Array, Array]:
         """Moments (3,), ascending, about the principal axes, and these axes (3, 3): right-handed, one a column."""
@@ -84,5 +85,5 @@ def joined_inertia(inertias: Iterable[Inertia]) -> Inertia:
     tensor = np.zeros((3, 3))
     for body in bodies:
         arm = body.center - center
-        tensor += body.tensor + body.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        tensor += body.tensor + body.mass * (dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
     return Inertia(mass, center, tensor)

@@ -21,7 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from artsim.elementary import cos, sin
 from artsim.errors import KinematicsError
+from artsim.products import apply, matmul, norm
 
 Array = NDArray[np.float64]
 
@@ -112,7 +114,7 @@ class KinematicTree:
                 raise KinematicsError("a parent must come before its children", where)
             if not np.all(np.isfinite([*joint.axis, *joint.origin, joint.rest, joint.pitch])):
                 raise KinematicsError("axis, origin, rest state and pitch must be finite", where)
-            if abs(np.linalg.norm(joint.axis) - 1.0) > 1e-6:
+            if abs(norm(joint.axis) - 1.0) > 1e-6:
                 raise KinematicsError(f"axis {joint.axis} is not a unit vector", where)
             if not joint.lower <= joint.upper:
                 raise KinematicsError(f"limits [{joint.lower}, {joint.upper}] are not an interval", where)
@@ -188,7 +190,7 @@ class KinematicTree:
     @cached_property
     def _axis_cross(self) -> tuple[Array, Array]:
         cross = cross_matrix(self.axes)
-        return cross, cross @ cross
+        return cross, matmul(cross, cross)
 
     @cached_property
     def _mimics_in_order(self) -> tuple[tuple[int, Mimic], ...]:
@@ -248,8 +250,8 @@ class KinematicTree:
         step[..., 0] = 0.0
         angle = (step * self._angle_rate)[..., None, None]
         cross, cross_squared = self._axis_cross
-        rotation = np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross_squared + _EYE
-        turned = (rotation @ self.origins[..., None])[..., 0]
+        rotation = sin(angle) * cross + (1.0 - cos(angle)) * cross_squared + _EYE
+        turned = apply(rotation, self.origins)
         motion = np.zeros((*step.shape, 4, 4))
         motion[..., :3, :3] = rotation
         motion[..., :3, 3] = self.origins - turned + (step * self._slide_rate)[..., None] * self.axes
@@ -283,7 +285,7 @@ class KinematicTree:
         for k in range(1, len(self)):
             parent = self.parents[k]
             if parent > 0:
-                T_rest_part[..., k, :, :] = T_rest_part[..., parent, :, :] @ T_rest_part[..., k, :, :]
+                T_rest_part[..., k, :, :] = matmul(T_rest_part[..., parent, :, :], T_rest_part[..., k, :, :])
         if q.ndim == 1:  # a state is often asked for twice: where to look from, then what is seen
             self._last_poses = q.tobytes(), T_rest_part.copy()
         return T_rest_part
@@ -303,9 +305,8 @@ class KinematicTree:
         """
         poses = np.asarray(T_frame_part, dtype=np.float64)
         carrier = poses[..., np.maximum(self.parents, 0), :, :]
-        axis = (carrier[..., :3, :3] @ self.axes[..., None])[..., 0]
-        origin = (carrier[..., :3, :3] @ self.origins[..., None])[..., 0] + carrier[..., :3, 3]
-        return axis, origin
+        rotation, position = carrier[..., :3, :3], carrier[..., :3, 3]
+        return apply(rotation, self.axes), apply(rotation, self.origins) + position
 
     def scaled(self, scale: float) -> KinematicTree:
         """The tree of the same object made ``scale`` times as large: every length is multiplied."""
@@ -449,7 +450,7 @@ def transform_points(T_to_from: ArrayLike, points: ArrayLike) -> Array:
     (..., N, 3) float
     """
     T = np.asarray(T_to_from, dtype=np.float64)
-    return np.asarray(points) @ np.swapaxes(T[..., :3, :3], -1, -2) + T[..., None, :3, 3]
+    return apply(T[..., None, :3, :3], np.asarray(points)) + T[..., None, :3, 3]
 
 
 def invert_transform(T_to_from: ArrayLike) -> Array:
@@ -468,6 +469,6 @@ def invert_transform(T_to_from: ArrayLike) -> Array:
     inverse = np.zeros_like(T)
     rotation = np.swapaxes(T[..., :3, :3], -1, -2)
     inverse[..., :3, :3] = rotation
-    inverse[..., :3, 3] = -(rotation @ T[..., :3, 3, None])[..., 0]
+    inverse[..., :3, 3] = -apply(rotation, T[..., :3, 3])
     inverse[..., 3, 3] = 1.0
     return inverse

@@ -8,17 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
+from artsim.elementary import arccos, cos, log, tan
 from artsim.kinematics import Array
+from artsim.products import norm
 
 Look = Callable[[NDArray[np.int64], NDArray[np.int64]], tuple[NDArray[np.float32], NDArray[np.uint8]]]
 """What stands at some pixels, by row and column: depth (N,), 0 where nothing does, and part ids (N,)."""
+
+Index = slice | NDArray[np.int64]
 
 _SAME_SURFACE = 0.02  # share of the depth by which neighbours on one surface differ at most
 _MAX_INCIDENCE = np.deg2rad(85.0)  # the formulae diverge at grazing incidence; no device was measured beyond
@@ -80,27 +84,35 @@ class View:
         ray = self.camera.directions(self.row * self.camera.width + self.column)
         constant = inverse - slope_x * ray[:, 0] - slope_y * ray[:, 1]
         normal = np.stack([slope_x, slope_y, constant], axis=-1)
-        length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(ray, axis=-1)
+        length = norm(normal) * norm(ray)
         cosine = np.where(length > 0, inverse / np.where(length > 0, length, 1.0), 1.0)
-        angle: Array = np.arccos(np.clip(cosine, 0.0, 1.0))
-        return angle
+        return arccos(np.clip(cosine, 0.0, 1.0))
 
-    def uniform(self, stream: int) -> Array:
-        """(N,) numbers in [0, 1), independent between pixels and streams."""
-        pixel = (self.row * self.camera.width + self.column).astype(np.uint64)
-        start = _scramble(_scramble(np.array([stream], dtype=np.uint64)) + np.array([self._key], dtype=np.uint64))
-        bits = _scramble(pixel + start)
+    @cached_property
+    def _pixel(self) -> NDArray[np.uint64]:
+        return (self.row * self.camera.width + self.column).astype(np.uint64)
+
+    def uniform(self, stream: int, at: Index = slice(None)) -> Array:
+        """(N,) numbers in [0, 1), independent between pixels and streams; only for the pixels ``at``, if given."""
+        bits = _scramble(self._pixel[at] + np.uint64(_start(self._key, stream)))
         return (bits >> np.uint64(11)) * 2.0**-53
 
-    def normal(self, stream: int) -> Array:
-        """(N,) numbers from N(0, 1), independent between pixels and streams."""
+    def normal(self, stream: int, at: Index = slice(None)) -> Array:
+        """(N,) numbers from N(0, 1), independent between pixels and streams; only for the pixels ``at``, if given."""
         # Box and Muller's transform; streams of its two uniform numbers are kept apart from those of `uniform`.
-        radius = np.sqrt(-2.0 * np.log1p(-self.uniform(1000 + 2 * stream)))
-        return radius * np.cos(2.0 * np.pi * self.uniform(1001 + 2 * stream))
+        radius = np.sqrt(-2.0 * log(1.0 - self.uniform(1000 + 2 * stream, at)))  # 1 - u is exact
+        return radius * cos(2.0 * np.pi * self.uniform(1001 + 2 * stream, at))
 
 
 def _flatter(one: Array, other: Array) -> Array:
     return np.where((np.abs(one) < np.abs(other)) | np.isnan(other), one, other)
+
+
+@lru_cache
+def _start(key: int, stream: int) -> int:
+    """What is added to the pixels' numbers for a key and a stream."""
+    first = _scramble(np.array([stream], dtype=np.uint64))
+    return int(_scramble(first + np.array([key], dtype=np.uint64))[0])
 
 
 def _scramble(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -178,7 +190,7 @@ class LateralJitter:
 
     def sigma(self, depth: Array, incidence: Array, focal: float) -> Array:
         """Of a plane tilted about an image axis, near the middle of the image."""
-        return self._sigma_px(incidence) * depth * np.tan(incidence) / focal
+        return self._sigma_px(incidence) * depth * tan(incidence) / focal
 
 
 @dataclass(frozen=True)
@@ -203,7 +215,7 @@ class DisparityQuantisation:
 
     def sigma(self, depth: Array, incidence: Array, focal: float) -> Array:
         """Of a surface that crosses several steps: that of a uniform error, one step wide."""
-        return depth**2 * self.step_px / (focal * self.baseline * np.sqrt(12.0))
+        return np.square(depth) * self.step_px / (focal * self.baseline * np.sqrt(12.0))
 
 
 @dataclass(frozen=True)
@@ -231,20 +243,23 @@ class AxialNoise:
 
     def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
         incidence = view.incidence if self.grazing else np.zeros(len(depth))
-        noisy = depth + self.sigma(depth, incidence, focal) * view.normal(stream)
-        return np.where(depth > 0, np.maximum(noisy, 0.0), 0.0)
+        seen = np.flatnonzero(depth > 0)
+        noisy = depth[seen] + self.sigma(depth[seen], incidence[seen], focal) * view.normal(stream, seen)
+        reading = np.zeros_like(depth)
+        reading[seen] = np.maximum(noisy, 0.0)
+        return reading
 
     def sigma(self, depth: Array, incidence: Array, focal: float) -> Array:
         """The formula, less the share of ``measured_with``."""
         beyond = depth - self.start
-        sigma = self.constant + self.linear * np.maximum(beyond, 0.0) + self.quadratic * beyond**2
+        sigma = self.constant + self.linear * np.maximum(beyond, 0.0) + self.quadratic * np.square(beyond)
         if self.grazing:
             angle = np.minimum(incidence, _MAX_INCIDENCE)
-            extra = self.grazing / np.sqrt(np.maximum(depth, 1e-3)) * (angle / (np.pi / 2 - angle)) ** 2
+            extra = self.grazing / np.sqrt(np.maximum(depth, 1e-3)) * np.square(angle / (np.pi / 2 - angle))
             sigma = sigma + np.where(angle > np.pi / 3, extra, 0.0)
         if self.measured_with is not None:
             known = self.measured_with.sigma(depth, incidence, focal)
-            sigma = np.sqrt(np.maximum(sigma**2 - known**2, 0.0))
+            sigma = np.sqrt(np.maximum(np.square(sigma) - np.square(known), 0.0))
         return sigma
 
 

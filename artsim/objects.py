@@ -15,6 +15,7 @@ from artsim.describe import brief, object_line, object_text
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.kinematics import Array, KinematicTree
 from artsim.names import printable
+from artsim.products import norm
 
 if TYPE_CHECKING:
     import trimesh
@@ -99,7 +100,8 @@ class Part:
         if len(self.faces) == 0:
             return np.full((2, 3), np.nan)
         used = self.vertices[np.unique(self.faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        # Which of 0.0 and -0.0 is the smaller depends on the processor: adding 0.0 leaves one of them.
+        return np.stack([used.min(axis=0), used.max(axis=0)]) + 0.0
 
     def moved(self, offset: Array) -> Part:
         """The part translated by (3,) metres."""
@@ -206,7 +208,7 @@ class ArticulatedObject:
     @cached_property
     def diagonal(self) -> float:
         """Diagonal of the box of the whole object in its rest state, metres."""
-        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+        return float(norm(self.bounds[1] - self.bounds[0]))
 
     @property
     def num_faces(self) -> int:

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
 from artsim.describe import sample_line, sample_text
+from artsim.elementary import log
 from artsim.errors import ConfigError, RenderError
 from artsim.kinematics import Array
 from artsim.noise import Look, View
 from artsim.objects import ArticulatedObject
+from artsim.products import apply, norm
 from artsim.renderers import BACKGROUND, Frame, Renderer, shared_renderer
 from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visibility
 from artsim.sensor import Sensor, find_sensor
@@ -116,7 +118,7 @@ class Sample:
     @property
     def rest_points(self) -> Array:
         """(N, 3) where in the rest frame, at rest, each place lies that ``npcs`` names, metres."""
-        diagonal = np.linalg.norm(self.box_size, axis=1)
+        diagonal = norm(self.box_size)
         rest: Array = (self.npcs - 0.5) * diagonal[self.part, None] + self.box_center[self.part]
         return rest
 
@@ -210,7 +212,7 @@ def observe(
     return Sample(
         points=points.astype(np.float32),
         part=part,
-        npcs=_npcs(true_points, part, posed).astype(np.float32),
+        npcs=_npcs(true_points, part, posed).astype(np.float32, order="C"),
         T_camera_part=posed.T_camera_part,
         box_center=obj.box_center,
         box_size=obj.box_size,
@@ -323,7 +325,7 @@ def draw_visible(
         else:
             # Numbers drawn with replacement repeat each other and earlier rounds: so many leave ``wanted`` new ones.
             drawn = np.zeros(total, dtype=bool)
-            drawn[rng.integers(0, total, size=int(-total * np.log1p(-wanted / left)))] = True
+            drawn[rng.integers(0, total, size=int(-total * log(1.0 - wanted / left)))] = True
             local = (drawn & fresh).nonzero()[0]  # in order: neighbouring rays share memory
         fresh[local] = False
         row = np.searchsorted(up_to, local, side="right")
@@ -387,11 +389,15 @@ def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
 def _npcs(points: Array, part: NDArray[np.uint8], posed: PosedObject) -> Array:
     """(N, 3) normalised part coordinates of camera-frame points: one uniform scale per part."""
     rotation, translation = posed.T_camera_part[:, :3, :3], posed.T_camera_part[:, :3, 3]
-    size = np.linalg.norm(posed.obj.box_size, axis=1)
+    size = norm(posed.obj.box_size)
     size[size == 0] = 1.0  # parts without geometry have no points
-    # (p - t) @ R is the inverse transform; the part's centre and scale are folded into it.
-    offset = np.einsum("ki,kij->kj", translation, rotation) + posed.obj.box_center
+    # R^T (p - t) is the inverse transform; the part's centre and scale are folded into it.
     linear = rotation / size[:, None, None]
-    shift = 0.5 - offset / size[:, None]
-    npcs: Array = np.einsum("ni,nij->nj", points, linear[part]) + shift[part]
-    return npcs
+    shift = 0.5 - (apply(np.swapaxes(rotation, 1, 2), translation) + posed.obj.box_center) / size[:, None]
+    # One column for each point, so that each step runs over memory in order.
+    table = np.concatenate([linear, shift[:, None]], axis=1).reshape(-1, 12).T.take(part, axis=1).reshape(4, 3, -1)
+    npcs = table[0] * points[:, 0]
+    npcs += table[1] * points[:, 1]
+    npcs += table[2] * points[:, 2]
+    npcs += table[3]
+    return npcs.T

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.camera import Camera
+from artsim.elementary import cos, sin, tan
 from artsim.errors import ConfigError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
+from artsim.products import apply, norm
 
 ViewSampler = Callable[[np.random.Generator, ArticulatedObject, Array], Camera]
 """Draws a camera for an object (in its rest frame, which is the world) in joint state q."""
@@ -192,29 +194,31 @@ def sample_view(obj: ArticulatedObject, q: ArrayLike, options: ViewOptions, rng:
     center, radius = bounding_sphere(obj, q)
     fov_y = np.deg2rad(options.fov)
     distance = radius / half_width(options, fill)
-    away = np.array([-np.cos(azimuth) * np.cos(elevation), -np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    level = cos(elevation)
+    away = np.array([-cos(azimuth) * level, -sin(azimuth) * level, sin(elevation)])
     return Camera.look_at(center + distance * away, center, options.width, options.height, fov_y)
 
 
 def half_width(options: ViewOptions, fill: ArrayLike) -> Array:
     """Sine of the angle between the optical axis and a bounding sphere that fills so much of the image."""
-    half_side = np.tan(0.5 * np.deg2rad(options.fov)) * min(1.0, options.width / options.height)
-    sine: Array = np.sin(np.arctan(np.asarray(fill) * half_side))
+    half_side = tan(0.5 * np.deg2rad(options.fov)) * min(1.0, options.width / options.height)
+    across = np.asarray(fill, dtype=np.float64) * half_side
+    sine: Array = across / np.sqrt(1.0 + across * across)
     return sine
 
 
 def bounding_sphere(obj: ArticulatedObject, q: ArrayLike) -> tuple[Array, float]:
     """Centre (3,) and radius of a sphere around the posed object, from its parts' boxes, rest frame, metres."""
     bottom, top = posed_bounds(obj, q)
-    return 0.5 * (bottom + top), 0.5 * float(np.linalg.norm(top - bottom))
+    return 0.5 * (bottom + top), 0.5 * float(norm(top - bottom))
 
 
 def posed_bounds(obj: ArticulatedObject, q: ArrayLike) -> tuple[Array, Array]:
     """Lower and upper corners (..., 3) of a box around the posed object in states (..., K), rest frame, metres."""
     low, high = obj.part_bounds[:, 0], obj.part_bounds[:, 1]
     T = obj.tree.forward_kinematics(q)
-    center = (T[..., :3, :3] @ (0.5 * (low + high))[:, :, None])[..., 0] + T[..., :3, 3]
-    reach = (np.abs(T[..., :3, :3]) @ (0.5 * (high - low))[:, :, None])[..., 0]
+    center = apply(T[..., :3, :3], 0.5 * (low + high)) + T[..., :3, 3]
+    reach = apply(np.abs(T[..., :3, :3]), 0.5 * (high - low))
     return (center - reach).min(axis=-2), (center + reach).max(axis=-2)
 
 

@@ -92,7 +92,8 @@ class Sensor:
             Metres.
         """
         z, angle = np.broadcast_arrays(np.asarray(depth, np.float64), np.asarray(incidence, np.float64))
-        total: Array = np.sqrt(sum((step.sigma(z, angle, self.focal) ** 2 for step in self.steps), np.zeros_like(z)))
+        squares = (np.square(step.sigma(z, angle, self.focal)) for step in self.steps)
+        total: Array = np.sqrt(sum(squares, np.zeros_like(z)))
         return total
 
 

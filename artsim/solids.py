@@ -15,7 +15,9 @@ import numpy as np
 from manifold3d import Manifold, OpType
 from numpy.typing import ArrayLike, NDArray
 
+from artsim.elementary import cos, sin
 from artsim.kinematics import Array, cross_matrix
+from artsim.products import apply, dot, matmul, unit
 
 Vector = Sequence[float] | Array
 
@@ -44,7 +46,11 @@ class Solid:
         """Rotated by ``angle`` radians about an axis through the point ``about``."""
         rotation = rotation_about(axis, angle)
         point = np.asarray(about, dtype=np.float64)
-        return self._mapped(rotation, point - rotation @ point)
+        return self._mapped(rotation, point - apply(rotation, point))
+
+    def rotated(self, rotation: Array) -> Solid:
+        """Turned about the origin by a (3, 3) rotation."""
+        return self._mapped(rotation, np.zeros(3))
 
     def mirrored(self, axis: int, about: float = 0.0) -> Solid:
         """Reflected in the plane where coordinate ``axis`` (0, 1, 2) equals ``about``."""
@@ -83,9 +89,8 @@ def mesh_of(manifold: Manifold) -> tuple[Array, NDArray[np.int32]]:
 
 def rotation_about(axis: Vector, angle: float) -> Array:
     """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
-    unit = np.asarray(axis, dtype=np.float64)
-    cross = cross_matrix(unit / np.linalg.norm(unit))
-    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    cross = cross_matrix(unit(axis))
+    rotation: Array = np.eye(3) + sin(angle) * cross + (1.0 - cos(angle)) * matmul(cross, cross)
     return rotation
 
 
@@ -133,8 +138,7 @@ def rounded_box(low: Vector, high: Vector, radius: float, axis: int | None = Non
     if axis is None:
         angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
         corner = np.array(
-            [(np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)) for b in angles[:-1] for a in angles]
-            + [(0.0, 0.0, 1.0)]
+            [(cos(a) * cos(b), sin(a) * cos(b), sin(b)) for b in angles[:-1] for a in angles] + [(0.0, 0.0, 1.0)]
         )
         signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         half = 0.5 * sides - radius
@@ -150,7 +154,7 @@ def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) 
     half = 0.5 * (np.asarray(high, dtype=np.float64) - low)
     radius = min(radius, float(half.min()))
     angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
-    quarter = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius + (half - radius)
+    quarter = np.stack([cos(angles), sin(angles)], axis=1) * radius + (half - radius)
     signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
     return np.concatenate([quarter[:: x * y] * (x, y) for x, y in signs]) + center
 
@@ -183,15 +187,13 @@ def circle(center: Vector, normal: Vector, radius: float, sections: int = 24) ->
     """(sections, 3) points of a circle."""
     u, v = _across(normal)
     angles = np.arange(sections) * (2.0 * np.pi / sections)
-    return np.asarray(center) + radius * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)
+    return np.asarray(center) + radius * (cos(angles)[:, None] * u + sin(angles)[:, None] * v)
 
 
 def _across(normal: Vector) -> tuple[Array, Array]:
     """Two unit vectors that complete a normal to a right-handed frame."""
-    w = np.asarray(normal, dtype=np.float64)
-    w = w / np.linalg.norm(w)
-    u = np.cross(np.eye(3)[np.argmin(np.abs(w))], w)
-    u /= np.linalg.norm(u)
+    w = unit(normal)
+    u = unit(np.cross(np.eye(3)[np.argmin(np.abs(w))], w))
     return u, np.cross(w, u)
 
 
@@ -221,18 +223,17 @@ def _rings(path: Array, radius: float | Sequence[float], sections: int, closed: 
     """A circle across the path at each of its points, turned as little as possible from one to the next."""
     radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), (len(path),))
     steps = np.roll(path, -1, axis=0) - path if closed else np.diff(path, axis=0)
-    steps = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    steps = unit(steps)
     before = np.roll(steps, 1, axis=0) if closed else np.concatenate([steps[:1], steps])
     after = steps if closed else np.concatenate([steps, steps[-1:]])
     u, _ = _across(after[0])
     angles = np.arange(sections) * (2.0 * np.pi / sections)
     rings = []
     for point, r, a, b in zip(path, radii, before, after, strict=True):
-        tangent = (a + b) / np.linalg.norm(a + b)
-        u = u - (u @ tangent) * tangent
-        u /= np.linalg.norm(u)
+        tangent = unit(a + b)
+        u = unit(u - dot(u, tangent) * tangent)
         v = np.cross(tangent, u)
-        rings.append(point + r * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v))
+        rings.append(point + r * (cos(angles)[:, None] * u + sin(angles)[:, None] * v))
     return rings
 
 
@@ -273,12 +274,10 @@ def revolved(
         First and last angle, radians.
     """
     u, v = _across(axis)
-    w = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    w = unit(axis)
     outline = np.asarray(outline, dtype=np.float64)
     angles = np.linspace(*arc, sections + 1)
-    slices = [
-        np.asarray(center) + outline[:, :1] * (np.cos(a) * u + np.sin(a) * v) + outline[:, 1:] * w for a in angles
-    ]
+    slices = [np.asarray(center) + outline[:, :1] * (cos(a) * u + sin(a) * v) + outline[:, 1:] * w for a in angles]
     return loft(slices)
 
 

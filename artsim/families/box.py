@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import cos, sin
 from artsim.families.carton import carton
 from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.solids import Solid, box, cylinder, frame, hull, rounded_box, tray, union
@@ -171,7 +172,7 @@ def _lid(
     straight = height * rng.uniform(0.0, 0.25) + 2 * wall
     rise = x * rng.uniform(0.35, 0.95)
     angles = np.linspace(0.0, np.pi, 11)
-    arc = [(np.cos(angles) * (x - w), seam + straight + np.sin(angles) * (rise - w)) for w in (0.0, wall)]
+    arc = [(cos(angles) * (x - w), seam + straight + sin(angles) * (rise - w)) for w in (0.0, wall)]
     rows = [np.stack([a, np.zeros(11), b], axis=1) for a, b in arc]
     solid = frame((-x, -y, seam), (x, y, seam + straight + 0.001), [wall] * 4, 0, 1)
     for k in range(10):

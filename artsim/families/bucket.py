@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import cos, hypot, power, sin
 from artsim.kinematics import Array
+from artsim.products import norm
 from artsim.solids import Solid, box, cylinder, ring, tube, vessel
 
 SIDES = 20
@@ -37,7 +39,7 @@ def build(rng: np.random.Generator) -> Assembly:
     for side in (-1.0, 1.0):
         body += _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
     # In every position a point of a round bail lies this far from the middle of the pins; the rim keeps within.
-    reach = np.hypot(outer, rim_z - pivot) + 2 * wire + 0.006
+    reach = hypot(outer, rim_z - pivot) + 2 * wire + 0.006
     bail = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
 
     narrowing = profile[0, 0] < 0.85 * profile[-1, 0]  # so that the bail may hang below the rim
@@ -60,7 +62,7 @@ def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
         )
     if kind == "belly":
         shares = np.linspace(0.0, 1.0, 4)
-        bulge = np.sin(np.pi * shares) * top * rng.uniform(0.02, 0.06)
+        bulge = sin(np.pi * shares) * top * rng.uniform(0.02, 0.06)
         return np.column_stack([bottom + (top - bottom) * shares + bulge * (shares < 1), shares * height])
     if kind == "foot":
         return np.array([(bottom, 0.0), (0.97 * bottom, 0.1 * height), (top, height)])
@@ -99,15 +101,15 @@ def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin
     height = reach * rng.uniform(1.0, 1.35)
     if curved:  # from a half circle to a rounded rectangle
         angles = np.linspace(0.0, np.pi, 17)
-        cosine, sine, power = np.cos(angles), np.sin(angles), rng.choice([0.95, rng.uniform(0.5, 0.95)])
+        cosine, sine, bend = cos(angles), sin(angles), rng.choice([0.95, rng.uniform(0.5, 0.95)])
         path = np.column_stack(
-            [np.zeros(17), half * np.sign(cosine) * np.abs(cosine) ** power, pivot + height * sine**power]
+            [np.zeros(17), half * np.sign(cosine) * power(np.abs(cosine), bend), pivot + height * power(sine, bend)]
         )
     else:
         straight, flat = 0.55 * height, rng.uniform(0.4, 0.8)
         side = [(0.0, half, pivot), (0.0, half, pivot + straight), (0.0, flat * half, pivot + height)]
         path = np.array(side + [(0.0, -y, z) for _, y, z in side[::-1]])
-    lift = (2.2 * pin) / np.linalg.norm(path[1] - path[0])
+    lift = (2.2 * pin) / norm(path[1] - path[0])
     path[0] += (path[1] - path[0]) * lift
     path[-1] += (path[-2] - path[-1]) * lift
     solid = tube(path, wire, 8)

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.assembly import JointSpec
+from artsim.elementary import cos
 from artsim.kinematics import Array, Joint, KinematicTree
+from artsim.products import dot, matmul, norm, unit
 from artsim.solids import Solid, Vector, cylinder
 
 Index = NDArray[np.int64]
@@ -49,7 +51,7 @@ class Link:
     def guard(self, start: Vector, end: Vector, radius: float) -> None:
         """Add the capsule around a rod with flat ends: 0.6 radii shorter at either end, and 17 % thicker."""
         start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-        length = float(np.linalg.norm(end - start))
+        length = float(norm(end - start))
         inset = min(0.6 * radius, 0.5 * length) / max(length, 1e-9) * (end - start)
         self.capsules.append(np.array([*(start + inset), *(end - inset), 1.17 * radius]))
 
@@ -81,7 +83,7 @@ def narrow_limits(links: list[Link], margin: float) -> bool:
         return False
     rng = np.random.default_rng(0)
     unit = rng.random((_STATES, len(links)))
-    unit[::2] = 0.5 - 0.5 * np.cos(np.pi * unit[::2])
+    unit[::2] = 0.5 - 0.5 * cos(np.pi * unit[::2])
     unit[::4] = np.round(unit[::4])
     for _ in range(_ROUNDS):
         bounds = np.array([_interval(link.joint) for link in links])
@@ -106,7 +108,7 @@ def _tight_pairs(
         tight: NDArray[np.bool_] = np.any(spare < 0, axis=0)
         if tight.any() or step == _DESCENTS:
             break
-        closest = unit[np.argsort(spare.min(axis=1))[:24]]
+        closest = unit[np.argsort(spare.min(axis=1), kind="stable")[:24]]
         near = np.repeat(closest, 8, axis=0)
         unit = np.clip(near + rng.normal(0.0, 0.25 / (step + 1), near.shape), 0.0, 1.0)
     return tight
@@ -135,7 +137,7 @@ class _Pairs:
         joints = [Joint("root", "free", -1)]
         for k, link in enumerate(links[1:], 1):
             assert link.joint is not None
-            x, y, z = (np.asarray(link.joint.axis, dtype=np.float64) / np.linalg.norm(link.joint.axis)).tolist()
+            x, y, z = unit(link.joint.axis).tolist()
             ox, oy, oz = (float(v) for v in link.joint.origin)
             joints.append(Joint(link.name, link.joint.type, k - 1, (x, y, z), (ox, oy, oz), -np.inf, np.inf))
         self.tree = KinematicTree(joints)
@@ -149,7 +151,7 @@ class _Pairs:
         """(S, P) distances in S states, in metres; negative where two capsules overlap."""
         T = self.tree.forward_kinematics(states)[:, self.owner]
         ends = np.stack([self.capsules[:, :3], self.capsules[:, 3:6]], axis=-1)
-        points = T[..., :3, :3] @ ends + T[..., :3, 3:]
+        points = matmul(T[..., :3, :3], ends) + T[..., :3, 3:]
         start, end = points[..., 0], points[..., 1]
         radius = self.capsules[:, 6]
         middle = _segment_distance(start, end - start, self.first, self.second)
@@ -160,9 +162,9 @@ class _Pairs:
 def _segment_distance(start: Array, along: Array, first: Index, second: Index) -> Array:
     """(S, P) distances of pairs of segments, which are (S, N, 3) start points and vectors to their ends."""
     u, v, w = along[:, first], along[:, second], start[:, first] - start[:, second]
-    length = np.maximum((along * along).sum(axis=-1), 1e-12)
+    length = np.maximum(dot(along, along), 1e-12)
     uu, vv = length[:, first], length[:, second]
-    uv, uw, vw, ww = (np.einsum("spc,spc->sp", a, b) for a, b in ((u, v), (u, w), (v, w), (w, w)))
+    uv, uw, vw, ww = (dot(a, b) for a, b in ((u, v), (u, w), (v, w), (w, w)))
     s = np.clip((uv * vw - vv * uw) / np.maximum(uu * vv - uv * uv, 1e-12), 0.0, 1.0)
     t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)

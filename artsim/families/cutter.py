@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic
+from artsim.elementary import cos, sin, tan
 from artsim.solids import Solid, box, cylinder, prism, rounded_box, rounded_rectangle, union
 
 GAP = 0.0005
@@ -56,7 +57,7 @@ def build(rng: np.random.Generator) -> Assembly:
         wheel = cylinder((at, 0, top + 0.001), (at, 0, top + 0.004), radius, sections=20)
         wheel += union(
             cylinder((at + x, y, top + 0.001), (at + x, y, top + 0.0034), 0.14 * radius, sections=6)
-            for x, y in ((radius * np.cos(a), radius * np.sin(a)) for a in np.arange(12) * np.pi / 6)
+            for x, y in ((radius * cos(a), radius * sin(a)) for a in np.arange(12) * np.pi / 6)
         )
         cutter.add("wheel", wheel, continuous("blade", (0, 0, 1), (at, 0, top)), density=1100.0)
     return cutter
@@ -114,7 +115,7 @@ def _body(
 
 def _blade(rng: np.random.Generator, front: float, back: float, half: float, low: float, thick: float) -> Solid:
     """Strip with a slanted point."""
-    slant = 2 * half * np.tan(rng.uniform(0.35, 1.0))
+    slant = 2 * half * tan(rng.uniform(0.35, 1.0))
     side = float(rng.choice([-1, 1]))
     outline = np.array([(front, -half), (front + slant, half), (back, half), (back, -half)])
     return prism(outline * (1, side), low, low + thick)

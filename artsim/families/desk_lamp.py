@@ -11,8 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, revolute
+from artsim.elementary import arcsin, arctan2, cos, sin
 from artsim.families.clearance import Link, narrow_limits
 from artsim.kinematics import Array
+from artsim.products import apply
 from artsim.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube
 
 GAP = 0.001
@@ -81,7 +83,7 @@ def _links(rng: np.random.Generator) -> tuple[list[Link], float, float, Array | 
 
 def _lean(angle: float) -> Array:
     """Direction that leans from the vertical to +X by an angle."""
-    return rotation_about(SIDE, angle) @ UP
+    return apply(rotation_about(SIDE, angle), UP)
 
 
 def _base(rng: np.random.Generator, link: Link, r: float) -> float:
@@ -105,7 +107,7 @@ def _base(rng: np.random.Generator, link: Link, r: float) -> float:
             link.solid += cylinder((0, 0, thick - 0.001), (0, 0, thick + 0.015), 0.9 * wide, 0.3 * wide, 32)
     if kind != "clamp":
         for angle in np.arange(8) * np.pi / 4.0:  # a rim of rods guards the disc
-            out = np.array([np.cos(angle), np.sin(angle), 0.0])
+            out = np.array([cos(angle), sin(angle), 0.0])
             link.guard((0, 0, 0.5 * thick), wide * 1.1 * out + (0, 0, 0.5 * thick), 0.5 * thick)
     post = rng.uniform(0.02, 0.045)
     link.solid += cylinder((0, 0, 0.002), (0, 0, thick + post), 1.25 * r)
@@ -152,7 +154,7 @@ def _shade(
         share, level = (0.55, 0.7) if kind == "cone" else (0.9, 0.6)
         outline = np.array([(neck, 0), (neck, 0.25 * deep), (neck + share * (rim - neck), level * deep), (rim, deep)])
     # Seen from its knuckle the shade takes up this angle to either side; the arm takes some as well.
-    keep = float(np.arctan2(outline[:, 0], stem + outline[:, 1]).max()) + np.arcsin(min((r + 0.003) / stem, 1.0)) + 0.05
+    keep = float(arctan2(outline[:, 0], stem + outline[:, 1]).max()) + arcsin(min((r + 0.003) / stem, 1.0)) + 0.05
     # Down and forward, measured from the arm.
     room = max((np.deg2rad(rng.uniform(-180, -140)) - arm_angle - np.pi) % (2.0 * np.pi), keep + 0.1)
     along = _lean(arm_angle + np.pi + room)

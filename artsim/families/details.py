@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.assembly import JointSpec, revolute
+from artsim.elementary import arctan2, cos, sin
 from artsim.kinematics import Array
+from artsim.products import unit
 from artsim.solids import (
     Solid,
     Vector,
@@ -48,8 +50,8 @@ def bow_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius
     """Round bow from one point of the surface to another."""
     start, end, outward = (np.asarray(v, dtype=np.float64) for v in (start, end, outward))
     angles = np.linspace(0.0, np.pi, 9)
-    shares = 0.5 - 0.5 * np.cos(angles)
-    path: Array = start + shares[:, None] * (end - start) + (reach * np.sin(angles) - 0.002)[:, None] * outward
+    shares = 0.5 - 0.5 * cos(angles)
+    path: Array = start + shares[:, None] * (end - start) + (reach * sin(angles) - 0.002)[:, None] * outward
     return tube(path, radius, 10)
 
 
@@ -125,7 +127,7 @@ def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, dept
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     half = np.array([0.0, 0.5 * thickness, 0.5 * thickness])
-    along = (end - start) / np.linalg.norm(end - start)
+    along = unit(end - start)
     side = half * (1.0 - along)
     front, back = np.array([-reach, 0.0, 0.0]), np.array([depth - reach, 0.0, 0.0])
     solid = rounded_box(start - side + front, end + side + back, 0.25 * min(thickness, depth))
@@ -166,12 +168,12 @@ def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: 
     across = [i for i in range(3) if i != axis]
     reach = np.stack([low[across], high[across]]) - middle
     corners = np.array([(u, v) for u in reach[:, 0] for v in reach[:, 1]])
-    corner_angles = np.mod(np.arctan2(corners[:, 1], corners[:, 0]), 2 * np.pi)
+    corner_angles = np.mod(arctan2(corners[:, 1], corners[:, 0]), 2 * np.pi)
     angles = np.linspace(0.0, 2.0 * np.pi, sections + 1)
-    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    rays = np.stack([cos(angles), sin(angles)], axis=1)
     limits = np.where(rays > 0, reach[1], reach[0])
     outer = rays * np.min(limits / np.where(np.abs(rays) > 1e-12, rays, 1e-12 * np.sign(limits)), axis=1)[:, None]
-    inner = rays * radius / np.cos(np.pi / sections)
+    inner = rays * radius / cos(np.pi / sections)
     solid = Solid()
     for k in range(sections):
         between = corners[(corner_angles > angles[k]) & (corner_angles < angles[k + 1])]
@@ -394,5 +396,5 @@ def swing_limits(near: float, reach: float) -> tuple[float, float]:
     reach : float
         How far that stands out beyond the hinge's plane; 0 for nothing.
     """
-    slant = float(np.arctan2(max(reach, 0.0), near))
+    slant = float(arctan2(max(reach, 0.0), near))
     return min(np.pi / 2 - slant - 0.01, np.deg2rad(88.0)), np.pi - max(slant, 0.03) - 0.05

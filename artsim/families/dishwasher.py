@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.elementary import hypot
 from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
 from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
 
@@ -43,7 +44,7 @@ class Shape:
     @property
     def front(self) -> float:
         """x of the tub's front: the lower back edge of the door swings clear of it."""
-        return float(np.hypot(self.hinge_x, self.hinge_z - self.bottom)) + self.hinge_x + GAP
+        return float(hypot(self.hinge_x, self.hinge_z - self.bottom)) + self.hinge_x + GAP
 
     @property
     def floor(self) -> float:
@@ -69,7 +70,7 @@ def build(rng: np.random.Generator) -> Assembly:
     elif flanked:
         strip = max(strip, wall)
     hinge_x = -thick if flush else -thick * rng.choice([0.0, rng.uniform(0.0, 0.6)])
-    swing = float(np.hypot(hinge_x, height - plinth)) - (height - plinth)  # the upper back edge rises while it opens
+    swing = float(hypot(hinge_x, height - plinth)) - (height - plinth)  # the upper back edge rises while it opens
     shape = Shape(
         half=0.5 * width,
         depth=rng.uniform(0.42, 0.64),

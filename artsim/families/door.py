@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, prismatic, revolute
+from artsim.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
@@ -150,7 +151,7 @@ def _frame(
         angles = np.linspace(0.0, np.pi, 17)
         radius, base = y + jamb, height + jamb - 0.002
         rise = rng.uniform(0.3, 1.0)
-        rim = np.stack([np.zeros(17), radius * np.cos(angles), base + rise * radius * np.sin(angles)], axis=1)
+        rim = np.stack([np.zeros(17), radius * cos(angles), base + rise * radius * sin(angles)], axis=1)
         solid += hull(np.concatenate([rim + (x0, 0, 0), rim + (x1, 0, 0)]))
     return solid
 

@@ -13,7 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import arcsin, cos, hypot, power, sin
 from artsim.kinematics import Array
+from artsim.products import norm
 from artsim.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
 
 GAP = 0.0006
@@ -56,7 +58,7 @@ class Front:
 
     def x(self, y: Array | float) -> Array:
         """Middle surface of the front over y."""
-        depth: Array = self.wrap * (np.asarray(y) / self.half) ** 2 - self.ahead
+        depth: Array = self.wrap * np.square(np.asarray(y) / self.half) - self.ahead
         return depth
 
 
@@ -87,10 +89,10 @@ def build(rng: np.random.Generator) -> Assembly:
 
     # The temples sweep two parallel planes: hinges tilted sideways by one angle keep one above the other however far
     # each is folded, as real ones lie across one another. The tilt bounds how far their ends may bend down.
-    bend = float(min(rng.uniform(3.0, 26.0) * MM, 2 * front.half * np.sin(STEEPEST) - front.height - 2.5 * MM))
+    bend = float(min(rng.uniform(3.0, 26.0) * MM, 2 * front.half * sin(STEEPEST) - front.height - 2.5 * MM))
     temple = _temple(rng, front, max(bend, 0.0), flat)
     rise = float(np.ptp(temple.bounds()[:, 2])) + 2.0 * MM
-    tilt = float(rng.choice([-1, 1]) * np.arcsin(rise / (2 * front.half)))
+    tilt = float(rng.choice([-1, 1]) * arcsin(rise / (2 * front.half)))
     limit = np.deg2rad(rng.uniform(77.0, 87.0))
     hinge = _hinge(front)
     parts = {}
@@ -99,7 +101,7 @@ def build(rng: np.random.Generator) -> Assembly:
         fixed, moving = (half if side > 0 else half.mirrored(1) for half in hinge)
         frame += fixed.turned((1, 0, 0), -tilt).moved(place) + _endpiece(front, outline, depth, side)
         arm = temple if side > 0 else temple.mirrored(1)
-        axis = (0.0, -side * np.sin(tilt), -side * np.cos(tilt))
+        axis = (0.0, -side * sin(tilt), -side * cos(tilt))
         solid = arm.moved(place) + moving.turned((1, 0, 0), -tilt).moved(place)
         parts[name] = solid, revolute("frame", axis, place, 0.0, limit)
     glasses = Assembly()
@@ -114,18 +116,18 @@ def _outline(rng: np.random.Generator) -> Array:
     kind = str(rng.choice(["round", "rectangular", "aviator", "cat", "panto"]))
     wide = {"round": (42, 52), "aviator": (54, 62)}.get(kind, (47, 58))
     tall = {"round": (0.9, 1.0), "rectangular": (0.48, 0.75), "aviator": (0.78, 0.92), "cat": (0.6, 0.82)}
-    power = {"round": (2.0, 2.2), "rectangular": (2.8, 5.0)}.get(kind, (2.2, 3.0))
+    exponent = {"round": (2.0, 2.2), "rectangular": (2.8, 5.0)}.get(kind, (2.2, 3.0))
     a = 0.5 * rng.uniform(*wide) * MM
     b = a * rng.uniform(*tall.get(kind, (0.72, 0.95)))
-    n = rng.uniform(*power)
+    n = rng.uniform(*exponent)
     angles = np.linspace(0.0, 2.0 * np.pi, 26, endpoint=False)
-    c, s = np.cos(angles), np.sin(angles)
-    y, z = np.sign(c) * np.abs(c) ** (2 / n), np.sign(s) * np.abs(s) ** (2 / n)
+    c, s = cos(angles), sin(angles)
+    y, z = np.sign(c) * power(np.abs(c), 2 / n), np.sign(s) * power(np.abs(s), 2 / n)
     nasal = {"aviator": (0.25, 0.45), "round": (0.0, 0.05)}.get(kind, (0.05, 0.25))
-    y = y + rng.uniform(*nasal) * (1 - z) ** 2 / 4 * np.clip(-y, 0, 1)  # room for the nose below
+    y = y + rng.uniform(*nasal) * np.square(1 - z) / 4 * np.clip(-y, 0, 1)  # room for the nose below
     y = y * (1 + rng.uniform(0.0, 0.12) * z * (kind != "round"))
     if kind == "cat":
-        z = z + rng.uniform(0.12, 0.35) * np.clip(y, 0, 2) ** 2 * np.clip(z + 0.3, 0, 1)
+        z = z + rng.uniform(0.12, 0.35) * np.square(np.clip(y, 0, 2)) * np.clip(z + 0.3, 0, 1)
     if kind == "aviator":
         z = z - rng.uniform(0.0, 0.15) * y * np.clip(-z, 0, 1)
     return np.stack([a * y, b * z], axis=1)
@@ -151,7 +153,7 @@ def _chains(outline: Array, y: Array) -> tuple[Array, Array]:
     turned = np.roll(outline, -int(np.argmax(outline[:, 0])), axis=0)
     half = int(np.argmin(turned[:, 0]))
     upper, lower = turned[: half + 1], np.concatenate([turned[half:], turned[:1]])
-    chains = [chain[np.argsort(chain[:, 0])] for chain in (lower, upper)]
+    chains = [chain[np.argsort(chain[:, 0], kind="stable")] for chain in (lower, upper)]
     low, high = (np.interp(y, chain[:, 0], chain[:, 1]) for chain in chains)
     return low, high
 
@@ -166,7 +168,7 @@ def _sheet(front: Front, y: Array, low: Array, high: Array, thickness: float) ->
 def _glass(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float, depth: float) -> Solid:
     """Lenses and rims."""
     inner, outer = outline[:, 0].min(), outline[:, 0].max()
-    y = 0.5 * (inner + outer) - 0.5 * (outer - inner) * np.cos(np.linspace(0.08, np.pi - 0.08, 10))
+    y = 0.5 * (inner + outer) - 0.5 * (outer - inner) * cos(np.linspace(0.08, np.pi - 0.08, 10))
     low, high = _chains(outline, y)
     lens = _sheet(front, y, low, high, 1.8 * MM)
     if style in ("wire", "thick"):
@@ -179,7 +181,7 @@ def _glass(rng: np.random.Generator, style: str, outline: Array, front: Front, r
         y = np.linspace(-edge, edge, 9)
         top = float(_chains(outline, np.array([edge]))[1][0])
         span = top - outline[:, 1].min()
-        nose = top - span * (rng.uniform(0.25, 0.4) + 0.5 * (y / edge) ** 2)
+        nose = top - span * (rng.uniform(0.25, 0.4) + 0.5 * np.square(y / edge))
         solid += _sheet(front, y, nose, np.full(9, top), 1.8 * MM)
         if rng.random() < 0.6:
             y = np.linspace(-outer, outer, 15)
@@ -193,7 +195,7 @@ def _rim(front: Front, points: Array, width: float, depth: float, closed: bool) 
     steps = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     if not closed:
         steps[0], steps[-1] = points[1] - points[0], points[-1] - points[-2]
-    normals = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / np.linalg.norm(steps, axis=1, keepdims=True)
+    normals = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / norm(steps)[:, None]
     section = _octagon(0.5 * width + 0.4 * MM, 0.5 * depth) + (0.5 * width - 0.4 * MM, 0.0)
     x = front.x(points[:, 0])
     rings = []
@@ -220,9 +222,10 @@ def _bridge(rng: np.random.Generator, style: str, outline: Array, front: Front, 
     def bar(level: float, arch: float) -> Solid:
         z = low + level * (high - low)
         left = inner[inner[:, 0] < np.median(inner[:, 0])]
-        y = float(np.interp(z, *left[np.argsort(left[:, 1])].T[::-1])) + (3.0 if style == "rimless" else 0.3) * MM
+        left = left[np.argsort(left[:, 1], kind="stable")]
+        y = float(np.interp(z, *left.T[::-1])) + (3.0 if style == "rimless" else 0.3) * MM
         share = np.linspace(-1.0, 1.0, 7)
-        bow = arch * (1 - share**2)
+        bow = arch * (1 - np.square(share))
         return tube(np.column_stack([front.x(share * y) - 0.4 * bow, share * y, z + bow]), radius, 8)
 
     level = rng.uniform(0.6, 0.78)
@@ -237,7 +240,7 @@ def _nose_pads(rng: np.random.Generator, style: str, outline: Array, front: Fron
     low, high = outline[:, 1].min(), outline[:, 1].max()
     z = low + rng.uniform(0.38, 0.55) * (high - low)
     left = outline[outline[:, 0] < np.median(outline[:, 0])]
-    edge = float(np.interp(z, *left[np.argsort(left[:, 1])].T[::-1]))
+    edge = float(np.interp(z, *left[np.argsort(left[:, 1], kind="stable")].T[::-1]))
     x = float(front.x(edge))
     if style == "shield":
         return Solid()
@@ -257,7 +260,7 @@ def _nose_pads(rng: np.random.Generator, style: str, outline: Array, front: Fron
 def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
     """Corner from the lens or rim out and back to the hinge."""
     right = outline[outline[:, 0] > np.median(outline[:, 0])]
-    right = right[np.argsort(right[:, 1])]
+    right = right[np.argsort(right[:, 1], kind="stable")]
     h, z = 0.5 * front.height, front.hinge_z
     y = float(np.interp(z, right[:, 1], right[:, 0]))
     x = float(front.x(front.half))
@@ -291,9 +294,9 @@ def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> 
     length = 2 * front.half * (rng.uniform(0.92, 1.06) if rng.random() < 0.75 else rng.uniform(0.62, 0.92))
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
-    z = -bend * (share / share[-1]) ** rng.uniform(1.2, 1.8)
+    z = -bend * power(share / share[-1], rng.uniform(1.2, 1.8))
     bow = rng.uniform(0.0, 3.0) * MM * (0.2 if front.slim else 1.0)
-    y = front.barrel + 0.5 * front.thickness - bow * (x / length) ** 2
+    y = front.barrel + 0.5 * front.thickness - bow * np.square(x / length)
     waist = rng.uniform(0.45, 0.95) if flat else 0.8
     heights = front.height * (1 - (1 - waist) * np.clip(x / (0.55 * length), 0, 1))
     thick = front.thickness * (1 - (0.3 if flat else 0.15) * x / length)
@@ -309,6 +312,6 @@ def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> 
     rings = []
     for k in range(len(x)):
         section = _octagon(0.5 * thick[k], 0.5 * heights[k])
-        up = np.array([-slopes[k], 0.0, 1.0]) / np.hypot(slopes[k], 1.0)
+        up = np.array([-slopes[k], 0.0, 1.0]) / hypot(slopes[k], 1.0)
         rings.append((x[k], y[k], z[k]) + section[:, :1] * (0, 1, 0) + section[:, 1:] * up)
     return loft(rings)

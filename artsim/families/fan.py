@@ -11,6 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.elementary import cos, sin
+from artsim.products import norm
 from artsim.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, rounded_box, tube, union
 
 GAP = 0.002
@@ -82,7 +84,7 @@ def _steepest(cage: float, back: float, middle: float, column: float) -> float:
     """Radians by which a head can look down before its cage meets the column."""
     angles = np.linspace(0.0, np.deg2rad(30), 31)
     profile = np.array([(back, 0.3 * cage), (middle, 1.04 * cage)])
-    x = profile[:, :1] * np.cos(angles) + profile[:, 1:] * np.sin(angles)
+    x = profile[:, :1] * cos(angles) + profile[:, 1:] * sin(angles)
     clear = angles[(x < -column).all(axis=0)]
     return float(clear.max()) if len(clear) else 0.01
 
@@ -143,13 +145,13 @@ def _blades(rng: np.random.Generator, cage: float, depth: float) -> Solid:
         radius = 0.8 * hub + share * (tip - 0.8 * hub)
         chord = min(broad * width * radius + 0.25 * hub, 0.55 * cage)
         rise = min(0.35 * chord, reach)
-        center = np.array([0.0, -np.sin(sweep * share), np.cos(sweep * share)]) * radius
-        across = np.array([2.0 * rise, -chord * np.cos(sweep * share), -chord * np.sin(sweep * share)]) * 0.5
+        center = np.array([0.0, -sin(sweep * share), cos(sweep * share)]) * radius
+        across = np.array([2.0 * rise, -chord * cos(sweep * share), -chord * sin(sweep * share)]) * 0.5
         thick = np.array([0.0012, 0.0, 0.0])
         sections.append([center + a * across + b * thick for a in (-1, 1) for b in (-1, 1)])
     blade = loft(sections)
     # The corners of a broad blade reach further out than its middle.
-    bounds = max(float(np.linalg.norm(np.array(s)[:, 1:], axis=1).max()) for s in sections)
+    bounds = max(float(norm(np.array(s)[:, 1:]).max()) for s in sections)
     if bounds > 0.88 * cage:
         blade = blade.scaled((1.0, 0.88 * cage / bounds, 0.88 * cage / bounds))
     return solid + union(blade.turned(FRONT, 2.0 * np.pi * k / count) for k in range(count))

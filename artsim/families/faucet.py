@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, JointSpec, continuous, revolute, screw
+from artsim.elementary import arcsin, cos, sin
 from artsim.kinematics import Array
+from artsim.products import unit
 from artsim.solids import Solid, Vector, cylinder, ellipsoid, hull_of, rounded_box, tube, union
 
 GAP = 0.001
@@ -44,7 +46,7 @@ def _basin_mixer(rng: np.random.Generator) -> Assembly:
         rise = (top - root[2] - 1.3 * r) if kind == "bow" else 0.1 * reach
         drop = min(0.35 * reach, root[2] + rise - 0.04)
         s = np.linspace(0.0, 1.0, 9)
-        z = root[2] + rise * np.sin(np.pi * np.minimum(0.75 * s, 1.0)) - drop * s**3
+        z = root[2] + rise * sin(np.pi * np.minimum(0.75 * s, 1.0)) - drop * s * s * s
         path = np.stack([-reach * s, 0 * s, z], axis=1)
         body += tube(path, (np.linspace(1.0, 0.75, 9) * r).tolist(), 14)
         body += _nozzle(rng, path[-1] + 0.2 * (path[-2] - path[-1]), path[-1] - path[-2], 0.85 * r, 0.9 * r)
@@ -139,7 +141,7 @@ def _pillar_tap(rng: np.random.Generator) -> Assembly:
     reach, r = rng.uniform(0.06, 0.11), 0.7 * radius
     s = np.linspace(0.0, 0.5 * np.pi, 7)
     bow = min(0.4 * reach, 0.5 * height)
-    path = np.stack([-(reach - bow) - bow * np.sin(s), 0 * s, 0.65 * height - bow * (1 - np.cos(s))], axis=1)
+    path = np.stack([-(reach - bow) - bow * sin(s), 0 * s, 0.65 * height - bow * (1 - cos(s))], axis=1)
     path = np.concatenate([[[0, 0, 0.55 * height]], path])
     body += tube(path, (np.linspace(1.0, 0.8, 8) * r).tolist(), 14) + _nozzle(
         rng, path[-1] + (0, 0, 0.004), -UP, 0.95 * r, r
@@ -168,12 +170,12 @@ def _wall_tap(rng: np.random.Generator) -> Assembly:
     s = np.linspace(0.0, 0.5 * np.pi, 6)
     bend = 2.2 * r
     low = -drop - GAP
-    path = np.stack([bend * (np.cos(s) - 1), 0 * s, low - 0.7 * r - bend * np.sin(s)], axis=1)
+    path = np.stack([bend * (cos(s) - 1), 0 * s, low - 0.7 * r - bend * sin(s)], axis=1)
     path = np.concatenate([[[0, 0, low]], path, path[-1:] + [[-reach, 0, rng.uniform(-0.1, 0.25) * reach]]])
     spout = tube(path, r, 14) + _nozzle(rng, path[-1] + (r, 0, 0), -UP, 0.8 * r, 1.4 * r)
     tap = Assembly()
     tap.add("base", body, density=BRASS)
-    limit = min(np.arcsin(min((half - 0.03) / (reach + bend + 2 * r), 1.0)), 1.2)
+    limit = min(arcsin(min((half - 0.03) / (reach + bend + 2 * r), 1.0)), 1.2)
     tap.add("spout", spout, revolute("base", UP, (0, 0, low), -limit, limit), density=BRASS)
     style = int(rng.integers(1 << 30))
     size = radius * rng.uniform(1.3, 1.9)
@@ -216,7 +218,7 @@ def _gooseneck(rng: np.random.Generator, foot: Array, r: float, reach: float, ti
         end = np.pi if kind == "bow" else rng.uniform(0.75, 0.92) * np.pi
         flat = 1.0 if kind == "bow" else rng.uniform(0.6, 0.9)
         angles = np.linspace(0.0, end, 13)
-        points = [(0.0, z0)] + [(bow - bow * np.cos(a), spring + flat * bow * np.sin(a)) for a in angles]
+        points = [(0.0, z0)] + [(bow - bow * cos(a), spring + flat * bow * sin(a)) for a in angles]
         if kind == "bow" and spring - tip > 0.004:
             points.append((reach, tip))
     path = np.array([(-x, 0.0, z) for x, z in points])
@@ -227,9 +229,8 @@ def _gooseneck(rng: np.random.Generator, foot: Array, r: float, reach: float, ti
 
 def _nozzle(rng: np.random.Generator, start: Array, direction: Array, radius: float, length: float) -> Solid:
     """The aerator at the mouth."""
-    unit = direction / np.linalg.norm(direction)
     wide = radius * rng.uniform(1.0, 1.15)
-    return cylinder(start, start + length * unit, wide, sections=18)
+    return cylinder(start, start + length * unit(direction), wide, sections=18)
 
 
 def _handle(
@@ -256,7 +257,7 @@ def _handle(
         hub = cylinder(foot, foot + 0.75 * tall * axis, radius) + _dome(foot + 0.75 * tall * axis, axis, radius)
     across = np.cross(axis, start)
     lean = rng.uniform(0.0, 0.45)
-    direction = np.cos(lean) * start + np.sin(lean) * axis
+    direction = cos(lean) * start + sin(lean) * axis
     root = foot + 0.65 * tall * axis
     tip = root + length * direction
     r = max(radius * rng.uniform(0.18, 0.3), 0.003)
@@ -294,12 +295,12 @@ def _knob(rng: np.random.Generator, pivot: Array, axis: Array, radius: float) ->
         center = foot + 0.55 * tall * axis
         solid = cylinder(foot, foot + tall * axis, 0.45 * radius, 0.35 * radius, 18)
         for angle in np.arange(arms) * 2.0 * np.pi / arms:
-            tip = center + radius * (np.cos(angle) * u + np.sin(angle) * v)
+            tip = center + radius * (cos(angle) * u + sin(angle) * v)
             solid += tube([center, tip], r, 10) + ellipsoid(tip, 1.35 * r, 10)
         return solid
     ribs = int(rng.integers(6, 12))
     solid = cylinder(foot, foot + tall * axis, radius, 0.85 * radius) + _dome(foot + tall * axis, axis, 0.7 * radius)
     return solid + union(
         cylinder(foot + 0.1 * tall * axis + s, foot + 0.85 * tall * axis + 0.9 * s, 0.14 * radius, sections=8)
-        for s in (0.93 * radius * (np.cos(a) * u + np.sin(a) * v) for a in np.arange(ribs) * 2.0 * np.pi / ribs)
+        for s in (0.93 * radius * (cos(a) * u + sin(a) * v) for a in np.arange(ribs) * 2.0 * np.pi / ribs)
     )

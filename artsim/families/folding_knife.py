@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import cos, power, sin
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, loft, prism, union
 
@@ -73,12 +74,12 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _outline(length: float, half: float, bow: float, swell: float) -> Array:
     """(2, N, 2) lower and upper edge of the handle, the ends round."""
-    cap = 0.5 * length - half * (1 - np.cos(np.linspace(0.0, 0.5 * np.pi, 6)))
+    cap = 0.5 * length - half * (1 - cos(np.linspace(0.0, 0.5 * np.pi, 6)))
     x = np.concatenate([-cap, np.linspace(-cap[-1], cap[-1], 7)[1:-1], cap[::-1]])
     share = 2 * x / length
     over = np.clip((np.abs(x) - (0.5 * length - half)) / half, 0.0, 0.995)
-    width = half * np.sqrt(1 - over**2) * (1 - swell + swell * np.cos(0.5 * np.pi * share) ** 2)
-    middle = bow * (share**2 - 0.5)
+    width = half * np.sqrt(1 - np.square(over)) * (1 - swell + swell * np.square(cos(0.5 * np.pi * share)))
+    middle = bow * (np.square(share) - 0.5)
     return np.stack([np.column_stack([x, middle - width]), np.column_stack([x, middle + width])])
 
 
@@ -110,7 +111,7 @@ def _blade(rng: np.random.Generator, length: float, low: float, high: float, pin
         back[-1], edge[-1] = 0.8 * back[-1], 0.8 * edge[-1]
     else:
         shape = str(rng.choice(["drop", "clip", "sheep", "spear"]))
-        power, level, turn = {
+        bend, level, turn = {
             "drop": (2.2, 0.4, 0.5),
             "clip": (1.0, 0.45, rng.uniform(0.55, 0.7)),
             "sheep": (2.5, 0.92, 0.75),
@@ -118,16 +119,16 @@ def _blade(rng: np.random.Generator, length: float, low: float, high: float, pin
         }[shape]
         point = low + level * (high - low)
         if shape == "sheep":  # the back falls to a straight edge
-            back = low + (point - low) * np.clip((x - turn) / (1 - turn), 0, 1) ** power
+            back = low + (point - low) * power(np.clip((x - turn) / (1 - turn), 0, 1), bend)
             edge = np.full(10, high)
         else:
-            back = low + (point - low - 0.0003) * np.clip((x - turn) / (1 - turn), 0, 1) ** power
-            edge = high - (high - point) * np.clip((x - 0.45) / 0.55, 0, 1) ** 2.2
+            back = low + (point - low - 0.0003) * power(np.clip((x - turn) / (1 - turn), 0, 1), bend)
+            edge = high - (high - point) * power(np.clip((x - 0.45) / 0.55, 0, 1), 2.2)
         choil = 0.12
         edge = np.where(x < choil, 0.7 * high, edge)
     lower, upper = np.column_stack([x * length, back]), np.column_stack([x * length, np.maximum(edge, back + 0.0006)])
     angles = np.arange(RING) * (2.0 * np.pi / RING)
-    tang = pin * np.column_stack([np.cos(angles), np.sin(angles)])
+    tang = pin * np.column_stack([cos(angles), sin(angles)])
     return [tang, *(np.concatenate([lower[k : k + 2], upper[k : k + 2]]) for k in range(9))]
 
 

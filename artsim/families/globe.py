@@ -11,6 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, revolute
+from artsim.elementary import cos, sin
+from artsim.products import apply, unit
 from artsim.solids import Solid, cylinder, ellipsoid, hull, revolved, ring, rotation_about, rounded_box, tube, union
 
 GAP = 0.0015
@@ -22,7 +24,7 @@ def build(rng: np.random.Generator) -> Assembly:
     radius = rng.uniform(0.06, 0.2)
     tilt = np.deg2rad(rng.choice([23.4, rng.uniform(0.0, 40.0)]))
     lean = rng.choice([-1.0, 1.0])
-    axis = rotation_about((1, 0, 0), lean * tilt) @ UP
+    axis = apply(rotation_about((1, 0, 0), lean * tilt), UP)
     thick = radius * rng.uniform(0.04, 0.075)
     arc_radius = radius * rng.uniform(1.08, 1.16) + thick
     sphere = ellipsoid((0, 0, 0), radius, 36) + _continents(rng, radius)
@@ -59,17 +61,17 @@ def _continents(rng: np.random.Generator, radius: float) -> Solid:
     solid = Solid()
     for _ in range(int(rng.integers(5, 9))):
         center = rng.normal(size=3)
-        center /= np.linalg.norm(center)
+        center = unit(center)
         u = np.cross(center, np.eye(3)[np.argmin(np.abs(center))])
-        u /= np.linalg.norm(u)
+        u = unit(u)
         v = np.cross(center, u)
         size = rng.uniform(0.18, 0.42)
         angles = np.arange(11) * (2.0 * np.pi / 11)
         sizes = size * rng.uniform(0.6, 1.2, 11)
         points = [center]
         for share in (0.5, 1.0):
-            spread = share * sizes[:, None] * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)
-            points += list((center + spread) / np.linalg.norm(center + spread, axis=1, keepdims=True))
+            spread = share * sizes[:, None] * (cos(angles)[:, None] * u + sin(angles)[:, None] * v)
+            points += list(unit(center + spread))
         shell = 1.025 * radius * np.array(points)
         solid += hull(np.concatenate([shell, 0.93 * shell]))
     return solid
@@ -86,14 +88,14 @@ def _arc(rng: np.random.Generator, radius: float, thick: float, tilt: float) -> 
         angles = tilt + np.linspace(0.0, np.pi, 21)
     else:
         angles = tilt - np.linspace(0.0, np.pi, 21)
-    along = np.stack([0 * angles, -np.sin(angles), np.cos(angles)], axis=1)
+    along = np.stack([0 * angles, -sin(angles), cos(angles)], axis=1)
     if flat:
         wide, t = thick * rng.uniform(0.8, 1.6), 0.5 * thick
         rings = [[(x, *(p[1:] * r)) for r in (radius - t, radius + t) for x in (-wide, wide)] for p in along]
         solid = union(hull(np.concatenate([a, b])) for a, b in pairwise(rings))
     else:
         solid = tube(radius * along, 0.6 * thick, 10)
-    axis = along[0] if not whole else np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    axis = along[0] if not whole else np.array([0.0, -sin(tilt), cos(tilt)])
     for side in (-1.0, 1.0):
         root, tip = side * (radius - 0.8 * thick) * axis, side * (radius + thick) * axis
         solid += cylinder(root, tip, 0.8 * thick, sections=14)
@@ -117,7 +119,7 @@ def _stand(rng: np.random.Generator, radius: float, top: float, thick: float) ->
         count = int(rng.integers(3, 5))
         for k in range(count):
             a = 2.0 * np.pi * k / count + 0.3
-            out = np.array([np.cos(a), np.sin(a), 0.0])
+            out = np.array([cos(a), sin(a), 0.0])
             heights = low + height * np.array([0.5, 0.25, 0.0])
             path = np.outer([0.0, 0.5 * wide, wide], out) + np.outer(heights, UP)
             solid += tube(path, [stem, 0.8 * stem, 0.7 * stem], 10) + ellipsoid(path[-1], 0.9 * stem, 10)
@@ -140,7 +142,7 @@ def _horizon(rng: np.random.Generator, inner: float, foot: float, thick: float, 
     count = int(rng.integers(3, 5))
     for k in range(count):
         a = 2.0 * np.pi * (k + 0.5) / count
-        out = np.array([np.cos(a), np.sin(a), 0.0])
+        out = np.array([cos(a), sin(a), 0.0])
         at = inner + 1.5 * thick
         path = np.outer([at, at, 0.0], out) + np.outer([0.0, 0.6 * foot, foot - 0.06 * radius], UP)
         solid += tube(path, 0.7 * thick, 10)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, prismatic, revolute
+from artsim.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
@@ -101,10 +102,10 @@ def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Soli
     """Short handle at -X."""
     spread, reach = rng.uniform(0.25, 0.45), rng.uniform(0.022, 0.045)
     inside = radius - 0.003
-    start, end = (np.array([-inside * np.cos(spread), s * inside * np.sin(spread), z]) for s in (-1, 1))
+    start, end = (np.array([-inside * cos(spread), s * inside * sin(spread), z]) for s in (-1, 1))
     if kind == "bow":
         sag = rng.uniform(-0.5, 0.0)
-        outward = np.array([-1.0, 0.0, sag]) / np.hypot(1.0, sag)
+        outward = np.array([-1.0, 0.0, sag]) / hypot(1.0, sag)
         return bow_handle(start, end, outward, reach, rng.uniform(0.004, 0.007))
     if kind == "bar":
         r = rng.uniform(0.0035, 0.006)
@@ -112,10 +113,10 @@ def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Soli
         over = np.array([0.0, rng.uniform(0.0, 0.02), 0.0])
         bar = tube([posts[0][1] - over, posts[1][1] + over], 1.2 * r)
         return bar + union(tube([foot, tip], 0.8 * r, 10) for foot, tip in posts)
-    half, thick = radius * np.sin(spread), rng.uniform(0.004, 0.007)
+    half, thick = radius * sin(spread), rng.uniform(0.004, 0.007)
     far_x = -radius - reach
     far = rounded_box((far_x, -0.6 * half, z - thick), (far_x + 0.012, 0.6 * half, z + 0.8 * thick), 0.004)
-    start_box = rounded_box((-radius - 0.004, -half, z - thick), (-inside * np.cos(spread), half, z + thick), 0.003)
+    start_box = rounded_box((-radius - 0.004, -half, z - thick), (-inside * cos(spread), half, z + thick), 0.003)
     return hull_of(start_box, far)
 
 

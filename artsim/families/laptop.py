@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import tan
 from artsim.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
 
 GAP = 0.0008
@@ -130,7 +131,7 @@ def _propped(rng: np.random.Generator, shape: _Shape) -> Solid:
     deck = height - 0.0015
     plate = rounded_box((shape.base_front, -half, 0), (back, half, deck), shape.corner, axis=2)
     plate += _keyboard(rng, shape, deck, 0.01 * shape.width)
-    drop = np.tan(shape.tilt) * (back - shape.base_front) + height
+    drop = tan(shape.tilt) * (back - shape.base_front) + height
     radius = 0.5 * drop * rng.uniform(0.7, 1.1)
     x, z = back - radius, height - 0.0015 - radius
     end = half - rng.uniform(0.0, 0.1) * shape.width

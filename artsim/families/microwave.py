@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, rounded_box, tray, union
@@ -171,6 +172,6 @@ def _turntable(rng: np.random.Generator, low: Array, high: Array, center: Array)
     solid += cylinder((x, y, z), (x, y, z + 0.008), rng.uniform(0.03, 0.05), sections=12)
     for k in range(3):
         a = 2.0 * np.pi * k / 3
-        point = np.array([x + 0.8 * radius * np.cos(a), y + 0.8 * radius * np.sin(a), z + 0.012])
+        point = np.array([x + 0.8 * radius * cos(a), y + 0.8 * radius * sin(a), z + 0.012])
         solid += box(point - (0.012, 0.006, 0.003), point + (0.012, 0.006, 0.0015))
     return solid

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
@@ -141,7 +142,7 @@ def _hinge(rng: np.random.Generator, low: Array, high: Array, sideways: bool, gr
         return side_hinge(0.0, high[1] if left else low[1], np.deg2rad(rng.uniform(85.0, 130.0)), left)
     upper = np.deg2rad(90.0 if rng.random() < 0.7 else rng.uniform(75.0, 90.0))
     if reach > 0:
-        upper = min(upper, float(np.arctan2(grip - low[2] - 0.03, reach + 0.015)))
+        upper = min(upper, float(arctan2(grip - low[2] - 0.03, reach + 0.015)))
     return revolute("body", (0, -1, 0), (low[0], 0.0, low[2]), 0.0, upper)
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import power, sin
 from artsim.kinematics import Array
+from artsim.products import norm
 from artsim.solids import Solid, box, cylinder, hull_of, loft, prism, union
 
 GAP = 0.0006
@@ -67,13 +69,13 @@ def _jaw(rng: np.random.Generator, kind: str, length: float, disc: float) -> lis
         "cutting": (1.25, rng.uniform(0.2, 0.4)),
     }.get(kind, (1.1, rng.uniform(0.5, 0.75)))
     belly = rng.uniform(0.6, 1.6) if kind != "cutting" else rng.uniform(1.8, 2.6)
-    outer = disc * (start + (tip - start) * share**belly)
+    outer = disc * (start + (tip - start) * power(share, belly))
     outer[-1] *= 0.8
     inner = np.full(11, 0.5 * GAP)
     if kind in ("combination", "hollow"):  # a round hollow that holds pipes
         first, last = (0.08, 0.42) if kind == "combination" else (0.12, 0.8)
         inside = np.clip((share - first) / (last - first), 0, 1)
-        inner += disc * rng.uniform(0.25, 0.45) * np.sin(np.pi * inside)
+        inner += disc * rng.uniform(0.25, 0.45) * sin(np.pi * inside)
     x = -(disc + GAP) - share * (length - disc)
     upper, lower = np.column_stack([x, -inner]), np.column_stack([x, -np.maximum(outer, inner + 0.002)])
     return [np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(10)]
@@ -88,10 +90,10 @@ def _grip(rng: np.random.Generator, reach: float, disc: float, length: float) ->
     middle = rng.uniform(0.45, 0.65)
     y = np.where(
         share < middle,
-        first + (widest - first) * np.sin(0.5 * np.pi * share / middle),
-        widest + (last - widest) * ((share - middle) / (1 - middle)) ** 2,
+        first + (widest - first) * sin(0.5 * np.pi * share / middle),
+        widest + (last - widest) * np.square((share - middle) / (1 - middle)),
     )
-    start = np.sqrt(max((disc + half + 2 * GAP) ** 2 - first**2, 0.0)) + half
+    start = np.sqrt(max(np.square(disc + half + 2 * GAP) - np.square(first), 0.0)) + half
     return np.column_stack([start + share * (reach - start), y]), half * (1 - rng.uniform(0.0, 0.3) * share)
 
 
@@ -114,7 +116,7 @@ def _handle(path: Array, radii: Array, thick: float, covered: bool, guard: bool,
 def _bar(path: Array, half_width: Array, half_height: Array, middle: float) -> Solid:
     """Bar of octagonal section along a level path."""
     along = np.gradient(path, axis=0)
-    across = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.stack([along[:, 1], -along[:, 0]], axis=1) / norm(along)[:, None]
     corners = np.array([(1, 0.5), (0.6, 1), (-0.6, 1), (-1, 0.5), (-1, -0.5), (-0.6, -1), (0.6, -1), (1, -0.5)])
     rings = []
     for point, u, w, h in zip(path, across, half_width, half_height, strict=True):

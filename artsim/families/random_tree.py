@@ -13,14 +13,16 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from artsim.assembly import Assembly, JointSpec
+from artsim.elementary import cos, exp, log
 from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, ellipsoid, hull, ring, rounded_box, tube
+from artsim.products import apply, matmul, norm, unit
+from artsim.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, rounded_box, tube
 
 GAP = 0.002
-_LONGEST_STUB = 4.0
+_STUBS = np.concatenate([[0.0], 0.005 * exp(np.linspace(0.0, log(800.0), 50))])
+"""Lengths to try: 0, then from 5 mm to 4 m, each the same factor longer."""
 _DEEPEST_DIP = 0.02  # metres by which a branch on a hinge may swing below the foot of its neck
 _BELOW = np.array([[-9.0, -9.0, -9.0], [9.0, 9.0, -GAP]])
 """Where nothing may hang on a part: towards its own parent."""
@@ -48,11 +50,11 @@ class _Motion:
         turns = np.zeros(len(states)) if self.type == "prismatic" else states
         shifts = {"prismatic": states, "screw": self.pitch * states}.get(self.type, np.zeros(len(states)))
         arms = _corners(bounds) - self.origin
-        turned = Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ arms.T
-        points = (turned.transpose(0, 2, 1) + self.origin + (shifts[:, None] * self.axis)[:, None]).reshape(-1, 3)
+        turned = matmul(arms, np.array([rotation_about(self.axis, turn).T for turn in turns]))
+        points = (turned + self.origin + (shifts[:, None] * self.axis)[:, None]).reshape(-1, 3)
         # Between two of the states a corner leaves the box of the samples by less than the sagitta of its arc.
-        radius = np.linalg.norm(np.cross(arms, self.axis), axis=1).max()
-        sagitta = radius * (1.0 - np.cos(0.5 * (turns[1] - turns[0])))
+        radius = norm(np.cross(arms, self.axis)).max()
+        sagitta = radius * (1.0 - cos(0.5 * (turns[1] - turns[0])))
         return np.stack([points.min(axis=0) - sagitta, points.max(axis=0) + sagitta])
 
 
@@ -178,8 +180,7 @@ def _motion(rng: np.random.Generator, branch: _Branch, siblings: list[_Motion]) 
         return _Motion(leader.type, axis, origin, lower, upper, 0.0, source, multiplier)
     kind = str(rng.choice(JOINTS, p=[0.25, 0.3, 0.28, 0.17]))
     if rng.random() < 0.15:  # oblique
-        axis = axis + rng.normal(0.0, 0.2, 3)
-        axis /= np.linalg.norm(axis)
+        axis = unit(axis + rng.normal(0.0, 0.2, 3))
     if kind == "prismatic":
         return _Motion(kind, axis, origin, 0.0, rng.uniform(0.2, 0.9) * extent)
     if kind == "screw":
@@ -218,11 +219,11 @@ def _attach(
             break
         axis, side = faces[choice]
         turn = rng.uniform(0, 2 * np.pi) if rng.random() < 0.3 else 0.5 * np.pi * rng.integers(4)
-        rotation = _towards(side * np.eye(3)[axis]) @ Rotation.from_rotvec([0, 0, turn]).as_matrix()
-        reach = np.array([_box_around(_corners(b) @ rotation.T) for b in swept])
+        rotation = matmul(_towards(side * np.eye(3)[axis]), rotation_about((0, 0, 1), turn))
+        reach = np.array([_box_around(matmul(_corners(b), rotation.T)) for b in swept])
         across = np.arange(3) != axis
         surface = float(bounds[1, axis] if side > 0 else bounds[0, axis])
-        for stub in np.concatenate([[0.0], np.geomspace(0.005, _LONGEST_STUB, 50)]):
+        for stub in _STUBS:
             if stub >= shortest:
                 break
             start, end = (np.where(across, inner, surface + side * s) for s in (0.0, stub))
@@ -269,16 +270,20 @@ def _put(
     tree: Assembly, branch: _Branch, names: Iterator[str], joint: JointSpec | None, rotation: Array, position: Array
 ) -> str:
     """Add a branch to the assembly, its frame standing at the given pose; returns the name of its part."""
-    turn = Rotation.from_matrix(rotation).as_rotvec()
-    angle = float(np.linalg.norm(turn))
-    solid = branch.solid.turned(turn, angle) if angle > 0 else branch.solid
-    name = tree.add(next(names), solid.moved(position), joint)
+    name = tree.add(next(names), branch.solid.rotated(rotation).moved(position), joint)
     siblings: list[str] = []
     for child, motion, R_branch_child, foot in branch.children:
-        R, at = rotation @ R_branch_child, rotation @ foot + position
+        R, at = matmul(rotation, R_branch_child), apply(rotation, foot) + position
         mimic = None if motion.follows is None else (siblings[motion.follows], motion.multiplier)
         spec = JointSpec(
-            motion.type, name, R @ motion.axis, R @ motion.origin + at, motion.lower, motion.upper, motion.pitch, mimic
+            motion.type,
+            name,
+            apply(R, motion.axis),
+            apply(R, motion.origin) + at,
+            motion.lower,
+            motion.upper,
+            motion.pitch,
+            mimic,
         )
         siblings.append(_put(tree, child, names, spec, R, at))
     return name

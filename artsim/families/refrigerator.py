@@ -167,7 +167,7 @@ def _door(
     if style.bins > 0:
         # The bins swing past the side wall, or past the bins of the other door.
         margin = style.wall + 0.008
-        clear = (0.03 if inner_edge else margin) + style.bins**2 / (2.0 * (wide - margin)) + 0.004
+        clear = (0.03 if inner_edge else margin) + style.bins * style.bins / (2.0 * (wide - margin)) + 0.004
         right, left = (low[1] + clear, high[1] - margin) if side > 0 else (low[1] + margin, high[1] - clear)
         for z in np.linspace(low[2], high[2], int(2 + tall // 0.32))[:-1]:
             bottom = z + 0.085

@@ -11,6 +11,7 @@ import numpy as np
 from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.families.clearance import Link, narrow_limits
 from artsim.kinematics import Array
+from artsim.products import apply, matmul
 from artsim.solids import Solid, box, cylinder, hull, hull_of, ring, rotation_about, rounded_box, rounded_rectangle
 
 GAP = 0.0015
@@ -72,7 +73,9 @@ class _Chain:
 
     def _beam(self, start: Array, end: Array, half: float, end_half: float) -> None:
         """Tapering beam of square section with broken edges."""
-        outline = rounded_rectangle((-1, -1), (1, 1), 0.3, 2) @ [np.cross(self.lateral, self.along), self.lateral]
+        outline = matmul(
+            rounded_rectangle((-1, -1), (1, 1), 0.3, 2), [np.cross(self.lateral, self.along), self.lateral]
+        )
         self.link.solid += hull(np.concatenate([start + half * outline, end + end_half * outline]))
         self.link.guard(start, end, 1.2 * max(half, end_half))
 
@@ -108,7 +111,7 @@ class _Chain:
         self.link.rod(center, center + (2 * half - cap) * step, r)
         self.link.solid += cylinder(center + half * step, center + 2 * half * step, 0.75 * r, sections=20)
         self.at = center + half * step
-        self.along = rotation_about(self.lateral, angle) @ self.along
+        self.along = apply(rotation_about(self.lateral, angle), self.along)
 
     def slide(self, depth: float, travel: float) -> None:
         """Telescope: a rod that comes out of a sleeve."""
@@ -298,7 +301,7 @@ def _palm(chain: _Chain) -> float:
     r, d, link = chain.radius, chain.along, chain.link
     half = r * chain.rng.uniform(1.1, 1.5)
     v = np.cross(d, chain.lateral)
-    outline = rounded_rectangle((-half, -0.6 * r), (half, 0.6 * r), 0.25 * r, 2) @ [chain.lateral, v]
+    outline = matmul(rounded_rectangle((-half, -0.6 * r), (half, 0.6 * r), 0.25 * r, 2), [chain.lateral, v])
     low, high = chain.at - 0.1 * r * d, chain.at + 0.8 * r * d
     link.solid += hull(np.concatenate([low + outline, high + outline]))
     chain.at = high

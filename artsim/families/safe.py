@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, revolute
+from artsim.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, ellipsoid, ring, rounded_box, tube, union
@@ -41,7 +42,7 @@ class Shape:
         if not self.inset:
             return np.array([-GAP - self.thick, -self.half, self.low]), np.array([-GAP, self.half, self.high])
         reach = 2.0 * (self.half - self.wall)
-        swing = self.thick**2 / (2.0 * reach) + 2 * GAP  # the inner edge swings past the wall
+        swing = self.thick * self.thick / (2.0 * reach) + 2 * GAP  # the inner edge swings past the wall
         y, z = self.half - self.wall, self.wall + GAP
         return np.array([0.0, swing - y, self.low + z]), np.array([self.thick, y - GAP, self.high - z])
 
@@ -99,7 +100,7 @@ def build(rng: np.random.Generator) -> Assembly:
         else [(low[1] + s * (high[1] - low[1]), 0.5 * (low[2] + high[2])) for s in (0.66, 0.33)]
     )
     (lock_y, lock_z), (grip_y, grip_z) = spots
-    apart = float(np.hypot(lock_y - grip_y, lock_z - grip_z))
+    apart = float(hypot(lock_y - grip_y, lock_z - grip_z))
     if combination:
         radius = min(0.13 * size, 0.055, 0.3 * apart)
         foot_at = (face, sign * lock_y, lock_z)
@@ -164,7 +165,7 @@ def _door(rng: np.random.Generator, s: Shape, combination: bool, opener: str) ->
         solid = rounded_box(low, high, min(0.4 * s.thick, 0.012))
         # The plug that fills the opening; its inner edge swings past the wall.
         plug, inner = rng.uniform(0.01, 0.03), s.half - s.wall
-        swing = plug**2 / (4.0 * inner) + 0.004
+        swing = plug * plug / (4.0 * inner) + 0.004
         solid += box(
             (high[0] - 0.002, swing - inner, low[2] + s.wall + 0.004), (plug, inner - 0.004, high[2] - s.wall - 0.004)
         )
@@ -213,7 +214,7 @@ def _wheel(rng: np.random.Generator, x: float, y: float, z: float, radius: float
     hub = np.array([x - 0.8 * reach, y, z])
     for k in range(spokes):
         a = 2.0 * np.pi * (k + 0.25) / spokes
-        end = hub + radius * np.array([0.0, np.cos(a), np.sin(a)])
+        end = hub + radius * np.array([0.0, cos(a), sin(a)])
         solid += tube(np.stack([hub, end]), 0.006, 10)
         solid += Solid() if rim else ellipsoid(end, 0.011, 12)
     if rim:

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import arcsin, arctan2, cos, hypot, sin
 from artsim.kinematics import Array
+from artsim.products import dot, matmul, norm
 from artsim.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
 
 GAP = 0.0005
@@ -89,7 +91,7 @@ def _blade(rng: np.random.Generator, length: float, width: float) -> tuple[Array
     sag = {"bellied": 0.7, "straight": 0.2, "narrow": 0.0}.get(kind, 0.5)
     x = np.linspace(0.0, 1.0, 9)
     falling = np.clip((x - turn) / (1 - turn), 0, 1)
-    backs = back + (edge - tip - back) * ((1 - sag) * falling + sag * falling**2)
+    backs = back + (edge - tip - back) * ((1 - sag) * falling + sag * np.square(falling))
     backs[0] = 0.8 * back
     if kind == "blunt":
         backs[-1] = edge - 0.3 * width
@@ -106,7 +108,7 @@ def _ring(rng: np.random.Generator, reach: float, bar: float, kind: str, k: int,
     along = reach * (rng.uniform(0.27, 0.35) if long else rng.uniform(0.17, 0.27)) * (1.1 if plastic else 1.0)
     across = min(along, reach * rng.uniform(0.13, 0.2)) if long or rng.random() < 0.5 else along * 0.95
     turn, egg = rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.35)
-    half = np.hypot(along * np.sin(turn), (1 + egg) * across * np.cos(turn)) + 0.6 * bar
+    half = hypot(along * sin(turn), (1 + egg) * across * cos(turn)) + 0.6 * bar
     y = half + GAP + reach * rng.uniform(0.0, 0.05)
     shift = reach * rng.uniform(0.05, 0.12) if kind == "offset" and k == 0 else 0.0
     return Ring(np.array([reach - along - bar - shift, y]), np.array([along, across]), turn, egg)
@@ -115,10 +117,10 @@ def _ring(rng: np.random.Generator, reach: float, bar: float, kind: str, k: int,
 def _loop(ring: Ring, count: int = 22) -> Array:
     """(count, 2) points of the ring's middle line."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    wide = ring.radii[1] * (1 + ring.egg * np.cos(angles))
-    u = np.column_stack([ring.radii[0] * np.cos(angles), wide * np.sin(angles)])
-    c, s = np.cos(ring.turn), np.sin(ring.turn)
-    return ring.center + u @ np.array([[c, s], [-s, c]])
+    wide = ring.radii[1] * (1 + ring.egg * cos(angles))
+    u = np.column_stack([ring.radii[0] * cos(angles), wide * sin(angles)])
+    c, s = cos(ring.turn), sin(ring.turn)
+    return ring.center + matmul(u, [[c, s], [-s, c]])
 
 
 def _handle(
@@ -131,7 +133,7 @@ def _handle(
     sections = _sections(path, bar, height)
     solid = loft(sections, closed=True)
     # The shank meets the ring where it comes nearest to the pivot.
-    k = int(np.argmin(np.linalg.norm(loop, axis=1)))
+    k = int(np.argmin(norm(loop)))
     near, top = path[k], low + sheet
     rear = np.array([(x, side * y) for x in (-0.3, -0.2) for y in (-0.78, 0.2)]) * width
     end = cylinder((near[0], near[1], low), (near[0], near[1], top), 0.5 * bar, sections=16)
@@ -152,8 +154,8 @@ def _clear_opening(handle: Solid, low: float, high: float, width: float) -> floa
     """Angle up to which what is thicker than a blade's layer stays clear of the other blade's back."""
     points = np.concatenate([vertices for vertices, _ in handle.piece_meshes()])
     thick = points[(points[:, 2] < low - 1e-6) | (points[:, 2] > high + 1e-6)]
-    away = np.hypot(thick[:, 0], thick[:, 1])
-    turned = np.abs(np.arctan2(thick[:, 1], thick[:, 0])) + np.arcsin(np.minimum(1.0, 0.9 * width / away))
+    away = hypot(thick[:, 0], thick[:, 1])
+    turned = np.abs(arctan2(thick[:, 1], thick[:, 0])) + arcsin(np.minimum(1.0, 0.9 * width / away))
     return float(np.pi - turned.max() - 0.05)
 
 
@@ -164,10 +166,10 @@ def _sections(path: Array, width: float, height: float) -> list[Array]:
     ahead = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
     sections = []
     for point, along in zip(path, ahead, strict=True):
-        out = np.array([along[1], -along[0], 0.0]) / np.linalg.norm(along)
-        out *= np.sign(out @ (point - center))
-        radial = 0.54 * width * np.cos(angles)
-        sections.append(point + radial[:, None] * out + (0.54 * height * np.sin(angles))[:, None] * (0, 0, 1))
+        out = np.array([along[1], -along[0], 0.0]) / norm(along)
+        out *= np.sign(dot(out, point - center))
+        radial = 0.54 * width * cos(angles)
+        sections.append(point + radial[:, None] * out + (0.54 * height * sin(angles))[:, None] * (0, 0, 1))
     return sections
 
 
@@ -176,5 +178,5 @@ def _finger_rest(ring: Ring, length: float, bar: float, middle: float) -> Solid:
     loop = _loop(ring)
     start = loop[np.argmax(loop[:, 0])]
     share = np.linspace(0.0, 1.0, 6)
-    path = np.column_stack([start[0] + length * share, start[1] + 0.5 * length * share**2, np.full(6, middle)])
+    path = np.column_stack([start[0] + length * share, start[1] + 0.5 * length * np.square(share), np.full(6, middle)])
     return tube(path, list(0.35 * bar * (1 - 0.3 * share)), 8)

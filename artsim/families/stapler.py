@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.assembly import Assembly, revolute
+from artsim.elementary import cos, sin
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_box, rounded_rectangle
 
@@ -100,8 +101,8 @@ def _opening(solid: Solid, lay: Layout) -> float:
     points = np.concatenate([corners + t * (np.roll(corners, 1, axis=1) - corners) for t in (0.0, 0.25, 0.5, 0.75)])
     points = points.reshape(-1, 3)
     angles = np.deg2rad(np.arange(0.0, 171.0, 2.0))
-    heights = lay.hinge + (points[:, 2] - lay.hinge) * np.cos(angles)[:, None] - points[:, 0] * np.sin(angles)[:, None]
-    forward = points[:, 0] * np.cos(angles)[:, None] + (points[:, 2] - lay.hinge) * np.sin(angles)[:, None]
+    heights = lay.hinge + (points[:, 2] - lay.hinge) * cos(angles)[:, None] - points[:, 0] * sin(angles)[:, None]
+    forward = points[:, 0] * cos(angles)[:, None] + (points[:, 2] - lay.hinge) * sin(angles)[:, None]
     low = ((heights < lay.base + 2 * GAP) & (forward < lay.back + 2 * GAP)).any(axis=1)
     low[angles < 0.5] = False  # near rest only the front is low, and it rises
     return float(angles[np.argmax(low) - 1]) if low.any() else float(angles[-1])

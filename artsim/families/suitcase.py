@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.elementary import cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, frame, hull, loft, rounded_box, rounded_rectangle, tube, union
@@ -200,9 +201,9 @@ def _bail(
     """Handle that turns about the Y axis through ``center`` between two pairs of lugs; the lugs end ``drop`` away."""
     x, _, z = center
     angles = np.linspace(0.0, np.pi, 15)
-    cosine = np.cos(angles)
+    cosine = cos(angles)
     path: Array = np.column_stack([
-        np.full(15, x), half * np.sign(cosine) * np.abs(cosine) ** 0.6, z + height * np.sin(angles) ** 0.7
+        np.full(15, x), half * np.sign(cosine) * power(np.abs(cosine), 0.6), z + height * power(sin(angles), 0.7)
     ])  # fmt: skip
     handle, lugs = tube(path, wire, 10), Solid()
     barrel = wire + 0.001
@@ -227,7 +228,7 @@ def _bag(rng: np.random.Generator) -> Assembly:
         z = 2 * x * rng.uniform(0.9, 1.15)
         angles = np.linspace(0.0, 2 * np.pi, 25)[:-1]
         rings = [
-            np.column_stack([k * x * np.cos(angles), np.full(24, w), z / 2 + k * z / 2 * np.sin(angles)])
+            np.column_stack([k * x * cos(angles), np.full(24, w), z / 2 + k * z / 2 * sin(angles)])
             for k, w in ((0.86, -y), (1.0, -0.92 * y), (1.0, 0.92 * y), (0.86, y))
         ]
         body = loft(rings)

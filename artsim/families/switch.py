@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.assembly import Assembly, JointSpec, revolute
+from artsim.elementary import sin, tan
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
 
@@ -109,17 +110,17 @@ def _rocker(rng: np.random.Generator, cell: Array, depth: float, tilt: float) ->
     half_y = 0.5 * (high[0] - low[0]) - GAP
     thick = min(0.3 * depth, 0.004)
     proud = rng.uniform(0.0005, 0.0025)
-    half_z = 0.5 * (high[1] - low[1]) - GAP - (thick + proud) * np.sin(2 * tilt) - 0.0003
+    half_z = 0.5 * (high[1] - low[1]) - GAP - (thick + proud) * sin(2 * tilt) - 0.0003
     ridge = rounded_box((x - thick, -half_y, -0.001), (x + 0.3 * thick, half_y, 0.001), 0.0008)
     solid = Solid()
     for side in (-1.0, 1.0):
         # Bent outward by the tilt: either half stands flush when the switch is tipped its way.
         end = rounded_box((x - thick - proud, -half_y, -0.0015), (x + 0.2 * thick, half_y, 0.0015), 0.001)
-        solid += hull_of(ridge, end.moved((-0.5 * half_z * np.tan(tilt), 0, side * (half_z - 0.0015))))
+        solid += hull_of(ridge, end.moved((-0.5 * half_z * tan(tilt), 0, side * (half_z - 0.0015))))
     if rng.random() < 0.5:
         mark = 0.12 * half_z
         z, w = 0.7 * half_z, 0.1 * half_y
-        front = x - thick - proud - 0.45 * half_z * np.tan(tilt)
+        front = x - thick - proud - 0.45 * half_z * tan(tilt)
         solid += box((front - 0.0006, -w, z - mark), (x, w, z))
     return solid.moved((0, *center)).turned((0, 1, 0), -tilt, (x, *center))
 

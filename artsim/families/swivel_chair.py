@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.elementary import cos, sin
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, frame, hull_of, ring, rounded_box, tube
 
@@ -98,7 +99,7 @@ def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, 
     gap, broad = 0.004, 0.012
     for k in range(legs):
         angle = 2.0 * np.pi * (k + 0.5) / legs
-        x, y = span * np.cos(angle), span * np.sin(angle)
+        x, y = span * cos(angle), span * sin(angle)
         fork = cylinder((0, 0, floor - 0.018), (0, 0, floor + 0.004 - GAP), 0.011, sections=14)
         fork += hull_of(
             box((-0.009, -gap, floor - 0.02), (0.009, gap, floor - 0.01)),
@@ -126,8 +127,8 @@ def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, 
             fork += wheels
         chair.add(name, fork.turned(UP, angle).moved(pose), continuous("base", UP, pose), density=1200.0)
         if rolling:
-            axis = np.array([-np.sin(angle), np.cos(angle), 0.0])
-            center = np.array([trail * np.cos(angle), trail * np.sin(angle), wheel]) + pose
+            axis = np.array([-sin(angle), cos(angle), 0.0])
+            center = np.array([trail * cos(angle), trail * sin(angle), wheel]) + pose
             chair.add(
                 f"wheel_{k}", wheels.turned(UP, angle).moved(pose), continuous(name, axis, center), density=1200.0
             )

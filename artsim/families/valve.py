@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, revolute, screw
+from artsim.elementary import cos, sin
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
 
@@ -120,7 +121,7 @@ def _wheel(rng: np.random.Generator, hub: float, radius: float, stem: float, pip
     flat = rng.random() < 0.5
     for k in range(spokes):
         angle = 2.0 * np.pi * k / spokes
-        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        out = np.array([cos(angle), sin(angle), 0.0])
         root, tip = out * stem + (0, 0, hub + 0.5 * tall), out * (radius - rim) + (0, 0, level)
         if flat:
             across = np.cross(UP, out)

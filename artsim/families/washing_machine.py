@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.assembly import Assembly, continuous, prismatic, revolute
+from artsim.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.kinematics import Array
 from artsim.solids import Solid, box, cylinder, frame, hull, ring, rounded_box, tray, union, vessel
@@ -117,7 +118,7 @@ def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: flo
     solid += ring((front + 0.004, 0, z), (1, 0, 0), hole + 0.012, radius - 0.004, 0.008, 16)
     for k in range(3):
         a = 2.0 * np.pi * k / 3 + 0.4
-        out, across = np.array([0.0, np.cos(a), np.sin(a)]), np.array([0.0, -np.sin(a), np.cos(a)])
+        out, across = np.array([0.0, cos(a), sin(a)]), np.array([0.0, -sin(a), cos(a)])
         feet = [
             np.array([x, 0, z]) + (radius - 0.005) * out + v * across
             for x in (front + 0.03, back)

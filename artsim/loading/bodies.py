@@ -14,6 +14,7 @@ from artsim.errors import AssetError
 from artsim.kinematics import Array
 from artsim.loading.robot import Robot, RobotJoint
 from artsim.objects import Part, Repair
+from artsim.products import apply, dot, matmul, unit
 
 
 @dataclass(eq=False)
@@ -57,7 +58,7 @@ def merge_fixed_links(robot: Robot, file: Path, repairs: list[Repair]) -> list[R
         if body.links[0] == link and body is not bodies[0]:
             bodies.append(body)
         for joint in children[link]:
-            T = body.T_base_link[link] @ joint.origin
+            T = matmul(body.T_base_link[link], joint.origin)
             if joint.type == "fixed" or _places_root(joint, link, root, children, solid, repairs):
                 body.links.append(joint.child)
                 body.T_base_link[joint.child] = T
@@ -146,7 +147,7 @@ def join_screws(bodies: list[RigidBody], known: Collection[str], repairs: list[R
         if set(by_type) != {"prismatic", "continuous"} or body.joint is None:
             continue
         turn, slide = by_type["continuous"], by_type["prismatic"]
-        along = float(axis_in_base(slide) @ axis_in_base(turn))
+        along = float(dot(axis_in_base(slide), axis_in_base(turn)))
         rate = _slide_rate(turn, slide)
         if abs(abs(along) - 1.0) > 1e-6 or rate == 0.0:
             continue
@@ -186,8 +187,7 @@ def in_order(bodies: list[RigidBody], order: Sequence[str], repairs: list[Repair
 def axis_in_base(body: RigidBody) -> Array:
     """Unit axis of a body's joint in the base link's frame."""
     assert body.joint is not None
-    direction: Array = body.T_base_joint[:3, :3] @ body.joint.axis
-    return direction / np.linalg.norm(direction)
+    return unit(apply(body.T_base_joint[:3, :3], body.joint.axis))
 
 
 def _slide_rate(turn: RigidBody, slide: RigidBody) -> float:

@@ -26,6 +26,7 @@ from artsim.kinematics import Array
 from artsim.loading.robot import MimicRelation, RobotJoint
 from artsim.loading.xml_values import Element
 from artsim.objects import Repair
+from artsim.products import norm, unit
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 KNOWN_TYPES = (*MOVING_TYPES, "fixed", "floating")
@@ -123,12 +124,11 @@ def _read_axis(joint: etree._Element, kind: str, element: Element) -> Array | No
     if largest < 1e-9:
         element.say("has a zero axis, along which nothing moves: read as fixed")
         return None
-    length = largest * float(np.linalg.norm(direction / largest))  # of huge numbers, too
+    length = largest * float(norm(direction / largest))  # of huge numbers, too
     if abs(length - 1.0) > 1e-6:
         travel = ", travel stays in metres as URDF and MuJoCo have it" if kind == "prismatic" else ""
         element.say(f"axis of length {length:.6g} normalised{travel}")
-    unit: Array = direction / largest
-    return unit / np.linalg.norm(unit)
+    return unit(direction / largest)
 
 
 def _read_limits(joint: etree._Element, kind: str, element: Element) -> tuple[str, float, float]:

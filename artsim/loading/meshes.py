@@ -20,6 +20,7 @@ from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, transform_points
 from artsim.loading.packages import AssetPaths, MissingFileError
+from artsim.loading.primitives import capsule, cylinder, sphere
 from artsim.loading.robot import Geometry, MeshFile
 from artsim.loading.urdf_xml import safe_xml
 
@@ -77,11 +78,11 @@ class MeshReader:
         if geometry.box is not None:
             mesh = trimesh.creation.box(extents=geometry.box.size)
         elif geometry.cylinder is not None:
-            mesh = trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length, sections=64)
+            return cylinder(geometry.cylinder.radius, geometry.cylinder.length)
         elif geometry.capsule is not None:
-            mesh = trimesh.creation.capsule(geometry.capsule.length, geometry.capsule.radius)
+            return capsule(geometry.capsule.radius, geometry.capsule.length)
         elif geometry.sphere is not None:
-            mesh = trimesh.creation.icosphere(subdivisions=4, radius=geometry.sphere.radius)
+            return sphere(geometry.sphere.radius)
         else:
             assert geometry.mesh is not None
             return self._file(geometry.mesh)
@@ -162,7 +163,21 @@ def triangles(data: bytes, kind: str, where: Path) -> tuple[Array, NDArray[np.in
     usable = np.all((faces >= 0) & (faces < len(vertices)), axis=1)
     finite = np.all(np.isfinite(vertices), axis=1)
     usable &= finite[faces.clip(0, max(0, len(vertices) - 1))].all(axis=1)
-    return np.where(finite[:, None], vertices, 0.0), faces[usable].astype(np.int32), int((~usable).sum())
+    return *in_order_of_use(vertices, faces[usable]), int((~usable).sum())
+
+
+def in_order_of_use(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32]]:
+    """The same triangles, their vertices in the order in which the faces name them, without those that none names.
+
+    trimesh numbers vertices by an unstable sort, whose order of equals depends on the processor.
+    """
+    named = faces.ravel()
+    first = np.full(len(vertices), len(named))
+    np.minimum.at(first, named, np.arange(len(named)))
+    order = np.argsort(first, kind="stable")[: np.count_nonzero(first < len(named))]
+    number = np.empty(len(vertices), dtype=np.int32)
+    number[order] = np.arange(len(order), dtype=np.int32)
+    return vertices[order], number[faces]
 
 
 def merged(shapes: list[tuple[Array, NDArray[np.int32], Array]]) -> tuple[Array, NDArray[np.int32]]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from artsim.kinematics import Array, KinematicTree, transform_points
 from artsim.objects import Part, Repair
+from artsim.products import norm
 
 _STATES = 61  # of a joint's range that are looked at before refining
 _HINGED_SHUT = np.deg2rad(15.0)  # a lid's limit may lie this far beyond the state in which it is shut
@@ -135,7 +136,7 @@ def _covering_flap(shape: _Shape, k: int) -> float | None:
     def cost(state: float) -> float:
         flap = shape.posed(k, state)[k]
         low, high = flap.min(axis=0), flap.max(axis=0)
-        return float(high[2] - low[2] + np.linalg.norm(0.5 * (low + high)[:2] - body[:2]))
+        return float(high[2] - low[2] + norm(0.5 * (low + high)[:2] - body[:2]))
 
     states = shape.states(k)
     best = states[np.argmin([cost(state) for state in states])]

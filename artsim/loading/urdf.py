@@ -32,6 +32,7 @@ from artsim.loading.robot import Link, Robot, RobotJoint
 from artsim.loading.urdf_xml import parse_robot
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
+from artsim.products import matmul, unit
 
 _THIN = 1e-6
 """Share of its length by which a surface is a line: squares of less are lost in double precision."""
@@ -193,7 +194,7 @@ def _surfaces(
             if isinstance(problem.__cause__, MissingFileError):
                 fix = fix or problem.__cause__.fix
             continue
-        surfaces.append((vertices, faces, T_base_link @ shape.origin))
+        surfaces.append((vertices, faces, matmul(T_base_link, shape.origin)))
     if problems and not surfaces:
         count = len(problems)
         raise AssetError(
@@ -281,9 +282,7 @@ def _to_rest_frame(tree: KinematicTree, parts: list[Part], rest: Array) -> tuple
     center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
     joints = [
         replace(joint, axis=_triple(a), origin=_triple(o - center), rest=float(r))
-        for joint, a, o, r in zip(
-            tree.joints, axes / np.linalg.norm(axes, axis=1, keepdims=True), origins, rest, strict=True
-        )
+        for joint, a, o, r in zip(tree.joints, unit(axes), origins, rest, strict=True)
     ]
     joints[0] = replace(joints[0], origin=(0.0, 0.0, 0.0))
     T_base_rest = np.eye(4)

@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
+from artsim.elementary import cos, sin
 from artsim.errors import AssetError
-from artsim.kinematics import Array
+from artsim.kinematics import Array, cross_matrix
 from artsim.objects import Repair
+from artsim.products import matmul, norm, unit
 
 # What C's strtod reads in decimal; Python's float would also take 1_0 and other scripts' digits.
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan)", re.IGNORECASE | re.ASCII)
@@ -123,7 +125,8 @@ class Element:
             turn[:3, :3] = self._quaternion(quaternion)
         if xyz is not None:
             place[:3, 3] = self._three(xyz, "xyz")
-        return place @ turn
+        place[:3, :3] = turn[:3, :3]
+        return place
 
     def _three(self, text: str, attribute: str) -> Array:
         what = f"{attribute}={text[:60]!r} of <origin>"
@@ -133,22 +136,21 @@ class Element:
         return values
 
     def _quaternion(self, text: str) -> Array:
-        from scipy.spatial.transform import Rotation
-
         what = f"quat_xyzw={text[:60]!r} of <origin>"
         values = self.parsed(text, what, (4,))
-        length = float(np.linalg.norm(values))
+        length = float(norm(values))
         if not (np.isfinite(length) and length > 1e-9):
             raise self.error(f"{what} is no rotation", 'write quat_xyzw="0 0 0 1" or an rpy')
         if abs(length - 1.0) > 1e-3:
             self.say(f"{what} has length {length:.4g}: normalised")
-        matrix: Array = Rotation.from_quat(values).as_matrix()
-        return matrix
+        x, y, z, w = unit(values).tolist()
+        cross = cross_matrix((x, y, z))
+        return np.eye(3) + 2.0 * (w * cross + matmul(cross, cross))
 
 
 def rotation_of(rpy: Array) -> Array:
     """(3, 3) rotation: roll about x, then pitch about y, then yaw about z, all of the fixed frame."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy).tolist(), np.cos(rpy).tolist()
+    (sr, sp, sy), (cr, cp, cy) = sin(rpy).tolist(), cos(rpy).tolist()
     return np.array(
         [
             [cp * cy, sp * sr * cy - cr * sy, sp * cr * cy + sr * sy],

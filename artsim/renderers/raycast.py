@@ -19,8 +19,10 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.camera import Camera
-from artsim.kinematics import Array, transform_points
+from artsim.elementary import cos, tan
+from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
+from artsim.products import apply, matmul, unit
 from artsim.renderers.base import BACKGROUND, Frame
 
 _MISS = np.float32(1e30)
@@ -70,13 +72,13 @@ def bounding_corners(points: Array) -> Array:
     """
     from scipy.spatial import HalfspaceIntersection, QhullError
 
-    reach = points @ _NORMALS.T
+    reach = matmul(points, _NORMALS.T)
     low, high = reach.min(axis=0), reach.max(axis=0)
     slack = 1e-5 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
     faces = np.concatenate([np.column_stack([_NORMALS, -high - slack]), np.column_stack([-_NORMALS, low - slack])])
     with contextlib.suppress(QhullError):
         corners = HalfspaceIntersection(faces, points.mean(axis=0)).intersections
-        around = corners @ _NORMALS.T
+        around = matmul(corners, _NORMALS.T)
         if np.isfinite(around).all() and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
             return corners
     box = np.stack([points.min(axis=0), points.max(axis=0)])
@@ -84,7 +86,7 @@ def bounding_corners(points: Array) -> Array:
 
 
 _NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)])
-_NORMALS = _NORMALS / np.linalg.norm(_NORMALS, axis=1, keepdims=True)
+_NORMALS = unit(_NORMALS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,16 +120,15 @@ class PosedObject:
     def origins(self) -> NDArray[np.float32]:
         """(K, 3) position of the camera in each part's rest frame, native units."""
         rotation, translation = self.T_camera_part[:, :3, :3], self.T_camera_part[:, :3, 3]
-        return (-np.einsum("ki,kij->kj", translation, rotation) / self.obj.scale).astype(np.float32)
+        return (apply(np.swapaxes(rotation, 1, 2), translation) / -self.obj.scale).astype(np.float32)
 
     def image_plane(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.float32]:
-        """(N, 3) directions of the rays through pixel centres, camera frame, z = 1."""
+        """(2, N) x and y of the directions of the rays through pixel centres, camera frame, where z = 1."""
         K = self.camera.K.astype(np.float32)
-        directions = np.ones((len(row), 3), dtype=np.float32)
-        y = (row.astype(np.float32) + (np.float32(0.5) - K[1, 2])) / K[1, 1]
-        directions[:, 1] = y
-        directions[:, 0] = (column.astype(np.float32) + (np.float32(0.5) - K[0, 2]) - K[0, 1] * y) / K[0, 0]
-        return directions
+        plane = np.empty((2, len(row)), dtype=np.float32)
+        plane[1] = (row.astype(np.float32) + (np.float32(0.5) - K[1, 2])) / K[1, 1]
+        plane[0] = (column.astype(np.float32) + (np.float32(0.5) - K[0, 2]) - K[0, 1] * plane[1]) / K[0, 0]
+        return plane
 
     def candidates(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(H,) first and end column, in each row, of the pixels that the whole object can cover."""
@@ -154,16 +155,18 @@ def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: A
     T_world_object : (4, 4) float, optional
         Pose of the rest frame in the world; identity by default.
     """
-    T_world_rest = np.eye(4) if T_world_object is None else np.asarray(T_world_object, dtype=np.float64)
-    T_camera_part = camera.T_camera_world @ T_world_rest @ obj.tree.forward_kinematics(q)
+    T_camera_rest = camera.T_camera_world
+    if T_world_object is not None:
+        T_camera_rest = matmul(T_camera_rest, np.asarray(T_world_object, dtype=np.float64))
+    T_camera_part = matmul(T_camera_rest, obj.tree.forward_kinematics(q))
     return PosedObject(obj, camera, T_camera_part, *_spans(obj, camera, T_camera_part))
 
 
 _TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right
-_TANGENTS = np.tan(_TILTS)
+_TANGENTS = tan(_TILTS)[:, None]
 _SLOPES = np.stack([_TANGENTS, -_TANGENTS]).astype(np.float32)  # for the left side, and for the negated right side
 _MARGIN = 0.05  # pixels: covers single precision
-_MARGINS = _MARGIN / np.cos(_TILTS)
+_MARGINS = _MARGIN / cos(_TILTS)
 
 
 def _spans(
@@ -174,20 +177,19 @@ def _spans(
     A convex body in front of the camera has a convex image: it lies between its highest and lowest corners, and
     between the lines of any slope that touch it.
     """
-    seen = transform_points(T_camera_part, _corners(obj) * obj.scale)
-    depth = seen[..., 2]
-    image = camera.project(np.where(depth[..., None] > 0, seen, [0.0, 0.0, 1.0])).clip(-1e6, 1e6)
-    u, v = image[..., 0], image[..., 1]
+    seen = matmul(T_camera_part[:, :3, :3], _corners(obj) * obj.scale) + T_camera_part[:, :3, 3, None]
+    depth = seen[:, 2]
+    u, v, _ = np.swapaxes(matmul(camera.K, seen) / np.where(depth > 0, depth, np.inf)[:, None], 0, 1).clip(-1e6, 1e6)
     heights = np.stack([v.min(axis=1) - _MARGIN, v.max(axis=1) + 1.0 + _MARGIN], axis=1)
     row_ranges = np.clip(np.ceil(heights - 0.5), 0, camera.height).astype(np.int64)
     # u + tan * v of the corners: the line through the outermost bounds the outline. Spans count from pixel centres.
-    across = u[..., None] + v[..., None] * _TANGENTS
-    bounds = np.stack([across.min(axis=1) - _MARGINS, -across.max(axis=1) - _MARGINS], axis=1)
+    across = u[:, None] + v[:, None] * _TANGENTS
+    bounds = np.stack([across.min(axis=2) - _MARGINS, -across.max(axis=2) - _MARGINS], axis=1)
     bounds -= [[0.5], [-0.5]]
     first_row, end_row = row_ranges[:, 0].min(), row_ranges[:, 1].max()
     rows = np.arange(first_row, end_row, dtype=np.float32) + np.float32(0.5)
     spans = np.full((len(obj), 2, camera.height), np.inf, dtype=np.float32)
-    lines = bounds.astype(np.float32)[..., None] - _SLOPES[..., None] * rows
+    lines = bounds.astype(np.float32)[..., None] - _SLOPES * rows
     spans[:, :, first_row:end_row] = lines.max(axis=2)
     spans[:, 1] *= -1.0
     for k in range(len(obj)):
@@ -200,13 +202,13 @@ def _spans(
 
 
 def _corners(obj: ArticulatedObject) -> Array:
-    """(K, C, 3) corners around each part, native units; the last is repeated where a part has fewer."""
+    """(K, 3, C) corners around each part, native units; the last is repeated where a part has fewer."""
     root, others = obj.parts[0], obj.parts[1:]
     known = _corners_of.get(root)
     if known is None or known[0] != others:  # other objects may have the same root
         own = [surface(p).corners if len(p.faces) else np.zeros((1, 3)) for p in obj.parts]
         most = max(map(len, own))
-        padded = np.stack([np.pad(c, ((0, most - len(c)), (0, 0)), "edge") for c in own])
+        padded = np.stack([np.pad(c, ((0, most - len(c)), (0, 0)), "edge").T for c in own])
         known = _corners_of[root] = (others, padded)
     return known[1]
 
@@ -237,13 +239,13 @@ def cast(
         Rays that hit each part, hidden or not.
     """
     nearest = _Nearest(len(row), len(posed.obj))
-    directions = posed.image_plane(row, column)
+    plane = posed.image_plane(row, column)
     for k, (start, end) in enumerate(np.searchsorted(row, posed.row_ranges).tolist()):
         low, high = posed.spans[k]
         near_row, near_column = row[start:end], column[start:end]
         rays = ((near_column >= low[near_row]) & (near_column <= high[near_row])).nonzero()[0] + start
         if len(rays):
-            nearest.update(k, rays, _cast_part(posed, k, directions[rays]))
+            nearest.update(k, rays, _cast_part(posed, k, plane.take(rays, axis=1)))
     return (*nearest.result(posed.obj.scale), nearest.amodal)
 
 
@@ -269,13 +271,20 @@ class _Nearest:
         return self.distance * np.float32(scale), self.part_ids
 
 
-def _cast_part(posed: PosedObject, k: int, directions: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Native z-depth at which rays from the camera meet part k, ``_MISS`` or more where they do not."""
+def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Native z-depth at which rays from the camera meet part k, ``_MISS`` or more where they do not.
+
+    ``plane`` is (2, N), what :meth:`PosedObject.image_plane` gives.
+    """
+    # Row by row of the rotation, not by BLAS: see `artsim.products`.
+    x, y, z = posed.rotations[k][..., None]
+    directions = plane[0] * x
+    directions += plane[1] * y
+    directions += z
     # All rays start at the camera: one origin, seen N times through a stride of 0.
-    origins: NDArray[np.float32] = np.ndarray(directions.shape, np.float32, posed.origins[k].copy(), strides=(0, 4))
-    distance: NDArray[np.float32] = surface(posed.obj.parts[k]).scene.run(
-        origins, directions @ posed.rotations[k], query="DISTANCE"
-    )
+    shape = (plane.shape[1], 3)
+    origins: NDArray[np.float32] = np.ndarray(shape, np.float32, posed.origins[k].copy(), strides=(0, 4))
+    distance: NDArray[np.float32] = surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="DISTANCE")
     return distance
 
 

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.camera import Camera
+from artsim.elementary import cos, sin
 from artsim.errors import ConfigError
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
+from artsim.products import apply, matmul, norm
 from artsim.sampling import StateOptions, ViewOptions, half_width, posed_bounds, states_at
 
 
@@ -79,7 +81,9 @@ class Views:
         for row, state in zip(q, rows, strict=True):
             row[: len(state)] = state
         T_camera_world = np.stack([camera.T_camera_world for camera in cameras])
-        T_camera_object = T_camera_world if T_world_object is None else T_camera_world @ np.asarray(T_world_object)
+        T_camera_object = (
+            T_camera_world if T_world_object is None else matmul(T_camera_world, np.asarray(T_world_object))
+        )
         return Views(objects, q, T_camera_object, np.stack([camera.K for camera in cameras]), *sizes.pop())
 
 
@@ -120,10 +124,10 @@ def draw_views(
         q[chosen, : len(obj)] = state
         low[chosen], high[chosen] = posed_bounds(obj, state)
     azimuth, elevation = cameras.draw_directions(rng, count)
-    distance = 0.5 * np.linalg.norm(high - low, axis=1) / half_width(cameras, rng.uniform(*cameras.fill, count))
+    distance = 0.5 * norm(high - low) / half_width(cameras, rng.uniform(*cameras.fill, count))
     T_camera_object = np.zeros((count, 4, 4))
     T_camera_object[:, :3, :3] = rotation = _facing(azimuth, elevation)
-    T_camera_object[:, :3, 3] = -(rotation @ (0.5 * (low + high))[..., None])[..., 0]
+    T_camera_object[:, :3, 3] = -apply(rotation, 0.5 * (low + high))
     T_camera_object[:, 2, 3] += distance
     T_camera_object[:, 3, 3] = 1.0
     K = Camera.look_at((1, 0, 0), (0, 0, 0), cameras.width, cameras.height, np.deg2rad(cameras.fov)).K
@@ -132,7 +136,7 @@ def draw_views(
 
 def _facing(azimuth: Array, elevation: Array) -> Array:
     """(B, 3, 3) rotations from the world to cameras that look at it from directions as ``ViewOptions`` has them."""
-    sin_a, cos_a, sin_e, cos_e = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
+    sin_a, cos_a, sin_e, cos_e = sin(azimuth), cos(azimuth), sin(elevation), cos(elevation)
     right = np.stack([sin_a, -cos_a, np.zeros_like(azimuth)], axis=1)
     down = np.stack([-cos_a * sin_e, -sin_a * sin_e, -cos_e], axis=1)
     forward = np.stack([cos_a * cos_e, sin_a * cos_e, -sin_e], axis=1)

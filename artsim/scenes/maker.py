@@ -14,12 +14,14 @@ from artsim.appearance import Coat, Colour, Lights, Sun
 from artsim.appearance.finishes import draw_coats, repainted
 from artsim.appearance.painted import painted_coats
 from artsim.camera import Camera
+from artsim.elementary import cos, sin, tan
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
-from artsim.kinematics import Array
+from artsim.kinematics import Array, transform_points
 from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
+from artsim.products import norm
 from artsim.sampling import StateOptions, sample_state
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
@@ -198,7 +200,7 @@ def _area(solids: list[_Placeable], on_table: bool, attempt: int) -> Area:
     sizes = np.array([np.sort(obj.bounds[1] - obj.bounds[0])[1:] for obj, _, _ in solids])
     crowd = _CROWD if on_table else 2.0 * _CROWD  # so that what is small need not stand behind furniture
     total = crowd * (1.0 + 0.3 * attempt) * float((sizes + 0.06).prod(axis=1).sum())
-    longest = float(np.linalg.norm(sizes, axis=1).max()) + 0.1
+    longest = float(norm(sizes).max()) + 0.1
     width = max(np.sqrt(1.6 * total), longest)
     depth = max(total / width, 0.8 * longest)
     if on_table:
@@ -237,9 +239,9 @@ def draw_lights(supports: Sequence[Thing], rng: np.random.Generator) -> Lights:
     away = -np.sign(max(sides, key=abs, default=1.0))  # the side without a wall
     azimuth, elevation = np.deg2rad(rng.uniform(42.0, 78.0)), np.deg2rad(rng.uniform(36.0, 56.0))
     direction = (
-        float(np.cos(azimuth) * np.cos(elevation)),
-        float(-away * np.sin(azimuth) * np.cos(elevation)),
-        float(-np.sin(elevation)),
+        float(cos(azimuth) * cos(elevation)),
+        float(-away * sin(azimuth) * cos(elevation)),
+        float(-sin(elevation)),
     )
     warm = rng.uniform(-0.06, 0.1)
     sun = Sun(direction, _tinted(rng.uniform(0.8, 1.1), warm), float(np.deg2rad(rng.uniform(2.0, 6.0))))
@@ -262,14 +264,14 @@ def scene_camera(scene: Scene, options: SceneCameraOptions, seed: int, view: int
     """
     rng = np.random.default_rng([seed, 3, view])
     azimuth, elevation = (np.deg2rad(rng.uniform(*bounds)) for bounds in (options.azimuth, options.elevation))
-    focal = 0.5 * options.height / np.tan(0.5 * np.deg2rad(rng.uniform(*options.fov)))
+    focal = 0.5 * options.height / tan(0.5 * np.deg2rad(rng.uniform(*options.fov)))
     size = np.array([options.width, options.height])
     center = size * (0.5 + options.off_center * rng.uniform(-1.0, 1.0, 2))
     K = np.array([[focal / rng.uniform(*options.aspect), 0.0, center[0]], [0.0, focal, center[1]], [0.0, 0.0, 1.0]])
     fill = rng.uniform(*options.fill)
     points = np.concatenate([thing.vertices for thing in scene.instances])
     target = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    away = np.array([-np.cos(azimuth) * np.cos(elevation), -np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    away = np.array([-cos(azimuth) * cos(elevation), -sin(azimuth) * cos(elevation), sin(elevation)])
 
     def seen_from(distance: float) -> Camera:
         look = Camera.look_at(target + distance * away, target)
@@ -279,7 +281,7 @@ def scene_camera(scene: Scene, options: SceneCameraOptions, seed: int, view: int
     for _ in range(40):  # the least distance from which everything lies within its share of the image
         middle = 0.5 * (near + far)
         camera = seen_from(middle)
-        p = points @ camera.T_camera_world[:3, :3].T + camera.T_camera_world[:3, 3]
+        p = transform_points(camera.T_camera_world, points)
         inside = (p[:, 2] > 0.05).all() and (np.abs(camera.project(p) - 0.5 * size) <= 0.5 * fill * size).all()
         near, far = (near, middle) if inside else (middle, far)
     return seen_from(far)

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from artsim.appearance import Coat
+from artsim.elementary import arccos, arctan2, cos
 from artsim.extras import needs
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject, Part
+from artsim.products import apply, dot, matmul, unit
 from artsim.scenes.scene import Thing, used_vertices
 from artsim.solids import rotation_about
 
@@ -26,7 +28,7 @@ _TRIES = 200
 _CHOICE = 12  # places that are compared for each thing
 _TALL = 0.15  # metres: what is higher stands rather at the back, what is lower at the front
 _HIDDEN = 0.4  # of its width and height: what covers more of a thing hides it
-_UPRIGHT = np.cos(np.deg2rad(30.0))  # what leans less is turned like what stands upright
+_UPRIGHT = cos(np.deg2rad(30.0))  # what leans less is turned like what stands upright
 
 
 @dataclass(frozen=True)
@@ -90,11 +92,11 @@ class Arrangement:
         if upright[2, 2] < _UPRIGHT:
             turn = (-np.pi, np.pi)
         at_origin = Thing(obj, q, np.eye(4), coats).vertices
-        tall = float(np.ptp(at_origin @ upright[2]))
+        tall = float(np.ptp(dot(at_origin, upright[2])))
         best, least, found = None, np.inf, 0
         for _ in range(_TRIES):
-            rotation = rotation_about((0, 0, 1), rng.uniform(*turn)) @ upright
-            posed = at_origin @ rotation.T
+            rotation = matmul(rotation_about((0, 0, 1), rng.uniform(*turn)), upright)
+            posed = apply(rotation, at_origin)
             low, high = posed.min(axis=0), posed.max(axis=0)
             room_low, room_high = np.asarray(self.area.low) - low[:2], np.asarray(self.area.high) - high[:2]
             if (room_low > room_high).any():
@@ -151,13 +153,13 @@ def resting_rotation(obj: ArticulatedObject) -> Array:
         return np.eye(3)
     corners, middle = posed[hull.vertices], _center_of_mass(obj)
     normals = np.concatenate([[(0.0, 0.0, -1.0)], np.unique(np.round(hull.equations[:, :3], 4), axis=0)])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    reach = (corners @ normals.T).max(axis=0)
-    height = reach - normals @ middle  # of the centre of mass above the ground, each normal pointing down
+    normals = unit(normals)
+    reach = matmul(corners, normals.T).max(axis=0)
+    height = reach - dot(normals, middle)  # of the centre of mass above the ground, each normal pointing down
     level = _LEVEL * float(np.ptp(posed, axis=0).max())
     leaning = normals[:, 2] > -_UPRIGHT
     for n in (0, *np.lexsort((height, leaning))):
-        touching = corners[corners @ normals[n] > reach[n] - max(level, _YIELD * height[n])]
+        touching = corners[dot(corners, normals[n]) > reach[n] - max(level, _YIELD * height[n])]
         if _steadiness(touching, normals[n], middle, float(height[n])) > _STEADY:
             return np.eye(3) if n == 0 else _turned_down(normals[n])
     return np.eye(3)
@@ -169,19 +171,19 @@ def _steadiness(touching: Array, down: Array, middle: Array, height: float) -> f
 
     plane = _turned_down(down)[:2]
     try:
-        base = ConvexHull((touching - middle) @ plane.T)
+        base = ConvexHull(matmul(touching - middle, plane.T))
     except (QhullError, ValueError):  # an edge or a corner
         return 0.0
-    return float(np.arctan2((-base.equations[:, 2]).min(), height))
+    return arctan2(float((-base.equations[:, 2]).min()), height)
 
 
 def _turned_down(normal: Array) -> Array:
     """(3, 3) rotation by the least angle that makes a unit vector point down."""
     down = np.array([0.0, 0.0, -1.0])
-    axis, cosine = np.cross(normal, down), float(np.clip(normal @ down, -1.0, 1.0))
-    if axis @ axis < 1e-16:
+    axis, cosine = np.cross(normal, down), float(np.clip(dot(normal, down), -1.0, 1.0))
+    if dot(axis, axis) < 1e-16:
         return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
-    return rotation_about(axis, float(np.arccos(cosine)))
+    return rotation_about(axis, arccos(cosine))
 
 
 def _center_of_mass(obj: ArticulatedObject) -> Array:
@@ -207,7 +209,7 @@ def _hull_volume(part: Part) -> tuple[float, Array]:
     except QhullError:
         return 1e-12, inside
     tetrahedra = points[hull.simplices] - inside
-    volumes = np.abs(np.linalg.det(tetrahedra)) / 6.0
+    volumes = np.abs(dot(tetrahedra[:, 0], np.cross(tetrahedra[:, 1], tetrahedra[:, 2]))) / 6.0
     return float(volumes.sum()), inside + (volumes[:, None] * tetrahedra.sum(axis=1) / 4.0).sum(axis=0) / volumes.sum()
 
 

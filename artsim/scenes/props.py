@@ -8,8 +8,10 @@ import numpy as np
 
 from artsim.appearance import Coat, Material, plain_coat
 from artsim.appearance.finishes import draw_material, piece_of_face
+from artsim.elementary import cos, sin
 from artsim.kinematics import Array
 from artsim.objects import ArticulatedObject
+from artsim.products import matmul
 from artsim.scenes.scene import Thing, rigid
 from artsim.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
 
@@ -35,7 +37,7 @@ def placed(name: str, solid: Solid, materials: Material | Sequence[Material], T_
     obj, center, coats = _rigid(name, solid, materials)
     T = np.eye(4)
     T[:3, 3] = center
-    return Thing(obj, np.zeros(1), T if T_world is None else T_world @ T, coats)
+    return Thing(obj, np.zeros(1), T if T_world is None else matmul(T_world, T), coats)
 
 
 def _rigid(
@@ -133,9 +135,7 @@ def _can(rng: np.random.Generator) -> tuple[Solid, list[Material]]:
 def _mug(rng: np.random.Generator) -> tuple[Solid, list[Material]]:
     radius, height = rng.uniform(0.036, 0.045), rng.uniform(0.08, 0.1)
     body = vessel([(0.95 * radius, 0.0), (radius, 0.3 * height), (radius, height)], 0.004, sections=48)
-    path = [
-        (0, radius - 0.002 + 0.028 * np.sin(a), height * (0.52 - 0.3 * np.cos(a))) for a in np.linspace(0.1, 3.04, 13)
-    ]
+    path = [(0, radius - 0.002 + 0.028 * sin(a), height * (0.52 - 0.3 * cos(a))) for a in np.linspace(0.1, 3.04, 13)]
     cup = body + tube(path, 0.0045, sections=12)
     return cup, [draw_material("enamel", rng)] * len(cup.pieces)
 

@@ -13,6 +13,7 @@ from artsim.appearance import Coat, Lights
 from artsim.errors import ConfigError
 from artsim.kinematics import Array, Joint, KinematicTree, transform_points
 from artsim.objects import ArticulatedObject, Mesh, Part, content_sha256
+from artsim.products import matmul
 from artsim.renderers.base import BACKGROUND
 
 MAX_THINGS = 254
@@ -42,7 +43,7 @@ class Thing:
     @cached_property
     def T_world_part(self) -> Array:
         """(K, 4, 4) pose of the rest frame, as carried by each part, in the world."""
-        return self.T_world_object @ self.obj.tree.forward_kinematics(self.q)
+        return matmul(self.T_world_object, self.obj.tree.forward_kinematics(self.q))
 
     @cached_property
     def part_vertices(self) -> tuple[Array, ...]:

@@ -1,0 +1,63 @@
+"""Cylinders, capsules and spheres that a URDF file describes in numbers.
+
+The same bits on every processor, as :mod:`artsim.elementary` says; trimesh leaves them to BLAS and the C library.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.elementary import cos, sin
+from artsim.kinematics import Array
+from artsim.objects import Mesh
+from artsim.products import unit
+
+_SECTIONS = 64
+_SUBDIVISIONS = 4
+
+
+def cylinder(radius: float, length: float) -> Mesh:
+    """A cylinder about z, its middle at the origin: 64 sides."""
+    half = 0.5 * length
+    return _turned([-half, half], [radius, radius], (-half, half))
+
+
+def capsule(radius: float, length: float) -> Mesh:
+    """A cylinder about z, its middle at the origin, with half a ball on either end: 64 sides, 16 rings to a half."""
+    angles = np.arange(_SECTIONS // 4) * (0.5 * np.pi / (_SECTIONS // 4))
+    heights, radii = 0.5 * length + radius * sin(angles), radius * cos(angles)
+    tip = 0.5 * length + radius
+    return _turned([*-heights[::-1], *heights], [*radii[::-1], *radii], (-tip, tip))
+
+
+def _turned(heights: list[float], radii: list[float], ends: tuple[float, float]) -> Mesh:
+    """Closed surface of rings about z, from the lowest to the highest, and of the two points that close it."""
+    angles = np.arange(_SECTIONS) * (2.0 * np.pi / _SECTIONS)
+    circle = np.stack([cos(angles), sin(angles)], axis=1)
+    rings: list[Array] = [
+        np.column_stack([radius * circle, np.full(_SECTIONS, height)])
+        for height, radius in zip(heights, radii, strict=True)
+    ]
+    a = np.arange(_SECTIONS)
+    b = (a + 1) % _SECTIONS
+    starts = range(0, len(rings) * _SECTIONS, _SECTIONS)
+    corners = [triangle for i, j in pairwise(starts) for triangle in ((a + i, b + i, b + j), (a + i, b + j, a + j))]
+    bottom = np.full(_SECTIONS, len(rings) * _SECTIONS)
+    corners += [(b, a, bottom), (a + starts[-1], b + starts[-1], bottom + 1)]
+    faces: NDArray[np.int32] = np.concatenate([np.stack(triangle, axis=1) for triangle in corners]).astype(np.int32)
+    return np.concatenate([*rings, [(0.0, 0.0, ends[0]), (0.0, 0.0, ends[1])]]), faces
+
+
+def sphere(radius: float) -> Mesh:
+    """A sphere about the origin: an icosahedron whose faces are divided in four, four times."""
+    import trimesh
+
+    solid = trimesh.creation.icosahedron()
+    vertices, faces = np.asarray(solid.vertices, dtype=np.float64), np.asarray(solid.faces)
+    for _ in range(_SUBDIVISIONS):
+        vertices, faces = trimesh.remesh.subdivide(vertices, faces)
+        vertices = unit(vertices)
+    return radius * vertices, faces.astype(np.int32)
