@@ -9,7 +9,7 @@ import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, named
-from artsim.loading.mesh_files.text import Rows, numbers, numbers_per_row, plain_text
+from artsim.loading.mesh_files.text import Rows, first_numbers, numbers, numbers_per_row, plain_text
 
 _HARMLESS = ("vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", "mg", "lod", "bevel", "c_interp",
              "d_interp", "shadow_obj", "trace_obj")  # fmt: skip
@@ -77,18 +77,64 @@ def statements(data: bytes, bounds: Bounds) -> Statements:
     vertex_rows, face_rows = rows.which(b"v"), rows.which(b"f")
     bounds.check(int(vertex_rows.sum()), "vertices")
     bounds.check(int(face_rows.sum()), "triangles")
-    places = rows.rest(vertex_rows, b"v")
-    per_row = numbers_per_row(places)
-    values = np.append(numbers(places, np.float64, np.nan, int(per_row.sum())), np.nan)
-    # A row may go on with a weight or a colour.
-    at = (np.cumsum(per_row) - per_row)[:, None] + np.arange(3)
-    points = values[np.where(per_row[:, None] >= 3, at, len(values) - 1)]
+    points = first_numbers(rows.rest(vertex_rows, b"v"), 3)  # a row may go on with a weight or a colour
     references = rows.rest(face_rows, b"f")
     return Statements(rows, points, vertex_rows, face_rows, numbers_per_row(references), references)
 
 
 def read_obj(data: bytes, bounds: Bounds) -> Surface:
-    """The surface of a Wavefront file; ``corners`` number the corners of its faces.
+    """The surface of a Wavefront file.
+
+    Raises
+    ------
+    UnusableMeshError
+    AssetError
+    """
+    return _surface(statements(data, bounds), _declared(data), bounds)
+
+
+def _surface(found: Statements, declared: int, bounds: Bounds) -> Surface:
+    """The surface that statements describe; its ``corners`` number the corners of all faces."""
+    draft = Draft(declared=declared)
+    references = found.references
+    if b"/" in references:
+        references = re.sub(rb"/[^ \n]*", b"", references)
+    bounds.check(int(found.counts.sum()) - 2 * len(found.counts), "triangles")
+    corners = found.indices(references, found.vertex_rows)
+    made = triangulate(found.points, corners, found.counts)
+    draft.accounted = len(found.counts)
+    made.tell(draft)
+    _tell_others(found, draft)
+    draft.add(found.points, corners[made.corners])
+    draft.corners = made.corners
+    return draft.surface()
+
+
+@dataclass(frozen=True)
+class Painted:
+    """What a Wavefront file says of its surface's looks.
+
+    Attributes
+    ----------
+    surface : Surface
+    libraries : list of str
+        Files that describe materials.
+    materials : list of str
+        Names; the first, empty, is of faces without one.
+    material_of_face : (F,) int
+    uv : (F, 3, 2) float
+        Place of each corner in the material's picture; NaN where the file gives none.
+    """
+
+    surface: Surface
+    libraries: list[str]
+    materials: list[str]
+    material_of_face: Indices
+    uv: Array
+
+
+def read_painted(data: bytes, bounds: Bounds) -> Painted:
+    """The surface of a Wavefront file, as :func:`read_obj` gives it, and its looks.
 
     Raises
     ------
@@ -96,21 +142,29 @@ def read_obj(data: bytes, bounds: Bounds) -> Surface:
     AssetError
     """
     found = statements(data, bounds)
-    draft = Draft(declared=_declared(data))
-    references = found.references
-    if b"/" in references:
-        references = re.sub(rb"/[^ \n]*", b"", references)
-    if len(found.counts) and int(found.counts.sum()) > 3 * bounds.max_faces:
-        bounds.check(int(found.counts.sum()) - 2 * len(found.counts), "triangles")
-    corners = found.indices(references, found.vertex_rows)
-    made = triangulate(found.points, corners, found.counts)
-    bounds.check(len(made.corners), "triangles")
-    draft.accounted = len(found.counts)
-    made.tell(draft)
-    _tell_others(found, draft)
-    draft.add(found.points, corners[made.corners])
-    draft.corners = made.corners
-    return draft.surface()
+    surface = _surface(found, _declared(data), bounds)
+    assert surface.corners is not None
+    libraries, used = found.rows.which(b"mtllib"), found.rows.which(b"usemtl")
+    names = ["", *_names(found.rows.rest(used, b"usemtl"))]
+    number = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    of_statement = np.array([number[name] for name in names])
+    of_corner = np.repeat(of_statement[np.cumsum(used)[found.face_rows]], found.counts)
+    places = first_numbers(found.rows.rest(found.rows.which(b"vt"), b"vt"), 2)
+    uv = np.append(places, [[np.nan, np.nan]], axis=0)
+    index = found.indices(_textures(found.references), found.rows.which(b"vt"))[surface.corners]
+    index[(index < 0) | (index >= len(places))] = len(places)
+    files = _names(found.rows.rest(libraries, b"mtllib"))
+    return Painted(surface, files, list(number), of_corner[surface.corners[:, 0]], uv[index])
+
+
+def _names(text: bytes) -> list[str]:
+    return [name.strip().decode("utf-8", "replace") for name in text.split(b"\n")[:-1]]
+
+
+def _textures(references: bytes) -> bytes:
+    """The second number of each corner such as ``1/2/3``; 0 where there is none."""
+    marked = re.sub(rb"[^ \n/]+(?:/([^ \n/]*)(?:/[^ \n]*)?)?", rb"<\1>", references)
+    return marked.replace(b"<>", b"0").replace(b"<", b"").replace(b">", b"")
 
 
 def _tell_others(found: Statements, draft: Draft) -> None:

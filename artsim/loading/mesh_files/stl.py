@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import Bounds, Draft, Surface, UnusableMeshError
-from artsim.loading.mesh_files.text import Rows, numbers, numbers_per_row, plain_text
+from artsim.loading.mesh_files.text import Rows, first_numbers, plain_text
 
 _HEADER = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -65,11 +65,7 @@ def _read_text(data: bytes, bounds: Bounds) -> Surface:
     corners, closed = rows.which(b"vertex"), rows.which(b"endloop")
     bounds.check(int(closed.sum()), "triangles")
     bounds.check(int(corners.sum()) // 3, "triangles")
-    places = rows.rest(corners, b"vertex")
-    per_row = numbers_per_row(places)
-    values = np.append(numbers(places, np.float64, np.nan, int(per_row.sum())), np.nan)
-    at = (np.cumsum(per_row) - per_row)[:, None] + np.arange(3)
-    points = values[np.where(per_row[:, None] == 3, at, len(values) - 1)]
+    points = first_numbers(rows.rest(corners, b"vertex"), 3)
     so_far = np.cumsum(corners)
     counts = np.diff(so_far[closed], prepend=0)
     unclosed = len(points) - int(counts.sum())

@@ -96,6 +96,20 @@ def numbers_per_row(text: bytes) -> NDArray[np.int64]:
     return np.diff(begun[np.flatnonzero(letters[1:] == ord("\n"))], prepend=0)
 
 
+def first_numbers(text: bytes, width: int) -> NDArray[np.float64]:
+    """(N, width) first numbers of each row of a text; NaN where there are fewer, or a word is none.
+
+    Raises
+    ------
+    UnusableMeshError
+        When very many words are no numbers.
+    """
+    per_row = numbers_per_row(text)
+    values = np.append(numbers(text, np.float64, np.nan, int(per_row.sum())), np.nan)
+    at = (np.cumsum(per_row) - per_row)[:, None] + np.arange(width)
+    return values[np.where(per_row[:, None] >= width, at, len(values) - 1)]
+
+
 def numbers(text: bytes, dtype: type[np.generic], unreadable: float, count: int | None = None) -> NDArray[Any]:
     """One number of each word of a text: ``unreadable`` where it is none.
 
