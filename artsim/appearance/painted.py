@@ -5,8 +5,7 @@ Files are untrusted: a material file or picture must lie inside the asset's fold
 
 from __future__ import annotations
 
-import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,8 @@ from artsim.appearance.textures import Image
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.loading.bodies import merge_fixed_links
+from artsim.loading.mesh_files import Bounds
+from artsim.loading.mesh_files.obj import read_painted
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.urdf_xml import parse_robot
@@ -55,7 +56,10 @@ def painted_coats(obj: ArticulatedObject) -> tuple[Coat, ...] | None:
     pictures: dict[Path, Image | None] = {}
     for part in obj.parts:
         links = next((links for links in meshes if part.name in links), None)
-        painted = [_read(mesh, pictures) for mesh in meshes[links]] if links is not None else []
+        try:
+            painted = [_read(mesh, pictures) for mesh in meshes[links]] if links is not None else []
+        except (AssetError, UnusableMeshError):
+            return None
         if sum(len(mesh.material_of_face) for mesh in painted) != len(part.faces):
             return None
         coats.append(_joined(painted))
@@ -89,13 +93,22 @@ def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
 
 def _read(path: Path, pictures: dict[Path, Image | None]) -> Coat:
     """Coat of one Wavefront file, its materials grey where it says nothing of them."""
-    import trimesh
+    from trimesh.exchange.obj import parse_mtl
 
     if path.suffix.lower() != ".obj":
         raise UnusableMeshError(f"{path.name} has no materials that are read")
-    data = read_bounded(path, LoadLimits().max_mesh_bytes, "mesh")
-    scene = trimesh.load_scene(io.BytesIO(data), file_type="obj", process=False, resolver=_Inside(path.parent))
-    return _joined([_coat_of(mesh, path.parent, pictures) for mesh in scene.dump()] if len(scene.geometry) else [])
+    limits, inside = LoadLimits(), _Inside(path.parent)
+    painted = read_painted(read_bounded(path, limits.max_mesh_bytes, "mesh"), Bounds(path, limits.max_faces))
+    described: dict[str, Any] = {}
+    for name in painted.libraries:
+        try:
+            described |= parse_mtl(inside.get(name), inside)
+        except (OSError, ValueError, TypeError, LookupError):  # a material that cannot be read is grey
+            continue
+    used, number = np.unique(painted.material_of_face, return_inverse=True)
+    looks = tuple(_material(described.get(painted.materials[k], {}), path.parent, pictures) for k in used)
+    plain = np.array([look.texture is None for look in looks], dtype=bool)[number]
+    return _joined([Coat(looks, number, np.where(plain[:, None, None], np.nan, painted.uv))])
 
 
 class _Inside:
@@ -116,30 +129,22 @@ class _Inside:
     __getitem__ = get
 
 
-def _coat_of(mesh: Any, folder: Path, pictures: dict[Path, Image | None]) -> Coat:
-    """Coat of a mesh of one material; each picture is read once."""
-    material, uv = getattr(mesh.visual, "material", None), getattr(mesh.visual, "uv", None)
-    picture, texture = getattr(material, "image", None), None
+def _material(described: Mapping[str, Any], folder: Path, pictures: dict[Path, Image | None]) -> Material:
+    """One material of a Wavefront material file; each picture is read once."""
+    picture, texture = described.get("image"), None
     if picture is not None:
         place = (folder / picture.info["file_path"]).resolve()
         if place not in pictures:
             pictures[place] = _texture(picture)
         texture = pictures[place]
-    red, green, blue = _colour(getattr(material, "diffuse", None)) if material is not None else _GREY
-    own = Material((red, green, blue), roughness=0.5, specular=0.4, texture=texture)
-    laid = None
-    if uv is not None and texture is not None:
-        laid = np.asarray(uv, dtype=np.float64)[mesh.faces]
-    return Coat((own,), np.zeros(len(mesh.faces), dtype=np.int64), laid)
+    return Material(_colour(described.get("diffuse")), roughness=0.5, specular=0.4, texture=texture)
 
 
 def _colour(diffuse: ArrayLike | None) -> Colour:
-    if diffuse is None:
+    value = np.zeros(0) if diffuse is None else np.asarray(diffuse, np.float64).ravel()
+    if len(value) < 3 or not np.isfinite(value).all():
         return _GREY
-    # trimesh keeps 8-bit RGBA, or what the file says where it cannot.
-    value = np.asarray(diffuse)
-    scale = 255.0 if value.dtype == np.uint8 else 1.0
-    red, green, blue = (value.astype(np.float64).ravel()[:3] / scale).clip(0.0, 1.0).tolist()
+    red, green, blue = value[:3].clip(0.0, 1.0).tolist()
     return red, green, blue
 
 

@@ -1,17 +1,16 @@
-"""Triangles of the shapes that a URDF names: primitives, and OBJ, STL, DAE, GLB or PLY files.
+"""Triangles of the shapes that a URDF names: primitives, and mesh files.
 
-Mesh files are untrusted: they must lie inside the asset's folder or a declared package root, are bounded in
-size before they are parsed, and never make another file be opened.
+Mesh files are untrusted: they must lie inside the asset's folder or a declared package root, and are bounded in size
+before they are read. Each is read once, however often the URDF names it.
 """
 
 from __future__ import annotations
 
-import io
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +18,16 @@ from numpy.typing import NDArray
 from artsim.errors import AssetError
 from artsim.files import read_bounded
 from artsim.kinematics import Array, transform_points
+from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import capsule, cylinder, sphere
 from artsim.loading.robot import Geometry, MeshFile
-from artsim.loading.urdf_xml import safe_xml
+from artsim.objects import Repair
 
-FORMATS = (".obj", ".stl", ".dae", ".glb", ".ply")
+__all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merged", "triangles"]
+
+_BOX, _CYLINDER, _CAPSULE, _SPHERE = 12, 256, 4096, 5120
+"""Triangles of a box, a cylinder of 64 sides, a capsule, and an icosahedron divided in four, four times."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +36,29 @@ class LoadLimits:
 
     max_urdf_bytes: int = 16_000_000
     max_mesh_bytes: int = 100_000_000
+    max_total_mesh_bytes: int = 300_000_000
+    """Of all mesh files, each counted as often as the URDF names it."""
     max_faces: int = 5_000_000
     """Triangles over the whole object."""
     max_links: int = 1_000
+    max_shapes: int = 10_000
+    """Primitives and mesh references in a URDF file."""
 
 
-class UnusableMeshError(Exception):
-    """One mesh cannot be used, and why; the loader leaves it out and says so."""
+def check_shapes(data: bytes, where: Path, limits: LoadLimits) -> None:
+    """Refuse a URDF file with too many shapes before it is parsed.
+
+    Raises
+    ------
+    AssetError
+    """
+    count = data.count(b"<geometry")
+    if count > limits.max_shapes:
+        raise AssetError(
+            f"{count} shapes are over the limit of {limits.max_shapes}",
+            where,
+            "raise it with artsim.load(..., limits=LoadLimits(max_shapes=...)) if you trust the file",
+        )
 
 
 @dataclass
@@ -55,13 +74,19 @@ class MeshReader:
     limits : LoadLimits
     contents : list of bytes
         Bytes of every mesh file read, in order: they are part of the object's digest.
+    notes : list of Repair
+        What was left out, assumed or mended in mesh files.
     """
 
     folder: Path
     package_roots: Mapping[str, Path]
     limits: LoadLimits
     contents: list[bytes] = field(default_factory=list)
+    notes: list[Repair] = field(default_factory=list)
     num_faces: int = 0
+    _num_bytes: int = 0
+    _paths: dict[str, Path] = field(default_factory=dict)
+    _read: dict[Path, tuple[Surface, list[bytes]]] = field(default_factory=dict)
 
     def shape(self, geometry: Geometry) -> tuple[Array, NDArray[np.int32]]:
         """Vertices (V, 3) and triangles (F, 3) of a URDF geometry in its own frame.
@@ -76,17 +101,31 @@ class MeshReader:
         import trimesh
 
         if geometry.box is not None:
+            self._count(_BOX)
             mesh = trimesh.creation.box(extents=geometry.box.size)
         elif geometry.cylinder is not None:
+            self._count(_CYLINDER)
             return cylinder(geometry.cylinder.radius, geometry.cylinder.length)
         elif geometry.capsule is not None:
+            self._count(_CAPSULE)
             return capsule(geometry.capsule.radius, geometry.capsule.length)
         elif geometry.sphere is not None:
+            self._count(_SPHERE)
             return sphere(geometry.sphere.radius)
         else:
             assert geometry.mesh is not None
             return self._file(geometry.mesh)
         return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int32)
+
+    def _count(self, faces: int) -> None:
+        """Count triangles before they are made."""
+        self.num_faces += faces
+        if self.num_faces > self.limits.max_faces:
+            raise AssetError(
+                f"the object has more than {self.limits.max_faces} triangles",
+                self.folder,
+                "decimate its meshes or raise LoadLimits.max_faces",
+            )
 
     @cached_property
     def paths(self) -> AssetPaths:
@@ -109,75 +148,90 @@ class MeshReader:
             raise UnusableMeshError(str(error)) from error
 
     def _file(self, reference: MeshFile) -> tuple[Array, NDArray[np.int32]]:
-        path = self.resolve(reference.filename)
-        kind = path.suffix.lower()
-        if kind not in FORMATS:
-            raise UnusableMeshError(f"mesh {reference.filename!r} is of a kind that is not read ({', '.join(FORMATS)})")
-        data = read_bounded(path, self.limits.max_mesh_bytes, "mesh")
-        self.contents.append(data)
-        vertices, faces, dropped = triangles(data, kind, path)
-        if len(faces) == 0:
+        if reference.filename not in self._paths:
+            self._paths[reference.filename] = self.resolve(reference.filename)
+        path = self._paths[reference.filename]
+        surface, contents = self._read.get(path) or self._parse(path, reference.filename)
+        self._take(contents, path)
+        if len(surface.faces) == 0:
             raise UnusableMeshError(f"mesh {reference.filename!r} has no faces")
-        self.num_faces += len(faces)
-        if self.num_faces > self.limits.max_faces:
-            raise AssetError(
-                f"the object has more than {self.limits.max_faces} triangles",
-                path,
-                "decimate its meshes or raise LoadLimits.max_faces",
-            )
+        self._count(len(surface.faces))
+        vertices, faces = surface.vertices, surface.faces
         if reference.scale is not None:
             vertices = vertices * np.asarray(reference.scale, dtype=np.float64)
             if np.prod(np.sign(np.broadcast_to(reference.scale, 3))) < 0:
                 faces = faces[:, ::-1]
-        if dropped:
-            self.dropped_faces[reference.filename] = dropped
         return vertices, faces
 
-    dropped_faces: dict[str, int] = field(default_factory=dict)
+    def _parse(self, path: Path, name: str) -> tuple[Surface, list[bytes]]:
+        """The surface of a file that was not read before, and the bytes it was made of."""
+        kind = path.suffix.lower()
+        if kind not in FORMATS:
+            raise UnusableMeshError(f"mesh {name!r} is of a kind that is not read ({', '.join(FORMATS)})")
+        data = read_bounded(path, self.limits.max_mesh_bytes, "mesh")
+        contents = [data]
+        self._check_bytes(len(data), path)
+
+        def neighbour(beside: str) -> bytes:
+            contents.append(self._beside(path, beside))
+            return contents[-1]
+
+        try:
+            surface = read_mesh(data, kind, Bounds(path, self.limits.max_faces), neighbour)
+        except UnusableMeshError as problem:
+            self._take(contents, path)
+            raise UnusableMeshError(f"mesh {name!r} {problem}") from problem
+        self.notes += [Repair(f"mesh {name!r}", text) for text in surface.notes]
+        self._read[path] = surface, contents
+        return self._read[path]
+
+    def _beside(self, path: Path, name: str) -> bytes:
+        """The content of a file that a mesh file names, confined like the mesh file itself."""
+        home = path.resolve().parent
+        roots = [home, *(root.resolve() for root in (self.paths.root, self.folder, *self.package_roots.values()))]
+        try:
+            file = (home / unquote(name)).resolve()
+            inside = any(file.is_relative_to(root) for root in roots) and file.is_file()
+        except (OSError, ValueError, RuntimeError):  # a name that no file can have
+            inside = False
+        if not inside:
+            raise UnusableMeshError(f"names file {ascii(name)[:60]}, which is missing or outside the asset's folder")
+        self._check_bytes(file.stat().st_size, file)
+        return read_bounded(file, self.limits.max_mesh_bytes, "mesh buffer")
+
+    def _check_bytes(self, count: int, path: Path) -> None:
+        if self._num_bytes + count > self.limits.max_total_mesh_bytes:
+            raise AssetError(
+                f"the meshes are over the limit of {self.limits.max_total_mesh_bytes / 1e6:.0f} MB in all",
+                path,
+                "raise LoadLimits.max_total_mesh_bytes if you trust the file",
+            )
+
+    def _take(self, contents: list[bytes], path: Path) -> None:
+        """Add what a mesh is made of to the object's digest."""
+        for content in contents:
+            self._check_bytes(len(content), path)
+            self._num_bytes += len(content)
+        self.contents += contents
 
 
-def triangles(data: bytes, kind: str, where: Path) -> tuple[Array, NDArray[np.int32], int]:
-    """Vertices, triangles and the number of unusable triangles (not finite, or out of range) left out.
+def triangles(
+    data: bytes, kind: str, where: Path, max_faces: int = LoadLimits().max_faces
+) -> tuple[Array, NDArray[np.int32], tuple[str, ...]]:
+    """Vertices, triangles and what was left out, assumed or mended of a mesh file that needs no other file.
 
     Raises
     ------
     UnusableMeshError
-        When the content cannot be parsed.
+        When the content cannot be read.
+    AssetError
+        When it is over a limit, or dangerous.
     """
-    import trimesh
-
-    if kind == ".dae":
-        safe_xml(data, where)
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
-        loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind[1:], process=False, skip_materials=True)
-        mesh = loaded.to_mesh() if len(loaded.geometry) else None
-    except AssetError:
-        raise
-    except Exception as error:  # parsers raise whatever they stumble on; the file is at fault either way
-        raise UnusableMeshError(f"mesh {where.name!r} cannot be parsed ({type(error).__name__}: {error})") from error
-    if mesh is None or not hasattr(mesh, "faces"):
-        return np.zeros((0, 3)), np.zeros((0, 3), np.int32), 0
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    faces = np.asarray(mesh.faces, dtype=np.int64)
-    usable = np.all((faces >= 0) & (faces < len(vertices)), axis=1)
-    finite = np.all(np.isfinite(vertices), axis=1)
-    usable &= finite[faces.clip(0, max(0, len(vertices) - 1))].all(axis=1)
-    return *in_order_of_use(vertices, faces[usable]), int((~usable).sum())
-
-
-def in_order_of_use(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32]]:
-    """The same triangles, their vertices in the order in which the faces name them, without those that none names.
-
-    trimesh numbers vertices by an unstable sort, whose order of equals depends on the processor.
-    """
-    named = faces.ravel()
-    first = np.full(len(vertices), len(named))
-    np.minimum.at(first, named, np.arange(len(named)))
-    order = np.argsort(first, kind="stable")[: np.count_nonzero(first < len(named))]
-    number = np.empty(len(vertices), dtype=np.int32)
-    number[order] = np.arange(len(order), dtype=np.int32)
-    return vertices[order], number[faces]
+        surface = read_mesh(data, kind, Bounds(where, max_faces))
+    except UnusableMeshError as problem:
+        raise UnusableMeshError(f"mesh {where.name!r} {problem}") from problem
+    return surface.vertices, surface.faces, surface.notes
 
 
 def merged(shapes: list[tuple[Array, NDArray[np.int32], Array]]) -> tuple[Array, NDArray[np.int32]]:

@@ -5,6 +5,7 @@ The same bits on every processor, as :mod:`artsim.elementary` says; trimesh leav
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -53,6 +54,13 @@ def _turned(heights: list[float], radii: list[float], ends: tuple[float, float])
 
 def sphere(radius: float) -> Mesh:
     """A sphere about the origin: an icosahedron whose faces are divided in four, four times."""
+    vertices, faces = _unit_sphere()
+    return radius * vertices, faces
+
+
+@cache
+def _unit_sphere() -> Mesh:
+    """Made once: a thousand of them would take a second."""
     import trimesh
 
     solid = trimesh.creation.icosahedron()
@@ -60,4 +68,4 @@ def sphere(radius: float) -> Mesh:
     for _ in range(_SUBDIVISIONS):
         vertices, faces = trimesh.remesh.subdivide(vertices, faces)
         vertices = unit(vertices)
-    return radius * vertices, faces.astype(np.int32)
+    return vertices, faces.astype(np.int32)

@@ -24,7 +24,7 @@ from artsim.loading.bodies import (
     merge_fixed_links,
     without_empty_leaves,
 )
-from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, merged
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_shapes, merged
 from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_state import canonical_category, rest_state
@@ -73,6 +73,7 @@ def load(
     if file.suffix == ".npz":
         return load_object(file)
     data = read_bounded(file, limits.max_urdf_bytes, "URDF file")
+    check_shapes(data, file, limits)
     side = read_side_files(file.parent)
     robot, repairs = parse_robot(data, file, limits.max_links, side.helpers)
     roots = _roots(package_roots or {})
@@ -165,8 +166,7 @@ def _read_geometry(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
         body.vertices, body.faces = merged(surfaces)
-    for name, count in reader.dropped_faces.items():
-        repairs.append(Repair(f"mesh {name!r}", f"{count} triangles left out: not finite or out of range"))
+    repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
         raise AssetError("no link has any geometry", file, "add <visual> elements")
 

@@ -1,0 +1,286 @@
+"""COLLADA (DAE): a graph of nodes that show geometries, in XML.
+
+Materials, images and texture coordinates are never looked at: what is missing of them costs no geometry.
+
+``<unit>`` is applied and ``<up_axis>`` is not: so do RViz, PyBullet and SAPIEN when a URDF file names a mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from lxml import etree
+
+from artsim.loading.mesh_files.dae_document import Document, attribute, values
+from artsim.loading.mesh_files.dae_geometry import Geometry, read_geometry
+from artsim.loading.mesh_files.surface import (
+    Array,
+    Bounds,
+    Draft,
+    Surface,
+    UnusableMeshError,
+    mirrors,
+    moved,
+    named,
+    product,
+)
+
+_MAX_DEPTH = 150
+"""Nodes inside nodes; far from Python's own limit."""
+
+
+def read_dae(data: bytes, bounds: Bounds) -> Surface:
+    """The surface of the scene that a COLLADA file shows, in metres.
+
+    Raises
+    ------
+    UnusableMeshError
+    AssetError
+    """
+    document = Document(data, bounds)
+    draft = Draft()
+    scale = _unit(document, draft)
+    _tell_up_axis(document, draft)
+    scene = _Scene(document, bounds, draft)
+    roots = scene.roots()
+    total = _Extent()
+    for root in roots:
+        total += scene.extent(root, _MAX_DEPTH)
+    bounds.check_instances(max(total.instances, total.nodes))
+    bounds.check(total.faces, "triangles")
+    bounds.check(total.vertices, "vertices")
+    draft.declared = total.faces
+    for root in roots:
+        scene.show(root, np.diag([scale, scale, scale, 1.0]))
+    scene.tell_unseen()
+    return draft.surface()
+
+
+def _unit(document: Document, draft: Draft) -> float:
+    """Metres in a unit of the file."""
+    unit = document.root.find("asset/unit")
+    text = None if unit is None else unit.get("meter")
+    if text is None:
+        return 1.0
+    try:
+        meter = float(text)
+    except ValueError:
+        meter = math.nan
+    if not 0.0 < meter < math.inf:
+        raise UnusableMeshError(f"its <unit meter={named(text)}> is no length")
+    if any(u.get("meter") not in (None, text) for u in document.root.iter("unit") if u is not unit):
+        draft.note(f"has parts in other units: all are taken as units of {meter:g} m")
+    return meter
+
+
+def _tell_up_axis(document: Document, draft: Draft) -> None:
+    axis = document.root.findtext("asset/up_axis")
+    if axis is not None and axis.strip() != "Z_UP":
+        draft.note(f"up_axis {named(axis.strip())} is not applied, as in RViz, PyBullet and SAPIEN")
+
+
+@dataclass
+class _Extent:
+    """How much a node shows, all that it contains included, before any of it is copied."""
+
+    instances: int = 0
+    nodes: int = 0
+    faces: int = 0
+    vertices: int = 0
+
+    def __iadd__(self, other: _Extent) -> _Extent:
+        self.instances += other.instances
+        self.nodes += other.nodes
+        self.faces += other.faces
+        self.vertices += other.vertices
+        return self
+
+
+class _Scene:
+    """The nodes of a file, and what they show."""
+
+    def __init__(self, document: Document, bounds: Bounds, draft: Draft):
+        self._document, self._bounds, self._draft = document, bounds, draft
+        self._geometries: dict[etree._Element, Geometry | None] = {}
+        self._extents: dict[etree._Element, _Extent | None] = {}
+        self._seen: set[etree._Element] = set()
+        self._told: set[tuple[etree._Element, str]] = set()
+
+    def roots(self) -> list[etree._Element]:
+        """The elements that hold the nodes that the file shows."""
+        shown = self._document.root.find("scene/instance_visual_scene")
+        scenes = self._document.root.findall("library_visual_scenes/visual_scene")
+        if shown is not None:
+            scene = self._document.target(shown)
+            if scene is not None:
+                return [scene]
+            self._draft.note(f"scene {named(shown.get('url'))} is missing")
+        elif scenes:
+            self._draft.note("does not say which scene it shows")
+        if scenes:
+            return scenes[:1]
+        self._draft.note("has no scene: each geometry is shown once, as it is")
+        return self._document.root.findall("library_geometries/geometry")
+
+    def extent(self, node: etree._Element, depth: int) -> _Extent:
+        """What a node, scene or geometry shows.
+
+        Raises
+        ------
+        UnusableMeshError
+            When nodes contain each other or are nested too deeply.
+        """
+        if node in self._extents:
+            known = self._extents[node]
+            if known is None:
+                raise UnusableMeshError(f"node {named(node.get('id'))} contains itself")
+            return known
+        if depth == 0:
+            raise UnusableMeshError(f"its nodes are nested over {_MAX_DEPTH} deep")
+        self._extents[node] = None
+        total = _Extent(nodes=1)
+        for geometry in self._shown_by(node):
+            total += _Extent(1, 0, len(geometry.faces), len(geometry.vertices))
+        for child in self._children(node):
+            part = self.extent(child, depth - 1)
+            if part.instances:
+                total += part
+        self._extents[node] = total
+        return total
+
+    def show(self, node: etree._Element, T: Array) -> None:
+        """Add what a node shows to the surface; T carries its parent's frame to the file's."""
+        if not self.extent(node, _MAX_DEPTH).instances:
+            return
+        if node.tag == "node":
+            for element in node:
+                make = _TRANSFORMS.get(element.tag)
+                if make is not None:
+                    T = product(T, make(element, node))
+        for geometry in self._shown_by(node):
+            faces = geometry.faces[:, ::-1] if mirrors(T) else geometry.faces
+            self._draft.accounted += len(faces)
+            self._draft.add(moved(T, geometry.vertices), faces)
+        for child in self._children(node):
+            self.show(child, T)
+
+    def _children(self, node: etree._Element) -> Iterator[etree._Element]:
+        for element in node:
+            if element.tag == "node":
+                yield element
+            elif element.tag == "instance_node":
+                target = self._document.target(element)
+                if target is not None:
+                    yield target
+                else:
+                    self._once(element, f"node {named(element.get('url'))} is missing: left out")
+
+    def _shown_by(self, node: etree._Element) -> Iterator[Geometry]:
+        if node.tag == "geometry":
+            found = self._geometry(node)
+            if found is not None:
+                yield found
+            return
+        for element in node:
+            if element.tag in ("instance_geometry", "instance_controller"):
+                self._seen.add(element)
+                geometry = self._named_by(element)
+                if geometry is not None:
+                    yield geometry
+
+    def _named_by(self, instance: etree._Element) -> Geometry | None:
+        """The geometry of an instance, through the skins and shapes that would change it."""
+        target, steps = self._document.target(instance), 0
+        while target is not None and target.tag == "controller" and steps < 10:
+            steps += 1
+            change = next((e for e in target if e.tag in ("skin", "morph")), None)
+            if change is not None:
+                kind = "skin" if change.tag == "skin" else "morph targets"
+                self._once(
+                    instance,
+                    f"{kind} of {named(target.get('id'))} left out: its geometry is shown as it stands in its node",
+                )
+            target = None if change is None else self._document.find(change.get("source"))
+        if target is None or target.tag != "geometry":
+            self._once(instance, f"{named(instance.get('url'))} is missing or no geometry: left out")
+            return None
+        return self._geometry(target)
+
+    def _geometry(self, element: etree._Element) -> Geometry | None:
+        if element not in self._geometries:
+            self._geometries[element] = read_geometry(element, self._document, self._bounds, self._draft)
+        return self._geometries[element]
+
+    def _once(self, element: etree._Element, text: str) -> None:
+        """Say something once for each element, however often it is shown."""
+        if (element, text) not in self._told:
+            self._told.add((element, text))
+            self._draft.note(text)
+
+    def tell_unseen(self) -> None:
+        """Name what the file holds but its scene does not show."""
+        root = self._document.root
+        for element in root.iter("instance_geometry", "instance_controller"):
+            if element not in self._seen:
+                self._draft.note(f"{named(element.get('url'))} in a node outside the scene: left out")
+        for geometry in root.iter("geometry"):
+            if geometry not in self._geometries:
+                self._draft.note(f"geometry {named(attribute(geometry))} is not in the scene: left out")
+
+
+def _matrix(element: etree._Element, node: etree._Element) -> Array:
+    return values(element, 16, node).reshape(4, 4)
+
+
+def _translation(element: etree._Element, node: etree._Element) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = values(element, 3, node)
+    return T
+
+
+def _scaling(element: etree._Element, node: etree._Element) -> Array:
+    return np.diag([*values(element, 3, node), 1.0])
+
+
+def _rotation(element: etree._Element, node: etree._Element) -> Array:
+    """About an axis, by degrees, as Rodrigues' formula says."""
+    x, y, z, degrees = values(element, 4, node).tolist()
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return np.eye(4)
+    x, y, z = x / length, y / length, z / length
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    T = np.eye(4)
+    T[:3, :3] = [
+        [c + (1 - c) * x * x, (1 - c) * x * y - s * z, (1 - c) * x * z + s * y],
+        [(1 - c) * x * y + s * z, c + (1 - c) * y * y, (1 - c) * y * z - s * x],
+        [(1 - c) * x * z - s * y, (1 - c) * y * z + s * x, c + (1 - c) * z * z],
+    ]
+    return T
+
+
+def _look_at(element: etree._Element, node: etree._Element) -> Array:
+    """A node that stands at a point and looks along its -z at another."""
+    eye, target, up = values(element, 9, node).reshape(3, 3)
+    back = eye - target
+    right = np.cross(up, back)
+    lengths = [math.sqrt(float((v * v).sum())) for v in (back, right)]
+    if min(lengths) == 0.0:
+        raise UnusableMeshError(f"<lookat> of node {named(attribute(node))} has no direction")
+    T = np.eye(4)
+    T[:3, 0], T[:3, 2], T[:3, 3] = right / lengths[1], back / lengths[0], eye
+    T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
+    return T
+
+
+def _skew(element: etree._Element, node: etree._Element) -> Array:
+    raise UnusableMeshError(f"node {named(attribute(node))} has a <skew>, which is not read")
+
+
+_TRANSFORMS: dict[str, Callable[[etree._Element, etree._Element], Array]] = {
+    "matrix": _matrix, "translate": _translation, "scale": _scaling, "rotate": _rotation, "lookat": _look_at,
+    "skew": _skew,
+}  # fmt: skip

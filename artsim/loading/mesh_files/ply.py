@@ -1,0 +1,351 @@
+"""PLY: a header that says what follows, then rows of numbers in text or in bytes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.loading.mesh_files.polygons import strips, triangulate
+from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, named
+from artsim.loading.mesh_files.text import numbers
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "int64": "i8", "uint64": "u8", "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_MAX_HEADER = 100_000
+_ORDER = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_CORNERS = ("vertex_indices", "vertex_index")
+
+
+@dataclass
+class Property:
+    """One column of an element: numbers of a type, or lists of them."""
+
+    name: str
+    type: str
+    count_type: str | None = None
+
+
+@dataclass
+class Element:
+    """One table of a PLY file."""
+
+    name: str
+    count: int
+    properties: list[Property] = field(default_factory=list)
+
+    @property
+    def least(self) -> int:
+        """Numbers that a row has at least."""
+        return len(self.properties)
+
+    @property
+    def least_bytes(self) -> int:
+        """Bytes that a row has at least."""
+        return sum(np.dtype(p.count_type or p.type).itemsize for p in self.properties)
+
+
+@dataclass
+class _Lists:
+    """A column of lists: how long each is, and all their values."""
+
+    counts: Indices
+    values: Indices
+
+
+def read_ply(data: bytes, bounds: Bounds) -> Surface:
+    """The surface of a PLY file: its faces and triangle strips.
+
+    Raises
+    ------
+    UnusableMeshError
+    AssetError
+    """
+    order, elements, start = _header(data)
+    body = _Text(data[start:]) if order == "" else _Bytes(data, start, order)
+    draft = Draft(declared=sum(e.count for e in elements if e.name == "face"))
+    for element in elements:
+        if element.count and (element.least == 0 or element.count > body.room(element)):
+            raise UnusableMeshError(
+                f"declares {element.count} rows of {named(element.name)}, more than its bytes can hold"
+            )
+        if element.name in ("vertex", "face", "tristrips"):
+            bounds.check(element.count, "vertices" if element.name == "vertex" else "triangles")
+    tables: dict[str, dict[str, Any]] = {}
+    for element in elements:
+        # Every table is read, because what is not wanted of it must be skipped.
+        tables[element.name] = body.table(element)
+    points = _points(tables.get("vertex", {}))
+    if "face" in tables:
+        _add_faces(tables["face"], points, bounds, draft)
+    if "tristrips" in tables:
+        _add_strips(tables["tristrips"], points, bounds, draft)
+    if body.left:
+        draft.note(f"goes on for {body.left} {body.unit} after what its header declares")
+    return draft.surface()
+
+
+def _header(data: bytes) -> tuple[str, list[Element], int]:
+    """Byte order, elements and where they start."""
+    found = re.search(rb"(?:^|[\r\n])end_header[ \t]*(\r\n|\r|\n)", data[:_MAX_HEADER])
+    if not data.startswith(b"ply") or found is None:
+        raise UnusableMeshError("has no PLY header")
+    order: str | None = None
+    elements: list[Element] = []
+    for row in re.split(rb"[\r\n]+", data[: found.start()])[1:]:
+        words = row.decode("ascii", "replace").split()
+        match words:
+            case ["format", kind, *_] if kind in _ORDER:
+                order = _ORDER[kind]
+            case ["element", name, count] if count.isdecimal() and len(count) < 19:
+                elements.append(Element(name, int(count)))
+            case ["property", "list", count_type, kind, name] if (
+                elements and kind in _TYPES and _TYPES.get(count_type, "f")[0] != "f"
+            ):
+                elements[-1].properties.append(Property(name, _TYPES[kind], _TYPES[count_type]))
+            case ["property", kind, name] if elements and kind in _TYPES:
+                elements[-1].properties.append(Property(name, _TYPES[kind]))
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case _:
+                raise UnusableMeshError(f"its header says {named(' '.join(words))}, which is not understood")
+    if order is None:
+        raise UnusableMeshError("its header names no format that is read")
+    names = [element.name for element in elements]
+    if len(set(names)) < len(names):
+        raise UnusableMeshError("its header declares an element twice")
+    return order, elements, found.end()
+
+
+class _Text:
+    """The numbers after the header of a text file."""
+
+    unit = "numbers"
+
+    def __init__(self, text: bytes):
+        # Rows, not numbers, are what PLY declares; but no file is known whose rows span lines.
+        self._values = numbers(text, np.float64, np.nan)
+        self._at = 0
+
+    @property
+    def left(self) -> int:
+        return len(self._values) - self._at
+
+    def room(self, element: Element) -> int:
+        return self.left // max(element.least, 1)
+
+    def table(self, element: Element) -> dict[str, Any]:
+        lists = [p.count_type is not None for p in element.properties]
+        if not any(lists):
+            block = self._take(element.count * element.least).reshape(element.count, -1)
+            return {p.name: block[:, i] for i, p in enumerate(element.properties)}
+        return self._rows(element, lists)
+
+    def _take(self, count: int) -> Array:
+        if count > self.left:
+            raise UnusableMeshError("ends before what its header declares")
+        self._at += count
+        return self._values[self._at - count : self._at]
+
+    def _rows(self, element: Element, lists: list[bool]) -> dict[str, Any]:
+        if element.count == 0:
+            return {}
+        uniform = self._uniform(element, lists)
+        if uniform is not None:
+            return uniform
+        starts = {p.name: [0] * element.count for p in element.properties}
+        counts = {p.name: [1] * element.count for p in element.properties}
+        values, at, end = self._values.tolist(), self._at, len(self._values)
+        for row in range(element.count):
+            for p, is_list in zip(element.properties, lists, strict=True):
+                n = 1
+                if is_list:
+                    number = values[at] if at < end else -1.0
+                    if not 0 <= number <= end - at - 1 or number != int(number):
+                        raise UnusableMeshError(f"row {row} of {named(element.name)} has a list that cannot be read")
+                    n, at = int(number), at + 1
+                elif at >= end:
+                    raise UnusableMeshError("ends before what its header declares")
+                starts[p.name][row], counts[p.name][row] = at, n
+                at += n
+        self._at = at
+        return {
+            p.name: _gathered(self._values, np.array(starts[p.name]), np.array(counts[p.name]))
+            if is_list
+            else self._values[starts[p.name]]
+            for p, is_list in zip(element.properties, lists, strict=True)
+        }
+
+    def _uniform(self, element: Element, lists: list[bool]) -> dict[str, Any] | None:
+        """The table, if all of its rows are as long as the first."""
+        columns: list[tuple[int, int]] = []
+        at = 0
+        for is_list in lists:
+            number = self._values[self._at + at] if is_list and self.left > at else 1.0
+            if not 0 <= number <= self.left or number != int(number):
+                return None
+            at += is_list
+            columns.append((at, int(number)))
+            at += int(number)
+        if at * element.count > self.left:
+            return None
+        block = self._values[self._at : self._at + at * element.count].reshape(element.count, at)
+        if any((block[:, c - 1] != n).any() for (c, n), is_list in zip(columns, lists, strict=True) if is_list):
+            return None
+        self._at += at * element.count
+        return {
+            p.name: _Lists(np.full(element.count, n), _whole(block[:, c : c + n].ravel())) if is_list else block[:, c]
+            for p, (c, n), is_list in zip(element.properties, columns, lists, strict=True)
+        }
+
+
+class _Bytes:
+    """The bytes after the header."""
+
+    unit = "bytes"
+
+    def __init__(self, data: bytes, start: int, order: str):
+        self._data, self._at, self._order = data, start, order
+
+    @property
+    def left(self) -> int:
+        return len(self._data) - self._at
+
+    def room(self, element: Element) -> int:
+        return self.left // max(element.least_bytes, 1)
+
+    def table(self, element: Element) -> dict[str, Any]:
+        if element.count == 0:
+            return {}
+        lengths = [self._length(element, i) if p.count_type else None for i, p in enumerate(element.properties)]
+        row = self._row_type(element, lengths)
+        if row is not None and row.itemsize * element.count <= self.left:
+            block = np.frombuffer(self._data, row, element.count, self._at)
+            same = all((block[f"n{i}"] == n).all() for i, n in enumerate(lengths) if n is not None)
+            if same:
+                self._at += row.itemsize * element.count
+                return {
+                    p.name: block[f"v{i}"]
+                    if n is None
+                    else _Lists(np.full(element.count, n), _whole(block[f"v{i}"].ravel()))
+                    for i, (p, n) in enumerate(zip(element.properties, lengths, strict=True))
+                }
+        if all(n is None for n in lengths):
+            raise UnusableMeshError("ends before what its header declares")
+        return self._rows(element)
+
+    def _length(self, element: Element, i: int) -> int:
+        """Length of the i-th column's list in the first row, if the lists before it are as long as they are there."""
+        at = self._at
+        for p in element.properties[: i + 1]:
+            size = np.dtype(p.type).itemsize
+            if p.count_type is None:
+                at, n = at + size, 0
+                continue
+            n, at = self._integer(at, p.count_type)
+            at += n * size
+        return n
+
+    def _integer(self, at: int, kind: str) -> tuple[int, int]:
+        size = np.dtype(kind).itemsize
+        if at + size > len(self._data):
+            raise UnusableMeshError("ends before what its header declares")
+        order = "big" if self._order == ">" else "little"
+        value = int.from_bytes(self._data[at : at + size], order, signed=kind[0] == "i")  # type: ignore[arg-type]
+        if not 0 <= value <= len(self._data) - at - size:
+            raise UnusableMeshError(f"has a list of {value} values, which its bytes cannot hold")
+        return value, at + size
+
+    def _row_type(self, element: Element, lengths: list[int | None]) -> np.dtype[Any] | None:
+        columns: list[tuple[Any, ...]] = []
+        for i, (p, n) in enumerate(zip(element.properties, lengths, strict=True)):
+            if n is None:
+                columns.append((f"v{i}", self._order + p.type))
+            else:
+                columns += [(f"n{i}", self._order + str(p.count_type)), (f"v{i}", self._order + p.type, (n,))]
+        return np.dtype(columns) if sum(n or 0 for n in lengths) * 8 < 2**31 else None
+
+    def _rows(self, element: Element) -> dict[str, Any]:
+        """A table whose rows differ in length, row by row."""
+        sizes = [np.dtype(p.type).itemsize for p in element.properties]
+        lists = [i for i, p in enumerate(element.properties) if p.count_type]
+        starts: dict[int, list[int]] = {i: [] for i in lists}
+        counts: dict[int, list[int]] = {i: [] for i in lists}
+        at = self._at
+        for _ in range(element.count):
+            for i, p in enumerate(element.properties):
+                n = 1
+                if p.count_type:
+                    n, at = self._integer(at, p.count_type)
+                    starts[i].append(at)
+                    counts[i].append(n)
+                at += n * sizes[i]
+        if at > len(self._data):
+            raise UnusableMeshError("ends before what its header declares")
+        self._at = at
+        letters = np.frombuffer(self._data, np.uint8)
+        columns = {}
+        for i in lists:
+            lengths = np.array(counts[i])
+            items = _gather_index(np.array(starts[i]), lengths, sizes[i])
+            raw = letters[items[:, None] + np.arange(sizes[i])]
+            kind = self._order + element.properties[i].type
+            columns[element.properties[i].name] = _Lists(lengths, _whole(np.ascontiguousarray(raw).view(kind).ravel()))
+        return columns
+
+
+def _gather_index(starts: Indices, counts: Indices, size: int = 1) -> Indices:
+    """Places of the items of lists that start at given places, each item ``size`` long."""
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.repeat(starts, counts) + size * within
+
+
+def _gathered(values: Array, starts: Indices, counts: Indices) -> _Lists:
+    return _Lists(counts, _whole(values[_gather_index(starts, counts)]))
+
+
+def _whole(values: NDArray[Any]) -> Indices:
+    """Whole numbers of vertices; -2 where a value is none (-1 ends a strip)."""
+    if values.dtype.kind in "iu" and values.dtype.itemsize < 8:
+        return values.astype(np.int64)
+    with np.errstate(invalid="ignore"):
+        fit = (values >= -1) & (values < 2**53)
+        return np.where(fit & (values == np.floor(values)), np.where(fit, values, 0).astype(np.int64), -2)
+
+
+def _points(table: dict[str, Any]) -> Array:
+    if any(not isinstance(table.get(axis), np.ndarray) for axis in "xyz"):
+        raise UnusableMeshError("has no vertices with x, y and z")
+    return np.stack([np.asarray(table[axis], np.float64) for axis in "xyz"], axis=1)
+
+
+def _corners(table: dict[str, Any]) -> _Lists:
+    found = next((table[name] for name in _CORNERS if isinstance(table.get(name), _Lists)), None)
+    if found is None:
+        if not table:
+            return _Lists(np.zeros(0, np.int64), np.zeros(0, np.int64))
+        raise UnusableMeshError(f"its faces have no list named {' or '.join(_CORNERS)}")
+    return found
+
+
+def _add_faces(table: dict[str, Any], points: Array, bounds: Bounds, draft: Draft) -> None:
+    lists = _corners(table)
+    bounds.check(len(lists.values) - 2 * len(lists.counts), "triangles")
+    made = triangulate(points, lists.values, lists.counts)
+    draft.accounted += len(lists.counts)
+    made.tell(draft)
+    draft.add(points, lists.values[made.corners])
+
+
+def _add_strips(table: dict[str, Any], points: Array, bounds: Bounds, draft: Draft) -> None:
+    """Strips of triangles, each ended by -1 or by its list's end."""
+    lists = _corners(table)
+    bounds.check(len(lists.values), "triangles")
+    runs = np.insert(lists.values, np.cumsum(lists.counts), -1)
+    draft.add(points, strips(runs))

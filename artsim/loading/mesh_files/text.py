@@ -1,0 +1,165 @@
+"""Rows of numbers in text files of millions of rows, read by NumPy instead of row by row."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.loading.mesh_files.surface import UnusableMeshError
+
+_WORD = 16
+"""Letters of a row's first word that are told apart."""
+
+_BLANKS = bytes(c if c == ord("\n") else max(c, ord(" ")) for c in range(256))
+"""Tabs and other characters that control a terminal become blanks."""
+
+_SMALL = 4096
+"""Letters of a text that are read word by word where need be."""
+
+_MAX_UNREADABLE = 20_000
+"""Words that are no numbers in a file that is damaged; more make it something else."""
+
+
+def plain_text(data: bytes) -> bytes:
+    """Text with newlines for any line end, blanks for tabs, and no blank before a row's first word."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        data = data.decode("utf-16", "replace").encode("ascii", "replace")
+    data = data.removeprefix(codecs.BOM_UTF8)
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = data.translate(_BLANKS)
+    if data.startswith(b" ") or b"\n " in data:
+        data = re.sub(rb"(?m)^ +", b"", data)
+    return data
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows of a plain text."""
+
+    data: bytes
+
+    @cached_property
+    def _bytes(self) -> NDArray[np.uint8]:
+        return np.frombuffer(self.data + b"\n", np.uint8)
+
+    @cached_property
+    def _ends(self) -> NDArray[np.int64]:
+        return np.flatnonzero(self._bytes == ord("\n"))
+
+    @cached_property
+    def _starts(self) -> NDArray[np.int64]:
+        return np.concatenate([np.zeros(1, np.int64), self._ends[:-1] + 1])
+
+    def which(self, word: bytes) -> NDArray[np.bool_]:
+        """Which rows begin with a word, alone or before a blank."""
+        here = np.ones(len(self._starts), dtype=bool)
+        for i, letter in enumerate(word):
+            here &= self._letter(i) == letter
+        after = self._letter(len(word))
+        return here & ((after == ord(" ")) | (after == ord("\n")))
+
+    def _letter(self, i: int) -> NDArray[np.uint8]:
+        """The i-th letter of each row, or its newline where the row is shorter."""
+        return self._bytes[np.minimum(self._starts + i, self._ends)]
+
+    def rest(self, which: NDArray[np.bool_], word: bytes) -> bytes:
+        """What follows a word in the rows that begin with it, each with its newline."""
+        starts, ends = self._starts[which] + len(word), self._ends[which]
+        change = np.zeros(len(self._bytes) + 1, dtype=np.int8)
+        change[starts] = 1
+        change[ends + 1] = -1
+        return self._bytes[np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)].tobytes()
+
+    def words(self, which: NDArray[np.bool_]) -> dict[str, int]:
+        """How many of some rows begin with each word, by its first letters."""
+        starts, ends = self._starts[which], self._ends[which]
+        letters = np.stack([self._bytes[np.minimum(starts + i, ends)] for i in range(_WORD)], axis=1)
+        blank = (letters == ord(" ")) | (letters == ord("\n"))
+        letters[np.logical_or.accumulate(blank, axis=1)] = 0
+        found, counts = np.unique(np.ascontiguousarray(letters).view(f"S{_WORD}"), return_counts=True)
+        return {w.decode("ascii", "replace"): int(n) for w, n in zip(found.tolist(), counts.tolist(), strict=True) if w}
+
+
+def numbers_per_row(text: bytes) -> NDArray[np.int64]:
+    """How many words each row of a text has, the last one ending in a newline."""
+    letters = np.frombuffer(b"\n" + text, np.uint8)
+    blank = letters <= ord(" ")
+    begun = np.cumsum(blank[:-1] & ~blank[1:])
+    return np.diff(begun[np.flatnonzero(letters[1:] == ord("\n"))], prepend=0)
+
+
+def first_numbers(text: bytes, width: int) -> NDArray[np.float64]:
+    """(N, width) first numbers of each row of a text; NaN where there are fewer, or a word is none.
+
+    Raises
+    ------
+    UnusableMeshError
+        When very many words are no numbers.
+    """
+    per_row = numbers_per_row(text)
+    values = np.append(numbers(text, np.float64, np.nan, int(per_row.sum())), np.nan)
+    at = (np.cumsum(per_row) - per_row)[:, None] + np.arange(width)
+    return values[np.where(per_row[:, None] >= width, at, len(values) - 1)]
+
+
+def numbers(text: bytes, dtype: type[np.generic], unreadable: float, count: int | None = None) -> NDArray[Any]:
+    """One number of each word of a text: ``unreadable`` where it is none.
+
+    ``count`` is how many words there are, for who has counted them already.
+
+    Raises
+    ------
+    UnusableMeshError
+        When very many words are no numbers.
+    """
+    return np.concatenate([np.zeros(0, dtype), *_blocks(text, dtype, unreadable, count, [_MAX_UNREADABLE])])
+
+
+def _blocks(
+    text: bytes, dtype: type[np.generic], unreadable: float, count: int | None, patience: list[int]
+) -> list[NDArray[Any]]:
+    """The numbers of a text, in pieces: halves are tried again until the words that are no numbers stand alone."""
+    if not text or text.isspace():  # NumPy would find a number in it
+        return []
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # how NumPy says, in some versions, that it stopped in the middle
+            found = np.fromstring(text, dtype=dtype, sep=" ")
+        if len(found) == (_num_words(text) if count is None else count):
+            return [found]
+    except (ValueError, DeprecationWarning):
+        pass
+    middle = text.find(b" ", len(text) // 2)
+    if len(text) < _SMALL or middle < 0:
+        values = [_number(word, dtype) for word in text.translate(_BLANKS).split()]
+        patience[0] -= sum(value is None for value in values)
+        if patience[0] < 0:
+            raise UnusableMeshError("holds words where numbers belong")
+        return [np.array([unreadable if value is None else value for value in values], dtype)]
+    halves = text[:middle], text[middle:]
+    return [block for half in halves for block in _blocks(half, dtype, unreadable, None, patience)]
+
+
+def _num_words(text: bytes) -> int:
+    blank = np.frombuffer(b" " + text, np.uint8) <= ord(" ")
+    return int((blank[:-1] & ~blank[1:]).sum())
+
+
+def _number(word: bytes, dtype: type[np.generic]) -> float | None:
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    if b"_" in word:  # Python's, not a file's
+        return None
+    if np.issubdtype(dtype, np.integer) and not (abs(value) < 2**53 and value == int(value)):
+        return None
+    return value
