@@ -126,7 +126,7 @@ def _read_axis(joint: etree._Element, kind: str, element: Element) -> Array | No
     length = largest * float(np.linalg.norm(direction / largest))  # of huge numbers, too
     if abs(length - 1.0) > 1e-6:
         travel = ", travel stays in metres as URDF and MuJoCo have it" if kind == "prismatic" else ""
-        element.say(f"axis of length {length:.6g} normalised{travel}")
+        element.say(f"axis of length {length:.6g} normalised{travel}", note=kind != "prismatic")
     unit: Array = direction / largest
     return unit / np.linalg.norm(unit)
 
@@ -180,7 +180,7 @@ def _ends(limit: etree._Element, element: Element) -> tuple[float | None, float 
         for end, text in zip(("lower", "upper"), texts, strict=True)
     )
     if any(value == 0 and np.signbit(value) for value in (lower, upper) if value is not None):
-        element.say("limit -0 read as 0")
+        element.say("limit -0 read as 0", note=True)
     return lower, upper
 
 
@@ -211,4 +211,3 @@ def _doubt_degrees(low: float, high: float, element: Element) -> None:
             f"limits {low:g} and {high:g} rad are {span / _TURN:.1f} turns: they look like degrees, and are taken as "
             f'radians; if they are degrees, write lower="{np.deg2rad(low):.6g}" upper="{np.deg2rad(high):.6g}"'
         )
-

@@ -193,7 +193,9 @@ class AssetPaths:
             return  # that package is there, but may not be read: a file of the same name here is another one
         for base in dict.fromkeys((self.root, self._own)):
             yield _Candidate(base / package / name, f"package {package!r} is taken for a folder in {base.name!r}")
-            yield _Candidate(base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own")
+            yield _Candidate(
+                base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own"
+            )
         yield from self._below_own_name([package, *parts])
 
     def _below_own_name(self, parts: list[str]) -> Iterator[_Candidate]:

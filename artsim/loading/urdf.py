@@ -229,9 +229,7 @@ def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str,
             lower, upper = joint.lower, joint.upper
         if body.slide is not None:
             kind = "screw"
-            lower, upper = sorted(
-                v / body.slide_rate + 0.0 for v in (body.slide.lower, body.slide.upper)
-            )
+            lower, upper = sorted(v / body.slide_rate + 0.0 for v in (body.slide.lower, body.slide.upper))
             source_joints[body.slide.name] = (k, body.slide_rate)
         source_joints[joint.name] = (k, 1.0)
         joints.append(
