@@ -182,5 +182,5 @@ def check_visible(obj: ArticulatedObject, options: SampleOptions, seed: int, ide
         if seen == _SEEN_OFTEN_ENOUGH:
             return
     raise RenderError(
-        f"{seen} of {_VIEW_ATTEMPTS} drawn views see the object", obj.object_id, "mend the view options, or the object"
+        f"{seen} of {_VIEW_ATTEMPTS} drawn views see the object", fix="mend the view options, or the object"
     )

@@ -73,7 +73,7 @@ def new_plan(
     used, repeated, left_out = _sorted_out(sources, [answers[i] for i in range(len(sources))])
     if (left_out and not skip_broken) or not used:
         raise _unusable(left_out, len(sources), asked.strict)
-    objects = list(_planned([source for source, _ in used], [compiled for _, compiled in used], asked))
+    objects = list(planned_objects([source for source, _ in used], [compiled for _, compiled in used], asked))
     for planned, (_, compiled) in zip(objects, used, strict=True):
         (staging / compiled.staged).replace(folder / planned.file)
     order = showing_order([(planned.category, planned.split) for planned in objects])
@@ -102,7 +102,9 @@ def _sorted_out(
     return list(used.values()), repeated, left_out
 
 
-def _planned(sources: Sequence[Source], compiled: Sequence[CompiledSource], asked: Plan) -> Iterator[PlannedObject]:
+def planned_objects(
+    sources: Sequence[Source], compiled: Sequence[CompiledSource], asked: Plan
+) -> Iterator[PlannedObject]:
     """The objects, each with its key and split."""
     keys = unique_keys([(c.category, c.object_id, c.identity) for c in compiled])
     splits = assign_splits([(c.category, c.identity) for c in compiled], asked.fractions, asked.seed)

@@ -159,7 +159,7 @@ def test_a_finished_dataset_is_left_alone(sources: list[Source], tmp_path: Path)
     ("change", "named"),
     [
         ({"seed": 1}, "seed"),
-        ({"num_samples": 61}, "num_samples"),
+        ({"num_samples": 59}, "num_samples"),
         ({"shard_size": 11}, "shard_size"),
         ({"splits": (1, 0, 0)}, "fractions"),
         ({"sample": SampleOptions(num_points=129)}, "sample.num_points"),

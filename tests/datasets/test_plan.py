@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
-from artsim.datasets.draw import SampleOptions, check_visible, draw_sample
+from artsim.datasets.draw import SampleOptions, draw_sample
 from artsim.datasets.plan import Plan, PlannedObject
-from artsim.datasets.splits import SPLITS, assign_splits, showing_order, unique_keys
+from artsim.datasets.splits import SPLITS, assign_splits, unique_keys
 from artsim.errors import ConfigError
 from artsim.renderers import make_renderer
 from artsim.sampling import StateOptions, ViewOptions
