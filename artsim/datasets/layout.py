@@ -13,8 +13,8 @@ _OBJECTS_AT_ONCE = 16
 _LAP = 16
 """Turns of each object in a lap."""
 
-_FIRST_LAPS = ((0, 4), (4, 8), (8, 16))
-"""Shorter ones at the start: a small dataset that grows keeps at least half of what it holds."""
+_FIRST_LAPS = ((0, 8), (8, 16))
+"""Shorter ones at the start: a dataset that grows keeps at least half of what it holds, from 8 views of each object on."""
 
 
 def at_place(place: int, objects: int, rounds: int | None = None) -> tuple[int, int]:

@@ -87,12 +87,12 @@ def test_what_a_sample_is_does_not_depend_on_how_many_there_are(objects: int, fe
 
 @given(st.integers(1, 60), st.integers(0, 100), st.integers(0, 59))
 def test_a_split_that_grows_keeps_what_lies_in_finished_laps(objects: int, rounds: int, more: int) -> None:
-    """Laps end after 4, 8, 16, 32, 48, ... rounds, so that at least half of what is there is kept from 4 rounds on."""
-    finished = max(end for end in [0, 4, 8, *range(16, 116, 16)] if end <= rounds)
+    """Laps end after 8, 16, 32, 48, ... rounds, so that at least half of what is there is kept from 8 rounds on."""
+    finished = max(end for end in [0, 8, *range(16, 116, 16)] if end <= rounds)
     kept = [at_place(place, objects, rounds) for place in range(finished * objects)]
     assert kept == [at_place(place, objects, rounds + more) for place in range(finished * objects)]
     assert kept == [at_place(place, objects) for place in range(finished * objects)]
-    assert 2 * finished >= rounds or rounds < 4
+    assert 2 * finished >= rounds or rounds < 8
     assert sorted(at_place(p, objects, rounds) for p in range(rounds * objects)) == [
         (r, n) for r in range(rounds) for n in range(objects)
     ]
