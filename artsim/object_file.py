@@ -98,8 +98,8 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
         scale=float(scale),
         T_base_rest=_numbers(header.get("T_base_rest"), (4, 4)),
         repairs=(
-            *(Repair(*_texts(repair, 2)) for repair in repairs),
-            *(Repair(*_texts(note, 2), note=True) for note in notes),
+            *(Repair(where, what) for where, what in (_texts(repair, 2) for repair in repairs)),
+            *(Repair(where, what, note=True) for where, what in (_texts(note, 2) for note in notes)),
         ),
         source=source,
         source_joints=_source_joints(header.get("source_joints"), len(tree)),

@@ -92,7 +92,7 @@ class Dataset:
         if self._owner != os.getpid():  # forked: a shared file position would mix up reads
             self._readers, self._owner = OrderedDict(), os.getpid()
         if name not in self._readers:
-            self._readers[name] = ShardReader(self.folder / name)
+            self._readers[name] = ShardReader(self.folder / name, repair_command(self.folder))
             if len(self._readers) > _OPEN_SHARDS:
                 self._readers.popitem(last=False)[1].close()
         self._readers.move_to_end(name)

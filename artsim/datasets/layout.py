@@ -14,7 +14,7 @@ _LAP = 16
 """Turns of each object in a lap."""
 
 _FIRST_LAPS = ((0, 8), (8, 16))
-"""Shorter ones at the start: a dataset that grows keeps at least half of what it holds, from 8 views of each object on."""
+"""Shorter ones at the start: once each object has 8 views, a dataset that grows keeps at least half of it."""
 
 
 def at_place(place: int, objects: int, rounds: int | None = None) -> tuple[int, int]:

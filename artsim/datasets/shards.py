@@ -33,7 +33,7 @@ _ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in _OTHER)
 _MAX_MEMBER = 1 << 30
 MAX_PIXELS = 8192 * 8192
 """Of the largest images that are made."""
-_FIX = "artsim repair FOLDER, or the same generate command again"
+_AGAIN = "make it again"
 
 
 def sample_members(sample: Sample) -> dict[str, bytes]:
@@ -56,7 +56,7 @@ def sample_members(sample: Sample) -> dict[str, bytes]:
     return members
 
 
-def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
+def sample_from_members(members: Mapping[str, bytes], where: str, fix: str = _AGAIN) -> Sample:
     """Inverse of :func:`sample_members`.
 
     Raises
@@ -89,7 +89,7 @@ def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
                 values[name] = np.asarray(open_image(members[f"{name}.png"], name, DatasetError, MAX_PIXELS))
         return Sample(**values)
     except Exception as error:  # NumPy, Pillow and json fail in many ways on bytes that are not theirs
-        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, _FIX) from error
+        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, fix) from error
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
@@ -182,6 +182,8 @@ class ShardReader:
     Parameters
     ----------
     path : Path
+    fix : str
+        What its errors advise.
 
     Raises
     ------
@@ -189,11 +191,11 @@ class ShardReader:
         When the file is missing or is not a whole tar file.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, fix: str = _AGAIN):
+        self.path, self.fix = path, fix
         self._members: dict[str, dict[str, tuple[int, int]]] = {}
         if not path.is_file():  # to open a pipe would wait for somebody who writes to it
-            raise DatasetError("is missing, or no file", path, _FIX)
+            raise DatasetError("is missing, or no file", path, fix)
         try:
             size = path.stat().st_size
             with tarfile.open(path, "r:") as tar:
@@ -201,11 +203,11 @@ class ShardReader:
                     key, _, suffix = info.name.partition(".")
                     inside = 0 <= info.size <= min(_MAX_MEMBER, size - info.offset_data)
                     if info.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or info.issparse() or not inside:
-                        raise DatasetError(f"unexpected member {printable(info.name)}", path, _FIX)
+                        raise DatasetError(f"unexpected member {printable(info.name)}", path, fix)
                     self._members.setdefault(key, {})[suffix] = (info.offset_data, info.size)
             self._file = path.open("rb")
         except (tarfile.TarError, OSError, EOFError, ValueError) as error:
-            raise DatasetError(f"cannot read the shard ({error})", path, _FIX) from error
+            raise DatasetError(f"cannot read the shard ({error})", path, fix) from error
 
     def __len__(self) -> int:
         return len(self._members)
@@ -218,14 +220,14 @@ class ShardReader:
         """One sample by its key."""
         members = self._members.get(key)
         if members is None:
-            raise DatasetError(f"holds no sample {key}", self.path, _FIX)
+            raise DatasetError(f"holds no sample {key}", self.path, self.fix)
         contents = {}
         for suffix, (offset, size) in members.items():
             self._file.seek(offset)
             contents[suffix] = self._file.read(size)
             if len(contents[suffix]) != size:
-                raise DatasetError("the shard is cut short", self.path, _FIX)
-        return sample_from_members(contents, f"{self.path}: sample {key}")
+                raise DatasetError("the shard is cut short", self.path, self.fix)
+        return sample_from_members(contents, f"{self.path}: sample {key}", self.fix)
 
     def close(self) -> None:
         """Close the file."""

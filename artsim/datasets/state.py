@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,17 +79,17 @@ def examine(folder: Path, begun: Begun, workers: int = 2, progress: bool = True)
         problem, digest = _file_problem(folder / shard.name, [record.sha256 for record in records])
         return problem, next((record for record in records if record.sha256 == digest), None)
 
+    objects: dict[PlannedObject, str] = {}
+    broken: dict[Shard, str] = {}
+    kept: dict[str, ShardRecord] = {}
     with (
-        ThreadPoolExecutor(workers) as pool,
+        _readers(workers) as pool,
         track("check", total=len(shards) + len(begun.plan.objects), unit="file", shown=progress, leave=False) as bar,
     ):
-        objects: dict[PlannedObject, str] = {}
         for planned, problem in zip(begun.plan.objects, pool.map(object_problem, begun.plan.objects), strict=True):
             if problem is not None:
                 objects[planned] = problem
             bar.update()
-        broken: dict[Shard, str] = {}
-        kept: dict[str, ShardRecord] = {}
         for shard, (problem, found) in zip(shards, pool.map(shard_state, shards), strict=True):
             if found is None:
                 broken[shard] = problem or "is not finished"
@@ -96,6 +97,16 @@ def examine(folder: Path, begun: Begun, workers: int = 2, progress: bool = True)
                 kept[shard.name] = found
             bar.update()
     return State(objects, broken, kept)
+
+
+@contextlib.contextmanager
+def _readers(workers: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that a Ctrl-C stops after the files that they are at, not after all."""
+    pool = ThreadPoolExecutor(workers)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _file_problem(path: Path, digests: Sequence[str]) -> tuple[str | None, str]:

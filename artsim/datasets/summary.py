@@ -102,7 +102,7 @@ def _repair_lines(folder: Path, objects: Sequence[PlannedObject], shown: int) ->
     ranked = sorted(found.values(), key=len, reverse=True)
     for alike in ranked[:shown]:
         planned, text = alike[0]
-        yield f"  {len(alike)} x  {printable(text, 110)}  ({printable(planned.source, 60)})"
+        yield f"  {len(alike)} x  {printable(text, 200)}  ({printable(planned.source, 60)})"
     if len(ranked) > shown:
         yield f"  and {len(ranked) - shown} more kinds"
     yield f"details: artsim inspect {shlex.quote(str(folder / ranked[0][0][0].file))}"

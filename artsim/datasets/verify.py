@@ -81,12 +81,12 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
 
 
 def _share_problems(plan: Plan) -> Iterator[Problem]:
-    """Objects of one content in several splits: what is trained with would be tested with."""
-    splits: dict[str, set[str]] = defaultdict(set)
+    """Files of one content in several splits: what is trained with would be tested with."""
+    splits: dict[tuple[str, str], set[str]] = defaultdict(set)
     for planned in plan.objects:
-        splits[planned.sha256].add(planned.split)
+        splits[planned.sha256, planned.source_sha256].add(planned.split)
     for planned in plan.objects:
-        if len(splits[planned.sha256]) > 1:
+        if len(splits[planned.sha256, planned.source_sha256]) > 1:
             yield Problem(planned.file, "is in several splits, under different names", _FIX)
 
 

@@ -19,6 +19,7 @@ from artsim.datasets.draw import PLANNED_ATTEMPTS, SampleOptions, check_visible,
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.shards import OtherBytesError, write_shard
 from artsim.errors import ArtsimError, DatasetError
+from artsim.extras import explained
 from artsim.files import file_sha256
 from artsim.loading.sources import FamilySource, Source
 from artsim.object_file import ObjectCache, save_object
@@ -79,6 +80,8 @@ def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, 
         return "done", work(*arguments)
     except ArtsimError as error:
         return "failed", error
+    except ImportError as error:
+        return "failed", explained(error, None)
     except Exception as error:  # whatever it is, the parent has to know; it may not survive a trip between processes
         return "failed", DatasetError(f"a worker process failed ({type(error).__name__}: {error})")
 
@@ -119,14 +122,16 @@ def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
 
 
 def _samples(worker: _Worker, shard: Shard) -> Iterator[Sample]:
-    plan = worker.plan
+    plan, renderer = worker.plan, worker.renderer  # which says itself what it lacks
     for made, index in enumerate(plan.indices(shard), start=1):
         if worker.connection.poll():  # nothing but a wish to stop comes while there is a task
             raise _StoppedError
         planned = plan.object_of(index)
         try:
             obj = worker.objects[planned.key]
-            yield draw_sample(obj, plan.sample, plan.seed, index, worker.renderer, PLANNED_ATTEMPTS)
+            yield draw_sample(obj, plan.sample, plan.seed, index, renderer, PLANNED_ATTEMPTS)
+        except ImportError:  # which says what to install
+            raise
         except Exception as error:  # whatever a renderer or a view function stumbles on: what matters is where
             what = error.what if isinstance(error, ArtsimError) else f"{type(error).__name__}: {error}"
             raise DatasetError(
