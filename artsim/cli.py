@@ -1,4 +1,4 @@
-"""The program ``artsim``: generate, generate-objects, record, scene, view, inspect, verify, doctor."""
+"""The program ``artsim``: generate, generate-objects, record, scene, view, inspect, verify, repair, doctor."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ import tyro
 
 from artsim.datasets.plan import SampleOptions
 from artsim.episode import EpisodeOptions
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.extras import explained, of_ours
 from artsim.loading.roots import PackageRoots
 from artsim.names import PrintableStream, printable
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
+
+_LISTED = 50
+"""Lines of a list before the rest is only counted."""
 
 
 def _cores() -> int:
@@ -34,8 +37,8 @@ class Generate:
 
     Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
     truth as WebDataset tar shards. Objects are made (--categories), loaded (--objects), or both. Stop it at any moment:
-    the same command goes on where it stopped. The result depends on the options and the seed alone, never on the number
-    of workers.
+    the same command goes on where it stopped, and makes again what is damaged. With a larger --num-samples it extends
+    the dataset. The result depends on the options and the seed alone, never on the number of workers.
 
     To make objects: python generate.py --categories laptop drawer --objects-per-category 200 --out out/first
 
@@ -66,11 +69,17 @@ class Generate:
     package_root: PackageRoots = field(default_factory=dict)
     """Folders that package:// names stand for, where they are not found as they are; repeatable."""
     skip_broken: bool = False
-    """Leave out objects that do not load, and say which, instead of stopping."""
+    """Leave out objects that do not load, or that no view sees, and say which, instead of stopping."""
+    strict: bool = False
+    """Refuse objects that were repaired while loading; with --skip-broken, leave them out."""
+    load_limit: float = 300.0
+    """Seconds that an object may take to load."""
 
     def run(self) -> None:
         from artsim.datasets.generate import generate
+        from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
+        from artsim.names import printable
 
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
         sources += family_sources(_categories(self.categories), self.objects_per_category, self.first_object)
@@ -85,12 +94,21 @@ class Generate:
                 shard_size=self.shard_size,
                 splits=self.splits,
                 skip_broken=self.skip_broken,
+                strict=self.strict,
+                load_limit=self.load_limit,
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")
             raise
         for reason in result.left_out:
-            print(f"left out: {reason}")
+            print(f"left out: {printable(reason, 1000)}")
+        for line in object_lines(result.folder, result.objects):
+            print(line)
+        if result.grown_from is not None:
+            kept = result.num_samples - result.made
+            print(f"extended from {result.grown_from} samples, {kept} of which are kept in their shards")
+        for file in result.restored:
+            print(f"made again: {file}")
         if result.made == 0:
             print(f"{result.folder}: already complete, {result.num_samples} samples")
             return
@@ -297,24 +315,64 @@ class Inspect:
 
 @dataclass(frozen=True)
 class Verify:
-    """Check a dataset: every shard's checksum, and what must hold of every sample's ground truth."""
+    """Check a dataset: every checksum, the descriptions, the objects, and what must hold of every sample's truth.
+
+    Nothing is written. Each problem says what to do.
+    """
 
     path: tyro.conf.Positional[Path]
     """Dataset folder."""
 
     def run(self) -> None:
+        from artsim.datasets.problems import repair_command
         from artsim.datasets.verify import verify
 
         problems = verify(self.path)
-        for problem in problems[:50]:
+        for problem in problems[:_LISTED]:
             print(problem)
-        if len(problems) > 50:
-            print(f"... and {len(problems) - 50} more")
+        if len(problems) > _LISTED:
+            print(f"... and {len(problems) - _LISTED} more")
         if problems:
-            raise ConfigError(
-                f"{len(problems)} problems found", self.path, "delete the shards named, then rerun generate"
-            )
+            plural = "problem" if len(problems) == 1 else "problems"
+            raise DatasetError(f"{len(problems)} {plural} found", self.path, repair_command(self.path))
         print(f"{self.path}: sound")
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Restore what is damaged or missing of a dataset, to the same bytes, or say why that cannot be.
+
+    Shards are drawn again, objects are made or loaded again, plan.json and dataset.json restore each other. A dataset
+    that was stopped is completed. What cannot be restored is listed, and the exit code is 2.
+    """
+
+    path: tyro.conf.Positional[Path]
+    """Dataset folder."""
+    objects: tuple[Path, ...] = ()
+    """Where objects lie that were loaded from files, if they are not where they were."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folder of a package:// name: NAME=FOLDER ..."""
+    workers: int = field(default_factory=_cores)
+    """Worker processes; by default one for each core."""
+
+    def run(self) -> None:
+        from artsim.datasets.repair import repair
+        from artsim.loading.sources import find_sources
+
+        try:
+            result = repair(self.path, find_sources(self.objects, self.package_root), self.workers)
+        except KeyboardInterrupt:
+            print(f"\nstopped; what was restored stays in {self.path}: the same command goes on from there")
+            raise
+        for file in result.restored[:_LISTED]:
+            print(f"restored: {file}")
+        if len(result.restored) > _LISTED:
+            print(f"... and {len(result.restored) - _LISTED} more")
+        for problem in result.failed[:_LISTED]:
+            print(problem)
+        if result.failed:
+            raise DatasetError(f"{len(result.failed)} problems are left", self.path)
+        print(f"{self.path}: " + (f"{len(result.restored)} files restored" if result.restored else "nothing to repair"))
 
 
 @dataclass(frozen=True)
@@ -346,6 +404,7 @@ Verb = (
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
+    | Annotated[Repair, tyro.conf.subcommand("repair")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
 

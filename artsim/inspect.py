@@ -29,6 +29,8 @@ def describe(obj: ArticulatedObject) -> str:
     for k, part in enumerate(obj.parts):
         note = "" if len(part.faces) else "   (no geometry)"
         lines.append(f"  {k} {_lengths(obj.box_center[k])} / {_lengths(obj.box_size[k])}{note}")
+    if obj.is_rigid:
+        lines += ["", "no joint can move: the object is rigid"]
     lines += ["", f"repairs: {len(obj.repairs) or 'none'}", *(f"  {repair}" for repair in obj.repairs)]
     return "\n".join(lines)
 

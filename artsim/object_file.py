@@ -34,7 +34,8 @@ def save_object(obj: ArticulatedObject, path: Path) -> None:
         "sha256": obj.sha256,
         "scale": obj.scale,
         "T_base_rest": obj.T_base_rest.tolist(),
-        "repairs": [[r.where, r.what] for r in obj.repairs],
+        "repairs": [[r.where, r.what] for r in obj.repairs if not r.note],
+        "notes": [[r.where, r.what] for r in obj.repairs if r.note],
         "source_joints": {name: list(v) for name, v in obj.source_joints.items()},
     }
     vertices = np.concatenate([p.vertices for p in obj.parts])
@@ -85,8 +86,8 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
     (scale,) = _numbers([header.get("scale")], (1,))
     if not 0.0 < scale <= _LARGEST:
         raise ValueError(f"its scale is {scale}")
-    repairs = header.get("repairs")
-    if not isinstance(repairs, list):
+    repairs, notes = header.get("repairs"), header.get("notes", [])  # older files have no notes
+    if not isinstance(repairs, list) or not isinstance(notes, list):
         raise ValueError("its repairs are no list")
     return ArticulatedObject(
         object_id=object_id,
@@ -96,7 +97,10 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
         sha256=sha256,
         scale=float(scale),
         T_base_rest=_numbers(header.get("T_base_rest"), (4, 4)),
-        repairs=tuple(Repair(*_texts(repair, 2)) for repair in repairs),
+        repairs=(
+            *(Repair(where, what) for where, what in (_texts(repair, 2) for repair in repairs)),
+            *(Repair(where, what, note=True) for where, what in (_texts(note, 2) for note in notes)),
+        ),
         source=source,
         source_joints=_source_joints(header.get("source_joints"), len(tree)),
     )

@@ -37,10 +37,13 @@ class Repair:
         Element concerned, for example ``joint 'joint_2'``.
     what : str
         What was found and what was done about it.
+    note : bool
+        Whether the object is all that the file says, nothing of which was assumed, changed or dropped.
     """
 
     where: str
     what: str
+    note: bool = False
 
     def __str__(self) -> str:
         return printable(f"{self.where}: {self.what}", _MAX_REPAIR)
@@ -214,6 +217,12 @@ class ArticulatedObject:
     def num_faces(self) -> int:
         """Triangles over all parts."""
         return sum(len(p.faces) for p in self.parts)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether no joint can move."""
+        low, high = self.tree.limits[self.tree.free_joints].T
+        return not bool((high > low).any())
 
     def scaled(self, scale: float) -> ArticulatedObject:
         """The same object at ``scale`` times its native size; geometry is shared, not copied."""

@@ -143,7 +143,7 @@ def main(options: Options) -> None:
             same.append(digests(whole) == digests(out))
             print(f"{workers} workers: {'the same bytes' if same[-1] else 'DIFFERENT BYTES'}", flush=True)
         counts = sample_counts(out)
-        known = {".lock", "objects", "plan.json", "dataset.json"}
+        known = {".lock", ".sources.json", "objects", "plan.json", "dataset.json"}
         leftovers = sorted({p.name for p in out.iterdir() if p.suffix != ".tar"} - known)
     result = {
         "rounds": options.rounds,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -86,6 +87,19 @@ def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     assert made.returncode == 0, made.stderr
     assert "20 samples" in made.stdout
     assert "sound" in run(ARTSIM, "verify", str(out)).stdout
+    (out / "plan.json").write_text("{")
+    shutil.copy(out / "train-000000.tar", out / "mine.tar")
+    found = run(ARTSIM, "verify", str(out))
+    assert found.returncode == 2
+    assert "plan.json: is damaged (" in found.stdout
+    assert f"Fix: artsim repair {out}" in found.stderr
+    refused = run(ARTSIM, "repair", str(out))
+    assert refused.returncode == 2
+    assert "restored: plan.json" in refused.stdout
+    assert "mine.tar: is no part of this dataset. Fix: move it out of the folder, or delete it" in refused.stdout
+    (out / "mine.tar").unlink()
+    assert f"{out}: nothing to repair" in run(ARTSIM, "repair", str(out)).stdout
+    assert "already complete, 20 samples" in generate(*made.args[2:]).stdout
     view = run(ARTSIM, "view", str(out), "--samples", "2", "--rerun", str(tmp_path / "r.rrd"))
     assert view.returncode == 0, view.stderr
     assert (out / "contact_sheet.png").stat().st_size > 10_000

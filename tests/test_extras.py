@@ -47,6 +47,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "view": [("box.urdf --samples 1", "view"), ("made", "view")],
         "inspect": [("box.urdf", ""), ("box.urdf --gates", "sim")],
         "verify": [("made", "")],
+        "repair": [("made", "")],
         "doctor": [("warp", "")],
     },
     "artperl": {

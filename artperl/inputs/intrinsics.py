@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from artperl.inputs.bounds import guarded, read_file, read_npy, read_npz
 from artperl.inputs.intrinsics_formats import Hints, Stated, stated_camera
 from artsim.errors import ArtsimError, ConfigError
+from artsim.extras import needs
 from artsim.files import parse_json
 
 Array = NDArray[np.float64]
@@ -196,10 +197,8 @@ def _numbers(data: bytes, path: Path) -> Array:
 
 
 def _yaml(data: bytes, path: Path) -> Any:
-    try:
-        import yaml  # type: ignore[import-untyped]
-    except ImportError:
-        raise ConfigError("YAML needs PyYAML", path, "pip install pyyaml") from None
+    with needs("intrinsics in YAML"):
+        import yaml
 
     class Plain(yaml.SafeLoader):  # type: ignore[misc]
         """No references: a few lines of them can stand for gigabytes."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import json
 import os
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -13,8 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.datasets.plan import FORMAT, SPLITS, Plan, ShardRecord, draw_sample
+from artsim.datasets.description import read_description
+from artsim.datasets.draw import draw_sample
+from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
+from artsim.datasets.problems import repair_command
 from artsim.datasets.shards import ShardReader, sample_key
+from artsim.datasets.splits import SPLITS
+from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
 from artsim.kinematics import JOINT_TYPES
 from artsim.object_file import ObjectCache
@@ -30,7 +34,8 @@ class Dataset:
     """Random access to the samples of one split, or of all: ``len(ds)``, ``ds[i]``, iteration.
 
     It can be given to a torch ``DataLoader`` (which wants :meth:`padded`, so that samples of objects with different
-    numbers of parts stack) and pickled to its workers; torch itself is not imported.
+    numbers of parts stack) and pickled to its workers; torch itself is not imported. Samples come in the order of the
+    shards, in which several views of few objects lie together: shuffle for training.
 
     Parameters
     ----------
@@ -47,7 +52,7 @@ class Dataset:
 
     def __init__(self, folder: str | Path, split: str | None = None):
         self.folder = Path(folder)
-        self.plan, shards = _read_description(self.folder)
+        self.plan, shards, self.description = read_description(self.folder)
         if split is not None and split not in SPLITS:
             raise ConfigError(f"there is no split {split!r}", fix=f"use one of {', '.join(SPLITS)}")
         self.split = split
@@ -69,7 +74,16 @@ class Dataset:
     def _place(self, i: int) -> tuple[ShardRecord, int]:
         """Shard and number in the whole dataset of sample ``i``."""
         s = bisect.bisect_right(self._ends, i)
-        return self.shards[s], self.shards[s].end - (self._ends[s] - i)
+        shard = self.shards[s]
+        return shard, self.plan.index_at(shard.split, shard.end - (self._ends[s] - i))
+
+    def __str__(self) -> str:
+        """What it holds, on one screen."""
+        return summary(self.folder, self.plan, self.shards, self.description, self.split)
+
+    def __repr__(self) -> str:
+        split = "" if self.split is None else f", split={self.split!r}"
+        return f"<Dataset {str(self.folder)!r}{split}: {len(self)} samples of {len(self.plan.objects)} objects>"
 
     def __iter__(self) -> Iterator[Sample]:
         return (self[i] for i in range(len(self)))
@@ -78,7 +92,7 @@ class Dataset:
         if self._owner != os.getpid():  # forked: a shared file position would mix up reads
             self._readers, self._owner = OrderedDict(), os.getpid()
         if name not in self._readers:
-            self._readers[name] = ShardReader(self.folder / name)
+            self._readers[name] = ShardReader(self.folder / name, repair_command(self.folder))
             if len(self._readers) > _OPEN_SHARDS:
                 self._readers.popitem(last=False)[1].close()
         self._readers.move_to_end(name)
@@ -92,11 +106,24 @@ class Dataset:
 
     def object_key(self, i: int) -> str:
         """Name, unique in the dataset, of the object that sample ``i`` shows, without reading it."""
-        return self.plan.object_of(self._place(i)[1]).key
+        return self.planned(self._place(i)[1]).key
+
+    def planned(self, index: int) -> PlannedObject:
+        """What the plan says of the object that the sample of an index shows.
+
+        Raises
+        ------
+        DatasetError
+            When the dataset has no such sample.
+        """
+        try:
+            return self.plan.object_of(index)
+        except IndexError as error:
+            raise DatasetError(f"it has no sample {index}", self.folder, repair_command(self.folder)) from error
 
     def object_of(self, sample: Sample) -> ArticulatedObject:
         """The object that a sample shows, at the sample's scale."""
-        return self.objects[self.plan.object_of(sample.index).key].scaled(sample.scale)
+        return self.objects[self.planned(sample.index).key].scaled(sample.scale)
 
     def padded(self, max_parts: int | None = None) -> PaddedDataset:
         """View as dictionaries of arrays of one shape, which default collation stacks.
@@ -218,29 +245,3 @@ class SampleStream:
 def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:
     """Open a dataset that ``generate.py`` wrote; see :class:`Dataset`."""
     return Dataset(folder, split)
-
-
-def _read_description(folder: Path) -> tuple[Plan, list[ShardRecord]]:
-    """Content of ``dataset.json``.
-
-    Raises
-    ------
-    DatasetError
-        When it is missing, damaged or of another format.
-    """
-    path = folder / "dataset.json"
-    if not path.is_file():
-        unfinished = (folder / "plan.json").is_file()
-        raise DatasetError(
-            "the dataset is not complete" if unfinished else "no dataset here (no dataset.json)",
-            folder,
-            "run the same generate command again: it goes on" if unfinished else "name a folder that generate.py wrote",
-        )
-    try:
-        description = json.loads(path.read_text())
-        found = description["format"]
-        if found != FORMAT:
-            raise DatasetError(f"format {found} is not {FORMAT}", folder, "generate it with this version of artsim")
-        return Plan.from_dict(description), [ShardRecord(**s) for s in description["shards"]]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, ConfigError) as error:
-        raise DatasetError(f"dataset.json is damaged ({error})", folder, "delete it and rerun generate") from error

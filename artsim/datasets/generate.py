@@ -7,51 +7,61 @@ presence means that the dataset is complete.
 
 from __future__ import annotations
 
-import contextlib
-import itertools
-import json
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artsim.datasets.plan import (
-    Plan,
-    PlannedObject,
-    SampleOptions,
-    ShardRecord,
-    assign_splits,
-    check_shares,
-    unique_keys,
-)
+from artsim.datasets.description import DESCRIPTION, JOURNAL, Begun, read_begun
+from artsim.datasets.draw import SampleOptions
+from artsim.datasets.origins import Origins, write_origins
+from artsim.datasets.plan import FORMAT, MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
+from artsim.datasets.planning import new_plan
+from artsim.datasets.restore import journal_line, remove_leftovers, restore
+from artsim.datasets.splits import check_shares
+from artsim.datasets.state import State, examine, leftover_problems
 from artsim.datasets.team import Team, locked
-from artsim.datasets.worker import CompiledSource, compile_source, make_shard
-from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError, KinematicsError
-from artsim.files import write_atomic, write_error
+from artsim.errors import AssetError, ConfigError, DatasetError
+from artsim.files import write_atomic
 from artsim.loading.sources import Source
-from artsim.progress import track
+from artsim.sampling import view_sampler
 
-CONVENTIONS = (
-    "Metres, radians. Camera frame OpenCV (x right, y down, z forward); depth is z-depth, 0 = no return; pixel centres "
-    "at +0.5. T_camera_part maps the rest frame, as carried by each part, to the camera. Rest frame: Z up, front "
-    "towards -X, origin at the centre of the object's box in its rest state."
-)
-_VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
+LOAD_LIMIT = 300.0
+"""Seconds that an object may take to load: a hundred times what the largest real ones take."""
 
 
 @dataclass(frozen=True)
 class GenerateResult:
-    """What a call of :func:`generate` did."""
+    """What a call of :func:`generate` did.
+
+    Attributes
+    ----------
+    folder : Path
+    num_samples : int
+        Of the whole dataset.
+    made : int
+        Samples made by this call.
+    seconds : float
+    left_out : tuple of str
+        Sources left out because they are of no use, with the reason.
+    objects : tuple of PlannedObject
+        Of the dataset.
+    restored : tuple of str
+        Files that were there before, and had to be made again.
+    grown_from : int or None
+        Samples that the dataset had before it was extended.
+    """
 
     folder: Path
     num_samples: int
     made: int
     seconds: float
     left_out: tuple[str, ...]
-    """Sources left out because they could not be loaded, with the reason."""
+    objects: tuple[PlannedObject, ...] = ()
+    restored: tuple[str, ...] = ()
+    grown_from: int | None = None
 
 
 def generate(
@@ -65,8 +75,14 @@ def generate(
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1),
     skip_broken: bool = False,
     progress: bool = True,
+    strict: bool = False,
+    load_limit: float = LOAD_LIMIT,
 ) -> GenerateResult:
-    """Generate a dataset, or go on with one that was stopped.
+    """Generate a dataset, or go on with one that was stopped, extend it, or repair it.
+
+    On the folder of a dataset, the same options and sources make what is missing or damaged, and a larger
+    ``num_samples`` extends it: the result has the same bytes as if it had been generated at once. A complete dataset is
+    checked and left alone.
 
     Parameters
     ----------
@@ -83,9 +99,14 @@ def generate(
     splits : 3 float
         Shares of each category's objects in train, val and test.
     skip_broken : bool
-        Leave out sources that do not load instead of stopping.
+        Leave out sources that are of no use instead of stopping: that do not load, that no view sees, that end or stall
+        the process that loads them.
     progress : bool
         Show progress bars.
+    strict : bool
+        Refuse objects that were repaired while loading.
+    load_limit : float
+        Seconds that an object may take to load.
 
     Returns
     -------
@@ -94,94 +115,139 @@ def generate(
     Raises
     ------
     AssetError
-        When sources cannot be loaded.
+        When sources cannot be used.
     ConfigError
         When an option makes no sense, or the folder cannot be written to.
     DatasetError
-        When the folder holds a dataset of another plan, or is in use.
+        When the folder holds a dataset of another plan, is in use, or cannot be restored to what it was.
     KeyboardInterrupt
         On Ctrl-C, after the workers have stopped; the same call resumes.
     """
     start = time.perf_counter()
     folder = Path(out)
-    asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), ())
-    options = {**json.loads(json.dumps(asked.to_dict())), "artsim_version": version("artsim")}
-    del options["objects"]
-    _check_options(num_samples, seed, shard_size, workers, splits, sources)
+    asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), (), strict, version("artsim"))
+    _check_options(asked, workers, load_limit, sources)
+    if (folder / DESCRIPTION).exists():  # else it is not complete, and perhaps another run is at it
+        begun = _begun(folder, asked, sources)
+        if begun is not None and _is_sound(folder, begun, num_samples, workers, progress):
+            return _result(folder, begun, 0, start)
     with locked(folder):
-        _remove_leftovers(folder)
-        begun = _begun_plan(folder, options, sources)
-        with Team(folder, workers) as team:
-            if begun is None:
-                begun = _new_plan(folder, options, sources, team, skip_broken, progress)
-            plan = Plan.from_dict(begun)
-            finished = _finished_shards(folder, plan)
-            before = sum(record.end - record.first for record in finished.values())
-            finished |= _make_missing(folder, plan, finished, team, progress)
-        _complete(folder, plan, begun, finished)
-    left_out = tuple(entry["why"] for entry in begun["left_out"])
-    return GenerateResult(folder, plan.num_samples, plan.num_samples - before, time.perf_counter() - start, left_out)
+        remove_leftovers(folder)
+        try:
+            begun = _begun(folder, asked, sources)
+            grown_from = None
+            with Team(folder, workers) as team:
+                if begun is None:
+                    document = new_plan(folder, asked, sources, team, skip_broken, load_limit, progress)
+                    begun = Begun(document, Plan.from_dict(document), (), False, ())
+                elif num_samples > begun.plan.num_samples:
+                    grown_from = begun.plan.num_samples
+                    begun = _extended(folder, begun, num_samples)
+                write_origins(folder, sources)
+                state = examine(folder, begun, workers, progress)
+                damaged = _damaged(folder, begun, state) if grown_from is None else set()
+                restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
+        finally:
+            remove_leftovers(folder)
+    if restored.failed:
+        raise DatasetError(
+            f"{len(restored.failed)} files of the dataset: " + "; ".join(map(str, restored.failed[:5])), folder
+        )
+    files = tuple(name for name in restored.files if name in damaged)
+    return replace(_result(folder, begun, restored.samples, start), restored=files, grown_from=grown_from)
 
 
-def _check_options(
-    num_samples: int,
-    seed: int,
-    shard_size: int,
-    workers: int,
-    splits: tuple[float, float, float],
-    sources: Sequence[Source],
-) -> None:
-    for name, value in (("num_samples", num_samples), ("shard_size", shard_size), ("workers", workers)):
+def _is_sound(folder: Path, begun: Begun, num_samples: int, workers: int, progress: bool) -> bool:
+    """Whether the dataset asked for is there, complete and undamaged: then nothing is written, not even a lock."""
+    if not begun.complete or begun.problems or num_samples != begun.plan.num_samples:
+        return False
+    return not leftover_problems(folder, begun) and not examine(folder, begun, workers, progress)
+
+
+def _result(folder: Path, begun: Begun, made: int, start: float) -> GenerateResult:
+    left_out = tuple(str(entry["why"]) for entry in begun.document["left_out"])
+    seconds = time.perf_counter() - start
+    return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
+
+
+def _damaged(folder: Path, begun: Begun, state: State) -> set[str]:
+    """Files that were there before, or were said to be, and have to be made again."""
+    finished = {record.name for record in begun.records}
+    shards = {shard.name for shard in state.shards if shard.name in finished}
+    descriptions = {problem.where for problem in begun.problems}
+    return shards | {planned.file for planned in state.objects} | descriptions
+
+
+def _check_options(asked: Plan, workers: int, load_limit: float, sources: Sequence[Source]) -> None:
+    counts = (("num_samples", asked.num_samples), ("shard_size", asked.shard_size), ("workers", workers))
+    for name, value in counts:
         if value < 1:
             raise ConfigError(f"{value} is not a count", name, "use 1 or more")
-    if seed < 0:
-        raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
-    check_shares(splits)
+    if asked.seed < 0:
+        raise ConfigError(f"{asked.seed} is not a seed", "seed", "use 0 or more")
+    if not load_limit > 0:
+        raise ConfigError(f"{load_limit} is no time", "load_limit", "use some seconds, such as 300")
+    check_shares(asked.fractions)
+    if asked.num_samples > MAX_SAMPLES or asked.num_samples / asked.shard_size > MAX_SHARDS - 3:
+        raise ConfigError(
+            f"{asked.num_samples} samples in shards of {asked.shard_size} are too many",
+            "num_samples, shard_size",
+            f"make at most {MAX_SAMPLES} samples in at most {MAX_SHARDS} shards",
+        )
     if not sources:
         raise AssetError("no objects to show", fix="name categories to make, or URDF files or folders that hold some")
+    if asked.sample.views.custom is not None:
+        view_sampler(asked.sample.views.custom)
 
 
-def _remove_leftovers(folder: Path) -> None:
-    """Remove files that killed runs did not finish."""
-    for leftover in [*folder.glob(".*.part"), *folder.glob("objects/.*.part")]:
-        leftover.unlink(missing_ok=True)
-
-
-def _begun_plan(folder: Path, options: Mapping[str, Any], sources: Sequence[Source]) -> dict[str, Any] | None:
-    """Content of the folder's ``plan.json`` if there is one and it is the one asked for.
+def _begun(folder: Path, asked: Plan, sources: Sequence[Source]) -> Begun | None:
+    """What the folder says of its dataset, which is the one asked for, or a smaller one; None when there is none.
 
     Raises
     ------
     DatasetError
         When the folder belongs to another plan, or to something else.
     """
-    path = folder / "plan.json"
-    if not path.exists():
-        ours = {folder / "objects", *folder.glob(".*"), *folder.glob("objects/.*"), *folder.glob("objects/*.npz")}
-        strangers = sorted({*folder.iterdir(), *folder.glob("objects/*")} - ours)
-        if strangers:
-            name = strangers[0].relative_to(folder).as_posix()
-            raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
+    if not folder.exists():
         return None
-    try:
-        stored: dict[str, Any] = json.loads(path.read_text())
-        differing = _differing(options, stored)
-        have = {
-            (o["source"], o["source_sha256"]) for o in [*stored["objects"], *stored["left_out"], *stored["repeated"]]
-        }
-        if have != {(s.name, s.sha256) for s in sources}:
-            differing.append("objects")
-        if not differing:
-            Plan.from_dict(stored)
-    except (ValueError, KeyError, TypeError, AttributeError, ArtsimError) as error:
-        raise DatasetError(f"plan.json is damaged ({error})", folder, "delete the folder and start again") from error
-    if differing:
+    if not folder.is_dir():
+        raise ConfigError("cannot write (it is a file)", folder, "choose another folder")
+    begun = read_begun(folder)
+    if begun is None:
+        _refuse_strangers(folder)
+        return None
+    if begun.plan.format != FORMAT:
         raise DatasetError(
-            f"the folder holds a dataset of another plan (different: {', '.join(differing)})",
+            f"the folder holds a dataset of format {begun.plan.format}, which opens but is not gone on with",
             folder,
-            "choose another --out folder, or the options it was begun with (see its plan.json)",
+            "choose another --out folder",
         )
-    return stored
+    wanted = asked.to_dict()
+    del wanted["objects"]
+    if asked.num_samples > begun.plan.num_samples:
+        del wanted["num_samples"]  # it is to grow
+    differing = _differing(wanted, begun.document)
+    document = begun.document
+    have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
+    if have != {(s.name, s.sha256) for s in sources}:
+        differing.append("objects")
+    if differing:
+        fix = "choose another --out folder, or the options it was begun with (see its plan.json)"
+        if differing == ["num_samples"]:
+            fix = f"a dataset grows, but does not shrink: choose another --out folder, or {begun.plan.num_samples}"
+        raise DatasetError(
+            f"the folder holds a dataset of another plan (different: {', '.join(differing)})", folder, fix
+        )
+    return begun
+
+
+def _refuse_strangers(folder: Path) -> None:
+    """Refuse a folder without a dataset that holds something else."""
+    ours = {folder / "objects", *folder.glob(".*"), *folder.glob("objects/.*"), *folder.glob("objects/*.npz")}
+    found = sorted({*folder.iterdir(), *folder.glob("objects/*")} - ours)
+    if found:
+        name = found[0].relative_to(folder).as_posix()
+        raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
 
 
 def _differing(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
@@ -196,142 +262,10 @@ def _differing(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str
     return names
 
 
-def _new_plan(
-    folder: Path,
-    options: Mapping[str, Any],
-    sources: Sequence[Source],
-    team: Team,
-    skip_broken: bool,
-    progress: bool,
-) -> dict[str, Any]:
-    """Load every source, keep it compiled in the folder, and write the plan."""
-    staging = folder / "objects"
-    try:
-        staging.mkdir(exist_ok=True)
-    except OSError as error:
-        raise write_error(error, staging) from error
-    loaded: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
-    repeated: list[dict[str, str]] = []
-    left_out: list[dict[str, str]] = []
-    futures = [team.submit(compile_source, source, f"_staged_{i}.npz") for i, source in enumerate(sources)]
-    with track("objects", total=len(sources), unit="object", shown=progress) as bar:
-        for source, future in zip(sources, futures, strict=True):
-            entry = {"source": source.name, "source_sha256": source.sha256}
-            try:
-                compiled = future.result()
-                content = compiled.category, compiled.object_id, compiled.sha256
-                if loaded.setdefault(content, (source, compiled))[0] is not source:
-                    repeated.append(entry)  # the same object named twice counts once
-            except (AssetError, KinematicsError) as error:
-                left_out.append({**entry, "why": str(error)})
-            bar.update()
-    if (left_out and not skip_broken) or not loaded:
-        raise AssetError(
-            f"{len(left_out)} of {len(sources)} objects do not load:\n  "
-            + "\n  ".join(entry["why"] for entry in left_out[:20]),
-            fix="mend them, or leave them out with --skip-broken",
-        )
-    keys = unique_keys(list(loaded))
-    splits = assign_splits(
-        [(category, sha256) for category, _, sha256 in loaded], options["fractions"], options["seed"]
-    )
-    objects = []
-    for key, split, (source, compiled) in zip(keys, splits, loaded.values(), strict=True):
-        (staging / compiled.staged).replace(staging / f"{key}.npz")
-        objects.append(
-            PlannedObject(
-                key=key,
-                category=compiled.category,
-                object_id=compiled.object_id,
-                sha256=compiled.sha256,
-                num_parts=compiled.num_parts,
-                source=source.name,
-                source_sha256=source.sha256,
-                split=split,
-            )
-        )
-    plan = {
-        **options,
-        "versions": {name: version(name) for name in _VERSIONS_OF},
-        "objects": [asdict(o) for o in objects],
-        "left_out": left_out,
-        "repeated": repeated,
-    }
-    write_atomic(folder / "plan.json", json.dumps(plan, indent=1).encode())
-    return plan
-
-
-def _finished_shards(folder: Path, plan: Plan) -> dict[str, ShardRecord]:
-    """Shards that earlier runs finished and that are still there at their full size."""
-    lines: list[str] = []
-    with contextlib.suppress(FileNotFoundError):
-        lines += (folder / "progress.jsonl").read_text(errors="replace").splitlines()
-    with contextlib.suppress(FileNotFoundError, ValueError, KeyError, TypeError):
-        lines += [json.dumps(record) for record in json.loads((folder / "dataset.json").read_text())["shards"]]
-    wanted = {shard.name for shard in plan.shards()}
-    finished = {}
-    for line in lines:
-        try:
-            record = ShardRecord(**json.loads(line))
-        except (ValueError, TypeError):
-            continue  # the last line of a killed run may be cut short; its shard is made again
-        file = folder / record.name
-        if record.name in wanted and file.exists() and file.stat().st_size == record.bytes:
-            finished[record.name] = record
-    return finished
-
-
-def _make_missing(
-    folder: Path, plan: Plan, finished: Mapping[str, ShardRecord], team: Team, progress: bool
-) -> dict[str, ShardRecord]:
-    """Make the shards that are not finished, writing down each as it is."""
-    missing = [shard for shard in plan.shards() if shard.name not in finished]
-    if not missing:
-        return {}
-    journal = folder / "progress.jsonl"
-    write_atomic(journal, b"".join(map(_line, finished.values())))
-    (folder / "dataset.json").unlink(missing_ok=True)
-    before = plan.num_samples - sum(shard.end - shard.first for shard in missing)
-    made: dict[str, ShardRecord] = {}
-    waiting = iter(missing)
-    pending: set[Future[ShardRecord | None]] = set()
-    with track("samples", total=plan.num_samples, initial=before, unit="sample", shown=progress) as bar:
-        while len(made) < len(missing):
-            pending |= {team.submit(make_shard, s) for s in itertools.islice(waiting, 2 * team.workers - len(pending))}
-            done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-            records = [record for future in done if (record := future.result())]
-            made |= {record.name: record for record in records}
-            _append(journal, b"".join(map(_line, records)))
-            bar.update(before + team.made.value - bar.n)
-    return made
-
-
-def _line(record: ShardRecord) -> bytes:
-    return json.dumps(asdict(record)).encode() + b"\n"
-
-
-def _append(path: Path, data: bytes) -> None:
-    try:
-        with path.open("ab") as file:
-            file.write(data)
-    except OSError as error:
-        raise write_error(error, path) from error
-
-
-def _complete(folder: Path, plan: Plan, begun: Mapping[str, Any], finished: Mapping[str, ShardRecord]) -> None:
-    """Write ``dataset.json``, and remove what killed runs and their last workers left."""
-    description = {
-        **begun,
-        "conventions": CONVENTIONS,
-        "splits": {split: {"first": first, "end": end} for split, (first, end) in plan.ranges.items()},
-        "shards": [asdict(finished[shard.name]) for shard in plan.shards()],
-    }
-    path, content = folder / "dataset.json", json.dumps(description, indent=1).encode()
-    if not path.exists() or path.read_bytes() != content:
-        write_atomic(path, content)
-    planned = {f"{o.key}.npz" for o in plan.objects}
-    for stray in folder.glob("objects/*.npz"):
-        if stray.name not in planned:
-            stray.unlink()
-    (folder / "progress.jsonl").unlink(missing_ok=True)
-    _remove_leftovers(folder)
+def _extended(folder: Path, begun: Begun, num_samples: int) -> Begun:
+    """The plan with more samples. What is finished of the smaller one is noted, before nothing else says so."""
+    document = {**begun.document, "num_samples": num_samples}
+    plan = replace(begun.plan, num_samples=num_samples)
+    write_atomic(folder / JOURNAL, b"".join(map(journal_line, begun.records)))
+    (folder / DESCRIPTION).unlink(missing_ok=True)
+    return Begun(document, plan, begun.records, False, ())

@@ -1,115 +1,38 @@
 """The plan of a dataset: which object, split and random stream each sample index has.
 
-A sample depends on (dataset seed, sample index) and on nothing else: not on the number of workers, the size of
-a shard, the order of work or a restart.
+Sample ``i`` shows object ``i % len(objects)``, drawn from (dataset seed, ``i``). Nothing else decides on it: not the
+number of samples, of workers, the size of a shard, the order of work or a restart. So a dataset can grow.
 """
 
 from __future__ import annotations
 
+import bisect
 import hashlib
 import json
 import re
-from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
+from artsim.datasets import checked
+from artsim.datasets.draw import SampleOptions as SampleOptions
+from artsim.datasets.draw import draw_sample as draw_sample
+from artsim.datasets.layout import at_place
+from artsim.datasets.splits import SPLITS, check_shares
+from artsim.objects import MAX_PARTS
 
-from artsim.errors import ConfigError, RenderError
-from artsim.objects import ArticulatedObject
-from artsim.renderers import Renderer
-from artsim.sample import Sample, observe
-from artsim.sampling import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
+FORMAT = 2
 
-SPLITS = ("train", "val", "test")
-FORMAT = 1
+MAX_SAMPLES = 1_000_000_000
+"""Sample keys have nine digits."""
 
-_OBJECTS_AT_ONCE = 16
-_VIEWS_IN_A_ROW = 16
-_VIEW_ATTEMPTS = 50
+MAX_SHARDS = 1_000_000
+"""More files do not fit a folder, nor their list a description."""
 
+_MAX_OBJECTS = 1_000_000
 
-@dataclass(frozen=True)
-class SampleOptions:
-    """What one sample looks like."""
-
-    num_points: int = 2048
-    """Points of each cloud."""
-    scale: Scale = "native"
-    """Size of the object: native (as in its file), unit (diagonal of 1 m), or a range of diagonals in metres."""
-    states: StateOptions = field(default_factory=StateOptions)
-    views: ViewOptions = field(default_factory=ViewOptions)
-    renderer: Literal["raycast", "pybullet", "pybullet-egl", "sapien", "warp"] = "raycast"
-    """raycast needs nothing installed; the others need the extra 'pybullet', 'sapien' or 'warp'."""
-    images: tuple[Literal["depth", "part_mask", "rgb"], ...] = ()
-    """Images to keep beside the cloud; rgb needs sapien or pybullet."""
-    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
-    """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.num_points <= 1_000_000:
-            raise ConfigError(f"clouds of {self.num_points} points are not made", "num_points", "use 1 to 1000000")
-        if not isinstance(self.scale, str) and not 0.0 < self.scale[0] <= self.scale[1]:
-            raise ConfigError(f"{self.scale} is not a range of diagonals", "scale", "write LOW HIGH in metres")
-        if "rgb" in self.images and self.renderer in ("raycast", "warp"):
-            raise ConfigError(f"{self.renderer} makes no rgb", "images", "add --renderer sapien or pybullet")
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> SampleOptions:
-        """Inverse of ``dataclasses.asdict`` after a trip through JSON."""
-
-        def pair(values: Any) -> Any:
-            return None if values is None else (float(values[0]), float(values[1]))
-
-        states, views, scale = data["states"], data["views"], data["scale"]
-        ranges = {name: (float(low), float(high)) for name, (low, high) in states["joint_range"].items()}
-        return SampleOptions(
-            num_points=data["num_points"],
-            scale=scale if scale in ("native", "unit") else (float(scale[0]), float(scale[1])),
-            states=StateOptions(states["mode"], pair(states["fraction_open"]), ranges),
-            views=ViewOptions(**{k: pair(v) if isinstance(v, list) else v for k, v in views.items()}),
-            renderer=data["renderer"],
-            images=tuple(data["images"]),
-            noise=data.get("noise", "none"),  # older plans do not say
-        )
-
-
-def draw_sample(obj: ArticulatedObject, options: SampleOptions, seed: int, index: int, renderer: Renderer) -> Sample:
-    """The sample that (seed, index) stands for, of this object.
-
-    Raises
-    ------
-    RenderError
-        When 50 drawn views in a row do not see the object.
-    """
-    rng = np.random.default_rng([seed, index])
-    sized = sample_scale(obj, options.scale, rng)
-    for _ in range(_VIEW_ATTEMPTS):
-        q = sample_state(sized, options.states, rng)
-        camera = sample_view(sized, q, options.views, rng)
-        try:
-            return observe(
-                sized,
-                q,
-                camera,
-                num_points=options.num_points,
-                renderer=renderer,
-                images=options.images,
-                noise=options.noise,
-                rng=rng,
-                seed=seed,
-                index=index,
-            )
-        except RenderError:
-            continue  # out of sight: draw another view
-    raise RenderError(
-        f"{_VIEW_ATTEMPTS} drawn views in a row do not see the object",
-        f"{obj.object_id}, sample {index}",
-        "mend the view options",
-    )
+_KEY = re.compile(r"[A-Za-z0-9_-]{1,128}")
 
 
 @dataclass(frozen=True)
@@ -129,6 +52,12 @@ class PlannedObject:
         Digest of the source's main file, to tell a changed source at a restart.
     split : str
         One of ``SPLITS``.
+    file_sha256 : str
+        Digest of its file; empty in datasets of format 1.
+    rigid : bool
+        Whether no joint can move.
+    repairs : tuple of (where, what)
+        What was mended, assumed or left out while loading.
     """
 
     key: str
@@ -139,6 +68,38 @@ class PlannedObject:
     source: str
     source_sha256: str
     split: str
+    file_sha256: str = ""
+    rigid: bool = False
+    repairs: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def file(self) -> str:
+        """Name of its file in the dataset's folder."""
+        return f"objects/{self.key}.npz"
+
+    @staticmethod
+    def from_dict(data: object) -> PlannedObject:
+        """Inverse of ``dataclasses.asdict`` after a trip through JSON; ValueError where it is none."""
+        own = checked.mapping(data, "object")
+        known = {f.name for f in fields(PlannedObject)}
+        if not own.keys() <= known:
+            raise ValueError(f"an object has no {min(own.keys() - known)!r:.40}")
+        repairs = checked.sequence(own.get("repairs", []), "repairs", 10_000)
+        pairs = [checked.sequence(repair, "repair", 2) for repair in repairs]
+        digest = own.get("file_sha256", "")
+        return PlannedObject(
+            key=checked.text(own["key"], "key", _KEY),
+            category=checked.text(own["category"], "category"),
+            object_id=checked.text(own["object_id"], "object_id"),
+            sha256=checked.text(own["sha256"], "sha256"),
+            num_parts=checked.whole(own["num_parts"], "num_parts", 1, MAX_PARTS),
+            source=checked.text(own["source"], "source"),
+            source_sha256=checked.text(own["source_sha256"], "source_sha256"),
+            split=checked.one_of(own["split"], "split", SPLITS),
+            file_sha256=digest if digest == "" else checked.text(digest, "file_sha256", checked.SHA256),
+            rigid=checked.boolean(own.get("rigid", False), "rigid"),
+            repairs=tuple((checked.text(where, "repair"), checked.text(what, "repair")) for where, what in pairs),
+        )
 
 
 @dataclass(frozen=True)
@@ -152,6 +113,11 @@ class Plan:
         Share of the objects of each category in train, val and test.
     sample : SampleOptions
     objects : tuple of PlannedObject
+        In the order in which they are shown: sample ``i`` shows number ``i % len(objects)``.
+    strict : bool
+        Whether objects that were repaired while loading are refused.
+    artsim_version : str
+        That makes the samples.
     """
 
     seed: int
@@ -160,166 +126,173 @@ class Plan:
     fractions: tuple[float, float, float]
     sample: SampleOptions
     objects: tuple[PlannedObject, ...]
+    strict: bool = False
+    artsim_version: str = ""
+
+    format = FORMAT
 
     @cached_property
     def objects_of(self) -> dict[str, list[PlannedObject]]:
         """Objects of each split, in the plan's order."""
-        return {split: [o for o in self.objects if o.split == split] for split in SPLITS}
+        return {split: [self.objects[n] for n in numbers] for split, numbers in self._numbers.items()}
 
     @cached_property
-    def ranges(self) -> dict[str, tuple[int, int]]:
-        """First and end index of each split's samples: shares by the number of objects, together ``num_samples``."""
-        ends = np.cumsum([len(self.objects_of[split]) for split in SPLITS])
-        ends = np.round(self.num_samples * ends / max(1, len(self.objects))).astype(int)
-        starts = [0, *ends[:-1]]
-        return {split: (int(s), int(e)) for split, s, e in zip(SPLITS, starts, ends, strict=True)}
+    def _numbers(self) -> dict[str, list[int]]:
+        """Numbers of the objects of each split."""
+        numbers: dict[str, list[int]] = {split: [] for split in SPLITS}
+        for n, planned in enumerate(self.objects):
+            numbers[planned.split].append(n)
+        return numbers
+
+    @cached_property
+    def sizes(self) -> dict[str, int]:
+        """Samples of each split, together ``num_samples``."""
+        rounds, left = divmod(self.num_samples, max(1, len(self.objects)))
+        return {split: rounds * len(own) + bisect.bisect_left(own, left) for split, own in self._numbers.items()}
 
     def split_of(self, index: int) -> str:
         """Split that a sample belongs to."""
-        for split, (start, end) in self.ranges.items():
-            if start <= index < end:
-                return split
-        raise IndexError(f"sample {index} of {self.num_samples}")
+        return self.object_of(index).split
 
     def object_of(self, index: int) -> PlannedObject:
-        """Object that a sample shows: each object of a split gets the same number of samples, give or take one."""
-        split = self.split_of(index)
-        start, end = self.ranges[split]
-        objects = self.objects_of[split]
-        return objects[_whose_turn(index - start, len(objects), (end - start) // len(objects))]
+        """Object that a sample shows: each gets the same number of samples, give or take one."""
+        if not 0 <= index < self.num_samples:
+            raise IndexError(f"sample {index} of {self.num_samples}")
+        return self.objects[index % len(self.objects)]
+
+    def index_at(self, split: str, place: int) -> int:
+        """Index of the sample that lies at a place of a split; see :mod:`artsim.datasets.layout`."""
+        own, total = self._numbers[split], len(self.objects)
+        turn, number = at_place(place, len(own), self.num_samples // total)
+        return turn * total + own[number]
+
+    def indices(self, shard: Shard) -> list[int]:
+        """Indices of the samples of a shard, in its order."""
+        return [self.index_at(shard.split, place) for place in range(shard.first, shard.end)]
 
     def object_in_split(self, split: str, turn: int) -> PlannedObject:
         """Object at a turn of a split's endless rotation."""
-        objects = self.objects_of[split]
-        return objects[_whose_turn(turn, len(objects))]
+        own = self._numbers[split]
+        return self.objects[own[at_place(turn, len(own))[1]]]
+
+    @property
+    def num_shards(self) -> int:
+        """How many shards there are."""
+        return sum(-(-size // self.shard_size) for size in self.sizes.values())
 
     def shards(self) -> list[Shard]:
         """Every shard, in order."""
         return [
-            Shard(f"{split}-{number:06d}.tar", split, first, min(first + self.shard_size, end))
-            for split, (start, end) in self.ranges.items()
-            for number, first in enumerate(range(start, end, self.shard_size))
+            Shard(f"{split}-{number:06d}.tar", split, first, min(first + self.shard_size, size))
+            for split, size in self.sizes.items()
+            for number, first in enumerate(range(0, size, self.shard_size))
         ]
+
+    def recipe(self, shard: Shard) -> str:
+        """Digest of all that the bytes of a shard follow from: shards of one recipe are equal."""
+        text = f"{self._ingredients} {shard.split} {self.indices(shard)}"
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @cached_property
+    def _ingredients(self) -> str:
+        """Digest of what all shards follow from."""
+        made_of = [self.format, self.artsim_version, self.seed, asdict(self.sample)]
+        objects = [[planned.key, planned.file_sha256] for planned in self.objects]
+        return hashlib.sha256(json.dumps([made_of, objects], sort_keys=True).encode()).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready description, inverse of :meth:`from_dict`."""
-        return {
-            "format": FORMAT,
+        plan = {
+            "format": self.format,
+            "artsim_version": self.artsim_version,
             "seed": self.seed,
             "num_samples": self.num_samples,
             "shard_size": self.shard_size,
-            "fractions": list(self.fractions),
+            "fractions": self.fractions,
+            "strict": self.strict,
             "sample": asdict(self.sample),
             "objects": [asdict(o) for o in self.objects],
         }
+        plain: dict[str, Any] = json.loads(json.dumps(plan))
+        return plain
 
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> Plan:
-        """Rebuild a plan from :meth:`to_dict`."""
-        train, val, test = data["fractions"]
-        return Plan(
-            seed=data["seed"],
-            num_samples=data["num_samples"],
-            shard_size=data["shard_size"],
-            fractions=(train, val, test),
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Plan:
+        """Rebuild a plan from :meth:`to_dict`, or from a document that holds more than that.
+
+        Raises
+        ------
+        ValueError, KeyError, ConfigError
+            When a value is missing, of another type, or makes no sense.
+        """
+        fractions = tuple(checked.number(v, "fractions") for v in checked.sequence(data["fractions"], "fractions", 3))
+        if len(fractions) != 3:
+            raise ValueError("fractions are not three numbers")
+        check_shares(fractions)
+        objects = tuple(map(PlannedObject.from_dict, checked.sequence(data["objects"], "objects", _MAX_OBJECTS)))
+        if not objects:
+            raise ValueError("it has no objects")
+        if len({planned.key.lower() for planned in objects}) < len(objects):
+            raise ValueError("two objects have the same key")
+        plan = cls(
+            seed=checked.whole(data["seed"], "seed", 0, 2**63),
+            num_samples=checked.whole(data["num_samples"], "num_samples", 1, MAX_SAMPLES),
+            shard_size=checked.whole(data["shard_size"], "shard_size", 1, MAX_SAMPLES),
+            fractions=fractions,
             sample=SampleOptions.from_dict(data["sample"]),
-            objects=tuple(PlannedObject(**o) for o in data["objects"]),
+            objects=objects,
+            strict=checked.boolean(data.get("strict", False), "strict"),
+            artsim_version=checked.text(data["artsim_version"], "artsim_version", most=64),
         )
-
-
-def _whose_turn(turn: int, objects: int, rounds: int | None = None) -> int:
-    """Number of the object at a turn.
-
-    A few objects take turns until each has had several, then the next few: every shard mixes objects, and a worker
-    needs only those in memory. After the last of ``rounds`` turns each, every object gets one more, in order.
-    """
-    lap, left = divmod(turn, objects * _VIEWS_IN_A_ROW)
-    in_a_row = _VIEWS_IN_A_ROW if rounds is None else min(_VIEWS_IN_A_ROW, rounds - lap * _VIEWS_IN_A_ROW)
-    if left >= objects * in_a_row:
-        return left - objects * in_a_row
-    first = left // (_OBJECTS_AT_ONCE * in_a_row) * _OBJECTS_AT_ONCE
-    return first + (left - first * in_a_row) % min(_OBJECTS_AT_ONCE, objects - first)
-
-
-def read_plan(folder: Path) -> Plan:
-    """The plan that a generation run wrote into its folder."""
-    return Plan.from_dict(json.loads((folder / "plan.json").read_text()))
+        if plan.num_shards > MAX_SHARDS:
+            raise ValueError(f"it has {plan.num_shards} shards, over {MAX_SHARDS}")
+        return plan
 
 
 @dataclass(frozen=True)
 class Shard:
-    """Samples ``first`` to ``end`` (exclusive) in one tar file."""
+    """The samples at places ``first`` to ``end`` (exclusive) of a split, in one tar file."""
 
     name: str
     split: str
     first: int
     end: int
+
+    def __len__(self) -> int:
+        return self.end - self.first
 
 
 @dataclass(frozen=True)
-class ShardRecord:
-    """A finished shard: its samples are ``first`` to ``end`` (exclusive)."""
+class ShardRecord(Shard):
+    """A finished shard."""
 
-    name: str
-    split: str
-    first: int
-    end: int
     bytes: int
     sha256: str
+    recipe: str = ""
+    """See :meth:`Plan.recipe`; empty in datasets of format 1."""
 
+    @property
+    def shard(self) -> Shard:
+        """What was to be made."""
+        return Shard(self.name, self.split, self.first, self.end)
 
-def assign_splits(objects: Sequence[tuple[str, str]], fractions: tuple[float, float, float], seed: int) -> list[str]:
-    """Split of each object: by object, never by view, stratified by category.
-
-    Objects with equal content always share a split, whatever they and their categories are called. Each category has
-    at least one object in train, unless its share is 0.
-
-    Parameters
-    ----------
-    objects : sequence of (category, sha256)
-    fractions : 3 float
-        Shares of train, val and test; their sum is taken as 1.
-    seed : int
-
-    Returns
-    -------
-    list of str
-    """
-    check_shares(fractions)
-    category_of: dict[str, str] = {}
-    for category, sha256 in objects:
-        category_of[sha256] = min(category, category_of.get(sha256, category))
-    contents: dict[str, list[str]] = defaultdict(list)
-    for sha256, category in category_of.items():
-        contents[category].append(sha256)
-    shares = np.cumsum(fractions) / sum(fractions)
-    split_of: dict[str, str] = {}
-    for digests in contents.values():
-        order = sorted(digests, key=lambda d: hashlib.sha256(f"{seed}:{d}".encode()).hexdigest())
-        ends = np.floor(shares * len(order) + 0.5)
-        if fractions[0] > 0:
-            ends = np.maximum(ends, 1)  # a category of one object can at least be trained on
-        for place, digest in enumerate(order):
-            split_of[digest] = SPLITS[int(np.searchsorted(ends, place, side="right"))]
-    return [split_of[sha256] for _, sha256 in objects]
-
-
-def check_shares(fractions: tuple[float, float, float]) -> None:
-    """Refuse shares of train, val and test that make no sense.
-
-    Raises
-    ------
-    ConfigError
-    """
-    if not np.isfinite(fractions).all() or min(fractions) < 0 or sum(fractions) <= 0:
-        raise ConfigError(f"{tuple(fractions)} are not shares", "splits", "write three numbers such as 0.8 0.1 0.1")
-
-
-def unique_keys(objects: Sequence[tuple[str, str, str]]) -> list[str]:
-    """A file-safe unique key for each (category, object_id, sha256), also where file names ignore case."""
-    names = [re.sub(r"[^A-Za-z0-9_-]+", "_", f"{category}-{object_id}")[:100] for category, object_id, _ in objects]
-    count = Counter(name.lower() for name in names)
-    return [
-        f"{name}-{hashlib.sha256(repr(obj).encode()).hexdigest()[:12]}" if count[name.lower()] > 1 else name
-        for name, obj in zip(names, objects, strict=True)
-    ]
+    @staticmethod
+    def from_dict(data: object) -> ShardRecord:
+        """Inverse of ``dataclasses.asdict`` after a trip through JSON; ValueError where it is none."""
+        own = checked.mapping(data, "shard")
+        known = {f.name for f in fields(ShardRecord)}
+        if not known - {"recipe"} <= own.keys() <= known:
+            raise ValueError(f"a shard has {', '.join(sorted(map(str, own)))!s:.80}")
+        split, recipe = checked.one_of(own["split"], "split", SPLITS), own.get("recipe", "")
+        first, end = (checked.whole(own[name], name, 0, MAX_SAMPLES) for name in ("first", "end"))
+        if first >= end:
+            raise ValueError(f"a shard goes from {first} to {end}")
+        return ShardRecord(
+            name=checked.text(own["name"], "name", re.compile(rf"{split}-[0-9]{{6,9}}\.tar")),
+            split=split,
+            first=first,
+            end=end,
+            bytes=checked.whole(own["bytes"], "bytes", 0, 2**63),
+            sha256=checked.text(own["sha256"], "sha256", checked.SHA256),
+            recipe=recipe if recipe == "" else checked.text(recipe, "recipe", checked.SHA256),
+        )

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from artsim.errors import DatasetError
-from artsim.files import atomic_file
+from artsim.files import atomic_file, open_image, parse_npy
+from artsim.names import printable
 from artsim.sample import Sample
 
 _CLOUD = ("points", "part", "npcs")
@@ -30,7 +31,9 @@ _OTHER = (*_CLOUD, *_PNG, "depth", "noise", *_STRINGS, *_SCALARS)
 _ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in _OTHER)
 
 _MAX_MEMBER = 1 << 30
-_FIX = "delete the shard and run the same generate command again"
+MAX_PIXELS = 8192 * 8192
+"""Of the largest images that are made."""
+_AGAIN = "make it again"
 
 
 def sample_members(sample: Sample) -> dict[str, bytes]:
@@ -53,7 +56,7 @@ def sample_members(sample: Sample) -> dict[str, bytes]:
     return members
 
 
-def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
+def sample_from_members(members: Mapping[str, bytes], where: str, fix: str = _AGAIN) -> Sample:
     """Inverse of :func:`sample_members`.
 
     Raises
@@ -78,15 +81,15 @@ def sample_from_members(members: Mapping[str, bytes], where: str) -> Sample:
             if name != "joint_limits"
         }
         values["joint_limits"] = limits.reshape(-1, 2)
-        values |= {name: npy_array(members[f"{name}.npy"]) for name in _CLOUD}
+        values |= {name: parse_npy(members[f"{name}.npy"]) for name in _CLOUD}
         if "depth.npy" in members:
-            values["depth"] = npy_array(members["depth.npy"])
+            values["depth"] = parse_npy(members["depth.npy"])
         for name in _PNG:
             if f"{name}.png" in members:
-                values[name] = np.asarray(Image.open(io.BytesIO(members[f"{name}.png"])))
+                values[name] = np.asarray(open_image(members[f"{name}.png"], name, DatasetError, MAX_PIXELS))
         return Sample(**values)
     except Exception as error:  # NumPy, Pillow and json fail in many ways on bytes that are not theirs
-        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, _FIX) from error
+        raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, fix) from error
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
@@ -103,25 +106,45 @@ def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
     return buffer.getvalue()
 
 
-def npy_array(data: bytes) -> NDArray[Any]:
-    """Inverse of :func:`npy_bytes`; never unpickles."""
-    array: NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    return array
-
-
 def sample_key(index: int) -> str:
     """Name that all members of a sample share."""
     return f"{index:09d}"
 
 
-def write_shard(path: Path, samples: Iterable[Sample]) -> tuple[int, str]:
+class OtherBytesError(Exception):
+    """A shard came out with another digest than it was to have.
+
+    Attributes
+    ----------
+    sha256 : str
+        Its digest.
+    """
+
+    def __init__(self, sha256: str):
+        super().__init__(sha256)
+        self.sha256 = sha256
+
+
+def write_shard(path: Path, samples: Iterable[Sample], wanted: str | None = None) -> tuple[int, str]:
     """Write a whole shard, each sample as it comes: plain tar, no times, no owners.
+
+    Parameters
+    ----------
+    path : Path
+    samples : iterable of Sample
+    wanted : str, optional
+        Digest that the shard has to have to take the place of what is there.
 
     Returns
     -------
     size : int
         In bytes.
     sha256 : str
+
+    Raises
+    ------
+    OtherBytesError
+        When its digest is not ``wanted``: the file is as before.
     """
     size, digest = 0, hashlib.sha256()
     with atomic_file(path) as file:
@@ -135,6 +158,8 @@ def write_shard(path: Path, samples: Iterable[Sample]) -> tuple[int, str]:
         end = bytes(-(size + 2 * tarfile.BLOCKSIZE) % tarfile.RECORDSIZE + 2 * tarfile.BLOCKSIZE)
         file.write(end)
         digest.update(end)
+        if wanted not in (None, digest.hexdigest()):
+            raise OtherBytesError(digest.hexdigest())
     return size + len(end), digest.hexdigest()
 
 
@@ -157,6 +182,8 @@ class ShardReader:
     Parameters
     ----------
     path : Path
+    fix : str
+        What its errors advise.
 
     Raises
     ------
@@ -164,19 +191,23 @@ class ShardReader:
         When the file is missing or is not a whole tar file.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, fix: str = _AGAIN):
+        self.path, self.fix = path, fix
         self._members: dict[str, dict[str, tuple[int, int]]] = {}
+        if not path.is_file():  # to open a pipe would wait for somebody who writes to it
+            raise DatasetError("is missing, or no file", path, fix)
         try:
+            size = path.stat().st_size
             with tarfile.open(path, "r:") as tar:
                 for info in tar:
                     key, _, suffix = info.name.partition(".")
-                    if not info.isreg() or not 0 <= info.size <= _MAX_MEMBER:
-                        raise DatasetError(f"unexpected member {info.name!r}", path, _FIX)
+                    inside = 0 <= info.size <= min(_MAX_MEMBER, size - info.offset_data)
+                    if info.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or info.issparse() or not inside:
+                        raise DatasetError(f"unexpected member {printable(info.name)}", path, fix)
                     self._members.setdefault(key, {})[suffix] = (info.offset_data, info.size)
             self._file = path.open("rb")
         except (tarfile.TarError, OSError, EOFError, ValueError) as error:
-            raise DatasetError(f"cannot read the shard ({error})", path, _FIX) from error
+            raise DatasetError(f"cannot read the shard ({error})", path, fix) from error
 
     def __len__(self) -> int:
         return len(self._members)
@@ -189,14 +220,14 @@ class ShardReader:
         """One sample by its key."""
         members = self._members.get(key)
         if members is None:
-            raise DatasetError(f"holds no sample {key}", self.path, _FIX)
+            raise DatasetError(f"holds no sample {key}", self.path, self.fix)
         contents = {}
         for suffix, (offset, size) in members.items():
             self._file.seek(offset)
             contents[suffix] = self._file.read(size)
             if len(contents[suffix]) != size:
-                raise DatasetError("the shard is cut short", self.path, _FIX)
-        return sample_from_members(contents, f"{self.path}: sample {key}")
+                raise DatasetError("the shard is cut short", self.path, self.fix)
+        return sample_from_members(contents, f"{self.path}: sample {key}", self.fix)
 
     def close(self) -> None:
         """Close the file."""

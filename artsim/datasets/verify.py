@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 
 from artsim.camera import Camera
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.description import DESCRIPTION, read_begun, read_description
 from artsim.datasets.plan import Plan, ShardRecord
+from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
+from artsim.datasets.state import examine, leftover_problems, strangers
 from artsim.errors import ArtsimError, DatasetError
-from artsim.files import file_sha256
 from artsim.kinematics import Array, invert_transform, transform_points
+from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject
 from artsim.progress import track
 from artsim.renderers.raycast import cast, pose
@@ -25,29 +28,19 @@ from artsim.sampling import Scale
 
 _TOLERANCE = 1e-4
 """Of the object's diagonal: points are stored in single precision."""
+_FIX = "generate the dataset again, into another folder: its checksums are right, its content is not"
 _STRAY_RAYS = 0.005
 """Share of rays that may end elsewhere on another processor: those that graze an edge."""
 
 
-@dataclass(frozen=True)
-class Problem:
-    """One thing that is wrong, and where."""
-
-    where: str
-    what: str
-
-    def __str__(self) -> str:
-        return f"{self.where}: {self.what}"
-
-
 def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
-    """Check every file and sample of a dataset.
+    """Check every file and sample of a dataset. Nothing is written.
 
     Parameters
     ----------
     folder : path
     progress : bool
-        Show a progress bar.
+        Show progress bars.
 
     Returns
     -------
@@ -57,71 +50,112 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
     Raises
     ------
     DatasetError
-        When the folder holds no complete dataset.
+        When the folder holds no dataset, or one that is not complete yet.
     """
+    folder = Path(folder)
+    begun = read_begun(folder)
+    if begun is None or not (begun.complete or (folder / DESCRIPTION).exists()):
+        read_description(folder)  # raises
+    assert begun is not None
+    state = examine(folder, begun, progress=progress)
+    problems = [
+        *begun.problems,
+        *_share_problems(begun.plan),
+        *state.problems(folder),
+        *strangers(folder, begun),
+        *leftover_problems(folder, begun),
+    ]
+    if not begun.complete:
+        return problems
     dataset = Dataset(folder)
-    problems = [*_listing_problems(dataset), *_object_problems(dataset)]
-    unusable = {problem.where for problem in problems}
+    unusable = {planned.file for planned in state.objects}
+    found = list(_object_problems(dataset, unusable))
+    problems += found
+    unusable |= {problem.where for problem in found}
     with track("verify", total=len(dataset), unit="sample", shown=progress) as bar:
         for shard in dataset.shards:
-            problems += _shard_problems(dataset, shard, unusable)
-            bar.update(shard.end - shard.first)
+            if shard.name in state.kept:  # of another, nothing more needs to be known: it is to be made again
+                problems += _shard_problems(dataset, shard, unusable)
+            bar.update(len(shard))
     return problems
 
 
-def _listing_problems(dataset: Dataset) -> Iterator[Problem]:
-    planned = [(s.name, s.split, s.first, s.end) for s in dataset.plan.shards()]
-    if [(s.name, s.split, s.first, s.end) for s in dataset.shards] != planned:
-        yield Problem("dataset.json", "its shards are not those of its plan")
-    for name in sorted({path.name for path in dataset.folder.glob("*.tar")} - {s.name for s in dataset.shards}):
-        yield Problem(name, "is no shard of this dataset")
+def _share_problems(plan: Plan) -> Iterator[Problem]:
+    """Files of one content in several splits: what is trained with would be tested with."""
+    splits: dict[tuple[str, str], set[str]] = defaultdict(set)
+    for planned in plan.objects:
+        splits[planned.sha256, planned.source_sha256].add(planned.split)
+    for planned in plan.objects:
+        if len(splits[planned.sha256, planned.source_sha256]) > 1:
+            yield Problem(planned.file, "is in several splits, under different names", _FIX)
 
 
-def _object_file(key: str) -> str:
-    return f"objects/{key}.npz"
-
-
-def _object_problems(dataset: Dataset) -> Iterator[Problem]:
+def _object_problems(dataset: Dataset, unusable: set[str]) -> Iterator[Problem]:
+    """Whether objects are what the plan says, and can be posed."""
+    fix = repair_command(dataset.folder)
     for planned in dataset.plan.objects:
+        if planned.file in unusable:
+            continue
         try:
-            if dataset.objects[planned.key].sha256 != planned.sha256:
-                yield Problem(_object_file(planned.key), "is another object than the plan says")
+            obj = load_object(dataset.folder / planned.file)
+            named = planned.category, planned.object_id, planned.sha256, planned.num_parts
+            if (obj.category, obj.object_id, obj.sha256, len(obj)) != named:
+                yield Problem(planned.file, "is another object than the plan says", fix)
+            elif dataset.plan.format > 1 and obj.is_rigid != planned.rigid:
+                yield Problem(planned.file, "moves, or does not, other than the plan says", fix)
+            else:
+                yield from (Problem(planned.file, what, fix) for what in _object_flaws(obj))
         except ArtsimError as error:
-            yield Problem(_object_file(planned.key), str(error))
+            yield Problem(planned.file, error.what, fix)
+        except Exception as error:  # a forged object may hold anything
+            yield Problem(planned.file, f"cannot be checked ({type(error).__name__}: {error})", fix)
+
+
+def _object_flaws(obj: ArticulatedObject) -> Iterator[str]:
+    """What no object may be like."""
+    tree = obj.tree
+    low, high = tree.limits.T
+    if not all(np.isfinite(part.vertices).all() for part in obj.parts):
+        yield "a vertex is not finite"
+    if any(len(p.faces) and not 0 <= p.faces.min() <= p.faces.max() < len(p.vertices) for p in obj.parts):
+        yield "a triangle has a corner that does not exist"
+    if not np.isfinite([*tree.axes.ravel(), *tree.origins.ravel(), *tree.rest]).all():
+        yield "an axis, an origin or a rest state is not finite"
+    elif not _close(np.linalg.norm(tree.axes[1:], axis=1), 1.0, 1e-6):
+        yield "an axis is not of unit length"
+    if (low > high).any():
+        yield "a joint's lower limit is above its upper one"
+    if not _close(tree.forward_kinematics(tree.rest), np.eye(4), 1e-9):
+        yield "its parts are not at rest in its rest state"
 
 
 def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) -> Iterator[Problem]:
-    path = dataset.folder / shard.name
-    if not path.is_file():
-        yield Problem(shard.name, "is missing")
-        return
+    path, plan = dataset.folder / shard.name, dataset.plan
     try:
-        if file_sha256(path) != shard.sha256:
-            yield Problem(shard.name, "has another checksum than when it was written")
         reader = ShardReader(path)
-    except (OSError, DatasetError) as error:
-        yield Problem(shard.name, str(error))
+    except DatasetError as error:
+        yield Problem(shard.name, error.what, _FIX)
         return
-    wanted, have = [sample_key(index) for index in range(shard.first, shard.end)], reader.keys()
+    indices = plan.indices(shard)
+    wanted, have = [sample_key(index) for index in indices], reader.keys()
     if have != wanted:
         lost, foreign = sorted({*wanted} - {*have}), sorted({*have} - {*wanted})
-        yield Problem(
-            shard.name, f"lacks samples {lost[:5]}, has foreign ones {foreign[:5]}, or holds them out of order"
-        )
-    for index, key in enumerate(wanted, start=shard.first):
-        planned = dataset.plan.object_of(index)
-        if key not in have or _object_file(planned.key) in unusable:
+        what = f"lacks samples {lost[:5]}, has foreign ones {foreign[:5]}, or holds them out of order"
+        yield Problem(shard.name, what, _FIX)
+    for index, key in zip(indices, wanted, strict=True):
+        planned = plan.object_of(index)
+        if key not in have or planned.file in unusable:
             continue
         where = f"{shard.name}: sample {index}"
         try:
             sample = reader.read(key)
             obj = dataset.objects[planned.key].scaled(sample.scale)
-            yield from (Problem(where, what) for what in _unplanned(sample, dataset.plan, index))
-            yield from (Problem(where, what) for what in sample_problems(sample, obj))
+            yield from (Problem(where, what, _FIX) for what in _unplanned(sample, plan, index))
+            yield from (Problem(where, what, _FIX) for what in sample_problems(sample, obj))
         except ArtsimError as error:
-            yield Problem(where, str(error))
+            yield Problem(where, error.what, _FIX)
         except Exception as error:  # a forged record may hold anything
-            yield Problem(where, f"cannot be checked ({type(error).__name__}: {error})")
+            yield Problem(where, f"cannot be checked ({type(error).__name__}: {error})", _FIX)
     reader.close()
 
 

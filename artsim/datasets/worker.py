@@ -1,4 +1,4 @@
-"""The worker process of a generation run: makes whole shards, follows its parent, never outlives it."""
+"""The worker process of a generation run: loads objects, makes whole shards, and never outlives its parent."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from artsim.datasets.plan import Plan, Shard, ShardRecord, draw_sample, read_plan
-from artsim.datasets.shards import write_shard
-from artsim.loading.sources import Source
+from artsim.datasets.description import read_plan
+from artsim.datasets.draw import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
+from artsim.datasets.plan import Plan, Shard, ShardRecord
+from artsim.datasets.shards import OtherBytesError, write_shard
+from artsim.errors import ArtsimError, DatasetError
+from artsim.extras import explained
+from artsim.files import file_sha256
+from artsim.loading.sources import FamilySource, Source
 from artsim.object_file import ObjectCache, save_object
 from artsim.renderers import Renderer, make_renderer
 from artsim.sample import Sample
@@ -28,8 +34,7 @@ class _Worker:
     """What a worker process keeps between shards. The plan is read at the first: it may not exist before."""
 
     folder: Path
-    made: Any  # shared counter of samples
-    stop: Any  # shared event
+    connection: Connection
 
     @cached_property
     def plan(self) -> Plan:
@@ -47,11 +52,8 @@ class _Worker:
 _worker: _Worker | None = None
 
 
-def start_worker(folder: Path, made: Any, stop: Any) -> None:
-    """Prepare a process for :func:`compile_source` and :func:`make_shard`.
-
-    ``made`` counts samples, ``stop`` asks to stop. Ctrl-C is left to the parent; when that is killed, so is this.
-    """
+def serve(connection: Connection, folder: Path) -> None:
+    """Do what the parent asks for until it says None, or is gone. Ctrl-C is left to the parent."""
     global _worker
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
@@ -63,49 +65,149 @@ def start_worker(folder: Path, made: Any, stop: Any) -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
-    _worker = _Worker(folder, made, stop)
+    _worker = _Worker(folder, connection)
+    try:
+        connection.send(("ready", None))
+        while (task := connection.recv()) is not None:
+            connection.send(_answer(*task))
+    except (EOFError, OSError):
+        os._exit(1)  # the parent is gone
+
+
+def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+    """What becomes of a task: ("done", its result) or ("failed", what it raised)."""
+    try:
+        return "done", work(*arguments)
+    except ArtsimError as error:
+        return "failed", error
+    except ImportError as error:
+        return "failed", explained(error, None)
+    except Exception as error:  # whatever it is, the parent has to know; it may not survive a trip between processes
+        return "failed", DatasetError(f"a worker process failed ({type(error).__name__}: {error})")
+
+
+def report(count: int) -> None:
+    """Tell the parent that so much more is done."""
+    assert _worker is not None
+    _worker.connection.send(("progress", count))
 
 
 class _StoppedError(Exception):
     """The run was asked to stop."""
 
 
-def make_shard(shard: Shard) -> ShardRecord | None:
-    """Make and write one shard; None when asked to stop before it is whole."""
+def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
+    """Make and write one shard.
+
+    Parameters
+    ----------
+    shard : Shard
+    sha256 : str or None
+        What its digest has to be, if that is known: any other bytes are not written.
+
+    Returns
+    -------
+    ShardRecord or str or None
+        The other digest, where it is not as wanted; None when asked to stop before the shard is whole.
+    """
     assert _worker is not None
     try:
-        size, digest = write_shard(_worker.folder / shard.name, _samples(_worker, shard))
+        size, digest = write_shard(_worker.folder / shard.name, _samples(_worker, shard), sha256)
+    except OtherBytesError as other:
+        return other.sha256
     except _StoppedError:
         return None
-    return ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest)
+    recipe = _worker.plan.recipe(shard)
+    return ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
 
 
 def _samples(worker: _Worker, shard: Shard) -> Iterator[Sample]:
-    for index in range(shard.first, shard.end):
-        if worker.stop.is_set():
+    plan, renderer = worker.plan, worker.renderer  # which says itself what it lacks
+    for made, index in enumerate(plan.indices(shard), start=1):
+        if worker.connection.poll():  # nothing but a wish to stop comes while there is a task
             raise _StoppedError
-        obj = worker.objects[worker.plan.object_of(index).key]
-        yield draw_sample(obj, worker.plan.sample, worker.plan.seed, index, worker.renderer)
-        made = index - shard.first + 1
-        if made % _STEP == 0 or made == shard.end - shard.first:
-            with worker.made.get_lock():
-                worker.made.value += (made - 1) % _STEP + 1
+        planned = plan.object_of(index)
+        try:
+            obj = worker.objects[planned.key]
+            yield draw_sample(obj, plan.sample, plan.seed, index, renderer, PLANNED_ATTEMPTS)
+        except ImportError:  # which says what to install
+            raise
+        except Exception as error:  # whatever a renderer or a view function stumbles on: what matters is where
+            what = error.what if isinstance(error, ArtsimError) else f"{type(error).__name__}: {error}"
+            raise DatasetError(
+                f"sample {index} of {planned.source} cannot be made ({what})",
+                worker.folder,
+                "generate into a new folder, without this object or with other options",
+            ) from error
+        if made % _STEP == 0 or made == len(shard):
+            report((made - 1) % _STEP + 1)
 
 
 @dataclass(frozen=True)
 class CompiledSource:
-    """What the plan needs to know of a source, and the name of its compiled file."""
+    """What the plan needs to know of a source, and the name of its compiled file.
+
+    Attributes
+    ----------
+    staged : str
+        Name of its file, below ``objects``.
+    identity : str
+        Digest of what it is named by: category and seed of a procedural object, the bytes of the files of a loaded one.
+        Splits follow from it.
+    category, object_id, sha256, num_parts, rigid, repairs, file_sha256
+        As in :class:`artsim.datasets.plan.PlannedObject`.
+    """
 
     staged: str
+    identity: str
     category: str
     object_id: str
     sha256: str
     num_parts: int
+    rigid: bool
+    repairs: tuple[tuple[str, str], ...]
+    file_sha256: str
 
 
-def compile_source(source: Source, staged: str) -> CompiledSource:
-    """Load a source and keep it compiled in the dataset's folder, under a provisional name."""
+@dataclass(frozen=True)
+class Refused:
+    """Why a source is of no use."""
+
+    why: str
+
+
+def compile_source(
+    source: Source, staged: str, seed: int, options: SampleOptions | None, strict: bool = False
+) -> CompiledSource | Refused:
+    """Load a source and keep it compiled in the dataset's folder, under a provisional name.
+
+    Parameters
+    ----------
+    source : Source
+    staged : str
+        Name of the file.
+    seed : int
+        Of the dataset.
+    options : SampleOptions or None
+        Views of which some must see it, if given.
+    strict : bool
+        Refuse an object that had to be repaired.
+    """
     assert _worker is not None
-    obj = source.load()
-    save_object(obj, _worker.folder / "objects" / staged)
-    return CompiledSource(staged, obj.category, obj.object_id, obj.sha256, len(obj))
+    try:
+        obj = source.load()
+        repairs = tuple((r.where, r.what) for r in obj.repairs if not r.note)
+        if strict and repairs:
+            return Refused(f"{source.name}: repaired while loading: " + "; ".join(f"{a}: {b}" for a, b in repairs))
+        identity = source.sha256 if isinstance(source, FamilySource) else obj.sha256
+        if options is not None:
+            check_visible(obj, options, seed, identity)
+    except ArtsimError as error:
+        return Refused(str(error) if source.name in str(error) else f"{source.name}: {error}")
+    except (Exception, SystemExit) as error:  # parsers raise whatever they stumble on; memory and stack run out, too
+        return Refused(f"{source.name}: cannot be loaded ({type(error).__name__}: {error})")
+    path = _worker.folder / "objects" / staged
+    save_object(obj, path)
+    return CompiledSource(
+        staged, identity, obj.category, obj.object_id, obj.sha256, len(obj), obj.is_rigid, repairs, file_sha256(path)
+    )

@@ -12,14 +12,12 @@ import os
 import shutil
 import time
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from importlib.metadata import version
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from artsim.datasets.team import Team, locked
+from artsim.datasets.team import Lost, Team, locked
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
@@ -93,15 +91,12 @@ def generate_objects(
             track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
             Team(folder, workers) as team,
         ):
-            waiting = iter(missing)
-            pending: dict[Future[dict[str, Any]], tuple[str, int]] = {}
-            while len(found) < len(wanted):
-                for key in islice(waiting, 4 * workers - len(pending)):
-                    pending[team.submit(write_object, folder, *key, tuple(formats))] = key
-                done, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in done:
-                    found[pending.pop(future)] = future.result()
-                bar.update(len(done))
+            tasks = ((key, (folder, *key, tuple(formats))) for key in missing)
+            for key, answer in team.run(write_object, tasks):
+                if isinstance(answer, Lost):
+                    raise AssetError(answer.why, f"{key[0]} {key[1]}", "use fewer --workers; the same command resumes")
+                found[key] = answer
+                bar.update()
         write_atomic(folder / INDEX, _index_text([(key, found[key]) for key in wanted]).encode())
     return ObjectsResult(folder, len(wanted), len(missing), time.perf_counter() - start)
 

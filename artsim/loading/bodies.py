@@ -77,7 +77,7 @@ def merge_fixed_links(robot: Robot, file: Path, repairs: list[Repair]) -> list[R
         raise AssetError(f"links {', '.join(lost[:5])} form a cycle that hangs on nothing", file, "remove one joint")
     merged_links = [link for body in bodies for link in body.links[1:]]
     if merged_links:
-        repairs.append(Repair("fixed joints", f"merged into their parent: {', '.join(merged_links)}"))
+        repairs.append(Repair("fixed joints", f"merged into their parent: {', '.join(merged_links)}", note=True))
     return bodies
 
 
@@ -115,7 +115,7 @@ def _places_root(
     """Whether a floating joint only places the whole object in its world: the object's own pose covers that."""
     if joint.type != "floating" or link != root or root in solid or len(children[root]) != 1:
         return False
-    repairs.append(Repair(f"joint {joint.name!r}", "floats the whole object: left to the object's pose"))
+    repairs.append(Repair(f"joint {joint.name!r}", "floats the whole object: left to the object's pose", note=True))
     return True
 
 

@@ -127,7 +127,7 @@ def _read_axis(joint: etree._Element, kind: str, element: Element) -> Array | No
     length = largest * float(norm(direction / largest))  # of huge numbers, too
     if abs(length - 1.0) > 1e-6:
         travel = ", travel stays in metres as URDF and MuJoCo have it" if kind == "prismatic" else ""
-        element.say(f"axis of length {length:.6g} normalised{travel}")
+        element.say(f"axis of length {length:.6g} normalised{travel}", note=kind != "prismatic")
     return unit(direction / largest)
 
 
@@ -181,7 +181,7 @@ def _ends(limit: etree._Element, element: Element) -> tuple[float | None, float 
         for end, text in zip(("lower", "upper"), texts, strict=True)
     )
     if any(value == 0 and np.signbit(value) for value in (lower, upper) if value is not None):
-        element.say("limit -0 read as 0")
+        element.say("limit -0 read as 0", note=True)
     return lower, upper
 
 

@@ -43,6 +43,7 @@ def rest_state(tree: KinematicTree, parts: Sequence[Part], category: str) -> tup
     rest : (K,) float
         Within the limits.
     reasons : list of Repair
+        Notes: the joint's own values stay those of the file.
     """
     rest = np.clip(0.0, tree.limits[:, 0], tree.limits[:, 1])
     reasons = {int(k): "0 is outside its limits" for k in np.flatnonzero(rest)}
@@ -56,7 +57,9 @@ def rest_state(tree: KinematicTree, parts: Sequence[Part], category: str) -> tup
                     rest[k] = found
                     reasons[int(k)] = f"a {category.replace('_', ' ')} is closed there"
     return rest, [
-        Repair(f"joint {tree.joints[k].name!r}", f"rest state {_value(tree, k, rest[k])} instead of 0: {reason}")
+        Repair(
+            f"joint {tree.joints[k].name!r}", f"rest state {_value(tree, k, rest[k])} instead of 0: {reason}", note=True
+        )
         for k, reason in sorted(reasons.items())
         if rest[k] != 0.0
     ]

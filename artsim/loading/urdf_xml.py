@@ -196,4 +196,4 @@ def _summarise_missing(links: Sequence[etree._Element], shapeless: Collection[st
     empty = [link.get("name") for link in links if link.find("visual") is None and link.find("collision") is None]
     empty = [name for name in empty if name not in shapeless]
     if empty:
-        repairs.append(Repair("links", f"without geometry: {', '.join(map(str, empty))}"))
+        repairs.append(Repair("links", f"without geometry: {', '.join(map(str, empty))}", note=True))

@@ -32,11 +32,11 @@ class Element:
         """An error about this element."""
         return AssetError(what, f"{self.file}: {self.name}", fix)
 
-    def say(self, what: str) -> None:
-        """Record a repair, once."""
+    def say(self, what: str, note: bool = False) -> None:
+        """Record a repair, or a mere note, once."""
         if what not in self.said:
             self.said.add(what)
-            self.repairs.append(Repair(self.name, what))
+            self.repairs.append(Repair(self.name, what, note))
 
     def child(self, parent: etree._Element, tag: str) -> etree._Element | None:
         """The first child of a name; more than one is said."""

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
-from artsim.datasets.plan import SPLITS, Plan, PlannedObject, SampleOptions, assign_splits, draw_sample, unique_keys
+from artsim.datasets.draw import SampleOptions, draw_sample
+from artsim.datasets.plan import Plan, PlannedObject
+from artsim.datasets.splits import SPLITS, assign_splits, unique_keys
 from artsim.errors import ConfigError
 from artsim.renderers import make_renderer
 from artsim.sampling import StateOptions, ViewOptions
@@ -31,12 +33,13 @@ def plan(objects: int, samples: int, shard_size: int = 7, seed: int = 0) -> Plan
 @given(st.integers(1, 60), st.integers(1, 700), st.integers(1, 64))
 def test_shards_hold_every_index_once_and_one_split_each(objects: int, samples: int, size: int) -> None:
     p = plan(objects, samples, size)
-    indices = [i for shard in p.shards() for i in range(shard.first, shard.end)]
-    assert indices == list(range(samples))
+    indices = [i for shard in p.shards() for i in p.indices(shard)]
+    assert sorted(indices) == list(range(samples))
+    assert len(p.shards()) == p.num_shards
     for shard in p.shards():
-        assert 0 < shard.end - shard.first <= size
-        assert {p.split_of(i) for i in range(shard.first, shard.end)} == {shard.split}
-        assert {p.object_of(i).split for i in range(shard.first, shard.end)} == {shard.split}
+        assert 0 < len(shard) <= size
+        assert {p.split_of(i) for i in p.indices(shard)} == {shard.split}
+        assert {p.object_of(i).split for i in p.indices(shard)} == {shard.split}
 
 
 @given(st.integers(1, 60), st.integers(1, 3000))
@@ -143,7 +146,7 @@ def test_a_sample_depends_on_seed_and_index_only() -> None:
 
 
 def test_views_that_never_see_the_object_end_in_an_error() -> None:
-    options = SampleOptions(views=ViewOptions(custom="tests.test_plan:away"))
+    options = SampleOptions(views=ViewOptions(custom="tests.datasets.test_plan:away"))
     with pytest.raises(artsim.ArtsimError, match="50 drawn views in a row do not see the object"):
         draw_sample(artsim.load(ASSETS / "scissors"), options, 0, 0, make_renderer("raycast"))
 

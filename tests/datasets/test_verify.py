@@ -14,7 +14,8 @@ import pytest
 
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
-from artsim.datasets.plan import SampleOptions
+from artsim.datasets.description import document_bytes
+from artsim.datasets.draw import SampleOptions
 from artsim.datasets.shards import ShardReader, write_shard
 from artsim.datasets.verify import sample_problems, verify
 from artsim.loading.sources import find_sources
@@ -138,7 +139,7 @@ def rewrite(folder: Path, change: Callable[[list[Sample]], list[Sample]]) -> lis
     samples = list(map(reader.read, reader.keys()))
     size, sha256 = write_shard(path, change(samples))
     description["shards"][0] |= {"bytes": size, "sha256": sha256}
-    (folder / "dataset.json").write_text(json.dumps(description))
+    (folder / "dataset.json").write_bytes(document_bytes(description))
     return [str(problem) for problem in verify(folder, progress=False)]
 
 
@@ -183,7 +184,7 @@ def test_files_that_are_not_as_they_were_are_noticed(folder: Path) -> None:
     found = "\n".join(map(str, verify(folder, progress=False)))
     assert "train-000000.tar: is missing" in found
     assert "train-000001.tar: has another checksum than when it was written" in found
-    assert "train-000009.tar: is no shard of this dataset" in found
+    assert "train-000009.tar: is no part of this dataset" in found
     assert "objects/laptop-laptop.npz: " in found
     assert "train-000002.tar" not in found
     assert len(found.splitlines()) < 9
@@ -191,5 +192,7 @@ def test_files_that_are_not_as_they_were_are_noticed(folder: Path) -> None:
 
 def test_an_exchanged_object_is_noticed(folder: Path) -> None:
     shutil.copy(folder / "objects" / "scissors-scissors.npz", folder / "objects" / "laptop-laptop.npz")
-    found = [str(problem) for problem in verify(folder, progress=False)]
-    assert found == ["objects/laptop-laptop.npz: is another object than the plan says"]
+    (found,) = verify(folder, progress=False)
+    assert found.where == "objects/laptop-laptop.npz"
+    assert found.what == "has another checksum than when it was written"
+    assert found.fix == f"artsim repair {folder}"

@@ -1,0 +1,54 @@
+"""In which order the samples of a split lie on disk: close together where they show the same object.
+
+Objects take turns, so that each has been shown equally often at any time, give or take once. To load an object costs as
+much as dozens of samples of it, so on disk a few objects have several turns in a row, then the next few. That happens
+within laps of a fixed number of turns each: what a finished lap holds does not depend on the size of the dataset.
+"""
+
+from __future__ import annotations
+
+_OBJECTS_AT_ONCE = 16
+"""A worker keeps so many objects in memory, and every shard mixes so many."""
+
+_LAP = 16
+"""Turns of each object in a lap."""
+
+_FIRST_LAPS = ((0, 8), (8, 16))
+"""Shorter ones at the start: once each object has 8 views, a dataset that grows keeps at least half of it."""
+
+
+def at_place(place: int, objects: int, rounds: int | None = None) -> tuple[int, int]:
+    """What lies at a place of a split.
+
+    Parameters
+    ----------
+    place : int
+    objects : int
+        How many the split has.
+    rounds : int, optional
+        How often each object is shown, at least; a few may be shown once more, which lie last. Endless by default.
+
+    Returns
+    -------
+    round : int
+        How often the object has been shown before.
+    turn : int
+        Number of the object within its split.
+    """
+    if rounds is not None and place >= rounds * objects:
+        return rounds, place - rounds * objects
+    first, end = _lap(place // objects)
+    if rounds is not None:
+        end = min(end, rounds)
+    in_a_row, left = end - first, place - first * objects
+    few = left // (_OBJECTS_AT_ONCE * in_a_row) * _OBJECTS_AT_ONCE
+    turn, object_of_few = divmod(left - few * in_a_row, min(_OBJECTS_AT_ONCE, objects - few))
+    return first + turn, few + object_of_few
+
+
+def _lap(turn: int) -> tuple[int, int]:
+    """First and end turn of the lap that a turn belongs to."""
+    for first, end in _FIRST_LAPS:
+        if turn < end:
+            return first, end
+    return turn // _LAP * _LAP, turn // _LAP * _LAP + _LAP

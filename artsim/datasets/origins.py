@@ -1,0 +1,88 @@
+"""Where the objects of a dataset came from on this machine, so that they can be made again.
+
+``.sources.json`` holds paths, which are no part of the dataset: its bytes are the same wherever the sources lie.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+from artsim.datasets import checked
+from artsim.datasets.description import write_if_other
+from artsim.datasets.plan import PlannedObject
+from artsim.errors import ArtsimError, AssetError, DatasetError
+from artsim.families import FAMILIES
+from artsim.files import read_json
+from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
+
+ORIGINS = ".sources.json"
+_MAX_SOURCES = 1_000_000
+
+
+def write_origins(folder: Path, sources: Sequence[Source]) -> None:
+    """Note the paths of sources that are files."""
+    files = {
+        (str(source.path), source.sha256): {
+            "path": str(source.path),
+            "sha256": source.sha256,
+            "package_roots": {name: str(Path(root).absolute()) for name, root in source.package_roots.items()},
+        }
+        for source in sources
+        if isinstance(source, FileSource)
+    }
+    if files:
+        entries = [files[key] for key in sorted(files)]
+        write_if_other(folder / ORIGINS, json.dumps({"files": entries}, indent=1).encode())
+
+
+class Origins:
+    """Finds the source of an object: procedural ones by their name, files where they were, or where somebody says.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the dataset.
+    sources : sequence of Source
+        Those that are named now; they come first.
+    """
+
+    def __init__(self, folder: Path, sources: Sequence[Source] = ()):
+        self._files: dict[str, list[FileSource]] = defaultdict(list)
+        for source in [*sources, *_noted(folder)]:
+            if isinstance(source, FileSource):
+                self._files[source.sha256].append(source)
+
+    def of(self, planned: PlannedObject) -> list[Source]:
+        """Sources that may be that of an object; only what comes of them tells."""
+        category, _, seed = planned.source.rpartition(":")
+        if category in FAMILIES and seed.isdecimal() and len(seed) < 20:
+            made = FamilySource(category, int(seed))
+            if made.sha256 == planned.source_sha256:
+                return [made]
+        return list(self._files[planned.source_sha256])
+
+
+def _noted(folder: Path) -> list[FileSource]:
+    """Files that are still where they were, and still as they were."""
+    try:
+        noted = read_json(folder / ORIGINS, ORIGINS, DatasetError)
+        entries = checked.sequence(checked.mapping(noted, "it")["files"], "files", _MAX_SOURCES)
+        files = []
+        for entry in entries:
+            own = checked.mapping(entry, "file")
+            roots = checked.mapping(own["package_roots"], "package_roots")
+            path, sha256 = Path(checked.text(own["path"], "path")), checked.text(own["sha256"], "sha256")
+            files.append((path, sha256, {name: Path(checked.text(root, name)) for name, root in roots.items()}))
+    except (ArtsimError, ValueError, KeyError):
+        return []  # a note that helps, no more
+    found = []
+    for path, sha256, roots in files:
+        try:
+            if path.suffix.lower() in (".urdf", ".xml", ".npz"):
+                found += [source for source in find_sources([path], roots) if source.sha256 == sha256]
+        except (AssetError, OSError, ValueError):
+            continue
+    return found

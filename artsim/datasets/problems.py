@@ -1,0 +1,33 @@
+"""What can be wrong with a dataset on disk, and what to do about it."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong.
+
+    Attributes
+    ----------
+    where : str
+        File of the dataset, or sample in one.
+    what : str
+    fix : str, optional
+    """
+
+    where: str
+    what: str
+    fix: str | None = None
+
+    def __str__(self) -> str:
+        text = f"{self.where}: {self.what}"
+        return text if self.fix is None else f"{text.rstrip('.')}. Fix: {self.fix}"
+
+
+def repair_command(folder: Path) -> str:
+    """What to type to have a dataset repaired."""
+    return f"artsim repair {shlex.quote(str(folder))}"

@@ -1,0 +1,114 @@
+"""Datasets in words, on one screen: what one holds, and what was repaired on the way to it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
+from artsim.datasets.splits import SPLITS
+from artsim.names import printable
+
+_CATEGORIES_SHOWN = 12
+_KINDS_SHOWN = 12
+_NAMES_SHOWN = 8
+
+
+def summary(
+    folder: Path, plan: Plan, shards: Sequence[ShardRecord], description: Mapping[str, Any], split: str | None
+) -> str:
+    """Samples of each split, categories, options, versions and repairs of a dataset.
+
+    Parameters
+    ----------
+    folder : Path
+    plan : Plan
+    shards : sequence of ShardRecord
+    description : mapping
+        Content of ``dataset.json``.
+    split : str or None
+        The split that was opened.
+    """
+    options, views, states = plan.sample, plan.sample.views, plan.sample.states
+    size = sum(record.bytes for record in shards) / 1e6
+    chosen = "" if split is None else f", split {split}"
+    lines = [
+        f"{folder}{chosen}: {sum(map(len, shards))} samples in {len(shards)} shards, {size:.4g} MB",
+        "samples     " + ", ".join(f"{name} {plan.sizes[name]}" for name in SPLITS),
+        "objects     " + ", ".join(f"{name} {len(plan.objects_of[name])}" for name in SPLITS),
+        f"categories  {_categories(plan)}",
+        f"sample      {options.num_points} points, {options.renderer}, noise {options.noise}, "
+        f"images {' '.join(options.images) or 'none'}, scale {_value(options.scale)}",
+        f"views       {views.custom or views.preset}, {views.width}x{views.height}, field of view {views.fov:g} deg",
+        f"states      {states.mode if states.fraction_open is None else f'open by {_value(states.fraction_open)}'}"
+        + "".join(f", {name} {_value(bounds)}" for name, bounds in list(states.joint_range.items())[:4]),
+        f"made by     artsim {plan.artsim_version}, seed {plan.seed}, format {plan.format}",
+    ]
+    versions = description.get("versions")
+    if isinstance(versions, dict):
+        lines[-1] += "".join(f", {name} {value}" for name, value in versions.items() if name != "artsim")
+    lines += object_lines(folder, plan.objects, 3)
+    left_out = len(description["left_out"])
+    if left_out:
+        lines.append(f"{left_out} sources were left out (see left_out in {folder / 'dataset.json'})")
+    return "\n".join(printable(line, 240) for line in lines)
+
+
+def _categories(plan: Plan) -> str:
+    counts = Counter(planned.category for planned in plan.objects).most_common()
+    shown = ", ".join(f"{category} {count}" for category, count in counts[:_CATEGORIES_SHOWN])
+    more = len(counts) - _CATEGORIES_SHOWN
+    return shown if more <= 0 else f"{shown}, and {more} more"
+
+
+def _value(value: Any) -> str:
+    return value if isinstance(value, str) else " to ".join(f"{v:g}" for v in value)
+
+
+def object_lines(folder: Path, objects: Sequence[PlannedObject], kinds: int = _KINDS_SHOWN) -> list[str]:
+    """What there is to know about the objects: those that cannot move, and those that were repaired.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the dataset.
+    objects : sequence of PlannedObject
+    kinds : int
+        How many kinds of repairs are listed at most.
+    """
+    rigid = [planned.source for planned in objects if planned.rigid]
+    lines = []
+    if rigid:
+        verb = "object has" if len(rigid) == 1 else "objects have"
+        more = len(rigid) - _NAMES_SHOWN
+        names = ", ".join(rigid[:_NAMES_SHOWN]) + ("" if more <= 0 else f", and {more} more")
+        lines.append(f"{len(rigid)} {verb} no moving joint: {names}")
+    return [*lines, *_repair_lines(folder, objects, kinds)]
+
+
+def _repair_lines(folder: Path, objects: Sequence[PlannedObject], shown: int) -> Iterator[str]:
+    repaired = [planned for planned in objects if planned.repairs]
+    if not repaired:
+        return
+    yield f"{len(repaired)} of {len(objects)} objects repaired while loading, most often:"
+    found: dict[str, list[tuple[PlannedObject, str]]] = defaultdict(list)
+    for planned in repaired:
+        for kind, text in {_kind(where, what): f"{where}: {what}" for where, what in planned.repairs}.items():
+            found[kind].append((planned, text))
+    ranked = sorted(found.values(), key=len, reverse=True)
+    for alike in ranked[:shown]:
+        planned, text = alike[0]
+        yield f"  {len(alike)} x  {printable(text, 200)}  ({printable(planned.source, 60)})"
+    if len(ranked) > shown:
+        yield f"  and {len(ranked) - shown} more kinds"
+    yield f"details: artsim inspect {shlex.quote(str(folder / ranked[0][0][0].file))}"
+
+
+def _kind(where: str, what: str) -> str:
+    """A repair without the names and numbers that differ from object to object."""
+    text = re.sub(r"'[^']*'|\"[^\"]*\"", "'..'", f"{where}: {what}")
+    return re.sub(r"-?\d+(\.\d+)?(e[+-]?\d+)?", "#", text)
