@@ -159,7 +159,7 @@ class AssetPaths:
         allowed = self._allowed if package is None else [*self._allowed, *self._of_name(package)]
         try:
             real = path.resolve()
-        except (OSError, RuntimeError):  # links that go round in a circle
+        except (OSError, RuntimeError, ValueError):  # links that go round in a circle, names with a zero byte
             return False
         return any(real.is_relative_to(folder) for folder in allowed)
 
@@ -273,6 +273,13 @@ def _is_file(path: Path) -> bool:
         return False
 
 
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # as above
+        return False
+
+
 def _is_shared(folder: Path) -> bool:
     """Whether a folder holds more than one asset for sure: a home, what holds homes, the top, temporary files."""
     if folder == Path(tempfile.gettempdir()).resolve() or folder.parent in (Path("/home"), Path("/Users")):
@@ -292,7 +299,7 @@ def _with_case_of_disk(path: Path) -> Path | None:
     """The path of an existing file whose name differs in capital letters alone, if there is one."""
     missing = []
     here = path
-    while not here.is_dir():
+    while not _is_folder(here):
         missing.append(here.name)
         if here.parent == here or len(missing) > 20:
             return None

@@ -30,6 +30,7 @@ from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.robot import Link, Robot, RobotJoint
 from artsim.loading.urdf_xml import parse_robot
+from artsim.loading.xml_repair import unexpanded
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
 from artsim.products import matmul, unit
@@ -128,6 +129,9 @@ def find_urdf(path: Path) -> Path:
     if len(found) == 1:
         return found[0]
     if not found:
+        macros = sorted(path.glob("*.xacro"))
+        if macros:
+            raise unexpanded("the folder holds no URDF file, but macros", macros[0])
         raise AssetError("the folder holds no URDF file", path, "pass a folder with a mobility.urdf or one *.urdf")
     raise AssetError(f"the folder holds {len(found)} URDF files", path, f"pass one of them, such as {found[0].name}")
 

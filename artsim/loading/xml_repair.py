@@ -29,6 +29,7 @@ _DECLARATION = re.compile(r"<\?xml\b([^>]*?)\?>", re.IGNORECASE)
 _OPENING = re.compile(r"""(<[^\s/>]+)(?:\s+[^\s=>/]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
 _DECLARED = re.compile(r"\sxmlns:([\w.-]+)\s*=")
 _MAX_PREFIXES = 100
+_NOT_EXPANDED = "is a xacro file that is not expanded yet: it has "
 UNDECLARED = "urn:undeclared:"
 
 _OTHER_FORMATS = {
@@ -176,7 +177,7 @@ def use_plain_names(root: etree._Element, where: Path) -> list[Repair]:
         name = etree.QName(element)
         if name.namespace not in (None, own):
             if "xacro" in str(name.namespace):
-                raise _unexpanded(f"<{element.prefix}:{name.localname}>", where)
+                raise unexpanded(_NOT_EXPANDED + f"<{element.prefix}:{name.localname}>", where)
             continue
         plain = name.localname
         if plain not in _ELEMENTS and plain.lower() in _ELEMENTS:
@@ -209,23 +210,17 @@ def _refuse_unexpanded(root: etree._Element, where: Path) -> None:
     """Macros of xacro that have not been replaced; what they stand for would be missing."""
     for element in root:
         if element.tag in ("include", "macro"):
-            raise _unexpanded(f"<{element.tag}>", where)
+            raise unexpanded(_NOT_EXPANDED + f"<{element.tag}>", where)
         if element.tag in ("link", "joint"):
             for inner in element.iter(etree.Element):
                 for value in inner.attrib.values():
                     if "${" in value or "$(" in value:
-                        raise _unexpanded(f"{value[:60]!r} in <{inner.tag}>", where)
+                        raise unexpanded(_NOT_EXPANDED + f"{value[:60]!r} in <{inner.tag}>", where)
 
 
-def _unexpanded(what: str, where: Path) -> AssetError:
-    name = where.name.removesuffix(".xacro")
-    target = where.with_name(
-        name if name.endswith(".urdf") and name != where.name else f"{Path(name).stem}_expanded.urdf"
-    )
-    if where.name.endswith(".xacro") and not name.endswith(".urdf"):
-        target = where.with_name(f"{name}.urdf")
-    return AssetError(
-        f"is a xacro file that is not expanded yet: it has {what}", where,
-        f"xacro {shlex.quote(str(where))} > {shlex.quote(str(target))} and pass that file "
-        "(pip install xacro, or ROS, has the program)",
-    )  # fmt: skip
+def unexpanded(what: str, where: Path) -> AssetError:
+    """The error about a file of xacro, with the command that expands it."""
+    name = where.name.removesuffix(".xacro").removesuffix(".urdf")
+    target = where.with_name(f"{name}.urdf" if where.suffix == ".xacro" else f"{name}_expanded.urdf")
+    command = f"xacro {shlex.quote(str(where))} > {shlex.quote(str(target))}"
+    return AssetError(what, where, f"{command} and pass that file (xacro comes with ROS, or pip install xacro)")

@@ -229,3 +229,11 @@ def test_every_command_that_loads_objects_takes_package_roots() -> None:
     assert tyro.cli(Evaluate, args=roots).package_root == expected
     assert tyro.cli(Record, args=["--out", "o", *roots]).episode.package_root == expected
     assert tyro.cli(Scene, args=["--out", "o", *roots]).scene.package_root == expected
+
+
+@pytest.mark.parametrize(
+    "name", ["a" * 5000, "a%00b.obj", "package://p/" + "a" * 300 + ".obj", "../" * 2000 + "m.obj", "~/m.obj"]
+)
+def test_names_that_no_file_can_have_are_missing_files(name: str, tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match="--package-root"):
+        load(place(tmp_path, "x/r.urdf", name))

@@ -169,3 +169,10 @@ def test_pybullet_reads_what_we_read(tmp_path: Path) -> None:
             assert bullet.getNumJoints(body, physicsClientId=client) == 1
     finally:
         bullet.disconnect(client)
+
+
+def test_a_folder_of_macros_alone_says_how_to_expand_them(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+    with pytest.raises(AssetError) as error:
+        load(tmp_path)
+    assert f"xacro {tmp_path}/arm.urdf.xacro > {tmp_path}/arm.urdf" in str(error.value)
