@@ -25,8 +25,8 @@ from artsim.objects import Repair
 
 __all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merged", "triangles"]
 
-_BOX, _CYLINDER, _CAPSULE, _SPHERE = 12, 256, 4096, 5120
-"""Triangles of a box, a cylinder of 64 sides, a capsule, and an icosahedron divided in four, four times."""
+_TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
+"""Of each primitive: round ones have 64 sides, a sphere is an icosahedron whose faces are divided four times."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class LoadLimits:
     max_faces: int = 5_000_000
     """Triangles over the whole object."""
     max_links: int = 1_000
-    max_shapes: int = 10_000
+    max_shapes: int = 5_000
     """Primitives and mesh references in a URDF file."""
 
 
@@ -97,25 +97,21 @@ class MeshReader:
         AssetError
             When a mesh lies outside the allowed folders or is over a limit.
         """
-        import trimesh
-
-        if geometry.box is not None:
-            self._count(_BOX)
-            mesh = trimesh.creation.box(extents=geometry.box.size)
-        elif geometry.cylinder is not None:
-            self._count(_CYLINDER)
-            mesh = trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length, sections=64)
-        elif geometry.capsule is not None:
-            self._count(_CAPSULE)
-            mesh = trimesh.creation.capsule(geometry.capsule.length, geometry.capsule.radius)
-        elif geometry.sphere is not None:
-            self._count(_SPHERE)
-            vertices, faces = _unit_sphere()
-            return geometry.sphere.radius * vertices, faces
-        else:
-            assert geometry.mesh is not None
+        if geometry.mesh is not None:
             return self._file(geometry.mesh)
-        return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int32)
+        kind = str(geometry)
+        self._count(_TRIANGLES[kind])
+        vertices, faces = _unit_shape(kind)
+        if geometry.box is not None:
+            vertices = vertices * geometry.box.size
+        elif geometry.sphere is not None:
+            vertices = vertices * geometry.sphere.radius
+        elif geometry.cylinder is not None:
+            vertices = vertices * [geometry.cylinder.radius, geometry.cylinder.radius, geometry.cylinder.length]
+        elif geometry.capsule is not None:
+            ends = 0.5 * np.sign(vertices[:, 2:]) * [0.0, 0.0, 1.0]
+            vertices = geometry.capsule.radius * (vertices - ends) + geometry.capsule.length * ends
+        return vertices, faces
 
     def _count(self, faces: int) -> None:
         """Count triangles before they are made."""
@@ -216,11 +212,17 @@ class MeshReader:
 
 
 @cache
-def _unit_sphere() -> tuple[Array, NDArray[np.int32]]:
-    """Made once: a thousand of them would take a second."""
+def _unit_shape(kind: str) -> tuple[Array, NDArray[np.int32]]:
+    """A shape of radius 1 and length 1, made once: a thousand of them would take seconds."""
     import trimesh
 
-    mesh = trimesh.creation.icosphere(subdivisions=4)
+    make = {
+        "box": lambda: trimesh.creation.box((1.0, 1.0, 1.0)),
+        "cylinder": lambda: trimesh.creation.cylinder(1.0, 1.0, sections=64),
+        "capsule": lambda: trimesh.creation.capsule(1.0, 1.0),
+        "sphere": lambda: trimesh.creation.icosphere(subdivisions=4, radius=1.0),
+    }
+    mesh = make[kind]()
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int32)
 
 
