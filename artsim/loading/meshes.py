@@ -20,14 +20,14 @@ from artsim.files import read_bounded
 from artsim.kinematics import Array, transform_points
 from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
 from artsim.loading.packages import AssetPaths, MissingFileError
-from artsim.loading.primitives import capsule, cylinder, sphere
+from artsim.loading.primitives import box, capsule, cylinder, sphere
 from artsim.loading.robot import Geometry, MeshFile
 from artsim.objects import Repair
 
 __all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merged", "triangles"]
 
-_BOX, _CYLINDER, _CAPSULE, _SPHERE = 12, 256, 4096, 5120
-"""Triangles of a box, a cylinder of 64 sides, a capsule, and an icosahedron divided in four, four times."""
+_TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
+"""Of each primitive: round ones have 64 sides, a sphere is an icosahedron whose faces are divided four times."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class LoadLimits:
     max_faces: int = 5_000_000
     """Triangles over the whole object."""
     max_links: int = 1_000
-    max_shapes: int = 10_000
+    max_shapes: int = 5_000
     """Primitives and mesh references in a URDF file."""
 
 
@@ -98,24 +98,17 @@ class MeshReader:
         AssetError
             When a mesh lies outside the allowed folders or is over a limit.
         """
-        import trimesh
-
-        if geometry.box is not None:
-            self._count(_BOX)
-            mesh = trimesh.creation.box(extents=geometry.box.size)
-        elif geometry.cylinder is not None:
-            self._count(_CYLINDER)
-            return cylinder(geometry.cylinder.radius, geometry.cylinder.length)
-        elif geometry.capsule is not None:
-            self._count(_CAPSULE)
-            return capsule(geometry.capsule.radius, geometry.capsule.length)
-        elif geometry.sphere is not None:
-            self._count(_SPHERE)
-            return sphere(geometry.sphere.radius)
-        else:
-            assert geometry.mesh is not None
+        if geometry.mesh is not None:
             return self._file(geometry.mesh)
-        return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int32)
+        self._count(_TRIANGLES[str(geometry)])
+        if geometry.box is not None:
+            return box(geometry.box.size)
+        if geometry.sphere is not None:
+            return sphere(geometry.sphere.radius)
+        if geometry.cylinder is not None:
+            return cylinder(geometry.cylinder.radius, geometry.cylinder.length)
+        assert geometry.capsule is not None
+        return capsule(geometry.capsule.radius, geometry.capsule.length)
 
     def _count(self, faces: int) -> None:
         """Count triangles before they are made."""

@@ -20,18 +20,48 @@ _SECTIONS = 64
 _SUBDIVISIONS = 4
 
 
+def box(size: Array) -> Mesh:
+    """A box (3,) about the origin."""
+    vertices, faces = _unit_box()
+    return vertices * size, faces
+
+
+@cache
+def _unit_box() -> Mesh:
+    import trimesh
+
+    mesh = trimesh.creation.box((1.0, 1.0, 1.0))
+    return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int32)
+
+
 def cylinder(radius: float, length: float) -> Mesh:
     """A cylinder about z, its middle at the origin: 64 sides."""
-    half = 0.5 * length
-    return _turned([-half, half], [radius, radius], (-half, half))
+    vertices, faces = _unit_cylinder()
+    return vertices * (radius, radius, length), faces
+
+
+@cache
+def _unit_cylinder() -> Mesh:
+    return _turned([-0.5, 0.5], [1.0, 1.0], (-0.5, 0.5))
 
 
 def capsule(radius: float, length: float) -> Mesh:
     """A cylinder about z, its middle at the origin, with half a ball on either end: 64 sides, 16 rings to a half."""
+    ball, ends, faces = _unit_capsule()
+    return radius * ball + (0.5 * length) * ends, faces
+
+
+@cache
+def _unit_capsule() -> tuple[Array, Array, NDArray[np.int32]]:
+    """Points of the unit ball (V, 3), which way (V, 3) each goes as the capsule grows longer, and the triangles."""
     angles = np.arange(_SECTIONS // 4) * (0.5 * np.pi / (_SECTIONS // 4))
-    heights, radii = 0.5 * length + radius * sin(angles), radius * cos(angles)
-    tip = 0.5 * length + radius
-    return _turned([*-heights[::-1], *heights], [*radii[::-1], *radii], (-tip, tip))
+    heights, radii = sin(angles), cos(angles)
+    ball, faces = _turned([*-heights[::-1], *heights], [*radii[::-1], *radii], (-1.0, 1.0))
+    upper = np.zeros((len(ball), 3))
+    upper[:, 2] = -1.0
+    upper[len(heights) * _SECTIONS : 2 * len(heights) * _SECTIONS, 2] = 1.0
+    upper[-1, 2] = 1.0
+    return ball, upper, faces
 
 
 def _turned(heights: list[float], radii: list[float], ends: tuple[float, float]) -> Mesh:

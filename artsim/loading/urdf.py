@@ -211,7 +211,7 @@ def _surfaces(
 
 def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
     """Whether a surface is a point or a line; one that is flat is not."""
-    used = vertices[np.unique(faces)]
+    used = vertices  # readers leave none out
     if len(used) < 3:
         return True
     from_middle = used - used.mean(axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 from lxml import etree
 
 from artsim.loading.mesh_files.dae_document import Document, array, attribute, integers
-from artsim.loading.mesh_files.polygons import clip_ears, fans, strips, triangulate
+from artsim.loading.mesh_files.polygons import divide_with_holes, fans, strips, triangulate
 from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, UnusableMeshError, joined, named
 
 _NOT_READ = ("lines", "linestrips", "points")
@@ -185,7 +185,7 @@ def _with_holes(polygons: list[etree._Element], corners: _Corners, said: Draft) 
         if work < 0 or not good.all() or min(map(len, outlines)) < 3 or not np.isfinite(corners.points[numbers]).all():
             said.note("polygon with holes left out")
             continue
-        triangles, crossing = clip_ears([corners.points[outline] for outline in outlines])
+        triangles, crossing = divide_with_holes([corners.points[outline] for outline in outlines])
         if crossing:
             said.note("polygon whose holes cross its boundary: divided as well as it can be")
         faces.append(numbers[triangles])

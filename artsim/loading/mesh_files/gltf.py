@@ -33,7 +33,8 @@ _READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "EXT_lights_", "KHR_xmp")
 """Extensions that say nothing about where the surface is, by how their names begin."""
 
-_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
+_NOT_READ = (0, 1, 2, 3)
+"""Modes of primitives that are points, or lines of three kinds."""
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_DEPTH = 500
 
@@ -187,7 +188,10 @@ class _Scene:
             mode = primitive.value.get("mode", _TRIANGLES)
             source = primitive.value.get("indices", primitive.object("attributes").value.get("POSITION"))
             corners = 0 if source is None else self._buffers.count(source)
-            count += {_TRIANGLES: corners // 3, _STRIP: max(corners - 2, 0), _FAN: max(corners - 2, 0)}.get(mode, 0)
+            if mode == _TRIANGLES:
+                count += corners // 3
+            elif mode in (_STRIP, _FAN):
+                count += max(corners - 2, 0)
         return count
 
     def _primitives(self, node: Items) -> list[Items]:
@@ -212,8 +216,8 @@ class _Scene:
 
     def _primitive(self, primitive: Items, weights: tuple[float, ...], label: str) -> tuple[Array, Indices] | None:
         mode = primitive.value.get("mode", _TRIANGLES)
-        if mode in _MODES:
-            self._draft.note(f"{label}: {_MODES[mode]} left out")
+        if mode in _NOT_READ:
+            self._draft.note(f"{label}: {'lines' if mode else 'points'} left out")
             return None
         attributes = primitive.object("attributes").value
         if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in attributes:

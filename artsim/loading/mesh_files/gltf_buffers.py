@@ -84,6 +84,7 @@ class Buffers:
 
     def points(self, number: Any, label: str, draft: Draft) -> Array:
         """(V, 3) positions of an accessor, compared with the bounds that it declares."""
+        number = integer(number, len(self._accessors))
         if number not in self._points:
             points = self.values(number, 3)
             accessor = self._accessors[number]

@@ -15,6 +15,8 @@ _HARMLESS = ("vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", 
              "d_interp", "shadow_obj", "trace_obj")  # fmt: skip
 """Statements that say nothing about where the surface is."""
 
+_HARMLESS_WORDS = frozenset(word[:8] for word in _HARMLESS)  # as Rows.words cuts them
+
 
 @dataclass(frozen=True)
 class Statements:
@@ -177,7 +179,7 @@ def _tell_others(found: Statements, draft: Draft) -> None:
     for statement, count in found.rows.words(other).items():
         if statement in ("l", "p"):
             draft.left_out(count, "lines" if statement == "l" else "points")
-        elif statement not in _HARMLESS:
+        elif statement not in _HARMLESS_WORDS:
             draft.left_out(count, f"rows that begin with {named(statement)}")
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from artsim.loading.mesh_files.surface import NO_POINT, Array, Draft, Indices
 
-_EAR_CLIPPING = 3e9
+_EAR_CLIPPING = 4e9
 """Bound on the work of ear clipping, which takes up to 3e-10 s for each pair of corners of a polygon."""
 
 _WORK_OF_A_CALL = 2e4
@@ -112,30 +112,68 @@ def _fans(
         turned = (areas * normals[block, None]).sum(axis=2)
         # Corners in a line may lie the wrong way by rounding.
         whole[block] = (turned >= -1e-12 * (normals[block] ** 2).sum(axis=1, keepdims=True)).all(axis=1)
+    folded = np.flatnonzero(~whole)
+    allowed = min(len(folded), max(0, int(work[0] / (n * n + _WORK_OF_A_CALL))))
+    work[0] -= allowed * (n * n + _WORK_OF_A_CALL)
+    made.too_many += len(folded) - allowed
+    folded = folded[:allowed]
     triangles = [(first[whole, None, None] + fan).reshape(-1, 3)]
     owners = [np.repeat(own[whole], n - 2)]
-    for k in np.flatnonzero(~whole):
-        work[0] -= n * n + _WORK_OF_A_CALL
-        if work[0] < 0.0:
-            made.too_many += 1
-            continue
-        polygon = points[corners[first[k] + np.arange(n)]]
-        ears, crossing = clip_ears([polygon], normals[k])
+    for k, flat in zip(
+        folded, _flattened(points[corners[first[folded, None] + np.arange(n)]], normals[folded]), strict=True
+    ):
+        ears, crossing = clip_ears([flat])
         made.crossing += crossing
         triangles.append(first[k] + ears)
         owners.append(np.full(len(ears), own[k]))
     return np.concatenate(triangles), np.concatenate(owners)
 
 
-def clip_ears(outlines: list[Array], normal: Array | None = None) -> tuple[Indices, bool]:
-    """Triangles of one polygon with holes, which may be concave.
+def _flattened(polygons: Array, normals: Array) -> Array:
+    """(P, N, 2) polygons of (P, N, 3), seen from where their normals point: they turn to the left.
+
+    Leaving out the coordinate along which a polygon is thinnest keeps it whole and costs no precision.
+    """
+    drop = np.argmax(np.abs(normals), axis=1)
+    kept = np.array([[1, 2], [2, 0], [0, 1]])[drop]
+    backwards = normals[np.arange(len(normals)), drop] < 0.0
+    kept[backwards] = kept[backwards, ::-1]
+    flat = np.take_along_axis(polygons, kept[:, None, :], axis=2)
+    flat = flat - flat.min(axis=1, keepdims=True)
+    size = flat.max(axis=(1, 2), keepdims=True)
+    return flat / np.where(size > 0.0, size, 1.0)
+
+
+def divide_with_holes(outlines: list[Array]) -> tuple[Indices, bool]:
+    """Triangles of a polygon with holes: (n, 3) points of its boundary, then of each hole.
+
+    Returns
+    -------
+    (F, 3) int
+        Numbers of points, counted through all outlines.
+    crossing : bool
+        Whether outlines cross.
+    """
+    spokes = outlines[0] - outlines[0][0]
+    normal = _cross(spokes[:-1], spokes[1:]).sum(axis=0)
+    (flat,) = _flattened(np.concatenate(outlines)[None], normal[None])
+    ends = np.cumsum([len(outline) for outline in outlines])
+    places = np.split(flat, ends[:-1])
+    order = np.split(np.arange(len(flat)), ends[:-1])
+    for k in range(1, len(places)):
+        if _area(places[k]) > 0.0:  # holes turn to the right
+            places[k], order[k] = places[k][::-1], order[k][::-1]
+    found, crossing = clip_ears(places)
+    return np.concatenate(order)[found], crossing
+
+
+def clip_ears(outlines: list[NDArray[np.float64]]) -> tuple[Indices, bool]:
+    """Triangles of a flat polygon.
 
     Parameters
     ----------
-    outlines : list of (n, 3) float
-        The boundary, then the holes.
-    normal : (3,) float, optional
-        Of the boundary.
+    outlines : list of (n, 2) float
+        The boundary, which turns to the left, then holes, which turn to the right; at most about 1 in size.
 
     Returns
     -------
@@ -146,29 +184,12 @@ def clip_ears(outlines: list[Array], normal: Array | None = None) -> tuple[Indic
     """
     import manifold3d
 
-    if normal is None:
-        spokes = outlines[0] - outlines[0][0]
-        normal = _cross(spokes[:-1], spokes[1:]).sum(axis=0)
-    # Leaving out the coordinate along which the polygon is thinnest keeps it whole and costs no precision.
-    drop = int(np.argmax(np.abs(normal)))
-    kept = [(1, 2), (2, 0), (0, 1)][drop]
-    flat = [outline[:, kept if normal[drop] > 0 else kept[::-1]] for outline in outlines]
-    low = flat[0].min(axis=0)
-    size = float((flat[0].max(axis=0) - low).max()) or 1.0
-    flat = [(outline - low) / size for outline in flat]
-    order, start = [], 0
-    for k, outline in enumerate(flat):
-        numbers = np.arange(start, start + len(outline))
-        if (_area(outline) < 0.0) != (k > 0):  # holes turn the other way
-            numbers, flat[k] = numbers[::-1], outline[::-1]
-        order.append(numbers)
-        start += len(outline)
-    found = np.asarray(manifold3d.triangulate([np.ascontiguousarray(outline) for outline in flat]), np.int64)
-    triangles = np.concatenate(order)[found.reshape(-1, 3)]
-    place = np.concatenate([f[np.argsort(o)] for f, o in zip(flat, order, strict=True)])
-    a, b, c = (place[triangles[:, i]] for i in range(3))
-    covered = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum()
-    enclosed = sum(_area(outline) for outline in flat)
+    triangles = np.asarray(manifold3d.triangulate([np.ascontiguousarray(outline) for outline in outlines]), np.int64)
+    triangles = triangles.reshape(-1, 3)
+    places = outlines[0] if len(outlines) == 1 else np.concatenate(outlines)
+    x, y = places[triangles].transpose(2, 1, 0)
+    covered = 0.5 * np.abs((x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0])).sum()
+    enclosed = sum(map(_area, outlines))
     return triangles, bool(abs(covered - enclosed) > 1e-6 * max(abs(enclosed), 1e-6))
 
 
@@ -192,8 +213,9 @@ def fans(indices: Indices) -> Indices:
 
 
 def _area(outline: NDArray[np.float64]) -> float:
-    x, y = outline.T
-    return float(0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    """Area within an outline that turns to the left; negative when it turns to the right."""
+    x, y = outline[:, 0], outline[:, 1]
+    return 0.5 * float((x[:-1] * y[1:] - y[:-1] * x[1:]).sum() + x[-1] * y[0] - y[-1] * x[0])
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from artsim.loading.mesh_files.surface import UnusableMeshError
 
-_WORD = 16
-"""Letters of a row's first word that are told apart."""
+_WORD = 8
+"""Letters of a row's first word that are told apart: as many as fit a number, which sorts fast."""
 
 _BLANKS = bytes(c if c == ord("\n") else max(c, ord(" ")) for c in range(256))
 """Tabs and other characters that control a terminal become blanks."""
+
+_MAX_WORDS = 10
+"""Of the words that are not known, the most frequent ones are named."""
 
 _SMALL = 4096
 """Letters of a text that are read word by word where need be."""
@@ -79,13 +82,18 @@ class Rows:
         return self._bytes[np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)].tobytes()
 
     def words(self, which: NDArray[np.bool_]) -> dict[str, int]:
-        """How many of some rows begin with each word, by its first letters."""
+        """How many of some rows begin with each word, by its first letters; "..." stands for the rare ones."""
         starts, ends = self._starts[which], self._ends[which]
         letters = np.stack([self._bytes[np.minimum(starts + i, ends)] for i in range(_WORD)], axis=1)
         blank = (letters == ord(" ")) | (letters == ord("\n"))
         letters[np.logical_or.accumulate(blank, axis=1)] = 0
-        found, counts = np.unique(np.ascontiguousarray(letters).view(f"S{_WORD}"), return_counts=True)
-        return {w.decode("ascii", "replace"): int(n) for w, n in zip(found.tolist(), counts.tolist(), strict=True) if w}
+        found, counts = np.unique(np.ascontiguousarray(letters).view(">u8"), return_counts=True)
+        most = np.argsort(-counts, kind="stable")[:_MAX_WORDS]
+        words = found[most].astype(">u8").tobytes()
+        texts = [words[at : at + _WORD].rstrip(b"\0").decode("ascii", "replace") for at in range(0, len(words), _WORD)]
+        told = {text: int(n) for text, n in zip(texts, counts[most].tolist(), strict=True) if text}
+        others = int(counts.sum() - counts[most].sum())
+        return told | {"...": others} if others else told
 
 
 def numbers_per_row(text: bytes) -> NDArray[np.int64]:
