@@ -75,7 +75,7 @@ def examine(folder: Path, begun: Begun, workers: int = 2, progress: bool = True)
         recipe = begun.plan.recipe(shard) if begun.plan.format > 1 else ""
         records = [record for record in claims[shard.name, recipe] if record.shard == shard]
         if not records:
-            return "is not finished", None
+            return "is another one than the plan makes" if begun.complete else "is not finished", None
         problem, digest = _file_problem(folder / shard.name, [record.sha256 for record in records])
         return problem, next((record for record in records if record.sha256 == digest), None)
 

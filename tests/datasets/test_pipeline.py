@@ -271,6 +271,7 @@ def test_a_full_disk_is_a_clear_error_and_nothing_is_left_half_written(sources: 
     assert verify(out, progress=False) == []
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_a_worker_that_dies_is_a_clear_error(
     sources: list[Source], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
