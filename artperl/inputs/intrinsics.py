@@ -197,7 +197,7 @@ def _numbers(data: bytes, path: Path) -> Array:
 
 def _yaml(data: bytes, path: Path) -> Any:
     try:
-        import yaml  # type: ignore[import-untyped]
+        import yaml
     except ImportError:
         raise ConfigError("YAML needs PyYAML", path, "pip install pyyaml") from None
 
