@@ -24,7 +24,6 @@ from artsim.errors import ArtsimError, AssetError
 from artsim.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
 from artsim.names import printable, safe_name
 from artsim.plain import from_plain
-from tests import hostile_child
 from tests.conftest import ASSETS
 
 CASES = Path(__file__).parent / "cases" / "hostile"
@@ -133,7 +132,7 @@ def made(root: Path) -> dict[str, tuple[str, Path, str | None]]:
         "npz with many members": ("load", root / "members.npz", "over 10000 members"),
         "npz with a forged shape": ("load", root / "shape.npz", "takes 8000000000000 bytes, but there are 0"),
         "npz with a shape that overflows": ("load", root / "overflow.npz", "but there are 0"),
-        "npz with a forged type": ("load", root / "text.npz", "but there are 0"),
+        "npz with a forged type": ("load", root / "text.npz", "header of an array is damaged"),
         "npz with objects": ("load", root / "objects.npz", "Python objects, which are never read"),
         "npz without a byte": ("load", root / "empty.npz", "cannot be read"),
         "npz of a terabyte of nothing": ("load", root / "sparse.npz", "over the limit"),
@@ -152,7 +151,7 @@ def made(root: Path) -> dict[str, tuple[str, Path, str | None]]:
             "values",
         ),
         "dataset.json nested deeply": ("dataset", folder_with(root / "deep_set", dataset__json=lists), "deep"),
-        "image of billions of pixels": ("image", root / "large.png", "60000 x 60000 pixels is too large"),
+        "image of billions of pixels": ("image", root / "large.png", "exceeds limit"),
         "image of one long row": ("image", root / "wide.png", ""),
         "image cut short": ("image", root / "short.png", "cannot be read"),
         "estimator of forged sizes": (
@@ -163,7 +162,7 @@ def made(root: Path) -> dict[str, tuple[str, Path, str | None]]:
         "estimator of sizes that its weights do not have": (
             "estimator",
             changed_estimator(root / "broad", estimator__json=settings(perception={"num_rows": 2, "width": 2048})),
-            "perception.backbone",
+            "perception.backbone.whole.0.weight is not of shape (16384, 16384)",
         ),
         "estimator with forged options": (
             "estimator", changed_estimator(root / "tall", estimator__json=settings(options=tall)), "num_points"
@@ -221,7 +220,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     wanted = json.dumps([[kind, str(path)] for kind, path, _ in cases.values()])
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
     child = subprocess.run(
-        [sys.executable, hostile_child.__file__, wanted], capture_output=True, text=True, cwd=empty, env=environment
+        [sys.executable, "-m", "tests.hostile_child", wanted], capture_output=True, text=True, cwd=empty, env=environment
     )
     assert child.returncode == 0, child.stderr
     found = json.loads(child.stdout.splitlines()[-1])
@@ -260,7 +259,7 @@ def test_links_outward_are_not_followed_and_said(outcomes: dict[str, dict[str, A
     assert "secret" not in said
     assert "meta.json: ignored: meta.json is a link that leads out of the folder" in said
     assert "no regular file" in outcomes["meta.json that is a pipe"]["said"]
-    assert "no regular file" in outcomes["semantics.txt without end"]["said"]
+    assert "semantics.txt is a link that leads out" in outcomes["semantics.txt without end"]["said"]
 
 
 def test_a_folder_behind_a_link_is_read(tmp_path: Path) -> None:
@@ -355,7 +354,7 @@ def test_a_file_is_read_up_to_its_limit_and_no_further(tmp_path: Path) -> None:
     assert len(read_bounded(tmp_path / "f", 100, "file")) == 100
     with pytest.raises(AssetError, match="over the limit"):
         read_bounded(tmp_path / "f", 99, "file")
-    with pytest.raises(AssetError, match="is a folder"):
+    with pytest.raises(AssetError, match="directory"):
         read_bounded(tmp_path, 99, "file")
     with pytest.raises(AssetError, match="cannot read file"):
         read_json(tmp_path / "a\0b", "file")
@@ -425,7 +424,7 @@ def _joint(**changes: Any) -> Callable[[dict[str, Any]], dict[str, Any]]:
         ({"faces": lambda f: f + 10_000}, "corner that does not exist"),
         ({"faces": lambda f: f[:0]}, "no triangle"),
         ({"faces": lambda f: f.astype(np.float64)}, "faces are float64"),
-        ({"face_counts": lambda c: c + [1, -1] * (len(c) // 2)}, "does not exist|add up"),
+        ({"face_counts": lambda c: c[::-1]}, "does not exist"),
         ({"vertex_counts": lambda c: -c}, "do not fit"),
         ({"vertex_counts": lambda c: np.array([2**62, 2**62], np.int64)}, "add up to"),
     ],

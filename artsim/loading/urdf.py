@@ -166,6 +166,7 @@ def _read_geometry(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
         body.vertices, body.faces = merged(surfaces)
+        _check_range(body.vertices, f"{file}: link {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
         raise AssetError("no link has any geometry", file, "add <visual> elements")
@@ -187,6 +188,7 @@ def _surfaces(
     for shape in link.shapes:
         try:
             vertices, faces = reader.shape(shape.geometry)
+            _check_range(vertices, f"{file}: link {link.name!r}")
             if _is_thin(vertices, faces):
                 raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line")
         except UnusableMeshError as problem:
@@ -203,6 +205,23 @@ def _surfaces(
             fix or "restore the mesh files; an object with an invisible part would give wrong data",
         )
     return surfaces, [*problems, *link.empty]
+
+
+_LARGEST = 1e6
+"""Metres, or units of a file in millimetres: squares and products of much larger coordinates overflow."""
+
+
+def _check_range(vertices: Array, where: str) -> None:
+    """Refuse coordinates that nothing can be computed with.
+
+    Raises
+    ------
+    AssetError
+    """
+    if not (np.abs(vertices) <= _LARGEST).all():
+        raise AssetError(
+            f"a coordinate is not finite, or over {_LARGEST:g}", where, "write sizes, origins and meshes in metres"
+        )
 
 
 def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
