@@ -220,7 +220,11 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     wanted = json.dumps([[kind, str(path)] for kind, path, _ in cases.values()])
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
     child = subprocess.run(
-        [sys.executable, "-m", "tests.hostile_child", wanted], capture_output=True, text=True, cwd=empty, env=environment
+        [sys.executable, "-m", "tests.hostile_child", wanted],
+        capture_output=True,
+        text=True,
+        cwd=empty,
+        env=environment,
     )
     assert child.returncode == 0, child.stderr
     found = json.loads(child.stdout.splitlines()[-1])
@@ -446,3 +450,24 @@ def test_a_value_of_another_type_is_named() -> None:
             from_plain(EstimatorOptions, {name: value})
     with pytest.raises(ValueError, match="no field 'x'"):
         from_plain(EstimatorOptions, {"x": 1})
+
+
+def test_a_urdf_file_that_leads_out_of_its_folder_is_refused(tmp_path: Path) -> None:
+    folder_with(tmp_path / "elsewhere")
+    (tmp_path / "asset").mkdir()
+    (tmp_path / "asset" / "mobility.urdf").symlink_to(tmp_path / "elsewhere" / "mobility.urdf")
+    for path in (tmp_path / "asset", tmp_path / "asset" / "mobility.urdf"):
+        with pytest.raises(
+            AssetError, match=f"leads out of its folder. Fix: pass the file itself: {tmp_path}/elsewhere"
+        ):
+            artsim.load(path)
+    within = folder_with(tmp_path / "within")
+    (within / "mobility.urdf").rename(within / "robot.urdf")
+    (within / "mobility.urdf").symlink_to("robot.urdf")
+    assert len(artsim.load(within / "mobility.urdf")) == 1
+
+
+@pytest.mark.parametrize("size", ["1e300 1 1", "1e7 1 1", "1e-200 1e-200 1e-200"])
+def test_a_size_that_nothing_can_be_computed_with_is_refused(size: str, tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match=r"over 1e\+06|no extent"):
+        artsim.load(folder_with(tmp_path / "o", mobility__urdf=ONE_BOX.replace("1 1 1", size)))

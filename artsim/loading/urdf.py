@@ -72,7 +72,7 @@ def load(
     file = find_urdf(Path(path))
     if file.suffix == ".npz":
         return load_object(file)
-    data = read_bounded(file, limits.max_urdf_bytes, "URDF file")
+    data = read_urdf(file, limits.max_urdf_bytes)
     check_shapes(data, file, limits)
     side = read_side_files(file.parent)
     robot, repairs = parse_robot(data, file, limits.max_links, side.helpers)
@@ -109,6 +109,23 @@ def load(
     )
 
 
+def read_urdf(file: Path, max_bytes: int) -> bytes:
+    """The content of a URDF file, which lies in its folder once links are followed.
+
+    The folder itself may be reached through links: then its meshes are there, too.
+
+    Raises
+    ------
+    AssetError
+        When it cannot be read, is too large, or is a link that leads out of its folder.
+    """
+    if file.is_symlink() and not file.resolve().is_relative_to(file.parent.resolve()):
+        raise AssetError(
+            "the URDF file is a link that leads out of its folder", file, f"pass the file itself: {file.resolve()}"
+        )
+    return read_bounded(file, max_bytes, "URDF file")
+
+
 def find_urdf(path: Path) -> Path:
     """The URDF (or object) file that a path names: itself, or the one in a folder.
 
@@ -143,9 +160,14 @@ def _roots(declared: Mapping[str, str | Path]) -> dict[str, Path]:
 def _object_id(file: Path, annotated: str | None) -> str:
     """PartNet-Mobility's own number is the folder's name; ``meta.json`` may carry an older one."""
     if file.stem != "mobility":
-        return file.stem
+        return _encodable(file.stem)
     folder = file.resolve().parent.name
-    return folder if folder.isdigit() or annotated is None else annotated
+    return _encodable(folder) if folder.isdigit() or annotated is None else annotated
+
+
+def _encodable(name: str) -> str:
+    """A file's name as text that can be written; names of files may be any bytes."""
+    return name.encode("utf-8", "replace").decode("utf-8")
 
 
 def _read_geometry(
