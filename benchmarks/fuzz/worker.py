@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.fuzz.corpus import Seed
 from benchmarks.fuzz.inputs import Desk, Input, input_at
-from benchmarks.fuzz.targets import fails
+from benchmarks.fuzz.targets import TARGETS, fails
 
 HEADROOM = 2 << 30
 """Bytes of address space that a worker may take beyond what its libraries take."""
