@@ -81,9 +81,7 @@ def merge_fixed_links(robot: Robot, file: Path, repairs: list[Repair]) -> list[R
     return bodies
 
 
-def _root_link(
-    robot: Robot, children: Mapping[str, list[RobotJoint]], file: Path, repairs: list[Repair]
-) -> str:
+def _root_link(robot: Robot, children: Mapping[str, list[RobotJoint]], file: Path, repairs: list[Repair]) -> str:
     carried_by: dict[str, str] = {}
     for joint in robot.joints:
         if joint.child in carried_by:

@@ -212,4 +212,3 @@ def _doubt_degrees(low: float, high: float, element: Element) -> None:
             f"limits {low:g} and {high:g} rad are {span / _TURN:.1f} turns: they look like degrees, and are taken as "
             f'radians; if they are degrees, write lower="{np.deg2rad(low):.6g}" upper="{np.deg2rad(high):.6g}"'
         )
-

@@ -201,7 +201,9 @@ class AssetPaths:
             return  # that package is there, but may not be read: a file of the same name here is another one
         for base in self._bases:
             yield _Candidate(base / package / name, f"package {package!r} is taken for a folder in {base.name!r}")
-            yield _Candidate(base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own")
+            yield _Candidate(
+                base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own"
+            )
         yield from self._below_own_name([package, *parts])
         for i in range(1, len(parts) - 1):  # a folder and a name are left: a name alone may be that of another mesh
             for base in self._bases:

@@ -57,7 +57,9 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
     """
     if data.startswith(b"version https://git-lfs"):
         raise AssetError(
-            "is a pointer of Git LFS, not the file itself", where, f"cd {shlex.quote(str(where.parent))} && git lfs pull"
+            "is a pointer of Git LFS, not the file itself",
+            where,
+            f"cd {shlex.quote(str(where.parent))} && git lfs pull",
         )
     repairs: list[Repair] = []
     text = _decoded(data, repairs)
@@ -217,7 +219,9 @@ def _refuse_unexpanded(root: etree._Element, where: Path) -> None:
 
 def _unexpanded(what: str, where: Path) -> AssetError:
     name = where.name.removesuffix(".xacro")
-    target = where.with_name(name if name.endswith(".urdf") and name != where.name else f"{Path(name).stem}_expanded.urdf")
+    target = where.with_name(
+        name if name.endswith(".urdf") and name != where.name else f"{Path(name).stem}_expanded.urdf"
+    )
     if where.name.endswith(".xacro") and not name.endswith(".urdf"):
         target = where.with_name(f"{name}.urdf")
     return AssetError(
