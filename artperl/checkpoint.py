@@ -34,6 +34,7 @@ WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
 _FORMAT = 1
+_AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
 
@@ -103,17 +104,19 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
         options = replace(from_plain(EstimatorOptions, settings.get("options")), **changes)
         calibration = from_plain(Calibration, settings.get("calibration"))
     except ValueError as error:
-        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, "train it again") from error
+        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
     tensors = read_tensors(folder / _TENSORS)
-    with torch.device("meta"):  # a forged width takes no memory before it is known to be that of the weights
-        _check_fit(sizes.networks(), tensors, folder)
+    for key, shape in sizes.largest.items():  # a forged width takes no memory before it is that of the weights
+        if key not in tensors or tensors[key].shape != shape:
+            raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, _AGAIN)
     networks = sizes.networks()
+    _check_fit(networks, tensors, folder)
     for key, network in networks.items():
         network.load_state_dict(_under(tensors, f"{key}."))
         network.to(device)
     base = ShapeBase.load(folder / _BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
-        raise DatasetError("its embeddings are not of its objects", folder / _BASE, "train it again")
+        raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
     perception, agent, boxes = networks["perception"], networks.get("agent"), networks.get("boxes")
     assert isinstance(perception, Perception)
     assert isinstance(agent, Agent | None)
@@ -166,6 +169,17 @@ class _Sizes:
     agent: _AgentSize | None
     boxes: _BoxesSize | None
 
+    @property
+    def largest(self) -> dict[str, tuple[int, int]]:
+        """Shape of a tensor of each network that is among its largest, by its name."""
+        wide = 8 * self.perception.width
+        shapes = {"perception.backbone.whole.0.weight": (wide, wide)}
+        if self.agent is not None:
+            shapes["agent.observed.2.weight"] = 2 * self.agent.width, self.agent.width
+        if self.boxes is not None:
+            shapes["boxes.among.0.weight"] = self.boxes.width, 6 * self.boxes.width
+        return shapes
+
     def networks(self) -> dict[str, nn.Module]:
         """New networks of these sizes, by name."""
         networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
@@ -194,7 +208,7 @@ def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor],
             elif not bool(torch.isfinite(tensor).all()):
                 problem = f"{name} is not finite"
     if problem is not None:
-        raise DatasetError(f"the estimator does not load: {problem}", folder, "train it again")
+        raise DatasetError(f"the estimator does not load: {problem}", folder, _AGAIN)
 
 
 def folder_of(name: str | Path) -> Path:
@@ -219,9 +233,9 @@ def read_settings(folder: Path) -> dict[str, Any]:
     # An option, or a figure of its training, may be infinite.
     settings = read_json(folder / _SETTINGS, _SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
     if not isinstance(settings, dict) or not isinstance(settings.get("about"), dict):
-        raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, "train it again")
+        raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
     if settings.get("format") != _FORMAT:
-        raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, "train it again")
+        raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, _AGAIN)
     return settings
 
 
@@ -239,13 +253,13 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     DatasetError
         When the file is missing, damaged or too large.
     """
-    data = read_bounded(path, _MAX_TENSOR_BYTES, "weights", DatasetError, fix="train it again")
+    data = read_bounded(path, _MAX_TENSOR_BYTES, "weights", DatasetError, fix=_AGAIN)
     if int.from_bytes(data[:8], "little") > _MAX_TENSOR_HEADER:
-        raise DatasetError("weights cannot be read (the header says that it is huge)", path, "train it again")
+        raise DatasetError("weights cannot be read (the header says that it is huge)", path, _AGAIN)
     try:
         return load_tensors(data)
     except Exception as error:  # safetensors raises what its parser and torch stumble on in bytes that are not theirs
-        raise DatasetError(f"weights cannot be read ({error})", path, "train it again") from error
+        raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
 def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from artperl.cleaning import measured
 from artperl.estimate import Estimate
 from artperl.listing import HEAD, cells, summary
+from artsim.names import printable
 from artsim.view import PALETTE
 
 _MOST = 6000
@@ -48,10 +49,15 @@ def page(estimate: Estimate, points: ArrayLike, title: str) -> str:
         "colours": [f"rgb({r},{g},{b})" for r, g, b in PALETTE.tolist()],
     }
     return _PAGE.format(
-        title=html.escape(title), summary=html.escape(summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
-        warnings="\n".join(f"<p><b>Warning:</b> {html.escape(text)}</p>" for text in estimate.warnings),
+        title=_escaped(title), summary=_escaped(summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
+        warnings="\n".join(f"<p><b>Warning:</b> {_escaped(text)}</p>" for text in estimate.warnings),
         head="".join(f"<th>{name}</th>" for name in HEAD), last=len(T) - 1,
     )  # fmt: skip
+
+
+def _escaped(text: str) -> str:
+    """Text as a browser shows it, names out of files included."""
+    return html.escape(printable(text, 1000))
 
 
 def _rows(estimate: Estimate) -> str:
@@ -59,7 +65,7 @@ def _rows(estimate: Estimate) -> str:
     for k, (part, *values) in enumerate(cells(estimate)):
         colour = "rgb({},{},{})".format(*PALETTE[k % len(PALETTE)])
         rows.append(
-            f'<tr><td style="color:{colour}">■ {html.escape(part)}</td>'
+            f'<tr><td style="color:{colour}">■ {_escaped(part)}</td>'
             + "".join(f"<td>{html.escape(c)}</td>" for c in values)
             + "</tr>"
         )

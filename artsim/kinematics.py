@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 JOINT_TYPES = ("free", "revolute", "continuous", "prismatic", "screw")
 """Every joint type a tree can hold. Fixed joints do not appear: a loader merges them."""
 
+LARGEST = 1e9
+"""Metres or radians: squares of larger numbers, and their products, soon overflow."""
+
 _EYE = np.eye(3)
 ROTATING = ("revolute", "continuous", "screw")
 
@@ -112,8 +115,14 @@ class KinematicTree:
                 raise KinematicsError("exactly the first joint is the root: type 'free', parent -1", where)
             if joint.parent >= k:
                 raise KinematicsError("a parent must come before its children", where)
-            if not np.all(np.isfinite([*joint.axis, *joint.origin, joint.rest, joint.pitch])):
-                raise KinematicsError("axis, origin, rest state and pitch must be finite", where)
+            if not np.all(np.abs([*joint.axis, *joint.origin, joint.rest, joint.pitch]) <= LARGEST):
+                raise KinematicsError(
+                    f"axis, origin, rest state and pitch must be finite, and at most {LARGEST:g}", where
+                )
+            if any(np.isfinite(limit) and abs(limit) > LARGEST for limit in (joint.lower, joint.upper)):
+                raise KinematicsError(f"a limit is over {LARGEST:g}: make it infinite", where)
+            if joint.mimic is not None and not np.all(np.abs([joint.mimic.multiplier, joint.mimic.offset]) <= LARGEST):
+                raise KinematicsError(f"what a joint follows another by must be at most {LARGEST:g}", where)
             if abs(norm(joint.axis) - 1.0) > 1e-6:
                 raise KinematicsError(f"axis {joint.axis} is not a unit vector", where)
             if not joint.lower <= joint.upper:
@@ -369,15 +378,12 @@ class KinematicTree:
 _MAX_JOINTS = 1000
 """Objects have 254 parts at most."""
 
-_LARGEST = 1e9
-"""Metres or radians: squares of larger numbers, and their products, soon overflow."""
-
 
 def _joint(data: object, where: str) -> Joint:
     """A joint as :meth:`KinematicTree.to_dict` describes it."""
 
-    def number(value: object, name: str, largest: float = _LARGEST) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= largest:
+    def number(value: object, name: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
             raise KinematicsError(f"{name} is {value!r:.60}, which is no number in range", where)
         return float(value)
 
@@ -407,9 +413,8 @@ def _joint(data: object, where: str) -> Joint:
         parent=index(data["parent"], "parent"),
         axis=(x, y, z),
         origin=(u, v, w),
-        # Files of other programs have limits of any size, which are only ever compared.
-        lower=-np.inf if data["lower"] is None else number(data["lower"], "lower", np.finfo(np.float64).max),
-        upper=np.inf if data["upper"] is None else number(data["upper"], "upper", np.finfo(np.float64).max),
+        lower=-np.inf if data["lower"] is None else number(data["lower"], "lower"),
+        upper=np.inf if data["upper"] is None else number(data["upper"], "upper"),
         rest=number(data["rest"], "rest"),
         pitch=number(data["pitch"], "pitch"),
         mimic=mimic,

@@ -81,9 +81,10 @@ def safe_name(text: object, fallback: str = "object") -> str:
     """
     text = str(text)
     # Dots at the ends would hide a file, climb a folder, or be dropped by Windows.
-    name = re.sub(r"(?:[^\w.-]|\.{2,})+", "_", text).strip("._-")[:_MAX_NAME].rstrip("._-")
+    name = re.sub(r"(?:[^\w.-]|\.{2,})+", "_", text).strip("._-")
     if not name or _RESERVED.fullmatch(name):
         name = fallback
-    if name == text:
+    if name == text and len(name) <= _MAX_NAME:
         return name
-    return f"{name}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{name[: _MAX_NAME - 9].rstrip('._-')}-{digest}"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from artsim.errors import AssetError, KinematicsError
 from artsim.files import parse_json, read_npz, write_atomic
-from artsim.kinematics import Array, KinematicTree
+from artsim.kinematics import LARGEST, Array, KinematicTree
 from artsim.names import printable
 from artsim.objects import MAX_PARTS, ArticulatedObject, Part, Repair
 
@@ -84,7 +84,7 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
     names, labels = _texts(header.get("names"), len(tree)), _texts(header.get("labels"), len(tree))
     object_id, category, sha256 = _texts([header.get(key) for key in ("object_id", "category", "sha256")], 3)
     (scale,) = _numbers([header.get("scale")], (1,))
-    if not 0.0 < scale <= _LARGEST:
+    if not 0.0 < scale <= LARGEST:
         raise ValueError(f"its scale is {scale}")
     repairs, notes = header.get("repairs"), header.get("notes", [])  # older files have no notes
     if not isinstance(repairs, list) or not isinstance(notes, list):
@@ -106,10 +106,6 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
     )
 
 
-_LARGEST = 1e9
-"""Metres: squares and products of larger coordinates soon overflow in single precision."""
-
-
 def _parts(arrays: Mapping[str, NDArray[Any]], names: Sequence[str], labels: Sequence[str]) -> tuple[Part, ...]:
     """Names, labels and meshes of the parts, of which at least one has triangles."""
     if len(names) > MAX_PARTS:
@@ -118,7 +114,7 @@ def _parts(arrays: Mapping[str, NDArray[Any]], names: Sequence[str], labels: Seq
     for array, kinds, what in ((vertices, "f", "vertices"), (faces, "iu", "faces")):
         if array.dtype.kind not in kinds or array.ndim != 2 or array.shape[1] != 3:
             raise ValueError(f"its {what} are {array.dtype} of shape {array.shape}")
-    if not (np.abs(vertices) <= _LARGEST).all():
+    if not (np.abs(vertices) <= LARGEST).all():
         raise ValueError("a vertex is not finite, or out of range")
     if len(faces) == 0 or not np.ptp(vertices, axis=0).any():
         raise ValueError("it has no triangle, or no extent")
@@ -150,7 +146,7 @@ def _numbers(values: object, shape: tuple[int, ...]) -> Array:
         array = np.array(values)
     except ValueError:  # lists of different lengths
         array = np.empty(0)
-    if array.dtype.kind not in "iuf" or array.shape != shape or not (np.abs(array) <= _LARGEST).all():
+    if array.dtype.kind not in "iuf" or array.shape != shape or not (np.abs(array) <= LARGEST).all():
         raise ValueError(f"{values!r:.60} is not numbers of shape {shape}")
     return array.astype(np.float64)
 

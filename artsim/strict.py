@@ -20,7 +20,7 @@ from artsim.files import read_bounded
 from artsim.kinematics import Array
 from artsim.loading.joint_xml import MOVING_TYPES
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
-from artsim.loading.urdf import find_urdf
+from artsim.loading.urdf import find_urdf, read_urdf
 from artsim.loading.urdf_xml import safe_xml
 from artsim.objects import ArticulatedObject
 
@@ -127,7 +127,7 @@ def _paths(package_roots: Mapping[str, str | Path] | None) -> dict[str, Path]:
 
 def _read(path: str | Path) -> tuple[Path, etree._Element]:
     file = find_urdf(Path(path))
-    return file, safe_xml(read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file"), file)
+    return file, safe_xml(read_urdf(file, LoadLimits().max_urdf_bytes), file)
 
 
 def _tree_problems(links: list[etree._Element], joints: list[etree._Element]) -> list[str]:

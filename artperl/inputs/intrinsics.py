@@ -219,6 +219,8 @@ def _yaml(data: bytes, path: Path) -> Any:
 def _rescaled(camera: Intrinsics, size: tuple[int, int]) -> str:
     """The intrinsics of an image of the same view in another size, to be pasted; none where sides differ in ratio."""
     assert camera.size is not None
+    if not min(camera.size) > 0:
+        return ""
     across, down = size[0] / camera.size[0], size[1] / camera.size[1]
     if abs(across / down - 1.0) > 0.01:
         return ""

@@ -22,6 +22,7 @@ from artsim.loading.mesh_files import Bounds
 from artsim.loading.mesh_files.obj import read_painted
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.partnet import read_side_files
+from artsim.loading.urdf import read_urdf
 from artsim.loading.urdf_xml import parse_robot
 from artsim.objects import ArticulatedObject
 
@@ -74,9 +75,7 @@ def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
     """Mesh files of each rigid body, keyed by its links, in the order in which :func:`artsim.load` joins them."""
     limits = LoadLimits()
     side = read_side_files(file.parent)
-    robot, repairs = parse_robot(
-        read_bounded(file, limits.max_urdf_bytes, "URDF file"), file, limits.max_links, side.helpers
-    )
+    robot, repairs = parse_robot(read_urdf(file, limits.max_urdf_bytes), file, limits.max_links, side.helpers)
     reader = MeshReader(file.parent, {}, limits)
     links = {link.name: link for link in robot.links}
     found: dict[tuple[str, ...], list[Path]] = {}

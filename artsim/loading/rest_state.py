@@ -89,9 +89,13 @@ class _Shape:
 
     def hull_volume(self, k: int, state: float) -> float:
         """Volume of the convex hull of the whole object: least when it is folded up, however it is turned."""
-        from scipy.spatial import ConvexHull
+        from scipy.spatial import ConvexHull, QhullError
 
-        return float(ConvexHull(np.concatenate(self.posed(k, state)), qhull_options="QJ").volume)
+        corners = np.concatenate(self.posed(k, state))
+        try:
+            return float(ConvexHull(corners, qhull_options="QJ").volume)
+        except QhullError:  # parts of very different sizes, or very far apart
+            return float(np.ptp(corners, axis=0).prod())
 
     def states(self, k: int) -> Array:
         """States over a joint's range."""
@@ -110,12 +114,15 @@ class _Shape:
 
 def hull_corners(part: Part) -> Array:
     """(C, 3) corners of a part's convex hull; none for a part without geometry."""
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
     if len(part.faces) == 0:
         return np.zeros((0, 3))
     vertices = part.vertices[np.unique(part.faces)]
-    return vertices[ConvexHull(vertices, qhull_options="QJ").vertices]
+    try:
+        return vertices[ConvexHull(vertices, qhull_options="QJ").vertices]
+    except QhullError:  # sides of very different lengths; without a hull, all of them are its corners
+        return vertices
 
 
 def _closing_end(shape: _Shape, k: int) -> float:

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make
-from artsim.files import read_bounded
 from artsim.loading.meshes import LoadLimits
-from artsim.loading.urdf import find_urdf, load
+from artsim.loading.urdf import find_urdf, load, read_urdf
 from artsim.objects import ArticulatedObject
 
 
@@ -117,7 +116,7 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
             found = [find_urdf(given)]
         for file in found:
             name = (file.relative_to(given.parent) if given.is_dir() else Path(file.parent.name, file.name)).as_posix()
-            data = read_bounded(file, LoadLimits().max_urdf_bytes, "URDF file")
+            data = read_urdf(file, LoadLimits().max_urdf_bytes)
             sources.append(FileSource(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
     return sources
 

@@ -73,7 +73,7 @@ def load(
     file = find_urdf(Path(path))
     if file.suffix == ".npz":
         return load_object(file)
-    data = read_bounded(file, limits.max_urdf_bytes, "URDF file")
+    data = read_urdf(file, limits.max_urdf_bytes)
     check_shapes(data, file, limits)
     side = read_side_files(file.parent)
     robot, repairs = parse_robot(data, file, limits.max_links, side.helpers)
@@ -108,6 +108,23 @@ def load(
         source=str(file),
         source_joints=source_joints,
     )
+
+
+def read_urdf(file: Path, max_bytes: int) -> bytes:
+    """The content of a URDF file, which lies in its folder once links are followed.
+
+    The folder itself may be reached through links: then its meshes are there, too.
+
+    Raises
+    ------
+    AssetError
+        When it cannot be read, is too large, or is a link that leads out of its folder.
+    """
+    if file.is_symlink() and not file.resolve().is_relative_to(file.parent.resolve()):
+        raise AssetError(
+            "the URDF file is a link that leads out of its folder", file, f"pass the file itself: {file.resolve()}"
+        )
+    return read_bounded(file, max_bytes, "URDF file")
 
 
 def find_urdf(path: Path) -> Path:
@@ -147,9 +164,14 @@ def _roots(declared: Mapping[str, str | Path]) -> dict[str, Path]:
 def _object_id(file: Path, annotated: str | None) -> str:
     """PartNet-Mobility's own number is the folder's name; ``meta.json`` may carry an older one."""
     if file.stem != "mobility":
-        return file.stem
+        return _encodable(file.stem)
     folder = file.resolve().parent.name
-    return folder if folder.isdigit() or annotated is None else annotated
+    return _encodable(folder) if folder.isdigit() or annotated is None else annotated
+
+
+def _encodable(name: str) -> str:
+    """A file's name as text that can be written; names of files may be any bytes."""
+    return name.encode("utf-8", "replace").decode("utf-8")
 
 
 def _read_geometry(
@@ -170,6 +192,7 @@ def _read_geometry(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
         body.vertices, body.faces = merged(surfaces)
+        _check_range(body.vertices, f"{file}: link {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
         raise AssetError("no link has any geometry", file, "add <visual> elements")
@@ -191,6 +214,7 @@ def _surfaces(
     for shape in link.shapes:
         try:
             vertices, faces = reader.shape(shape.geometry)
+            _check_range(vertices, f"{file}: link {link.name!r}")
             if _is_thin(vertices, faces):
                 raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line")
         except UnusableMeshError as problem:
@@ -207,6 +231,23 @@ def _surfaces(
             fix or "restore the mesh files; an object with an invisible part would give wrong data",
         )
     return surfaces, [*problems, *link.empty]
+
+
+_LARGEST = 1e6
+"""Metres, or units of a file in millimetres: squares and products of much larger coordinates overflow."""
+
+
+def _check_range(vertices: Array, where: str) -> None:
+    """Refuse coordinates that nothing can be computed with.
+
+    Raises
+    ------
+    AssetError
+    """
+    if not (np.abs(vertices) <= _LARGEST).all():
+        raise AssetError(
+            f"a coordinate is not finite, or over {_LARGEST:g}", where, "write sizes, origins and meshes in metres"
+        )
 
 
 def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:

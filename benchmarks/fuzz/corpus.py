@@ -73,7 +73,7 @@ _CHAIN = """<robot name="chain">
   <link name="body"><visual><geometry><mesh filename="m.obj" scale="1 1 1"/></geometry></visual></link>
   <link name="drawer"><visual><geometry><cylinder radius="0.1" length="0.3"/></geometry></visual></link>
   <link name="knob"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
-  <link name="dial"><visual><geometry><mesh filename="sub/../m.obj" scale="0.5 -0.5 0.5"/></geometry></visual></link>
+  <link name="dial"><visual><geometry><mesh filename="./m.obj" scale="0.5 -0.5 0.5"/></geometry></visual></link>
   <link name="thread"/>
   <link name="cap"><visual><geometry><box size="0.2 0.2 0.2"/></geometry></visual></link>
   <joint name="fix" type="fixed"><origin rpy="1.5707963 0 -1.5707963" xyz="0 0 0"/><parent link="base"/>

@@ -15,6 +15,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping
 from copy import deepcopy
+from itertools import islice
 from random import Random
 from typing import Any
 
@@ -195,7 +196,7 @@ def of_json(rng: Random, data: bytes) -> bytes:
 def changed_value(rng: Random, value: Any) -> Any:
     """A JSON value with some values in it changed."""
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        places = list(_places(value))
+        places = list(islice(_places(value), 5000))
         if not places:
             return rng.choice(VALUES)
         holder, key = rng.choice(places)
@@ -203,7 +204,8 @@ def changed_value(rng: Random, value: Any) -> Any:
             case 0:
                 del holder[key]
             case 1 if isinstance(holder, list):
-                holder[key:key] = [holder[key]] * rng.choice((1, 2, 300))
+                copies = rng.choice((1, 2, 300))  # of containers only one, as copies of copies have no end
+                holder[key:key] = [holder[key]] * (1 if isinstance(holder[key], (dict, list)) else copies)
             case 2:
                 other, at = rng.choice(places)
                 if _has(other, at):

@@ -1,0 +1,112 @@
+"""Reads files in forked processes and says what came of each: run by ``test_hostile`` as a program of its own.
+
+Its argument is a JSON list of [kind, path]; its last line a JSON list of what came of each.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+from artsim.errors import ArtsimError
+
+
+def load(path: Path) -> str:
+    import artsim
+    from artsim.inspect import describe
+
+    return describe(artsim.load(path))
+
+
+def view(path: Path) -> str:
+    from artsim.view import view_path
+
+    return " ".join(str(written.absolute()) for written in view_path(path, samples=1))
+
+
+def base(path: Path) -> str:
+    from artperl.retrieval import ShapeBase
+
+    return f"{len(ShapeBase.load(path))} objects"
+
+
+def estimator(path: Path) -> str:
+    from artperl.checkpoint import load_estimator
+
+    return str(load_estimator(path).options)
+
+
+def dataset(path: Path) -> str:
+    import artsim
+
+    return str(artsim.open_dataset(path)[0].index)
+
+
+def motions(path: Path) -> str:
+    from artsim.record import open_motions
+
+    return f"{len(open_motions(path))} motions"
+
+
+def intrinsics(path: Path) -> str:
+    from artperl.inputs import read_intrinsics
+
+    return str(read_intrinsics(path))
+
+
+def points(path: Path) -> str:
+    from artperl.inputs import read_points
+
+    return str(read_points(path).shape)
+
+
+def image(path: Path) -> str:
+    from artsim.files import open_image
+
+    return str(open_image(path).size)
+
+
+READERS = {f.__name__: f for f in (load, view, base, estimator, dataset, motions, intrinsics, points, image)}
+
+
+def outcome(kind: str, path: Path) -> dict[str, Any]:
+    """What comes of reading a file: ``said``, or ``error`` and its type; a traceback where it is none of ours."""
+    try:
+        return {"said": READERS[kind](path)}
+    except ArtsimError as error:
+        return {"error": str(error), "type": type(error).__name__}
+    except BaseException:  # what must not happen is what the test is about
+        return {"raw": traceback.format_exc()}
+
+
+def forked(kind: str, path: Path) -> dict[str, Any]:
+    """As :func:`outcome`, in a process of its own, with its processor time in seconds and its memory in MB."""
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(read)
+        signal.alarm(30)  # of the clock: what waits for ever ends here
+        with os.fdopen(write, "w") as file:
+            json.dump(outcome(kind, path), file)
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as file:
+        text = file.read()
+    _, status, usage = os.wait4(child, 0)
+    result = json.loads(text) if text else {"raw": f"ended with status {status}"}
+    return result | {"seconds": usage.ru_utime + usage.ru_stime, "mb": usage.ru_maxrss / 1024}
+
+
+if __name__ == "__main__":
+    import yourdfpy  # noqa: F401  # takes most of a second, which is not the files' fault
+
+    wanted = [(kind, Path(path)) for kind, path in json.loads(sys.argv[1])]
+    if any(kind in ("base", "estimator", "points", "intrinsics") for kind, _ in wanted):
+        import artperl.checkpoint
+        import artperl.inputs  # noqa: F401  # as above
+    print(json.dumps([forked(kind, path) for kind, path in wanted]))

@@ -1,0 +1,473 @@
+"""Files nobody vouches for: each is read, or refused in one line, within 2 s of processor time and 500 MB."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import artsim
+from artsim.cli import main
+from artsim.errors import ArtsimError, AssetError
+from artsim.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
+from artsim.names import printable, safe_name
+from artsim.plain import from_plain
+from tests.conftest import ASSETS
+
+CASES = Path(__file__).parent / "cases" / "hostile"
+ESTIMATOR = Path(__file__).parents[1] / "artperl" / "weights" / "laptop"
+SECONDS, MB = 2.0, 500.0
+ONE_BOX = '<robot name="r"><link name="a"><visual><geometry><box size="1 1 1"/></geometry></visual></link></robot>'
+
+
+def folder_with(path: Path, **files: str | bytes) -> Path:
+    """A folder with these files, ``__`` for the dot in their names, and a URDF file of one box unless there is one."""
+    path.mkdir(parents=True, exist_ok=True)
+    for name, content in ({"mobility__urdf": ONE_BOX} | files).items():
+        data = content.encode() if isinstance(content, str) else content
+        (path / name.replace("__", ".")).write_bytes(data)
+    return path
+
+
+def zipped(members: dict[str, bytes], compression: int = zipfile.ZIP_DEFLATED) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", compression) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+def npy(descr: str, shape: str, content: bytes = b"") -> bytes:
+    """An array whose header says what it likes."""
+    header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + content
+
+
+def png(width: int, height: int) -> bytes:
+    """An image that is said to be large."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+    )
+
+
+def changed_estimator(path: Path, **files: bytes) -> Path:
+    shutil.copytree(ESTIMATOR, path)
+    for name, content in files.items():
+        (path / name.replace("__", ".")).write_bytes(content)
+    return path
+
+
+def settings(**changes: Any) -> bytes:
+    return json.dumps(json.loads((ESTIMATOR / "estimator.json").read_bytes()) | changes).encode()
+
+
+def huge_header() -> bytes:
+    """A safetensors file of which a tensor takes an exabyte."""
+    text = json.dumps({"a": {"dtype": "F32", "shape": [1 << 40, 1 << 20], "data_offsets": [0, 1 << 62]}}).encode()
+    return struct.pack("<Q", len(text)) + text
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def made(root: Path) -> dict[str, tuple[str, Path, str | None]]:
+    """Shapes of hostile files by name: what reads it, where it is, and what is said (None: it is read)."""
+    zeros = npy("'|u1'", "(150000000,)", bytes(150_000_000))
+    many = zipped({f"{i}.npy": b"" for i in range(20_000)}, zipfile.ZIP_STORED)
+    lists = b"[" * 200_000
+    files = {
+        "zeros.npz": zipped({"header.npy": zeros}),
+        "members.npz": many,
+        "shape.npz": zipped({"header.npy": npy("'<f8'", "(1000000000000,)")}),
+        "overflow.npz": zipped({"header.npy": npy("'<f8'", "(99999999999, 99999999999, 99999999999)")}),
+        "text.npz": zipped({"header.npy": npy("'<U999999999'", "(1,)")}),
+        "objects.npz": zipped({"header.npy": npy("'|O'", "(1,)", b"cos\nsystem\n(S'true'\ntR.")}),
+        "empty.npz": b"",
+        "large.png": png(60_000, 60_000),
+        "wide.png": png(2**31 - 1, 1),
+        "short.png": png(100, 100),
+    }
+    for name, content in files.items():
+        (root / name).write_bytes(content)
+    shutil.copy(root / "zeros.npz", root / "base.npz")
+    with (root / "sparse.npz").open("wb") as file:
+        file.truncate(1 << 40)
+    sparse = folder_with(root / "sparse")
+    with (sparse / "mobility.urdf").open("wb") as file:
+        file.truncate(1 << 40)
+    pipe, pipe_beside = folder_with(root / "pipe"), folder_with(root / "pipe_beside")
+    (pipe / "mobility.urdf").unlink()
+    os.mkfifo(pipe / "mobility.urdf")
+    os.mkfifo(pipe_beside / "meta.json")
+    zero, out, secret = folder_with(root / "zero"), folder_with(root / "out"), root / "secret.json"
+    (zero / "semantics.txt").symlink_to("/dev/zero")
+    secret.write_text('{"model_cat": "secret"}')
+    (out / "meta.json").symlink_to("../secret.json")
+    mesh = ONE_BOX.replace('<box size="1 1 1"/>', '<mesh filename="m.obj"/>')
+    directory = folder_with(root / "directory", mobility__urdf=mesh)
+    (directory / "m.obj").mkdir()
+    forged = {"num_rows": 10**9, "width": 10**9, "votes": False}
+    tall = json.loads((ESTIMATOR / "estimator.json").read_bytes())["options"] | {"num_points": 10**12}
+    return {
+        "npz of zeros": ("load", root / "zeros.npz", "expands to more than the limit"),
+        "npz of zeros as a base": ("base", root / "base.npz", "expands to more than the limit"),
+        "npz with many members": ("load", root / "members.npz", "over 10000 members"),
+        "npz with a forged shape": ("load", root / "shape.npz", "takes 8000000000000 bytes, but there are 0"),
+        "npz with a shape that overflows": ("load", root / "overflow.npz", "but there are 0"),
+        "npz with a forged type": ("load", root / "text.npz", "header of an array is damaged"),
+        "npz with objects": ("load", root / "objects.npz", "Python objects, which are never read"),
+        "npz without a byte": ("load", root / "empty.npz", "cannot be read"),
+        "npz of a terabyte of nothing": ("load", root / "sparse.npz", "over the limit"),
+        "urdf of a terabyte of nothing": ("load", sparse, "over the limit"),
+        "urdf that is a pipe": ("load", pipe / "mobility.urdf", ""),
+        "meta.json that is a pipe": ("load", pipe_beside, None),
+        "semantics.txt without end": ("load", zero, None),
+        "meta.json that is a link outward": ("load", out, None),
+        "mesh that is a folder": ("load", directory, "m.obj"),
+        "meta.json nested deeply": ("load", folder_with(root / "deep", meta__json=lists), None),
+        "meta.json of many values": ("load", folder_with(root / "many", meta__json=b"[" + b"[]," * 2_600_000), None),
+        "meta.json of 50 MB": ("load", folder_with(root / "long", meta__json=b'"' + bytes(50_000_000)), None),
+        "dataset.json of many values": (
+            "dataset",
+            folder_with(root / "dataset", dataset__json=b"[" + b"{}," * 10_000_000 + b"{}]"),
+            "values",
+        ),
+        "dataset.json nested deeply": ("dataset", folder_with(root / "deep_set", dataset__json=lists), "deep"),
+        "image of billions of pixels": ("image", root / "large.png", "exceeds limit"),
+        "image of one long row": ("image", root / "wide.png", ""),
+        "image cut short": ("image", root / "short.png", "cannot be read"),
+        "estimator of forged sizes": (
+            "estimator",
+            changed_estimator(root / "forged", estimator__json=settings(perception=forged)),
+            "num_rows is 1000000000",
+        ),
+        "estimator of sizes that its weights do not have": (
+            "estimator",
+            changed_estimator(root / "broad", estimator__json=settings(perception={"num_rows": 2, "width": 2048})),
+            "perception.backbone.whole.0.weight is not of shape (16384, 16384)",
+        ),
+        "estimator with forged options": (
+            "estimator", changed_estimator(root / "tall", estimator__json=settings(options=tall)), "num_points"
+        ),
+        "weights with a forged header": (
+            "estimator", changed_estimator(root / "header", weights__safetensors=huge_header()),
+            "weights cannot be read",
+        ),
+        "weights with an endless header": (
+            "estimator",
+            changed_estimator(root / "endless", weights__safetensors=b"\xff" * 8 + b"{"),
+            "the header says that it is huge",
+        ),
+    }  # fmt: skip
+
+
+def shared(root: Path) -> dict[str, tuple[str, Path, str | None]]:
+    """The cases of other people's making; each as its README says."""
+    cases: dict[str, tuple[str, Path, str | None]] = {
+        name: ("load", CASES / name, text)
+        for name, text in {
+            "dae_instance_bomb": "",
+            "fixed_axis": None,
+            "meta_surrogate": None,
+            "ply_no_vertices": "",
+            "robot_material": None,
+            "spheres": "",
+        }.items()
+    }
+    cases["view_traversal"] = ("view", CASES / "view_traversal", None)
+    (intrinsics,) = CASES.glob("fuzz_inputs_*")
+    cases["intrinsics"] = ("intrinsics", intrinsics, "")
+    (base,) = CASES.glob("fuzz_base_*")
+    cases["base"] = ("base", base, "Bad CRC-32")
+    (compiled,) = CASES.glob("fuzz_npzobj_*")
+    cases["object"] = ("load", compiled, "64 bits")
+    (forged,) = CASES.glob("fuzz_settings_*")
+    cases["settings"] = ("estimator", changed_estimator(root / "e", estimator__json=forged.read_bytes()), "references")
+    (description,) = CASES.glob("fuzz_dsjson_*")
+    cases["description"] = ("dataset", folder_with(root / "d", dataset__json=description.read_bytes()), "")
+    (mesh,) = CASES.glob("fuzz_mesh_*")
+    robot = ONE_BOX.replace('<box size="1 1 1"/>', '<mesh filename="m.obj"/>')
+    cases["mesh"] = ("load", folder_with(root / "m", mobility__urdf=robot, m__obj=mesh.read_bytes()), "")
+    (urdf,) = CASES.glob("fuzz_urdf_*")
+    cases["urdf"] = ("load", folder_with(root / "u", mobility__urdf=urdf.read_bytes()), "")
+    return cases
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """What came of every case, each read in a process of its own in an empty folder."""
+    root, empty = tmp_path_factory.mktemp("hostile"), tmp_path_factory.mktemp("here") / "a" / "b"
+    empty.mkdir(parents=True)
+    cases = made(root) | shared(root)
+    wanted = json.dumps([[kind, str(path)] for kind, path, _ in cases.values()])
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
+    child = subprocess.run(
+        [sys.executable, "-m", "tests.hostile_child", wanted],
+        capture_output=True,
+        text=True,
+        cwd=empty,
+        env=environment,
+    )
+    assert child.returncode == 0, child.stderr
+    found = json.loads(child.stdout.splitlines()[-1])
+    written = sorted(str(path.relative_to(empty.parents[1])) for path in empty.parents[1].rglob("*") if path.is_file())
+    return {name: one | {"text": cases[name][2], "written": written} for name, one in zip(cases, found, strict=True)}
+
+
+def test_each_is_read_or_refused_in_one_line(outcomes: dict[str, dict[str, Any]]) -> None:
+    wrong = {}
+    for name, one in outcomes.items():
+        if "raw" in one:
+            wrong[name] = one["raw"]
+        elif one["text"] is None and "said" not in one:
+            wrong[name] = one["error"]
+        elif one["text"] is not None and one["text"] not in one.get("error", "was read"):
+            wrong[name] = one.get("error", f"was read: {one.get('said')}")
+        elif "\n" in one.get("error", "") or len(one.get("error", "")) > 1500:
+            wrong[name] = one["error"]
+    assert not wrong
+
+
+def test_each_takes_little_time_and_memory(outcomes: dict[str, dict[str, Any]]) -> None:
+    figures = {name: (round(one["seconds"], 2), round(one["mb"])) for name, one in outcomes.items()}
+    assert not {name: f for name, f in figures.items() if f[0] > SECONDS or f[1] > MB}
+
+
+def test_a_picture_is_written_here_and_nowhere_else(outcomes: dict[str, dict[str, Any]]) -> None:
+    (picture,) = next(iter(outcomes.values()))["written"]
+    assert picture.startswith("a/b/")
+    assert "Pwned" in picture
+    assert picture.count("/") == 2
+
+
+def test_links_outward_are_not_followed_and_said(outcomes: dict[str, dict[str, Any]]) -> None:
+    said = outcomes["meta.json that is a link outward"]["said"]
+    assert "secret" not in said
+    assert "meta.json: ignored: meta.json is a link that leads out of the folder" in said
+    assert "no regular file" in outcomes["meta.json that is a pipe"]["said"]
+    assert "semantics.txt is a link that leads out" in outcomes["semantics.txt without end"]["said"]
+
+
+def test_a_folder_behind_a_link_is_read(tmp_path: Path) -> None:
+    folder_with(tmp_path / "there", meta__json='{"model_cat": "Laptop", "anno_id": "x1"}')
+    (tmp_path / "here").symlink_to("there")
+    assert artsim.load(tmp_path / "here").object_id == "x1"
+    assert artsim.load(tmp_path / "here").category == "laptop"
+
+
+def test_what_is_printed_holds_no_escapes(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any) -> None:
+    evil = "\x1b]0;owned\x07\u202egnp.\u009b31m" + "long " * 5000
+    meta = json.dumps({"model_cat": evil, "anno_id": evil})
+    robot = ONE_BOX.replace('"a"', '"&#x9b;2J&#x202e;a&#10;b"')
+    folder = folder_with(tmp_path / "o", meta__json=meta, mobility__urdf=robot)
+    monkeypatch.setattr(sys, "argv", ["artsim", "inspect", str(folder)])
+    main()
+    text = capsys.readouterr().out
+    assert all(c == "\n" or c.isprintable() for c in text)
+    assert len(text) < 5000
+    assert "\\x1b]0;owned" in text
+
+
+def test_an_error_is_one_printable_line_of_bounded_length(tmp_path: Path) -> None:
+    for name in ("\x1b[2J", "\u202e", "\udc80", "a\nb", "x" * 200):
+        with pytest.raises(ArtsimError) as caught:
+            artsim.load(tmp_path / name)
+        text = str(caught.value)
+        assert text.isprintable()
+        text.encode()
+    assert len(str(AssetError("x" * 100_000, "y" * 100_000, "z" * 100_000))) < 5000
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["/etc/passwd", "../../x", "x/../../y", "a\\b", ".hidden", "..", "", "con", "NUL.txt", "a\0b", "\ud800", "x" * 1000,
+     "\u202ex", "a b", "trailing.", "C:\\x"],
+)  # fmt: skip
+def test_a_name_is_never_a_path(text: str) -> None:
+    name = safe_name(text)
+    assert Path(name).name == name
+    assert not name.startswith(".")
+    assert len(f"{name}.png".encode()) <= 255
+    assert name.isprintable()
+    assert name != text
+    assert safe_name(text) == name
+    assert safe_name(name) == name
+
+
+def test_names_that_differ_stay_apart() -> None:
+    texts = ["a/b", "a_b", "a\\b", "a b", "..a_b", "x" * 100, "x" * 101, "\u6905", "\u6905/"]
+    assert len({safe_name(text) for text in texts}) == len(texts)
+    assert safe_name("laptop-10211") == "laptop-10211"
+    assert safe_name("\u6905\u5b50") == "\u6905\u5b50"
+
+
+def test_printable_text_stays_as_it_is() -> None:
+    for text in ("drawer_1", "\u6905\u5b50 \u00e9\u00df", "73 deg, 12 cm", ""):
+        assert printable(text) == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"[" * 100_000, b"[" * 70 + b"]" * 70, b"{\"a\":" * 500, b"1" * 5000, b"[1" + b"0" * 25 + b"]", b"1e999", b"NaN",
+     b"[Infinity]", b'"\\ud800"', b"\xff", b"", b"[0," * 10, b"nul", b"\xef\xbb\xbf"],
+)  # fmt: skip
+def test_json_of_no_use_is_a_value_error(text: bytes) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        parse_json(text)
+
+
+def test_json_is_read_with_a_byte_order_mark() -> None:
+    assert parse_json(b'\xef\xbb\xbf{"a": [1, 2.5, "\\ud83d\\ude00"]}') == {"a": [1, 2.5, "\U0001f600"]}
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("shape", [(), (0, 3), (4, 3), (2, 3, 4)])
+@pytest.mark.parametrize("dtype", ["f8", "i1", "<u2", ">f4", "?", "U3"])
+def test_arrays_come_back(order: Any, shape: tuple[int, ...], dtype: str) -> None:
+    array = np.asarray(np.arange(np.prod(shape, dtype=int)).reshape(shape).astype(dtype), order=order)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, a=array, b=array)
+    one = io.BytesIO()
+    np.save(one, array)
+    for found in (*parse_npz(buffer.getvalue()).values(), parse_npy(one.getvalue())):
+        np.testing.assert_array_equal(found, array)
+        assert found.dtype == array.dtype
+        assert found.flags.writeable
+
+
+def test_a_file_is_read_up_to_its_limit_and_no_further(tmp_path: Path) -> None:
+    (tmp_path / "f").write_bytes(bytes(100))
+    assert len(read_bounded(tmp_path / "f", 100, "file")) == 100
+    with pytest.raises(AssetError, match="over the limit"):
+        read_bounded(tmp_path / "f", 99, "file")
+    with pytest.raises(AssetError, match="directory"):
+        read_bounded(tmp_path, 99, "file")
+    with pytest.raises(AssetError, match="cannot read file"):
+        read_json(tmp_path / "a\0b", "file")
+
+
+def test_a_recording_names_its_motions_and_no_other_files(tmp_path: Path) -> None:
+    from artsim.record import open_motions
+
+    for name in ("../../secret", "/etc/passwd", 7, None, "", "a" * 300):
+        motion = {"name": name, "joint_state": [[0.0]], "joint_velocity": [[0.0]]}
+        content = {"format": 1, "control_step": 0.1, "motions": [motion]}
+        (tmp_path / "motions.json").write_text(json.dumps(content))
+        with pytest.raises(ArtsimError, match="names a motion"):
+            open_motions(tmp_path)
+
+
+def resaved(path: Path, **changes: Any) -> Path:
+    """An object file with other arrays, or, for what is no array, another header."""
+    from artsim.object_file import save_object
+
+    save_object(artsim.load(ASSETS / "laptop"), path)
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    header = json.loads(arrays["header"].tobytes())
+    for name, change in changes.items():
+        if name in arrays:
+            arrays[name] = change(arrays[name])
+        else:
+            header[name] = change(header[name])
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(path, **arrays)
+    return path
+
+
+def _joint(**changes: Any) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    return lambda tree: {"joints": [tree["joints"][0], tree["joints"][1] | changes, *tree["joints"][2:]]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"tree": _joint(parent=1)}, "a parent must come before its children"),
+        ({"tree": _joint(parent=-5)}, "no number of a joint"),
+        ({"tree": _joint(parent=True)}, "no number of a joint"),
+        ({"tree": _joint(mimic=[1, 1.0, 0.0])}, "form a loop"),
+        ({"tree": _joint(mimic=[1, 1.0])}, "not three values"),
+        ({"tree": _joint(axis=[0.0, 0.0, 2.0])}, "not a unit vector"),
+        ({"tree": _joint(axis=[1e308, 1e308, 1e308])}, "no number in range"),
+        ({"tree": _joint(rest=None)}, "no number in range"),
+        ({"tree": _joint(lower="a")}, "no number in range"),
+        ({"tree": lambda tree: {"joints": tree["joints"] * 1000}}, "no list of joints"),
+        ({"tree": lambda tree: tree["joints"]}, "no list of joints"),
+        ({"names": lambda names: names * 2}, "not 2 texts"),
+        ({"names": lambda names: [None] * len(names)}, "not 2 texts"),
+        ({"scale": lambda scale: -1.0}, "scale is -1"),
+        ({"scale": lambda scale: "1"}, "not numbers of shape"),
+        ({"T_base_rest": lambda T: T[:3]}, "not numbers of shape"),
+        ({"object_id": lambda name: "\ud800"}, "surrogates not allowed"),
+        ({"repairs": lambda repairs: [["a"]]}, "not 2 texts"),
+        ({"source_joints": lambda joints: {"a": [9, 1.0]}}, "source joint a"),
+        ({"format": lambda form: 2}, "its format is 2"),
+        ({"vertices": lambda v: v * np.nan}, "not finite"),
+        ({"vertices": lambda v: v * 0}, "no extent"),
+        ({"vertices": lambda v: v[:-1]}, "add up to"),
+        ({"vertices": lambda v: v.astype("U8")}, "vertices are <U8"),
+        ({"faces": lambda f: f - 1}, "corner that does not exist"),
+        ({"faces": lambda f: f + 10_000}, "corner that does not exist"),
+        ({"faces": lambda f: f[:0]}, "no triangle"),
+        ({"faces": lambda f: f.astype(np.float64)}, "faces are float64"),
+        ({"face_counts": lambda c: c[::-1]}, "does not exist"),
+        ({"vertex_counts": lambda c: -c}, "do not fit"),
+        ({"vertex_counts": lambda c: np.array([2**62, 2**62], np.int64)}, "add up to"),
+    ],
+)  # fmt: skip
+def test_a_damaged_object_file_is_refused(changes: dict[str, Any], text: str, tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match=text) as caught:
+        artsim.load(resaved(tmp_path / "o.npz", **changes))
+    assert "Fix: generate it again" in str(caught.value)
+
+
+def test_a_value_of_another_type_is_named() -> None:
+    from artperl.search import EstimatorOptions
+
+    assert from_plain(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
+    assert from_plain(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf
+    for name, value in (("beam", True), ("beam", 2.0), ("coherent", 1), ("azimuths", 3), ("seen_from", [1.0]),
+                        ("refine", []), ("refine", {"tolerance": "a"}), ("elevation", float("nan"))):  # fmt: skip
+        with pytest.raises(ValueError, match=r"is |not a set"):
+            from_plain(EstimatorOptions, {name: value})
+    with pytest.raises(ValueError, match="no field 'x'"):
+        from_plain(EstimatorOptions, {"x": 1})
+
+
+def test_a_urdf_file_that_leads_out_of_its_folder_is_refused(tmp_path: Path) -> None:
+    folder_with(tmp_path / "elsewhere")
+    (tmp_path / "asset").mkdir()
+    (tmp_path / "asset" / "mobility.urdf").symlink_to(tmp_path / "elsewhere" / "mobility.urdf")
+    for path in (tmp_path / "asset", tmp_path / "asset" / "mobility.urdf"):
+        with pytest.raises(
+            AssetError, match=f"leads out of its folder. Fix: pass the file itself: {tmp_path}/elsewhere"
+        ):
+            artsim.load(path)
+    within = folder_with(tmp_path / "within")
+    (within / "mobility.urdf").rename(within / "robot.urdf")
+    (within / "mobility.urdf").symlink_to("robot.urdf")
+    assert len(artsim.load(within / "mobility.urdf")) == 1
+
+
+@pytest.mark.parametrize("size", ["1e300 1 1", "1e7 1 1", "1e-200 1e-200 1e-200"])
+def test_a_size_that_nothing_can_be_computed_with_is_refused(size: str, tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match=r"over 1e\+06|no extent"):
+        artsim.load(folder_with(tmp_path / "o", mobility__urdf=ONE_BOX.replace("1 1 1", size)))
