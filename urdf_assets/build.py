@@ -5,7 +5,7 @@ meshes, an empty ``base`` link, and joints without rotations of their own. The b
 written too; all other quirk cases are written by hand. ``procedural`` holds one exported object of each family.
 
 Last digits of the demo objects and of inertias depend on which kernels numpy and its BLAS choose for a processor. They
-are told here to use those that every x86-64 processor with AVX2 and FMA has, which must happen before numpy is imported.
+are told here to use those that every x86-64 processor with AVX2 and FMA has, before numpy is imported.
 """
 
 from __future__ import annotations
