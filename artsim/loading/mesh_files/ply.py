@@ -143,7 +143,7 @@ class _Text:
     def table(self, element: Element) -> dict[str, Any]:
         lists = [p.count_type is not None for p in element.properties]
         if not any(lists):
-            block = self._take(element.count * element.least).reshape(element.count, -1)
+            block = self._take(element.count * element.least).reshape(element.count, element.least)
             return {p.name: block[:, i] for i, p in enumerate(element.properties)}
         return self._rows(element, lists)
 
