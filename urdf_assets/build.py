@@ -4,8 +4,9 @@ Objects are drawn in their rest frame (metres, Z up, front towards -X) and writt
 meshes, an empty ``base`` link, and joints without rotations of their own. The binary meshes of ``quirks/formats`` are
 written too; all other quirk cases are written by hand. ``procedural`` holds one exported object of each family.
 
-Last digits of the demo objects and of inertias depend on which kernels numpy and its BLAS choose for a processor. They
-are told here to use those that every x86-64 processor with AVX2 and FMA has, before numpy is imported.
+Last digits of the demo objects and of inertias depend on which kernels numpy and its BLAS choose for a processor.
+They are told here to use those that every x86-64 processor with AVX2 and FMA has, which must happen before numpy is
+imported.
 """
 
 from __future__ import annotations
