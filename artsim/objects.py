@@ -102,7 +102,9 @@ class Part:
         """(2, 3) corners of the axis-aligned box of the surface, native units; NaN without geometry."""
         if len(self.faces) == 0:
             return np.full((2, 3), np.nan)
-        used = self.vertices[np.unique(self.faces)]
+        named = np.zeros(len(self.vertices), dtype=bool)
+        named[self.faces] = True  # sorting millions of numbers would take seconds
+        used = self.vertices[named]
         # Which of 0.0 and -0.0 is the smaller depends on the processor: adding 0.0 leaves one of them.
         return np.stack([used.min(axis=0), used.max(axis=0)]) + 0.0
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, named
-from artsim.loading.mesh_files.text import Rows, first_numbers, numbers, numbers_per_row, plain_text
+from artsim.loading.mesh_files.text import Rows, first_numbers, numbers, numbers_per_row, plain_text, substitute
 
 _HARMLESS = ("vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", "mg", "lod", "bevel", "c_interp",
              "d_interp", "shadow_obj", "trace_obj")  # fmt: skip
@@ -72,16 +72,18 @@ def statements(data: bytes, bounds: Bounds) -> Statements:
     """
     text = plain_text(data)
     if b"\\" in text:
-        text = re.sub(rb"\\ *\n", b" ", text)
-    if b"#" in text:
-        text = re.sub(rb"#[^\n]*", b"", text)
+        text = text.replace(b"\\ \n", b" ").replace(b"\\\n", b" ")
     rows = Rows(text)
     vertex_rows, face_rows = rows.which(b"v"), rows.which(b"f")
     bounds.check(int(vertex_rows.sum()), "vertices")
     bounds.check(int(face_rows.sum()), "triangles")
-    points = first_numbers(rows.rest(vertex_rows, b"v"), 3)  # a row may go on with a weight or a colour
-    references = rows.rest(face_rows, b"f")
+    points = first_numbers(_uncommented(rows.rest(vertex_rows, b"v")), 3)  # a row may go on with a weight or a colour
+    references = _uncommented(rows.rest(face_rows, b"f"))
     return Statements(rows, points, vertex_rows, face_rows, numbers_per_row(references), references)
+
+
+def _uncommented(text: bytes) -> bytes:
+    return substitute(rb"#[^\n]*", b"", text) if b"#" in text else text
 
 
 def read_obj(data: bytes, bounds: Bounds) -> Surface:
@@ -100,7 +102,7 @@ def _surface(found: Statements, declared: int, bounds: Bounds) -> Surface:
     draft = Draft(declared=declared)
     references = found.references
     if b"/" in references:
-        references = re.sub(rb"/[^ \n]*", b"", references)
+        references = substitute(rb"/[^ \n]*", b"", references)
     bounds.check(int(found.counts.sum()) - 2 * len(found.counts), "triangles")
     corners = found.indices(references, found.vertex_rows)
     made = triangulate(found.points, corners, found.counts)
@@ -151,7 +153,7 @@ def read_painted(data: bytes, bounds: Bounds) -> Painted:
     number = {name: k for k, name in enumerate(dict.fromkeys(names))}
     of_statement = np.array([number[name] for name in names])
     of_corner = np.repeat(of_statement[np.cumsum(used)[found.face_rows]], found.counts)
-    places = first_numbers(found.rows.rest(found.rows.which(b"vt"), b"vt"), 2)
+    places = first_numbers(_uncommented(found.rows.rest(found.rows.which(b"vt"), b"vt")), 2)
     uv = np.append(places, [[np.nan, np.nan]], axis=0)
     index = found.indices(_textures(found.references), found.rows.which(b"vt"))[surface.corners]
     index[(index < 0) | (index >= len(places))] = len(places)
@@ -165,13 +167,13 @@ def _names(text: bytes) -> list[str]:
 
 def _textures(references: bytes) -> bytes:
     """The second number of each corner such as ``1/2/3``; 0 where there is none."""
-    marked = re.sub(rb"[^ \n/]+(?:/([^ \n/]*)(?:/[^ \n]*)?)?", rb"<\1>", references)
+    marked = substitute(rb"[^ \n/]+(?:/([^ \n/]*)(?:/[^ \n]*)?)?", rb"<\1>", references)
     return marked.replace(b"<>", b"0").replace(b"<", b"").replace(b">", b"")
 
 
 def _tell_others(found: Statements, draft: Draft) -> None:
     """Name the statements that are not read."""
-    other = ~found.vertex_rows & ~found.face_rows
+    other = ~found.vertex_rows & ~found.face_rows & ~found.rows.are_comments()
     for word in (b"vt", b"vn", b"usemtl", b"g", b"o", b"s"):
         other &= ~found.rows.which(word)
     if not other.any():
@@ -187,5 +189,6 @@ def _declared(data: bytes) -> int:
     """How many faces a Wavefront file declares."""
     if b"\r" not in data and b"\t" not in data and b"\n " not in data and not data.startswith((b" ", b"\xef")):
         return data.count(b"\nf ") + data.startswith(b"f ") + data.count(b"\nf\n")
-    # One row may go on in the next, and a row that does might begin with an f.
-    return len(re.findall(rb"(?<!\\)(?<!\\ )(?<!\\\r)(?:^|[\r\n]|\xef\xbb\xbf)[ \t\v\f]*f(?=\s|$)", data))
+    # A row may go on in the next one, and that one may begin with an f.
+    ends = rb"(?<!\\)(?<!\\ )(?<!\\\r)(?:^|[\r\n]|\xef\xbb\xbf)[ \t\v\f]*f(?=\s|$)"
+    return sum(1 for _ in re.finditer(ends, data))

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from artsim.loading.mesh_files.surface import NO_POINT, Array, Draft, Indices
 
-_EAR_CLIPPING = 4e9
+_EAR_CLIPPING = 2e9
 """Bound on the work of ear clipping, which takes up to 3e-10 s for each pair of corners of a polygon."""
 
-_WORK_OF_A_CALL = 2e4
+_WORK_OF_A_CALL = 4e4
 """What calling the library costs, in the same unit."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import Bounds, Draft, Surface, UnusableMeshError
-from artsim.loading.mesh_files.text import Rows, first_numbers, plain_text
+from artsim.loading.mesh_files.text import Rows, first_numbers, plain_text, substitute
 
 _HEADER = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -58,7 +58,7 @@ def _read_bytes(data: bytes, count: int, bounds: Bounds) -> Surface:
 def _read_text(data: bytes, bounds: Bounds) -> Surface:
     text = plain_text(data).lower()
     draft = Draft(declared=_declared(data))
-    rows = Rows(re.sub(rb"(?m)^((?:end)?solid)[^\n]*", rb"\1", text))  # any word may be the name of a solid
+    rows = Rows(substitute(rb"(?m)^((?:end)?solid)[^\n]*", rb"\1", text))  # any word may be the name of a solid
     if rows.which(b"vertex").sum() != rows.data.count(b"vertex"):
         # Blanks are as good as newlines.
         rows = Rows(re.sub(rb"\s+(?=(?:" + b"|".join(_WORDS) + rb")\b)", b"\n", text))

@@ -20,8 +20,13 @@ _WORD = 8
 _BLANKS = bytes(c if c == ord("\n") else max(c, ord(" ")) for c in range(256))
 """Tabs and other characters that control a terminal become blanks."""
 
+_MAX_ROWS = 10_000_000
+"""Twice as many as the faces of the largest mesh; each takes some 20 bytes of memory besides its text."""
+
 _MAX_WORDS = 10
 """Of the words that are not known, the most frequent ones are named."""
+
+_BLOCK = 1_000_000
 
 _SMALL = 4096
 """Letters of a text that are read word by word where need be."""
@@ -38,16 +43,36 @@ def plain_text(data: bytes) -> bytes:
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     data = data.translate(_BLANKS)
-    if data.startswith(b" ") or b"\n " in data:
-        data = re.sub(rb"(?m)^ +", b"", data)
-    return data
+    while b"  " in data:
+        data = data.replace(b"  ", b" ")
+    return data.replace(b"\n ", b"\n").removeprefix(b" ")
+
+
+def substitute(pattern: bytes, replacement: bytes, text: bytes) -> bytes:
+    """Replace within rows, some thousand rows at a time: each match takes tens of bytes of memory."""
+    compiled, blocks, at = re.compile(pattern), [], 0
+    while at < len(text):
+        end = text.find(b"\n", at + _BLOCK) + 1 or len(text)
+        blocks.append(compiled.sub(replacement, text[at:end]))
+        at = end
+    return b"".join(blocks)
 
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of a plain text."""
+    """The rows of a plain text.
+
+    Raises
+    ------
+    UnusableMeshError
+        When there are too many.
+    """
 
     data: bytes
+
+    def __post_init__(self) -> None:
+        if self.data.count(b"\n") > _MAX_ROWS:
+            raise UnusableMeshError(f"has over {_MAX_ROWS} rows")
 
     @cached_property
     def _bytes(self) -> NDArray[np.uint8]:
@@ -73,6 +98,10 @@ class Rows:
         """The i-th letter of each row, or its newline where the row is shorter."""
         return self._bytes[np.minimum(self._starts + i, self._ends)]
 
+    def are_comments(self) -> NDArray[np.bool_]:
+        """Which rows begin with #."""
+        return self._letter(0) == ord("#")
+
     def rest(self, which: NDArray[np.bool_], word: bytes) -> bytes:
         """What follows a word in the rows that begin with it, each with its newline."""
         starts, ends = self._starts[which] + len(word), self._ends[which]
@@ -88,10 +117,11 @@ class Rows:
         blank = (letters == ord(" ")) | (letters == ord("\n"))
         letters[np.logical_or.accumulate(blank, axis=1)] = 0
         found, counts = np.unique(np.ascontiguousarray(letters).view(">u8"), return_counts=True)
+        found, counts = found[found > 0], counts[found > 0]  # without blank rows
         most = np.argsort(-counts, kind="stable")[:_MAX_WORDS]
         words = found[most].astype(">u8").tobytes()
         texts = [words[at : at + _WORD].rstrip(b"\0").decode("ascii", "replace") for at in range(0, len(words), _WORD)]
-        told = {text: int(n) for text, n in zip(texts, counts[most].tolist(), strict=True) if text}
+        told = {text: int(n) for text, n in zip(texts, counts[most].tolist(), strict=True)}
         others = int(counts.sum() - counts[most].sum())
         return told | {"...": others} if others else told
 
@@ -100,8 +130,9 @@ def numbers_per_row(text: bytes) -> NDArray[np.int64]:
     """How many words each row of a text has, the last one ending in a newline."""
     letters = np.frombuffer(b"\n" + text, np.uint8)
     blank = letters <= ord(" ")
-    begun = np.cumsum(blank[:-1] & ~blank[1:])
-    return np.diff(begun[np.flatnonzero(letters[1:] == ord("\n"))], prepend=0)
+    begun = blank[:-1] & ~blank[1:]
+    starts = np.flatnonzero(letters[:-1] == ord("\n"))
+    return np.add.reduceat(begun, starts, dtype=np.int64) if len(starts) else np.zeros(0, np.int64)
 
 
 def first_numbers(text: bytes, width: int) -> NDArray[np.float64]:
