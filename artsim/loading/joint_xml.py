@@ -36,6 +36,7 @@ _SLIDE = 1.0  # metres of travel either way where a slide has no end
 _TURN = 2.0 * np.pi
 # No hinge turns four times; whole numbers look like degrees from two turns on, where wrists of robots still end.
 _DEGREES_FROM, _WHOLE_DEGREES_FROM = 4.0 * _TURN, 2.0 * _TURN
+_CHILDREN = ("origin", "axis", "limit", "mimic", "parent", "child")
 _OTHER_TYPES = {
     "planar": "two slides and a turn: write two prismatic joints and one revolute, with links without geometry between",
     "spherical": "three turns: write three revolute joints about x, y and z, with links without geometry between",
@@ -77,6 +78,11 @@ def read_joint(joint: etree._Element, links: Collection[str], file: Path, repair
             f"joint type {kind!r} is not supported", f"use one of {', '.join(KNOWN_TYPES)}"
             + (f"; this is {meaning}" if meaning else ""),
         )  # fmt: skip
+    strange = sorted(set(joint.keys()) & set(_CHILDREN))
+    if strange:
+        element.say(
+            f"<joint> has {', '.join(strange)} as attributes, which are not read: URDF has elements of that name"
+        )
     parent, child = (_end(joint, end, links, element) for end in ("parent", "child"))
     origin = element.origin(joint)
     name = str(joint.get("name"))

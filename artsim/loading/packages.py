@@ -245,7 +245,7 @@ class AssetPaths:
     def _fix_outside(self, package: str | None, rest: str, found: Path | None) -> str:
         if package is not None and package not in self.declared:
             return f"move it inside, or say where the package is: {option(package, self._sibling(package, rest))}"
-        path = Path(os.path.normpath(self.folder / rest if found is None else found))
+        path = Path(os.path.normpath(self.folder / rest)) if found is None else found.resolve()
         common = Path(os.path.commonpath([self._own, path]))
         folder = path.parent if _is_shared(common) or len(common.parts) <= 2 else common
         return f"move it inside, or allow its folder if you trust the URDF: {option(folder.name, folder)}"

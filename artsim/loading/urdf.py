@@ -33,10 +33,14 @@ from artsim.loading.urdf_xml import parse_robot
 from artsim.loading.xml_repair import unexpanded
 from artsim.object_file import load_object
 from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
-from artsim.products import matmul, unit
+from artsim.products import matmul, norm, unit
 
+_FAR = 20.0
+"""Times the object's size that no slide goes: a cart on its track goes once, a drawer less."""
 _THIN = 1e-6
 """Share of its length by which a surface is a line: squares of less are lost in double precision."""
+_NOTHING = 1e-9
+"""Metres below which a whole shape is a point: an atom is a tenth of it."""
 
 
 def load(
@@ -97,6 +101,7 @@ def load(
     rest, reasons = rest_state(tree, parts, "unknown" if exported else category)
     repairs += reasons
     tree, parts, T_base_rest = _to_rest_frame(tree, parts, rest)
+    repairs += _far_slides(tree, parts)
     return ArticulatedObject(
         object_id=_object_id(file, side.object_id),
         category=category,
@@ -108,6 +113,22 @@ def load(
         source=str(file),
         source_joints=source_joints,
     )
+
+
+def _far_slides(tree: KinematicTree, parts: list[Part]) -> list[Repair]:
+    """Slides that go so far that their limits look like millimetres."""
+    bounds = np.stack([part.bounds for part in parts if len(part.faces)])
+    size = float(norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+    return [
+        Repair(
+            f"joint {joint.name!r}",
+            f"goes from {joint.lower:g} to {joint.upper:g} m in an object of {size:.3g} m: its limits look like "
+            f'millimetres, and are taken as metres; if they are, write lower="{joint.lower / 1000:.6g}" '
+            f'upper="{joint.upper / 1000:.6g}"',
+        )
+        for joint in tree.joints
+        if joint.type == "prismatic" and joint.upper - joint.lower > _FAR * size
+    ]
 
 
 def read_urdf(file: Path, max_bytes: int) -> bytes:
@@ -216,7 +237,7 @@ def _surfaces(
             vertices, faces = reader.shape(shape.geometry)
             _check_range(vertices, f"{file}: link {link.name!r}")
             if _is_thin(vertices, faces):
-                raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line")
+                raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line or in a point")
         except UnusableMeshError as problem:
             problems.append(str(problem))
             if isinstance(problem.__cause__, MissingFileError):
@@ -258,7 +279,7 @@ def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
     from_middle = used - used.mean(axis=0)
     # Second moments, smallest first: their roots are the extents along the principal axes.
     extents = np.sqrt(np.linalg.eigvalsh(from_middle.T @ from_middle).clip(0.0))
-    return bool(extents[1] <= _THIN * extents[2])
+    return bool(extents[1] <= _THIN * extents[2] or extents[2] < _NOTHING)
 
 
 def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:

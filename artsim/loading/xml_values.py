@@ -75,12 +75,13 @@ class Element:
         return self.parsed(text, f"{attribute}={text[:60]!r} of <{element.tag}>", (count,))
 
     def parsed(self, text: str, what: str, counts: tuple[int, ...]) -> Array:
-        """The numbers of a text, as many as one of some counts; see :meth:`numbers`."""
+        """The numbers of a text, as many as one of some counts, in rising order; see :meth:`numbers`."""
         words = text.replace(",", " ").split()
         if not all(_NUMBER.fullmatch(word) for word in words):
             raise self.error(f"{what} is not numbers", "write numbers, separated by blanks")
         if len(words) not in counts:
-            raise self.error(f"{what} is not {' or '.join(map(str, counts))} numbers", "write as many")
+            wanted = " or ".join(map(str, counts[:2])) + (" or more" if len(counts) > 2 else "")
+            raise self.error(f"{what} is not {wanted} number{'' if wanted == '1' else 's'}", "write as many")
         if "," in text:
             self.say(f"{what}: commas read as separators")
         values = np.array([float(word) for word in words])
