@@ -30,7 +30,7 @@ def many_parts(count: int = 200, name: str = HOSTILE) -> ArticulatedObject:
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype=np.int32)
     parts = tuple(Part(name, name, vertices + [0, 0.2 * k, 0], faces) for k in range(count))
     joints = [Joint("root", "free", -1)]
-    joints += [Joint(f"j{k}", "prismatic", 0, axis=(1, 0, 0), lower=0.0, upper=1e30) for k in range(1, count)]
+    joints += [Joint(f"j{k}", "prismatic", 0, axis=(1, 0, 0), lower=0.0, upper=1e8) for k in range(1, count)]
     repairs = (Repair(name, name),) * 1000
     return ArticulatedObject(name, name, parts, KinematicTree(joints), "0" * 64, repairs=repairs, source=name)
 
