@@ -1,4 +1,4 @@
-"""The report of a training run: one page with its table, curves, and overlays of estimates on unseen objects."""
+"""What a training run reports: curves as it goes, and in the end a page with its table and overlays of estimates."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import base64
 import html
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from torch.utils.tensorboard import SummaryWriter
 
 from artperl.estimator import Estimator
 from artperl.evaluation import Scored
 from artperl.pictures import curves, overlays
-from artsim.files import write_atomic
+from artsim.files import write_atomic, write_error
 from artsim.sample import Sample
 
 _SHOWN = 8
@@ -61,3 +63,37 @@ img {{ max-width: 100%; }} pre {{ overflow-x: auto; }}</style></head><body>
 {figures}
 </body></html>
 """
+
+
+def rounded(figures: Any) -> Any:
+    """Figures with as many digits as anybody reads."""
+    if isinstance(figures, dict):
+        return {name: rounded(value) for name, value in figures.items()}
+    if isinstance(figures, list):
+        return [rounded(value) for value in figures]
+    return float(f"{figures:.4g}") if isinstance(figures, float) else figures
+
+
+def write_scalars(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:
+    """Write figures to a board of curves.
+
+    Raises
+    ------
+    ConfigError
+        When the disk is full.
+    """
+    try:
+        for name, value in figures.items():
+            board.add_scalar(f"{group}/{name}", value, step)
+    except OSError as error:  # of the thread that writes: the disk may be full
+        raise write_error(error, Path(board.log_dir)) from error
+
+
+def scalars(figures: dict[str, Any]) -> dict[str, float]:
+    """What a board shows of :func:`artperl.evaluation.summary`: the medians of each part."""
+    return {
+        f"{category}/{k}/{name}": part[name]["median"]
+        for category, figure in figures.items()
+        for k, part in enumerate(figure["parts"])
+        for name in ("rotation_deg", "translation_percent_diagonal", "iou_exact")
+    }

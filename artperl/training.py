@@ -54,7 +54,7 @@ from artperl.networks.boxes import Boxes
 from artperl.networks.perception import Perception, perception_figures, perception_losses
 from artperl.ppo import collect, update
 from artperl.problems import Problems
-from artperl.report import write_report
+from artperl.report import rounded, scalars, write_report, write_scalars
 from artperl.retrieval import ShapeBase
 from artperl.run_folder import RunFolder, differences
 from artperl.search import EstimatorOptions
@@ -63,7 +63,7 @@ from artperl.steps import Stop, autocast, one_cycle, set_rate
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.families import FAMILIES
-from artsim.files import write_atomic, write_error
+from artsim.files import write_atomic
 from artsim.loading.sources import find_sources
 from artsim.objects import ArticulatedObject
 from artsim.progress import say, track
@@ -230,7 +230,7 @@ class Training:
             done = self.done["perception"] = before + step + 1
             figures = {name: value.item() for name, value in losses.items()}
             figures |= perception_figures(perceived, truth)
-            _write(board, "perception", figures, done - 1)
+            write_scalars(board, "perception", figures, done - 1)
             bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
             bar.update()
             if (step + 1) % options.validate_every == 0 or step + 1 == total:
@@ -265,7 +265,7 @@ class Training:
                 update(self.agent, optimizer, rollout, ppo, generator, updates.append)
             self.done["agent"] = n + 1
             figures = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]} | rollout.figures
-            _write(board, "agent", figures, n)
+            write_scalars(board, "agent", figures, n)
             bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
             bar.update()
             if (n + 1) % options.validate_rollouts == 0 or n + 1 == total:
@@ -344,7 +344,7 @@ class Training:
         figures = summary(after[: len(validation)])
         if mean_iou(after) > mean_iou(before):
             save_estimator(replace(best, boxes=boxes), self.out / "best", self._about({"validation": figures}))
-        _write(board, "validation", _curves(figures), sum(self.done.values()))
+        write_scalars(board, "validation", scalars(figures), sum(self.done.values()))
         say(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
 
     def _stop_if(self, stop: Stop) -> None:
@@ -359,7 +359,7 @@ class Training:
         scored = evaluate(self.estimator(), self._validation, self.progress)
         figures, score = summary(scored), headline(scored)
         self.history.append({"step": step, "score": score, "done": dict(self.done)})
-        _write(board, "validation", _curves(figures) | {"score": score}, step)
+        write_scalars(board, "validation", scalars(figures) | {"score": score}, step)
         if score < _AS_GOOD * self.best:
             self.best = min(score, self.best)
             judge = evaluate if self.options.votes else mistake  # any parts are right if they are where they are
@@ -399,7 +399,7 @@ class Training:
         figures = summary(scored)
         about = read_settings(self.out / "best")["about"]
         told = {name: about[name] for name in ("options", "done")}  # not how validation went: it chose this one
-        save_estimator(best, self.out / "best", {**told, "test": _rounded(figures)})
+        save_estimator(best, self.out / "best", {**told, "test": rounded(figures)})
         write_atomic(self.out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
         write_atomic(self.out / "table.txt", (table(figures) + "\n").encode())
         try:
@@ -409,7 +409,7 @@ class Training:
         return figures
 
     def _about(self, figures: dict[str, Any]) -> dict[str, Any]:
-        return {"options": _plain(self.options), "done": dict(self.done), **_rounded(figures)}
+        return {"options": asdict(self.options), "done": dict(self.done), **rounded(figures)}
 
     def _save(self) -> None:
         """Everything that going on needs."""
@@ -418,7 +418,7 @@ class Training:
             tensors |= {f"{name}.{key}": value for key, value in network.state_dict().items()}
             for number, moments in self.optimizers[name].state_dict()["state"].items():
                 tensors |= {f"{name}/{number}/{key}": value for key, value in moments.items()}
-        state = {"options": _plain(self.options), "best": self.best, "history": self.history}
+        state = {"options": asdict(self.options), "best": self.best, "history": self.history}
         self._known = self.folder.write(state, tensors)
 
     def _load(self) -> None:
@@ -426,8 +426,8 @@ class Training:
         if digest and digest == self._known:
             return
         # An option that was not known yet when the run was begun has its default.
-        begun_with = _completed(json.loads(json.dumps(_plain(TrainOptions()))), state["options"])
-        changed = differences(begun_with, json.loads(json.dumps(_plain(self.options))))
+        begun_with = _completed(json.loads(json.dumps(asdict(TrainOptions()))), state["options"])
+        changed = differences(begun_with, json.loads(json.dumps(asdict(self.options))))
         if changed:
             raise DatasetError(
                 f"a run with other options is here: {changed}", self.out, "give the same options, or another --out"
@@ -494,33 +494,3 @@ def _device(name: str) -> torch.device:
     if device.type == "cuda" and not torch.cuda.is_available():
         raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
     return device
-
-
-def _rounded(figures: Any) -> Any:
-    """Figures with as many digits as anybody reads."""
-    if isinstance(figures, dict):
-        return {name: _rounded(value) for name, value in figures.items()}
-    if isinstance(figures, list):
-        return [_rounded(value) for value in figures]
-    return float(f"{figures:.4g}") if isinstance(figures, float) else figures
-
-
-def _write(board: SummaryWriter, group: str, figures: dict[str, float], step: int) -> None:
-    try:
-        for name, value in figures.items():
-            board.add_scalar(f"{group}/{name}", value, step)
-    except OSError as error:  # of the thread that writes: the disk may be full
-        raise write_error(error, Path(board.log_dir)) from error
-
-
-def _curves(figures: dict[str, Any]) -> dict[str, float]:
-    return {
-        f"{category}/{k}/{name}": part[name]["median"]
-        for category, figure in figures.items()
-        for k, part in enumerate(figure["parts"])
-        for name in ("rotation_deg", "translation_percent_diagonal", "iou_exact")
-    }
-
-
-def _plain(options: TrainOptions) -> dict[str, Any]:
-    return asdict(options)

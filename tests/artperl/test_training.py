@@ -71,7 +71,7 @@ def test_a_stopped_run_ends_as_if_it_had_not_been(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: tuple[str, int]
 ) -> None:
     stage, after = stop
-    monkeypatch.setattr("artperl.training._write", _interrupt(stage, after))
+    monkeypatch.setattr("artperl.training.write_scalars", _interrupt(stage, after))
     with pytest.raises(KeyboardInterrupt):
         Training(TINY, tmp_path, workers=0, progress=False).run()
     monkeypatch.undo()
