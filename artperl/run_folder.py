@@ -111,7 +111,7 @@ class RunFolder:
             raise DatasetError(error.what, self._json, self.fix) from error
         except ValueError as error:
             raise DatasetError(f"the state of the run is damaged ({error})", self._json, self.fix) from error
-        if not isinstance(state, dict) or not {"options", "best", "history"} <= state.keys():
+        if not isinstance(state, dict) or not {"best", "history"} <= state.keys() or not _is_options(state):
             raise DatasetError("the state of the run is damaged (there is no run in it)", self._json, self.fix)
         digest = state.pop("sha256", None)
         if digest is not None and digest != _digest(state):
@@ -154,6 +154,10 @@ class RunFolder:
             board.close()
         except OSError as error:
             raise write_error(error, events) from error
+
+
+def _is_options(state: Mapping[str, Any]) -> bool:
+    return isinstance(state.get("options"), dict)
 
 
 def differences(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:

@@ -426,7 +426,7 @@ class Training:
         if digest and digest == self._known:
             return
         # An option that was not known yet when the run was begun has its default.
-        begun_with = _completed(json.loads(json.dumps(asdict(TrainOptions()))), state["options"])
+        begun_with = completed(json.loads(json.dumps(asdict(TrainOptions()))), state["options"])
         changed = differences(begun_with, json.loads(json.dumps(asdict(self.options))))
         if changed:
             raise DatasetError(
@@ -481,10 +481,12 @@ def _given(options: TrainOptions) -> list[ArticulatedObject]:
     return objects
 
 
-def _completed(defaults: dict[str, Any], known: dict[str, Any]) -> dict[str, Any]:
+def completed(defaults: dict[str, Any], known: dict[str, Any]) -> dict[str, Any]:
     """What is known, with defaults for all else, at every depth."""
     return defaults | {
-        name: _completed(defaults[name], value) if isinstance(value, dict) and name in defaults else value
+        name: completed(defaults[name], value)
+        if isinstance(value, dict) and isinstance(defaults.get(name), dict)
+        else value
         for name, value in known.items()
     }
 

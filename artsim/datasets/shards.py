@@ -87,9 +87,33 @@ def sample_from_members(members: Mapping[str, bytes], where: str, fix: str = _AG
         for name in _PNG:
             if f"{name}.png" in members:
                 values[name] = np.asarray(open_image(members[f"{name}.png"], name, DatasetError, MAX_PIXELS))
+        _check(values)
         return Sample(**values)
     except Exception as error:  # NumPy, Pillow and json fail in many ways on bytes that are not theirs
         raise DatasetError(f"damaged sample ({type(error).__name__}: {error})", where, fix) from error
+
+
+_NUMBERS = {"width": int, "height": int, "seed": int, "index": int, "scale": float, "diagonal": float}
+"""Scalars that are no text."""
+
+
+def _check(values: Mapping[str, Any]) -> None:
+    """Refuse values of other types and shapes than a sample has: a ValueError names the first of them."""
+    for name in _SCALARS:
+        value, wanted = values[name], _NUMBERS.get(name, str)
+        fits = isinstance(value, (int, float) if wanted is float else wanted) and not isinstance(value, bool)
+        if not fits or (wanted is float and not 0.0 < value < np.inf):
+            raise ValueError(f"{name} is {value!r:.40}")
+    points, part, K = values["points"], values["part"], len(values["joint_type"])
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or not np.isfinite(points).all():
+        raise ValueError("its points are not finite coordinates")
+    if values["npcs"].shape != points.shape or part.shape != points.shape[:1] or part.dtype != np.uint8:
+        raise ValueError("its points have labels that do not fit")
+    if K == 0 or len(values["part_names"]) != K or (len(part) and int(part.max()) >= K):
+        raise ValueError("its points are of parts that it does not have")
+    wrong = [name for name in _ARRAYS if name not in ("K", "T_world_camera") and len(values[name]) != K]
+    if wrong:
+        raise ValueError(f"{wrong[0]} is not of {K} parts")
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:

@@ -156,9 +156,13 @@ def find_urdf(path: Path) -> Path:
     AssetError
         When there is none, or several to choose from.
     """
-    if path.is_file():
-        return path
-    if not path.is_dir():
+    try:
+        if path.is_file():
+            return path
+        found_folder = path.is_dir()
+    except OSError:  # a name that is too long for the system
+        found_folder = False
+    if not found_folder:
         raise AssetError("no such file or folder", path, "pass a URDF file or a folder that holds one")
     mobility = path / "mobility.urdf"
     if mobility.is_file():

@@ -6,7 +6,7 @@ import io
 import json
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from artperl.settings import TrainOptions
 from artsim.assembly import Assembly, prismatic, revolute
 from artsim.object_file import save_object
 from artsim.objects import ArticulatedObject
@@ -238,6 +239,7 @@ def _seeds(folder: Path) -> Iterator[Seed]:
     yield Seed("object", "npz", {"o.npz": (folder / "o.npz").read_bytes()}, "o.npz", "npz")
     yield from _datasets(folder / "dataset")
     yield from _estimators(folder / "estimator")
+    yield from _runs(folder / "run")
 
 
 def _robots() -> Iterator[Seed]:
@@ -377,20 +379,34 @@ def _datasets(folder: Path) -> Iterator[Seed]:
     yield Seed("motions", "description", recorded, "motions.json", "json")
 
 
+def _runs(folder: Path) -> Iterator[Seed]:
+    import torch
+
+    from artperl.run_folder import RunFolder
+
+    state = {"options": asdict(TrainOptions()), "best": 1.5, "history": [{"step": 10, "laptop": {"parts": []}}]}
+    RunFolder(folder).write(state, {"done": torch.tensor([10, 0, 0]), "perception.a": torch.zeros(3, 4)})
+    files = {name: content for name, content in _folder(folder).items() if name.startswith("state")}
+    # Checksums would hide all that is behind them; states of earlier versions have none.
+    unsigned = json.dumps(state).encode()
+    yield Seed("state", "signed", files, "state.json", "json")
+    yield Seed("state", "unsigned", files | {"state.json": unsigned}, "state.json", "json")
+    yield Seed("state", "tensors", files | {"state.json": unsigned}, "state.safetensors", "safetensors")
+
+
 def _estimators(folder: Path) -> Iterator[Seed]:
     import torch
 
     from artperl.checkpoint import save_estimator
     from artperl.embedding import by_boxes
     from artperl.estimator import Estimator
-    from artperl.networks.agent import Agent
     from artperl.networks.boxes import Boxes
     from artperl.networks.perception import Perception
     from artperl.retrieval import ShapeBase
 
     torch.manual_seed(0)
     base = by_boxes(ShapeBase.of([small_object(), small_object()], points_per_part=8))
-    estimator = Estimator(Perception(3, 8), base, Agent(8), boxes=Boxes(3, 8))
+    estimator = Estimator(Perception(3, 4), base, boxes=Boxes(3, 4))
     save_estimator(estimator, folder, {"options": {"categories": ["box"]}})
     files = _folder(folder)
     yield Seed("base", "npz", {"base.npz": files["base.npz"]}, "base.npz", "npz")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
+from artperl.settings import TrainOptions
 from artsim.errors import ArtsimError
 from artsim.objects import ArticulatedObject
 
@@ -51,6 +53,15 @@ def _estimator(folder: Path) -> None:
     from artperl.checkpoint import load_estimator
 
     load_estimator(folder)
+
+
+def _state(folder: Path) -> None:
+    from artperl.run_folder import RunFolder, differences
+    from artperl.training import completed
+
+    state, _, _ = RunFolder(folder).read()
+    known = json.loads(json.dumps(asdict(TrainOptions())))
+    differences(completed(known, state["options"]), known)
 
 
 def _dataset(folder: Path) -> None:
@@ -121,6 +132,7 @@ TARGETS = {
     "motions": Target(_motions, 3),
     "base": Target(_base, 8),
     "estimator": Target(_estimator, 4),
+    "state": Target(_state, 4),
 }
 """Kinds of files, and what reads them."""
 

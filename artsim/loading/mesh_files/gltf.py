@@ -185,7 +185,7 @@ class _Scene:
         """Triangles that a node's mesh declares, by the sizes of its accessors alone."""
         count = 0
         for primitive in self._primitives(node):
-            mode = primitive.value.get("mode", _TRIANGLES)
+            mode = integer(primitive.value.get("mode", _TRIANGLES), 2**31)
             source = primitive.value.get("indices", primitive.object("attributes").value.get("POSITION"))
             corners = 0 if source is None else self._buffers.count(source)
             if mode == _TRIANGLES:
