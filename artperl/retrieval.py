@@ -366,7 +366,8 @@ def _checked(values: NDArray[Any], shape: tuple[int | None, ...], name: str) -> 
     fits = len(shape) == values.ndim and all(want in (None, has) for want, has in zip(shape, values.shape, strict=True))
     if not fits or values.dtype.kind not in "iuf":
         raise ValueError(f"its {name} are {values.dtype} of shape {values.shape}")
-    if not (np.abs(values.astype(np.float64)) <= _LARGEST).all():
+    # The least and the largest take no memory; where a value is not a number, they are none, too.
+    if values.size and not -_LARGEST <= float(values.min()) <= float(values.max()) <= _LARGEST:
         raise ValueError(f"its {name} are not finite, or out of range")
     return values.astype(np.float32)
 

@@ -254,7 +254,7 @@ def _refuse_constant(text: str) -> float:
 MAX_ARRAY_BYTES = 256_000_000
 """Arrays of one archive, expanded."""
 
-_FREE_BYTES, _MAX_RATIO = 64_000_000, 100
+_FREE_BYTES, _MAX_RATIO = 32_000_000, 100
 """An archive may expand to so many bytes at any rate, and beyond them to so many times its own size: clouds and weights
 shrink to a third at best, and only bombs by a thousand."""
 
