@@ -295,13 +295,6 @@ def _home() -> Path:
         return Path("/root")
 
 
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except OSError:  # a name that is too long for the system
-        return False
-
-
 def _with_case_of_disk(path: Path) -> Path | None:
     """The path of an existing file whose name differs in capital letters alone, if there is one."""
     missing = []
