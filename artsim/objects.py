@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.describe import brief, object_line, object_text
 from artsim.errors import AssetError, ConfigError, KinematicsError
-from artsim.kinematics import Array, KinematicTree
+from artsim.kinematics import LARGEST, Array, KinematicTree
 from artsim.names import printable
 from artsim.products import norm
 
@@ -228,7 +228,7 @@ class ArticulatedObject:
 
     def scaled(self, scale: float) -> ArticulatedObject:
         """The same object at ``scale`` times its native size; geometry is shared, not copied."""
-        if not (np.isfinite(scale) and scale > 0):
+        if not 1.0 / LARGEST <= scale <= LARGEST:
             raise ConfigError(f"an object cannot have scale {scale}")
         return replace(self, scale=float(scale))
 

@@ -102,7 +102,7 @@ def _check(values: Mapping[str, Any]) -> None:
     for name in _SCALARS:
         value, wanted = values[name], _NUMBERS.get(name, str)
         fits = isinstance(value, (int, float) if wanted is float else wanted) and not isinstance(value, bool)
-        if not fits or (wanted is float and not 0.0 < value < np.inf):
+        if not fits or (wanted is float and not np.isfinite(value)):
             raise ValueError(f"{name} is {value!r:.40}")
     points, part, K = values["points"], values["part"], len(values["joint_type"])
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or not np.isfinite(points).all():
