@@ -204,6 +204,8 @@ class AssetPaths:
             yield _Candidate(
                 base / name, f"package {package!r} is not declared: taken to be {base.name!r}, the asset's own"
             )
+        if ".." in parts:  # what climbs is not guessed at
+            return
         yield from self._below_own_name([package, *parts])
         for i in range(1, len(parts) - 1):  # a folder and a name are left: a name alone may be that of another mesh
             for base in self._bases:

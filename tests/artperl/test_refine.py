@@ -204,7 +204,7 @@ def test_a_batch_gives_what_its_objects_give_alone(drawers: tuple[Shapes, Observ
 
 def test_hinges_lean_as_the_points_say_and_as_far_as_they_may() -> None:
     """References whose hinges lean by six degrees the other way; both hinges of a pair lean together."""
-    objects, samples = views("eyeglasses", 16, first_seed=30)
+    objects, samples = views("eyeglasses", 32, first_seed=30)
     shapes, observed = Shapes.from_objects(objects, dtype=torch.float32), observe(samples)
     folded = torch.tensor([min(abs(s.joint_state[1:])) > 0.5 for s in samples])
     lean = torch.zeros_like(shapes.points[:, :, 0])
@@ -221,9 +221,9 @@ def test_hinges_lean_as_the_points_say_and_as_far_as_they_may() -> None:
     assert (free.energy <= free.start_energy).all()
     off = [metrics.axis_error(axis[folded, 1:].numpy(), shapes.trees.axis[folded, 1:].numpy()) for axis in
            (others.trees.axis, free.axis)]  # fmt: skip
-    assert folded.sum() >= 4
+    assert folded.sum() >= 8
     assert np.median(off[0]) == pytest.approx(6.0, abs=0.01)
-    assert np.median(off[1]) < 2.0
+    assert np.median(off[1]) < 2.5
     shared = torch.linalg.cross(others.trees.axis, free.axis)[:, 1:, 0]
     torch.testing.assert_close(shared[:, 0], shared[:, 1], atol=0.02, rtol=0.1)  # up to what any axis may lean
 

@@ -72,7 +72,8 @@ INF = np.inf
         ("prismatic", '<limit effort="1"/>', ("prismatic", 0, 0), "without lower and upper in its limit: held at 0"),
         ("prismatic", '<limit lower="-1e38" upper="1e38"/>', ("prismatic", -1, 1), "bounded to -1 and 1 m"),
         ("prismatic", '<limit lower="0.5" upper="inf"/>', ("prismatic", 0.5, 1.5), "bounded to 0.5 and 1.5 m"),
-        ("prismatic", '<limit lower="0" upper="90"/>', ("prismatic", 0, 90), ""),
+        ("prismatic", '<limit lower="0" upper="9"/>', ("prismatic", 0, 9), ""),
+            ("prismatic", '<limit lower="0" upper="90"/>', ("prismatic", 0, 90), 'write lower="0" upper="0.09"'),
     ],
 )  # fmt: skip
 def test_limits_are_taken_as_written_or_said(
