@@ -126,13 +126,14 @@ def read_bounded(
         with os.fdopen(os.open(path, flags), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-                raise error(f"{what} is {kind}", path, "pass a file")
+                raise error(f"{what} is no regular file", path, "pass a file")
             if status.st_size > max_bytes:
                 raise error(
                     f"{what} of {status.st_size / 1e6:.0f} MB is over the limit of {max_bytes / 1e6:.0f} MB", path, fix
                 )
             data = file.read(status.st_size + 1)
+    except IsADirectoryError as problem:
+        raise error(f"{what} is a folder", path, "pass a file") from problem
     except (OSError, ValueError, RuntimeError) as problem:  # a null in the name is a ValueError, links in a circle
         reason = getattr(problem, "strerror", None) or problem  # are a RuntimeError before Python 3.13
         raise error(f"cannot read {what} ({reason})", path, "check the path and its rights") from problem
@@ -351,8 +352,24 @@ def parse_npy(data: bytes) -> NDArray[Any]:
     return _npy(io.BytesIO(data), len(data))
 
 
-def _npy(stream: BinaryIO, size: int) -> NDArray[Any]:
-    """One array in NumPy's format out of ``size`` bytes: its header is compared with them before memory is taken."""
+def npy_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+    """What an array in NumPy's format says of itself; its numbers are next in the stream.
+
+    Returns
+    -------
+    shape : tuple of int
+    fortran : bool
+        Whether columns, not rows, are together.
+    dtype : dtype
+        May be of Python objects, which nobody may read.
+    offset : int
+        Bytes before the numbers.
+
+    Raises
+    ------
+    ValueError
+        When it is damaged.
+    """
     start = stream.read(12)
     length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
     if start[:6] != b"\x93NUMPY" or length > _MAX_NPY_HEADER:
@@ -364,11 +381,19 @@ def _npy(stream: BinaryIO, size: int) -> NDArray[Any]:
         shape, fortran, dtype = read_header(header, max_header_size=_MAX_NPY_HEADER)
     except Exception as problem:  # NumPy lets through what Python's parser raises on a text that is not its own
         raise ValueError("the header of an array is damaged") from problem
+    if any(side < 0 for side in shape):
+        raise ValueError(f"there is no shape {shape}")
+    return tuple(int(side) for side in shape), fortran, dtype, offset + length
+
+
+def _npy(stream: BinaryIO, size: int) -> NDArray[Any]:
+    """One array in NumPy's format out of ``size`` bytes: its header is compared with them before memory is taken."""
+    shape, fortran, dtype, offset = npy_header(stream)
     if dtype.hasobject:
         raise ValueError("it holds Python objects, which are never read")
     wanted = math.prod(shape) * dtype.itemsize
-    if any(side < 0 for side in shape) or not 0 <= wanted <= size - offset - length or dtype.itemsize == 0:
-        raise ValueError(f"an array says that it takes {wanted} bytes, but there are {size - offset - length}")
+    if not 0 <= wanted <= size - offset or dtype.itemsize == 0:
+        raise ValueError(f"an array says that it takes {wanted} bytes, but there are {size - offset}")
     content = stream.read(wanted)
     if len(content) != wanted:
         raise ValueError("an array ends too early")

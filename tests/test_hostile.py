@@ -358,7 +358,7 @@ def test_a_file_is_read_up_to_its_limit_and_no_further(tmp_path: Path) -> None:
     assert len(read_bounded(tmp_path / "f", 100, "file")) == 100
     with pytest.raises(AssetError, match="over the limit"):
         read_bounded(tmp_path / "f", 99, "file")
-    with pytest.raises(AssetError, match="directory"):
+    with pytest.raises(AssetError, match="is a folder"):
         read_bounded(tmp_path, 99, "file")
     with pytest.raises(AssetError, match="cannot read file"):
         read_json(tmp_path / "a\0b", "file")

@@ -6,6 +6,7 @@ a file that is hostile costs less than half a gigabyte and two seconds.
 
 from __future__ import annotations
 
+import io
 import math
 import zipfile
 from collections.abc import Callable, Mapping
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.errors import ArtsimError, ConfigError
+from artsim.files import npy_header, read_bounded
 
 MAX_BYTES = 80_000_000
 """Of a file: it is held beside its values as doubles."""
@@ -52,25 +54,7 @@ def read_file(path: Path, what: str, limit: int = MAX_BYTES) -> bytes:
     ConfigError
         When it is missing, no file, unreadable, or too large.
     """
-    with open_file(path, what, limit) as file:
-        return file.read(limit)
-
-
-def open_file(path: Path, what: str, limit: int = MAX_BYTES) -> BinaryIO:
-    """A file to read from; errors as :func:`read_file`."""
-    try:
-        if not path.exists():
-            raise ConfigError(f"no {what} here: there is no such file", path, "check the path")
-        if not path.is_file():  # a folder, or a device that never ends
-            raise ConfigError(f"no {what} here: it must be a file", path, "name a file")
-        if (size := path.stat().st_size) > limit:
-            raise ConfigError(
-                f"{what} of {size / 1e6:.0f} MB is over the limit of {limit / 1e6:.0f} MB", path,
-                "thin it out, or crop it to the object",
-            )  # fmt: skip
-        return path.open("rb")
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise ConfigError(f"no {what} can be read ({error})", path, "check the path and its rights") from error
+    return read_bounded(path, limit, what, ConfigError, fix="thin it out, or crop it to the object")
 
 
 def guarded(read: Callable[[], Any], path: Path, what: str, fix: str) -> Any:
@@ -88,8 +72,8 @@ def read_npy(path: Path, what: str, fix: str) -> Arrays:
     """The array of an ``.npy`` file; never unpickles, and errors as :func:`read_file`."""
 
     def read() -> Arrays:
-        with open_file(path, what, 8 * MAX_VALUES + 10_000) as file:
-            _check_header(file, path.stat().st_size, path)
+        with io.BytesIO(read_file(path, what, 8 * MAX_VALUES + 10_000)) as file:
+            _check_header(file, len(file.getbuffer()), path)
             file.seek(0)
             return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
 
@@ -108,15 +92,15 @@ def read_npz(path: Path, what: str, fix: str, fits: Callable[[tuple[int, ...], n
     """
 
     def read() -> Choice:
-        with open_file(path, what) as file:
+        with io.BytesIO(read_file(path, what)) as file:
             _check_directory(file, path)
             shapes: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
             with zipfile.ZipFile(file) as archive:
                 for member in archive.infolist():
                     if member.filename.endswith(".npy"):
                         with archive.open(member) as stream:
-                            header = _header(stream)  # type: ignore[arg-type]
-                        shapes[member.filename.removesuffix(".npy")] = header
+                            shape, _, dtype, _ = npy_header(stream)  # type: ignore[arg-type]
+                        shapes[member.filename.removesuffix(".npy")] = shape, dtype
         return Choice(path, what, fix, {n: shape for n, (shape, dtype) in shapes.items() if fits(shape, dtype)}, shapes)
 
     return guarded(read, path, what, fix)
@@ -158,7 +142,7 @@ class Choice:
         return name, guarded(lambda: self._read(name), self.path, self.what, self.fix)
 
     def _read(self, name: str) -> Arrays:
-        with open_file(self.path, self.what) as file, zipfile.ZipFile(file) as archive:
+        with io.BytesIO(read_file(self.path, self.what)) as file, zipfile.ZipFile(file) as archive:
             member = archive.getinfo(f"{name}.npy")
             with archive.open(member) as stream:
                 _check_header(stream, member.file_size, self.path)  # type: ignore[arg-type]
@@ -176,7 +160,7 @@ def check_count(values: int, path: Path, what: str) -> None:
 
 def _check_header(stream: BinaryIO, size: int, path: Path) -> None:
     """Refuse an array that would need to be unpickled, that is too large, or that the file does not hold."""
-    shape, dtype = _header(stream)
+    shape, _, dtype, _ = npy_header(stream)
     count = math.prod(shape)
     if dtype.hasobject:
         raise ConfigError("it holds Python objects, which are never unpickled", path, "save an array of numbers")
@@ -185,17 +169,6 @@ def _check_header(stream: BinaryIO, size: int, path: Path) -> None:
         raise ConfigError(f"it is cut off: it does not hold its {shape} values", path, "copy or save it again")
     if count * dtype.itemsize > 8 * MAX_VALUES:
         raise ConfigError("it is too large", path, "save fewer points, or fewer columns")
-
-
-def _header(stream: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    version = np.lib.format.read_magic(stream)
-    if version not in ((1, 0), (2, 0)):
-        raise ValueError(f"arrays of version {version} are not read")
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
-    if any(n < 0 for n in shape):
-        raise ValueError(f"there is no shape {shape}")
-    return tuple(int(n) for n in shape), dtype
 
 
 def _check_directory(file: BinaryIO, path: Path) -> None:

@@ -76,7 +76,7 @@ def test_images_that_make_no_cloud_are_refused(tmp_path: Path) -> None:
     (tmp_path / "camera.json").write_text('{"fx": 1, "fy": 1, "cx": 0, "cy": 0}')
     with pytest.raises(ConfigError, match="no depth image"):
         read_points(tmp_path / "depth.png", intrinsics=tmp_path / "camera.json")
-    with pytest.raises(ConfigError, match="no intrinsics"):
+    with pytest.raises(ConfigError, match="cannot read intrinsics"):
         read_intrinsics(tmp_path / "lost.json")
 
 
