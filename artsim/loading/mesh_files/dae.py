@@ -49,7 +49,7 @@ def read_dae(data: bytes, bounds: Bounds) -> Surface:
     total = _Extent()
     for root in roots:
         total += scene.extent(root, _MAX_DEPTH)
-    bounds.check_instances(max(total.instances, total.nodes))
+    bounds.check_pieces(max(total.instances, total.nodes))
     bounds.check(total.faces, "triangles")
     bounds.check(total.vertices, "vertices")
     draft.declared = total.faces

@@ -9,8 +9,8 @@ from artsim.errors import AssetError
 from artsim.loading.mesh_files.surface import Array, Bounds, UnusableMeshError, named
 from artsim.loading.mesh_files.text import numbers
 
-_MAX_TAGS = 2_000_000
-"""An element takes some 200 bytes in memory, and two tags in the file."""
+_MAX_TAGS = 600_000
+"""An element has two tags, and takes some 200 bytes of memory and two microseconds."""
 
 
 class Document:
@@ -21,6 +21,8 @@ class Document:
     root : lxml element
     points : dict
         Positions of each source that was read.
+    num_primitives : int
+        Primitives that were read.
 
     Parameters
     ----------
@@ -37,6 +39,7 @@ class Document:
 
     def __init__(self, data: bytes, bounds: Bounds):
         self.root = _parsed(data, bounds)
+        self.num_primitives = 0
         self.points: dict[etree._Element, Array] = {}
         self._ids: dict[str, etree._Element] = {}
         for element in self.root.iter():

@@ -14,7 +14,7 @@ from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Unu
 _NOT_READ = ("lines", "linestrips", "points")
 _PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 _MAX_STRIDE = 256
-_MAX_HOLES = 1e6
+_MAX_HOLES = 5e5
 """Corners of polygons with holes in one geometry: each polygon is divided by a call of its own."""
 
 
@@ -57,6 +57,8 @@ def read_geometry(element: etree._Element, document: Document, bounds: Bounds, d
         if primitive.tag in _NOT_READ:
             said.note(f"{primitive.tag} left out")
         elif primitive.tag in _PRIMITIVES:
+            document.num_primitives += 1
+            bounds.check_pieces(document.num_primitives)
             try:
                 corners = _corners(primitive, document)
                 faces = _faces(primitive, corners, bounds, said)
@@ -177,12 +179,15 @@ def _counts(primitive: etree._Element, corners: int) -> Indices:
 def _with_holes(polygons: list[etree._Element], corners: _Corners, said: Draft) -> Indices:
     """Triangles of polygons that have holes."""
     faces, work = [np.zeros((0, 3), np.int64)], _MAX_HOLES
-    for polygon in polygons:
+    for place, polygon in enumerate(polygons):
+        if work < 0:
+            said.left_out(len(polygons) - place, "polygons with holes", "dividing them takes too long")
+            break
         outlines = [corners.of(polygon.find("p")), *(corners.of(hole) for hole in polygon.findall("h"))]
         numbers = np.concatenate(outlines)
-        work -= len(numbers) ** 1.5 + 100
+        work -= len(numbers) ** 1.5 + 60
         good = (numbers >= 0) & (numbers < len(corners.points))
-        if work < 0 or not good.all() or min(map(len, outlines)) < 3 or not np.isfinite(corners.points[numbers]).all():
+        if not good.all() or min(map(len, outlines)) < 3 or not np.isfinite(corners.points[numbers]).all():
             said.note("polygon with holes left out")
             continue
         triangles, crossing = divide_with_holes([corners.points[outline] for outline in outlines])

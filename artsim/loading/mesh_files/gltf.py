@@ -118,7 +118,7 @@ class _Scene:
         """Count what the scene shows, then read it."""
         shown = self._shown()
         copies = [self._placements(node, T) for node, T in shown]
-        self._bounds.check_instances(sum(map(len, copies)))
+        self._bounds.check_pieces(sum(map(len, copies)))
         self._draft.declared = sum(
             self._declared(node) * len(places) for (node, _), places in zip(shown, copies, strict=True)
         )
@@ -146,6 +146,7 @@ class _Scene:
             T = product(T, _transform(node))
             if "mesh" in node.value:
                 shown.append((node, T))
+                self._bounds.check_pieces(len(shown))
             waiting += [(integer(child, len(self._nodes)), T, depth + 1) for child in reversed(node.array("children"))]
         return shown
 
@@ -175,7 +176,7 @@ class _Scene:
         if len(counts) != 1:
             raise UnusableMeshError("EXT_mesh_gpu_instancing does not say how many copies it makes")
         count = counts.pop()
-        self._bounds.check_instances(count)
+        self._bounds.check_pieces(count)
         moves = columns.get("TRANSLATION", np.zeros((count, 3)))
         turns = columns.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
         scales = columns.get("SCALE", np.ones((count, 3)))
@@ -198,7 +199,7 @@ class _Scene:
         meshes = self._document.list("meshes")
         primitives = meshes[integer(node.value["mesh"], len(meshes))].list("primitives")
         self._num_primitives += len(primitives)
-        self._bounds.check_instances(self._num_primitives // 4)
+        self._bounds.check_pieces(self._num_primitives)
         return primitives
 
     def _mesh(self, node: Items) -> tuple[Array, Indices]:

@@ -14,6 +14,9 @@ from artsim.loading.mesh_files.surface import Array, Bounds, Draft, UnusableMesh
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_MAX_ZEROS = 1000
+"""Positions for each that a sparse accessor lists; the others are 0, which few can be."""
+
 _TOLERANCE = 1e-3
 """Programs write bounds in a few digits; vertices that are lost change them more."""
 
@@ -86,11 +89,13 @@ class Buffers:
         """(V, 3) positions of an accessor, compared with the bounds that it declares."""
         number = integer(number, len(self._accessors))
         if number not in self._points:
-            points = self.values(number, 3)
             accessor = self._accessors[number]
-            if "bufferView" not in accessor.value and "sparse" not in accessor.value:
+            listed = (
+                self.count(number) if "bufferView" in accessor.value else accessor.object("sparse").value.get("count")
+            )
+            if not isinstance(listed, int) or self.count(number) > _MAX_ZEROS * listed:
                 raise UnusableMeshError(f"{label} has positions without data")
-            self._points[number] = points
+            points = self._points[number] = self.values(number, 3)
             self._compare(points, accessor, label, draft)
         return self._points[number]
 

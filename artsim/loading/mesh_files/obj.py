@@ -189,6 +189,8 @@ def _declared(data: bytes) -> int:
     """How many faces a Wavefront file declares."""
     if b"\r" not in data and b"\t" not in data and b"\n " not in data and not data.startswith((b" ", b"\xef")):
         return data.count(b"\nf ") + data.startswith(b"f ") + data.count(b"\nf\n")
+    while b"  " in data:
+        data = data.replace(b"  ", b" ")
     # A row may go on in the next one, and that one may begin with an f.
     ends = rb"(?<!\\)(?<!\\ )(?<!\\\r)(?:^|[\r\n]|\xef\xbb\xbf)[ \t\v\f]*f(?=\s|$)"
     return sum(1 for _ in re.finditer(ends, data))

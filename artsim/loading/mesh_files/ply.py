@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ _TYPES = {
     "int64": "i8", "uint64": "u8", "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 _MAX_HEADER = 100_000
+_MAX_LISTS = 2_000_000
+"""Lists that are read one by one, in some 0.2 microseconds each."""
+
 _ORDER = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = ("vertex_indices", "vertex_index")
 
@@ -159,28 +163,18 @@ class _Text:
         uniform = self._uniform(element, lists)
         if uniform is not None:
             return uniform
-        starts = {p.name: [0] * element.count for p in element.properties}
-        counts = {p.name: [1] * element.count for p in element.properties}
-        values, at, end = self._values.tolist(), self._at, len(self._values)
-        for row in range(element.count):
-            for p, is_list in zip(element.properties, lists, strict=True):
-                n = 1
-                if is_list:
-                    number = values[at] if at < end else -1.0
-                    if not 0 <= number <= end - at - 1 or number != int(number):
-                        raise UnusableMeshError(f"row {row} of {named(element.name)} has a list that cannot be read")
-                    n, at = int(number), at + 1
-                elif at >= end:
-                    raise UnusableMeshError("ends before what its header declares")
-                starts[p.name][row], counts[p.name][row] = at, n
-                at += n
-        self._at = at
-        return {
-            p.name: _gathered(self._values, np.array(starts[p.name]), np.array(counts[p.name]))
-            if is_list
-            else self._values[starts[p.name]]
-            for p, is_list in zip(element.properties, lists, strict=True)
-        }
+        widths = [(1 if is_list else 0, 1) for is_list in lists]
+        read: Callable[[int], float] = self._values.data.__getitem__
+        starts, counts, self._at = _walk(read, self._at, widths, element.count, len(self._values))
+        columns = {}
+        for i, (p, is_list) in enumerate(zip(element.properties, lists, strict=True)):
+            first, length = starts[:, i], counts[:, i]
+            if is_list and (self._values[first - 1] != length).any():
+                raise UnusableMeshError(f"{named(element.name)} has lists whose lengths are no whole numbers")
+            columns[p.name] = (
+                _Lists(length, _whole(self._values[_places(first, length)])) if is_list else self._values[first]
+            )
+        return columns
 
     def _uniform(self, element: Element, lists: list[bool]) -> dict[str, Any] | None:
         """The table, if all of its rows are as long as the first."""
@@ -272,42 +266,95 @@ class _Bytes:
         return np.dtype(columns) if sum(n or 0 for n in lengths) * 8 < 2**31 else None
 
     def _rows(self, element: Element) -> dict[str, Any]:
-        """A table whose rows differ in length, row by row."""
-        sizes = [np.dtype(p.type).itemsize for p in element.properties]
-        lists = [i for i, p in enumerate(element.properties) if p.count_type]
-        starts: dict[int, list[int]] = {i: [] for i in lists}
-        counts: dict[int, list[int]] = {i: [] for i in lists}
-        at = self._at
-        for _ in range(element.count):
-            for i, p in enumerate(element.properties):
-                n = 1
-                if p.count_type:
-                    n, at = self._integer(at, p.count_type)
-                    starts[i].append(at)
-                    counts[i].append(n)
-                at += n * sizes[i]
-        if at > len(self._data):
-            raise UnusableMeshError("ends before what its header declares")
-        self._at = at
+        """The lists of a table whose rows differ in length."""
+        widths = [
+            (np.dtype(p.count_type).itemsize if p.count_type else 0, np.dtype(p.type).itemsize)
+            for p in element.properties
+        ]
+        kinds = {p.count_type for p in element.properties if p.count_type}
+        if len(kinds) > 1:
+            raise UnusableMeshError(f"{named(element.name)} counts its lists in several types, which is not read")
+        kind = np.dtype(kinds.pop())
+        end = len(self._data)
+        starts, counts, self._at = _walk(self._reader(kind), self._at, widths, element.count, end)
         letters = np.frombuffer(self._data, np.uint8)
         columns = {}
-        for i in lists:
-            lengths = np.array(counts[i])
-            items = _gather_index(np.array(starts[i]), lengths, sizes[i])
-            raw = letters[items[:, None] + np.arange(sizes[i])]
-            kind = self._order + element.properties[i].type
-            columns[element.properties[i].name] = _Lists(lengths, _whole(np.ascontiguousarray(raw).view(kind).ravel()))
+        for i, p in enumerate(element.properties):
+            if p.count_type:
+                size = widths[i][1]
+                raw = letters[_places(starts[:, i], counts[:, i], size)[:, None] + np.arange(size)]
+                items = np.ascontiguousarray(raw).view(self._order + p.type).ravel()
+                columns[p.name] = _Lists(counts[:, i], _whole(items))
         return columns
 
+    def _reader(self, kind: np.dtype[Any]) -> Callable[[int], int]:
+        """Gives the whole number at a place."""
+        data, size, signed = self._data, kind.itemsize, kind.kind == "i"
+        if size == 1 and not signed:
+            return data.__getitem__
+        order: Literal["big", "little"] = "big" if self._order == ">" else "little"
+        return lambda at: int.from_bytes(data[at : at + size], order, signed=signed)
 
-def _gather_index(starts: Indices, counts: Indices, size: int = 1) -> Indices:
-    """Places of the items of lists that start at given places, each item ``size`` long."""
+
+def _walk(
+    read: Callable[[int], float], start: int, widths: list[tuple[int, int]], rows: int, end: int
+) -> tuple[Indices, Indices, int]:
+    """Where the columns of rows are that differ in length.
+
+    Parameters
+    ----------
+    read : callable
+        Gives the number at a place.
+    start, end : int
+        Places where the table starts and what holds it ends.
+    widths : list of (int, int)
+        Of each column: the width of its list's length, 0 where it is no list, and the width of a value.
+    rows : int
+
+    Returns
+    -------
+    starts, counts : (rows, columns) int
+        Where the values of each column start, and how many there are.
+    int
+        Place after the table.
+    """
+    lists = sum(1 for head, _ in widths if head)
+    if rows * lists > _MAX_LISTS:
+        raise UnusableMeshError(f"has over {_MAX_LISTS} lists of different lengths")
+    # Widths up to each list, and after the last one: rows are walked in a loop, which is to do little.
+    steps: list[tuple[int, int, int]] = []
+    skip = 0
+    for head, size in widths:
+        if head:
+            steps.append((skip, head, size))
+            skip = 0
+        else:
+            skip += size
+    found: list[int] = []
+    at = start
+    for _ in range(rows):
+        for before, head, size in steps:
+            at += before
+            count = read(at) if at + head <= end else -1
+            if not 0 <= count <= end - at:
+                raise UnusableMeshError("has a list that ends after the file")
+            count = int(count)
+            found.append(count)
+            at += head + count * size
+        at += skip
+    if at > end:
+        raise UnusableMeshError("ends before what its header declares")
+    counts = np.ones((rows, len(widths)), np.int64)
+    counts[:, [bool(head) for head, _ in widths]] = np.array(found, np.int64).reshape(rows, lists)
+    heads, sizes = np.array(widths).T
+    ends = start + np.cumsum(counts * sizes + heads).reshape(rows, -1)
+    return ends - counts * sizes, counts, at
+
+
+def _places(starts: Indices, counts: Indices, size: int = 1) -> Indices:
+    """Places of the items of lists that start at given places, each item ``size`` wide."""
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.repeat(starts, counts) + size * within
-
-
-def _gathered(values: Array, starts: Indices, counts: Indices) -> _Lists:
-    return _Lists(counts, _whole(values[_gather_index(starts, counts)]))
 
 
 def _whole(values: NDArray[Any]) -> Indices:

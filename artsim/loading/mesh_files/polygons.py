@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from artsim.loading.mesh_files.surface import NO_POINT, Array, Draft, Indices
 
-_EAR_CLIPPING = 2e9
+_EAR_CLIPPING = 1e9
 """Bound on the work of ear clipping, which takes up to 3e-10 s for each pair of corners of a polygon."""
 
-_WORK_OF_A_CALL = 4e4
+_WORK_OF_A_CALL = 2e4
 """What calling the library costs, in the same unit."""
 
 
@@ -197,12 +197,12 @@ def strips(indices: Indices) -> Indices:
     """(F, 3) triangles of strips, wound as the first of each; -1 stands between one strip and the next."""
     if len(indices) < 3:
         return np.zeros((0, 3), np.int64)
-    place = np.arange(len(indices))
-    within = place - np.maximum.accumulate(np.where(indices == -1, place + 1, 0))
-    triangles = np.stack([indices[:-2], indices[1:-1], indices[2:]], axis=1)
-    odd = within[:-2] % 2 == 1
-    triangles[odd] = triangles[odd][:, [1, 0, 2]]
-    return triangles[(triangles != -1).all(axis=1)]
+    there = indices != -1
+    first = np.flatnonzero(there[:-2] & there[1:-1] & there[2:])
+    begun = np.maximum.accumulate(np.where(there, -1, np.arange(len(indices))))[first]
+    odd = (first - begun) % 2 == 0
+    second = np.where(odd, first, first + 1)
+    return np.stack([indices[np.where(odd, first + 1, first)], indices[second], indices[first + 2]], axis=1)
 
 
 def fans(indices: Indices) -> Indices:

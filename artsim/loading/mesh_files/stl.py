@@ -58,8 +58,12 @@ def _read_bytes(data: bytes, count: int, bounds: Bounds) -> Surface:
 def _read_text(data: bytes, bounds: Bounds) -> Surface:
     text = plain_text(data).lower()
     draft = Draft(declared=_declared(data))
-    rows = Rows(substitute(rb"(?m)^((?:end)?solid)[^\n]*", rb"\1", text))  # any word may be the name of a solid
-    if rows.which(b"vertex").sum() != rows.data.count(b"vertex"):
+    rows = Rows(text)
+    if rows.which(b"vertex").sum() != text.count(b"vertex"):
+        # Any word may be the name of a solid.
+        rows = Rows(substitute(rb"(?m)^((?:end)?solid)[^\n]*", rb"\1", text))
+    found = int(rows.which(b"vertex").sum())
+    if found == 0 or found != rows.data.count(b"vertex"):
         # Blanks are as good as newlines.
         rows = Rows(re.sub(rb"\s+(?=(?:" + b"|".join(_WORDS) + rb")\b)", b"\n", text))
     corners, closed = rows.which(b"vertex"), rows.which(b"endloop")

@@ -19,8 +19,8 @@ FAR = 1e18
 
 NO_POINT = "not finite, or of vertices that are missing"
 
-_MAX_INSTANCES = 20_000
-"""Copies of pieces in one file. Each costs some 20 microseconds, however small it is."""
+_MAX_PIECES = 10_000
+"""Primitives and copies of them in one file. Each costs some 100 microseconds, however small it is."""
 
 _FEW = 1000
 """Vertices that any mesh may have: limits on triangles this low are for tests."""
@@ -84,18 +84,18 @@ class Bounds:
                 "decimate it, or raise the limit with limits=LoadLimits(max_faces=...) if you trust the file",
             )
 
-    def check_instances(self, count: int) -> None:
-        """Refuse too many copies of pieces.
+    def check_pieces(self, count: int) -> None:
+        """Refuse too many primitives, or copies of them.
 
         Raises
         ------
         AssetError
         """
-        if count > _MAX_INSTANCES:
+        if count > _MAX_PIECES:
             raise AssetError(
-                f"the mesh shows its pieces {_readable(count)} times, over the limit of {_MAX_INSTANCES}",
+                f"the mesh is made up of {_readable(count)} pieces, over the limit of {_MAX_PIECES}",
                 self.where,
-                "export it again with its instances made real",
+                "export it again with its pieces joined into one",
             )
 
 

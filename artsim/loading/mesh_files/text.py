@@ -20,8 +20,8 @@ _WORD = 8
 _BLANKS = bytes(c if c == ord("\n") else max(c, ord(" ")) for c in range(256))
 """Tabs and other characters that control a terminal become blanks."""
 
-_MAX_ROWS = 10_000_000
-"""Twice as many as the faces of the largest mesh; each takes some 20 bytes of memory besides its text."""
+_MAX_ROWS = 8_000_000
+"""For as many faces as a mesh may have, and their vertices; each takes some 20 bytes of memory besides its text."""
 
 _MAX_WORDS = 10
 """Of the words that are not known, the most frequent ones are named."""
@@ -71,7 +71,7 @@ class Rows:
     data: bytes
 
     def __post_init__(self) -> None:
-        if self.data.count(b"\n") > _MAX_ROWS:
+        if self.data.count(b"\n") > _MAX_ROWS or len(self.data) >= 2**31:
             raise UnusableMeshError(f"has over {_MAX_ROWS} rows")
 
     @cached_property
@@ -79,20 +79,22 @@ class Rows:
         return np.frombuffer(self.data + b"\n", np.uint8)
 
     @cached_property
-    def _ends(self) -> NDArray[np.int64]:
-        return np.flatnonzero(self._bytes == ord("\n"))
+    def _ends(self) -> NDArray[np.int32]:
+        return np.flatnonzero(self._bytes == ord("\n")).astype(np.int32)
 
     @cached_property
-    def _starts(self) -> NDArray[np.int64]:
-        return np.concatenate([np.zeros(1, np.int64), self._ends[:-1] + 1])
+    def _starts(self) -> NDArray[np.int32]:
+        return np.concatenate([np.zeros(1, np.int32), self._ends[:-1] + 1])
 
     def which(self, word: bytes) -> NDArray[np.bool_]:
         """Which rows begin with a word, alone or before a blank."""
-        here = np.ones(len(self._starts), dtype=bool)
-        for i, letter in enumerate(word):
-            here &= self._letter(i) == letter
-        after = self._letter(len(word))
-        return here & ((after == ord(" ")) | (after == ord("\n")))
+        rows = np.flatnonzero(self._letter(0) == word[0])
+        for i, letter in enumerate(word[1:] + b" ", start=1):
+            found = self._bytes[np.minimum(self._starts[rows] + i, self._ends[rows])]
+            rows = rows[(found == letter) | ((found == ord("\n")) & (i == len(word)))]
+        here = np.zeros(len(self._starts), dtype=bool)
+        here[rows] = True
+        return here
 
     def _letter(self, i: int) -> NDArray[np.uint8]:
         """The i-th letter of each row, or its newline where the row is shorter."""
@@ -112,6 +114,7 @@ class Rows:
 
     def words(self, which: NDArray[np.bool_]) -> dict[str, int]:
         """How many of some rows begin with each word, by its first letters; "..." stands for the rare ones."""
+        which = which & (self._starts < self._ends)
         starts, ends = self._starts[which], self._ends[which]
         letters = np.stack([self._bytes[np.minimum(starts + i, ends)] for i in range(_WORD)], axis=1)
         blank = (letters == ord(" ")) | (letters == ord("\n"))
@@ -145,6 +148,8 @@ def first_numbers(text: bytes, width: int) -> NDArray[np.float64]:
     """
     per_row = numbers_per_row(text)
     values = np.append(numbers(text, np.float64, np.nan, int(per_row.sum())), np.nan)
+    if (per_row == width).all():
+        return values[:-1].reshape(-1, width)
     at = (np.cumsum(per_row) - per_row)[:, None] + np.arange(width)
     return values[np.where(per_row[:, None] >= width, at, len(values) - 1)]
 
