@@ -213,5 +213,5 @@ def test_folders_and_devices_are_no_clouds(tmp_path: Path) -> None:
     (tmp_path / "c.npy").mkdir()
     (tmp_path / "d.ply").symlink_to("/dev/zero")
     for name in ("c.npy", "d.ply"):
-        with pytest.raises(ConfigError, match="is a folder|is no regular file"):
+        with pytest.raises(ConfigError, match=r"is a folder|is no regular file"):
             read_cloud(tmp_path / name)
