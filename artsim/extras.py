@@ -29,6 +29,7 @@ MODULES = {
     "fcl": ("python-fcl", "sim"),
     "mujoco": ("MuJoCo", "sim"),
     "pxr": ("usd-core", "sim"),
+    "yourdfpy": ("yourdfpy", "sim"),
     "torch": ("torch", "train"),
     "tensorboard": ("tensorboard", "train"),
     "safetensors": ("safetensors", "train"),

@@ -228,7 +228,8 @@ def _compare(
 
 def poses_in_file(file: Path) -> LinkPoses:
     """Where the file itself puts its links, by yourdfpy: in double precision, which simulators do not all keep."""
-    import yourdfpy
+    with needs("where a file puts its links"):
+        import yourdfpy
 
     robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)
     for joint in robot.robot.joints:
