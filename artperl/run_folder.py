@@ -146,7 +146,7 @@ class RunFolder:
             raise write_error(error, events) from error
         try:
             yield board
-        except BaseException:
+        except BaseException:  # Ctrl-C, too: what was written so far is kept
             with contextlib.suppress(OSError):  # the first error is the one to tell
                 board.close()
             raise

@@ -21,7 +21,7 @@ import artsim.cli
 from artsim.errors import ConfigError, RenderError
 from artsim.extras import MODULES, explained, install_command, needs
 from artsim.renderers import RENDERERS
-from tests.conftest import ASSETS, BOX_LAPTOP
+from tests.conftest import ASSETS, BOX_LAPTOP, absent
 from tests.without import beyond_the_core, distributions_of, environment, normal
 
 ROOT = ASSETS.parent
@@ -250,7 +250,7 @@ def test_gymnasium_without_physics_names_the_extra(tmp_path: Path) -> None:
 def test_the_extra_that_is_named_brings_the_module(module: str) -> None:
     owners = packages_distributions().get(module)
     if owners is None:
-        pytest.skip(f"{module} is not installed here")
+        absent(f"{module} is not installed here")
     _, extra = MODULES[module]
     assert {normal(owner) for owner in owners} & distributions_of(extra)
     assert not {normal(owner) for owner in owners} & distributions_of("")

@@ -142,7 +142,7 @@ def test_nothing_is_unpickled(tmp_path: Path) -> None:
             return Path.touch, (tmp_path / "ran",)  # type: ignore[return-value]
 
     array = np.array([[Trap(), 1, 2]] * 3, dtype=object)
-    np.save(tmp_path / "c.npy", array, allow_pickle=True)
+    np.save(tmp_path / "c.npy", array)
     np.savez(tmp_path / "c.npz", points=array)
     for name in ("c.npy", "c.npz"):
         with pytest.raises(ConfigError):
