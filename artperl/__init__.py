@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from artsim.extras import needs
+from artsim.common.extras import needs
 
 if TYPE_CHECKING:
-    from artperl.estimator import Estimator
+    from artperl.methods.full import Estimator
 
 __all__ = ["load_estimator"]
 
@@ -21,7 +21,7 @@ def load_estimator(name: str | Path, **changes: Any) -> Estimator:
     name : str or Path
     **changes
         Of its options, such as ``seen_from=(-75.0, 75.0)``, degrees, where the camera is known to be in front of the
-        object. :class:`artperl.search.EstimatorOptions` has them all.
+        object. :class:`artperl.fitting.search.EstimatorOptions` has them all.
 
     Raises
     ------
@@ -31,6 +31,6 @@ def load_estimator(name: str | Path, **changes: Any) -> Estimator:
         When there is no such estimator, or its files are damaged.
     """
     with needs("artperl"):
-        from artperl.checkpoint import load_estimator as load  # torch takes seconds to import
+        from artperl.estimator import load_estimator as load  # torch takes seconds to import
 
     return load(name, **changes)

@@ -11,14 +11,14 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from artperl.estimate_command import Estimate
+from artperl.commands.estimate import Estimate
 from artsim.cli import run_program
+from artsim.common.files import write_atomic
+from artsim.common.progress import say
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
-from artsim.files import write_atomic
 from artsim.loading.roots import PackageRoots
-from artsim.progress import say
-from artsim.sampling import StateMode, StateOptions, ViewOptions, ViewPreset
+from artsim.model.draws import StateMode, StateOptions, ViewOptions, ViewPreset
 
 _FILE_VIEWS = 40
 """Views of files, at least, that an estimator is tested with."""
@@ -100,8 +100,8 @@ class Train:
     def run(self) -> None:
         import torch
 
-        from artperl.settings import PRESETS
-        from artperl.training import Training
+        from artperl.training.options import PRESETS
+        from artperl.training.run import Training
         from artsim.families import FAMILIES
 
         if self.threads is not None:
@@ -219,9 +219,9 @@ class Evaluate:
             write_atomic(self.json, _json(figures))
 
     def _rows(self) -> dict[str, Any]:
-        from artperl.benchmarks.artimage import ROWS, VIEWS
-        from artperl.benchmarks.rows import run_rows
-        from artperl.categories import ARTIMAGE
+        from artperl.data.categories import ARTIMAGE
+        from artperl.evaluation.artimage import ROWS, VIEWS
+        from artperl.evaluation.benchmark_rows import run_rows
 
         if (self.states, self.preset, self.noise) != ("uniform", "artimage", "none"):
             raise ConfigError(
@@ -242,9 +242,9 @@ class Evaluate:
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
-        from artperl.benchmarks.artimage import as_known
-        from artperl.checkpoint import folder_of, load_estimator, read_settings
-        from artperl.evaluation import evaluate, frozen_samples, samples_of, summary, table
+        from artperl.estimator import folder_of, load_estimator, read_settings
+        from artperl.evaluation.artimage import as_known
+        from artperl.evaluation.scoring import evaluate, frozen_samples, samples_of, summary, table
         from artsim.loading.sources import find_sources
 
         if self.estimator is None:
@@ -266,8 +266,8 @@ class Evaluate:
         else:
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
         if self.ablation:
-            from artperl.benchmarks.ablation import run_ablation, variants
-            from artperl.benchmarks.basin import basin_problem, run_basin
+            from artperl.evaluation.ablation import run_ablation, variants
+            from artperl.evaluation.basin import basin_problem, run_basin
 
             agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
             result = run_ablation(variants(estimator, *agents), samples, say, True)

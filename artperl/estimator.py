@@ -1,287 +1,272 @@
-"""From a cloud to the 9D pose of every part, in one call (ArtPERL, section 4).
+"""Trained estimators on disk: a folder with weights (safetensors), settings (JSON) and the base of references (npz).
 
-Perception says which part each point belongs to and where it lies in the object's rest frame; :mod:`artperl.search`
-finds the reference and the pose that explain it; :mod:`artperl.hidden` turns what hardly shows to where it would not,
-:mod:`artperl.squaring` the rest as its flat surfaces face; last, a network moves the faces of its boxes to where the
-cloud, seen from there, says that they are.
+Weights are kept in half precision. Nothing in the folder is executed when it is read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
-from torch import Tensor
+from safetensors.torch import load as load_tensors
+from torch import Tensor, nn
 
-from artperl.cleaning import as_cloud, clean, draw
-from artperl.cloud_checks import cloud_warnings
-from artperl.coherence import coherent
-from artperl.data import Clouds
-from artperl.estimate import Calibration, Estimate, brought_to_rest, labels_by_boxes, slid, visibility, widen
-from artperl.evidence import Evidence, roughness
-from artperl.grouping import grouped
-from artperl.hidden import uncovered
-from artperl.networks.agent import Agent
-from artperl.networks.boxes import Boxes
-from artperl.networks.perception import Perceived, Perception, Votes
-from artperl.part_names import part_names
-from artperl.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
-from artperl.retrieval import ShapeBase
-from artperl.search import Clock, EstimatorOptions, Found, find
-from artperl.shapes import Shapes
-from artperl.squaring import squared
+from artperl.agent.policy import Agent
+from artperl.boxes.network import Boxes
+from artperl.core.estimate import Calibration
+from artperl.core.tensor_files import write_tensors
+from artperl.fitting.search import EstimatorOptions
+from artperl.methods.full import Estimator
+from artperl.perception.network import Perception
+from artperl.retrieval.box_embedding import EMBEDDED
+from artperl.retrieval.shape_base import ShapeBase
+from artsim.common.files import read_bounded, read_json, write_atomic
+from artsim.common.names import printable
+from artsim.common.plain import from_plain
+from artsim.errors import ConfigError, DatasetError
+from artsim.model.objects import MAX_PARTS
 
-Array = NDArray[np.float64]
+WEIGHTS = Path(__file__).parent / "weights"
+"""Folder of the estimators that come with the package."""
 
-_BOX_POINTS = 8192
-"""Points by which faces of boxes are looked for."""
-_LOOKS = 2
-"""Times that boxes are looked for: the first ones tell which part a point cannot be of."""
-_OUTSIDE = 0.01
-"""Distance out of a part's box, in diagonals, that weighs as much against a label as odds of 1 to e."""
+_FORMAT = 1
+_AGAIN = "train it again"
+_SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """What is kept of perception once a cloud is fitted.
-
-    Attributes
-    ----------
-    log_odds : (N, P) float
-        Of each point to be of each part; NaN for outliers.
-    box_center, box_size : (P, 3) float
-        In the rest frame, metres.
-    chosen : (M,) int64
-        Points by which faces of boxes are looked for.
-    roughness : () float
-        Of these, metres.
-    lower : (K,) float
-        Least states of the joints, radians or metres.
-    """
-
-    log_odds: Array
-    box_center: Tensor
-    box_size: Tensor
-    chosen: NDArray[np.int64]
-    roughness: Tensor
-    lower: Array
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Torch works on one thread.
-
-    An estimate is thousands of small operations. A second thread hardly helps with them, and where another process has
-    its core, all wait for it: four times as long.
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
-
-
-@dataclass(eq=False)
-class Estimator:
-    """Everything that is needed to estimate poses of a category, or of several.
-
-    An estimate takes one thread of the processor, so that several processes may estimate side by side.
+def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any]) -> None:
+    """Write an estimator.
 
     Parameters
     ----------
-    perception : Perception
-    base : ShapeBase
-    agent : Agent, optional
-        Without one, references are refined from where perception puts them.
-    options : EstimatorOptions, optional
-    calibration : Calibration, optional
-    boxes : Boxes, optional
-        Without one, boxes are the reference's, widened to hold the points.
+    estimator : Estimator
+    folder : Path
+        Made if missing; files in it are replaced one by one.
+    about : mapping
+        Anything else worth knowing, in JSON's terms: what it was trained on, and how well it does.
     """
+    folder.mkdir(parents=True, exist_ok=True)
+    networks: dict[str, nn.Module] = {"perception": estimator.perception}
+    if estimator.agent is not None:
+        networks["agent"] = estimator.agent
+    if estimator.boxes is not None:
+        networks["boxes"] = estimator.boxes
+    tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
+    save_tensors(tensors, folder / _TENSORS)
+    estimator.base.save(folder / _BASE)
+    settings = {
+        "format": _FORMAT,
+        "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
+        "agent": None if estimator.agent is None else {"width": estimator.agent.width},
+        "boxes": None
+        if estimator.boxes is None
+        else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
+        "options": asdict(estimator.options),
+        "calibration": asdict(estimator.calibration),
+        "about": dict(about),
+    }
+    write_atomic(folder / _SETTINGS, (json.dumps(settings) + "\n").encode())
 
-    perception: Perception
-    base: ShapeBase
-    agent: Agent | None = None
-    options: EstimatorOptions = field(default_factory=EstimatorOptions)
-    calibration: Calibration = field(default_factory=Calibration)
-    boxes: Boxes | None = None
+
+def load_estimator(name: str | Path, device: torch.device | str = "cpu", **changes: Any) -> Estimator:
+    """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
+
+    Parameters
+    ----------
+    name : str or Path
+    device : torch.device or str
+        Where it works, such as "cuda".
+    **changes
+        Of its :class:`~artperl.fitting.search.EstimatorOptions`, such as ``seen_from=(-75.0, 75.0)``.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such option.
+    DatasetError
+        When there is no such estimator, or its files are damaged.
+    """
+    unknown = ", ".join(changes.keys() - {field.name for field in fields(EstimatorOptions)})
+    if unknown:
+        raise ConfigError("an estimator has no such option", unknown, "see artperl.fitting.search.EstimatorOptions")
+    folder = folder_of(name)
+    settings = read_settings(folder)
+    try:
+        sizes = _Sizes(
+            from_plain(_PerceptionSize, settings.get("perception")),
+            None if settings.get("agent") is None else from_plain(_AgentSize, settings["agent"]),
+            None if settings.get("boxes") is None else from_plain(_BoxesSize, settings["boxes"]),
+        )
+        options = replace(from_plain(EstimatorOptions, settings.get("options")), **changes)
+        calibration = from_plain(Calibration, settings.get("calibration"))
+    except ValueError as error:
+        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
+    tensors = read_tensors(folder / _TENSORS)
+    for key, shape in sizes.largest.items():  # a forged width takes no memory before it is that of the weights
+        if key not in tensors or tensors[key].shape != shape:
+            raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, _AGAIN)
+    networks = sizes.networks()
+    _check_fit(networks, tensors, folder)
+    for key, network in networks.items():
+        network.load_state_dict(_under(tensors, f"{key}."))
+        network.to(device)
+    base = ShapeBase.load(folder / _BASE)
+    if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
+        raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
+    perception, agent, boxes = networks["perception"], networks.get("agent"), networks.get("boxes")
+    assert isinstance(perception, Perception)
+    assert isinstance(agent, Agent | None)
+    assert isinstance(boxes, Boxes | None)
+    return Estimator(perception, base, agent, options, calibration, boxes)
+
+
+_MAX_ROWS, _MAX_WIDTH = MAX_PARTS, 2048
+
+
+def _check_size(value: int, most: int, what: str) -> None:
+    if not 1 <= value <= most:
+        raise ValueError(f"{what} is {value}, not 1 to {most}")
+
+
+@dataclass(frozen=True)
+class _PerceptionSize:
+    num_rows: int
+    width: int = 48
+    votes: bool = False
 
     def __post_init__(self) -> None:
-        self.perception.eval()
-        self.base = self.base.to(self.perception.device)
+        _check_size(self.num_rows, _MAX_ROWS, "num_rows")
+        _check_size(self.width, _MAX_WIDTH, "width")
+
+
+@dataclass(frozen=True)
+class _AgentSize:
+    width: int = 64
+
+    def __post_init__(self) -> None:
+        _check_size(self.width, _MAX_WIDTH, "width")
+
+
+@dataclass(frozen=True)
+class _BoxesSize:
+    num_rows: int
+    width: int = 80
+
+    def __post_init__(self) -> None:
+        _check_size(self.num_rows, _MAX_ROWS, "num_rows")
+        _check_size(self.width, _MAX_WIDTH, "width")
+
+
+@dataclass(frozen=True)
+class _Sizes:
+    """Sizes of an estimator's networks."""
+
+    perception: _PerceptionSize
+    agent: _AgentSize | None
+    boxes: _BoxesSize | None
+
+    @property
+    def largest(self) -> dict[str, tuple[int, int]]:
+        """Shape of a tensor of each network that is among its largest, by its name."""
+        wide = 8 * self.perception.width
+        shapes = {"perception.backbone.whole.0.weight": (wide, wide)}
+        if self.agent is not None:
+            shapes["agent.observed.2.weight"] = 2 * self.agent.width, self.agent.width
         if self.boxes is not None:
-            self.boxes.to(self.perception.device)
+            shapes["boxes.among.0.weight"] = self.boxes.width, 6 * self.boxes.width
+        return shapes
 
-    @torch.inference_mode()
-    @_one_thread()
-    def __call__(self, points: ArrayLike) -> Estimate:
-        """Estimate the pose of every part of the object that a cloud shows.
+    def networks(self) -> dict[str, nn.Module]:
+        """New networks of these sizes, by name."""
+        networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
+        if self.agent is not None:
+            networks["agent"] = Agent(**asdict(self.agent))
+        if self.boxes is not None:
+            networks["boxes"] = Boxes(**asdict(self.boxes))
+        return networks
 
-        Parameters
-        ----------
-        points : (N, 3) float
-            Camera frame, metres, any N. Points that are not finite, or at exactly 0 0 0, and outliers are left out.
-            What looks wrong with the cloud, such as its unit, is said in ``Estimate.warnings``.
 
-        Raises
-        ------
-        ArtsimError
-            When there is no object to be seen in the cloud.
-        """
-        clock = Clock()
-        estimate, seen = self._fit(points, clock)
-        if self.boxes is None:
-            return estimate
-        cloud, T, part = as_cloud(points), estimate.T_camera_part, estimate.part
-        with clock("boxes"):
-            for _ in range(_LOOKS):
-                evidence, unit = _evidence(cloud, replace(estimate, part=part), seen, self.boxes.num_rows)
-                boxes = self.boxes(evidence.to(self.perception.device))
-                center, size, farther = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
-                part = labels_by_boxes(cloud, T, center, size, seen.log_odds, _OUTSIDE * unit)
-        posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
-        farther = np.maximum(farther, np.minimum(seen.lower - estimate.state, 0.0))
-        return slid(replace(estimate, translation=posed, size=size, part=part), farther)
+def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor], folder: Path) -> None:
+    """Refuse tensors that are not exactly those of the networks, or are not finite.
 
-    @torch.inference_mode()
-    @_one_thread()
-    def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
-        """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
-        estimate, seen = self._fit(points, Clock())
-        return estimate, *_evidence(points, estimate, seen, self.perception.num_rows)
+    Raises
+    ------
+    DatasetError
+    """
+    wanted = {f"{key}.{name}": t.shape for key, net in networks.items() for name, t in net.state_dict().items()}
+    problem = None
+    if wanted.keys() != tensors.keys():
+        problem = f"{printable(min(wanted.keys() ^ tensors.keys()))} is in only one of {_SETTINGS} and {_TENSORS}"
+    else:
+        for name, tensor in tensors.items():
+            if tensor.shape != wanted[name] or not tensor.dtype.is_floating_point:
+                problem = f"{name} is {tensor.dtype} of shape {tuple(tensor.shape)}, not {tuple(wanted[name])}"
+            elif not bool(torch.isfinite(tensor).all()):
+                problem = f"{name} is not finite"
+    if problem is not None:
+        raise DatasetError(f"the estimator does not load: {problem}", folder, _AGAIN)
 
-    def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
-        """What is perceived of one cloud."""
-        with clock("perception"):
-            seen = self.perception(clouds.points)
-        if self.options.coherent:
-            with clock("coherence"):
-                seen = _held_together(clouds, seen)
-        if not isinstance(seen, Votes):
-            return seen
-        with clock("grouping"):
-            return grouped(seen)
 
-    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Seen]:
-        """The estimate whose boxes are the reference's, and what it goes by."""
-        options = self.options
-        points = as_cloud(points)
-        with clock("clean"):
-            good = clean(points)
-            warnings = cloud_warnings(points, good)
-            chosen = draw(len(good), options.num_points, np.random.default_rng(0))
-            cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None].to(self.perception.device)
-            clouds = Clouds.of(cloud)
-        perceived = self.perceive(clouds, clock)
-        found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
-        with clock("report"):
-            index = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
-            part = np.full(len(points), -1)
-            part[good] = found.observed.part[0].numpy()[index]
-            few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
-        if options.uncovered:
-            with clock("uncover"):
-                found = found.ending(uncovered(found.shapes, found.refined.theta, points[few], part[few]))
-        if options.squared:
-            with clock("square"):
-                found = found.ending(squared(found.shapes, found.refined.theta, points[few], part[few]))
-        with clock("report"):
-            log_odds = np.full((len(points), self.perception.num_rows), np.nan)
-            log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]
-            trees, metres = found.shapes.trees, (perceived.log_diagonal.exp() * clouds.radius).cpu()
-            seen = _Seen(
-                log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres, few,
-                roughness(torch.from_numpy(points[few].astype(np.float32))),
-                _numpy(trees.lower * reach(trees, found.refined.theta.log_scale))[: int(trees.valid[0].sum())],
-            )  # fmt: skip
-            return replace(self._report(points, part, found, clock), warnings=warnings), seen
+def folder_of(name: str | Path) -> Path:
+    """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
+    own = Path(name)
+    return WEIGHTS / name if (WEIGHTS / name).is_dir() and not (own / _SETTINGS).is_file() else own
 
-    def _report(self, points: Array, part: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
-        """Everything about one fitted reference and labelled points, as arrays."""
-        shapes, observed, theta = found.shapes, found.observed, found.refined.theta
-        trees, reference = shapes.trees, found.reference
-        K = int(trees.valid[0].sum())
-        posed = pose_parts(trees, theta, shapes.box_center)
-        axis, origin = joint_axes(trees, posed)
-        poses = [_transforms(shapes, step)[:K] for step in found.path]
-        shows = visibility(shapes, observed, posed)[:K]
-        limits = torch.stack([trees.lower, trees.upper], dim=-1)
-        limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
-        rotation, center = _numpy(posed.rotation)[:K], _numpy(posed.center)[:K]
-        translation, size = widen(rotation, center, _numpy(shapes.box_size * posed.scale)[:K], points, part)
-        return Estimate(
-            rotation=rotation,
-            translation=translation,
-            size=size,
-            T_camera_part=poses[-1],
-            state=_numpy(joint_states(trees, theta))[:K],
-            joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),
-            joint_parent=np.where(np.arange(K) == 0, -1, trees.parent[0, :K].numpy()),
-            joint_axis=_numpy(axis)[:K],
-            joint_origin=_numpy(origin)[:K],
-            part=part,
-            reference=f"{self.base.categories[reference]}:{self.base.object_ids[reference]}",
-            residual=found.residual,
-            disagreement=found.disagreement,
-            visibility=shows,
-            confidence=self.calibration(found.residual, found.disagreement, shows.min()),
-            trajectory=np.stack(poses),
-            milliseconds=clock.milliseconds,
-            part_names=part_names(self.base, reference, shapes),
-            joint_limits=_numpy(limits)[:K],
+
+def read_settings(folder: Path) -> dict[str, Any]:
+    """Settings of the estimator in a folder.
+
+    Raises
+    ------
+    DatasetError
+        When there is none, or it was written by another version.
+    """
+    if not (folder / _SETTINGS).exists():
+        shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{_SETTINGS}"))) or "none"
+        raise DatasetError(
+            "there is no estimator", folder, f"train one, or use one that comes with the package: {shipped}"
         )
+    # An option, or a figure of its training, may be infinite.
+    settings = read_json(folder / _SETTINGS, _SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
+    if not isinstance(settings, dict) or not isinstance(settings.get("about"), dict):
+        raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
+    if settings.get("format") != _FORMAT:
+        raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, _AGAIN)
+    return settings
 
 
-def _held_together(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes:
-    """What is perceived of one cloud, its labels, or votes, :func:`artperl.coherence.coherent`."""
-    points, diagonal = _numpy(clouds.points.cpu()), float(seen.log_diagonal.exp()[0])
-
-    def together(values: Tensor) -> Tensor:
-        return torch.from_numpy(coherent(points, _numpy(values.cpu()), diagonal))[None]
-
-    if not isinstance(seen, Votes):
-        logits = together(seen.part_logits.softmax(-1)).clamp(min=1e-6).log()
-        return replace(seen, part_logits=logits.to(seen.part_logits))
-    level = seen.level_logits.softmax(-1)
-    moves = 1.0 - level[..., :1]
-    said = torch.cat([seen.box, seen.joint], dim=-1)
-    every = together(torch.cat([level, moves * said, level[..., :1] * said], dim=-1)).to(said)
-    level, moving, still = every.split([level.shape[2], said.shape[2], said.shape[2]], dim=2)
-    # What moves and what does not are no mean of each other, where a walk goes from one to the other.
-    root = level.argmax(-1, keepdim=True) == 0
-    said = torch.where(root, still / level[..., :1], moving / level[..., 1:].sum(-1, keepdim=True))
-    return replace(seen, level_logits=level.clamp(min=1e-6).log(), box=said[..., :6], joint=said[..., 6:])
+_MAX_SETTINGS_BYTES = 16_000_000
+_MAX_TENSOR_BYTES = 4_000_000_000
+_MAX_TENSOR_HEADER = 4_000_000
+"""Bytes of JSON that name the tensors: some hundred of them take a tenth."""
 
 
-def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:
-    """Evidence of one estimate, padded to that many parts, and its unit in metres."""
-    T, K = estimate.T_camera_part, len(estimate.size)
-    slides = np.array(estimate.joint_type)[:, None] == "prismatic"
-    arrays = (
-        np.asarray(points)[seen.chosen], T, np.where(slides, estimate.joint_axis, 0.0),
-        brought_to_rest(estimate.translation, T), estimate.size,
-    )  # fmt: skip
-    cloud, poses, axis, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
-    part = torch.from_numpy(estimate.part[seen.chosen])
-    evidence, unit = Evidence.of(
-        cloud, part, poses, axis, center, size, seen.box_center[:K], seen.box_size[:K], seen.roughness
-    )  # fmt: skip
-    return evidence.padded(rows), float(unit)
+def read_tensors(path: Path) -> dict[str, Tensor]:
+    """Tensors of a safetensors file.
+
+    Raises
+    ------
+    DatasetError
+        When the file is missing, damaged or too large.
+    """
+    data = read_bounded(path, _MAX_TENSOR_BYTES, "weights", DatasetError, fix=_AGAIN)
+    if int.from_bytes(data[:8], "little") > _MAX_TENSOR_HEADER:
+        raise DatasetError("weights cannot be read (the header says that it is huge)", path, _AGAIN)
+    try:
+        return load_tensors(data)
+    except Exception as error:  # safetensors raises what its parser and torch stumble on in bytes that are not theirs
+        raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
-def _transforms(shapes: Shapes, theta: Theta) -> Array:
-    posed = pose_parts(shapes.trees, theta, shapes.box_center)
-    transforms = np.tile(np.eye(4), (posed.rotation.shape[1], 1, 1))
-    transforms[:, :3, :3], transforms[:, :3, 3] = _numpy(posed.rotation), _numpy(posed.translation)
-    return transforms
+def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
+    """Write tensors so that a stop halfway leaves the old file."""
+    write_tensors(tensors, path)
 
 
-def _numpy(values: Tensor) -> Array:
-    """The first row, in double precision."""
-    return values[0].double().numpy()
+def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """Tensors whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

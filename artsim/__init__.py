@@ -5,17 +5,17 @@ Stable names; everything else is private. Heavy backends are imported when first
 
 from __future__ import annotations
 
-from artsim.camera import Camera
 from artsim.datasets.dataset import Dataset, open_dataset
 from artsim.datasets.generate import generate
 from artsim.errors import ArtsimError
 from artsim.families import make
-from artsim.kinematics import KinematicTree
 from artsim.loading.urdf import load
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import Camera
+from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.kinematics import KinematicTree
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import ARTSIM_VERSION, Sample, observe
 from artsim.renderers import Frame, make_renderer, render, render_cameras
-from artsim.sample import ARTSIM_VERSION, Sample, observe
-from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
 
 __version__ = ARTSIM_VERSION
 

@@ -14,12 +14,12 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from artsim.common.extras import explained, of_ours
+from artsim.common.names import PrintableStream, printable
 from artsim.datasets.plan import SampleOptions
-from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
-from artsim.extras import explained, of_ours
 from artsim.loading.roots import PackageRoots
-from artsim.names import PrintableStream, printable
+from artsim.physics.episode import EpisodeOptions
 from artsim.scenes.maker import SceneCameraOptions, SceneOptions
 
 _LISTED = 50
@@ -76,10 +76,10 @@ class Generate:
     """Seconds that an object may take to load."""
 
     def run(self) -> None:
+        from artsim.common.names import printable
         from artsim.datasets.generate import generate
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
-        from artsim.names import printable
 
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
         sources += family_sources(_categories(self.categories), self.objects_per_category, self.first_object)
@@ -178,11 +178,14 @@ class Record:
     episode: Annotated[EpisodeOptions, tyro.conf.arg(name="")] = field(default_factory=EpisodeOptions)
 
     def run(self) -> None:
-        from artsim.record import record
+        from artsim.physics.episode_file import record
 
         episode = replace(self.episode, categories=_categories(self.episode.categories))
         folder = record(self.out, episode, self.motions, self.frames, self.seed)
-        print(f"{folder}: {self.motions} motions of {self.frames} frames; read them with artsim.record.open_motions")
+        print(
+            f"{folder}: {self.motions} motions of {self.frames} frames; "
+            "read them with artsim.physics.episode_file.open_motions"
+        )
 
 
 @dataclass(frozen=True)
@@ -257,7 +260,7 @@ class View:
     """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
-        from artsim.view import view_path
+        from artsim.drawing.view import view_path
 
         for written in view_path(self.path, self.out, self.samples, self.split, self.rerun, self.package_root):
             print(f"wrote {written}")
@@ -279,8 +282,8 @@ class Gallery:
     """PNG to write."""
 
     def run(self) -> None:
-        from artsim.files import write_atomic
-        from artsim.gallery import gallery
+        from artsim.common.files import write_atomic
+        from artsim.drawing.gallery import gallery
         from artsim.loading.sources import family_sources
 
         sources = family_sources(_categories(self.categories), self.objects, self.first_object)
@@ -300,13 +303,13 @@ class Inspect:
     """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
-        from artsim.inspect import describe
+        from artsim.drawing.inspect import describe
         from artsim.loading.urdf import load
 
         obj = load(self.path, package_roots=self.package_root)
         print(describe(obj))
         if self.gates:
-            from artsim.validity import check_file
+            from artsim.checks.validity import check_file
 
             print("\ngates")
             for gate in check_file(obj, self.path, self.package_root):

@@ -14,8 +14,8 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+from artsim.common.extras import explained, install_command
 from artsim.errors import ArtsimError, ConfigError, RenderError
-from artsim.extras import explained, install_command
 
 SIZE = 128
 """Width and height of the pictures that rates are measured with, pixels."""
@@ -120,8 +120,8 @@ def _rate(draw: Callable[[], object]) -> float:
 
 
 def _renderer_fps(name: str) -> float:
-    from artsim.camera import Camera
     from artsim.families import make
+    from artsim.model.camera import Camera
     from artsim.renderers import make_renderer
 
     obj, renderer = make("laptop", seed=0), make_renderer(name)
@@ -169,8 +169,8 @@ def _maniskill() -> tuple[str, float | None]:
 
     import artsim.envs  # noqa: F401 - registers it
     from artsim.envs.maniskill import ENV_ID
+    from artsim.model.draws import ViewOptions
     from artsim.renderers.sapien import import_sapien
-    from artsim.sampling import ViewOptions
 
     device = str(import_sapien().render.RenderSystem().device.name)
     import gymnasium

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from artsim.names import printable
+from artsim.common.names import printable
 
 _MAX_TEXT = 1200
 """Characters of each part of a message: names out of files may be of any length."""

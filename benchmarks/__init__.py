@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from types import TracebackType
 
+from artsim.common.extras import explained, of_ours
 from artsim.errors import ArtsimError
-from artsim.extras import explained, of_ours
 
 
 def _one_line(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

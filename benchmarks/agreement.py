@@ -21,13 +21,13 @@ import tyro
 from numpy.typing import NDArray
 
 from artsim import make_renderer
+from artsim.common.progress import track
 from artsim.errors import RenderError
 from artsim.families import FAMILIES
 from artsim.loading.sources import Source, family_sources, find_sources
-from artsim.objects import ArticulatedObject
-from artsim.progress import track
+from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, Renderer
-from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
 from benchmarks.differences import CLASSES, Scene, classify, near_edge
 
 LIMITS = {

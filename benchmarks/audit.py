@@ -26,14 +26,14 @@ import tyro
 from scipy.spatial import cKDTree
 
 from artsim import make
+from artsim.checks.validity import check_file
+from artsim.common.progress import track
 from artsim.errors import ArtsimError
 from artsim.export import export
 from artsim.families import FAMILIES
-from artsim.kinematics import Array
 from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
-from artsim.objects import ArticulatedObject
-from artsim.progress import track
-from artsim.validity import check_file
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
 
 NEAR = 0.01
 """Chamfer distance of near-duplicates, over the diagonal."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.doctor import examine
 from artsim.errors import RenderError
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers.views import draw_views
 from artsim.renderers.warp import WarpRenderer, import_warp
 

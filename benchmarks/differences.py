@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
-from artsim.camera import Camera
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import Camera
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame
 from artsim.renderers.raycast import pose, render_posed
 

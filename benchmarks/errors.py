@@ -25,22 +25,22 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from artperl import metrics
-from artperl.benchmarks.artimage import real_objects
-from artperl.benchmarks.rows import find_estimator
-from artperl.categories import ARTIMAGE, objects_of
-from artperl.data import Clouds
-from artperl.estimate import Estimate
-from artperl.estimator import Estimator
-from artperl.evaluation import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
-from artperl.networks.perception import Perceived
-from artperl.pictures import overlays
-from artperl.search import Clock
+from artperl.core.estimate import Estimate
+from artperl.data.batches import Clouds
+from artperl.data.categories import ARTIMAGE, objects_of
+from artperl.evaluation import metrics
+from artperl.evaluation.artimage import real_objects
+from artperl.evaluation.benchmark_rows import find_estimator
+from artperl.evaluation.pictures import overlays
+from artperl.evaluation.scoring import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
+from artperl.fitting.search import Clock
+from artperl.methods.full import Estimator
+from artperl.perception.network import Perceived
+from artsim.common.files import atomic_file, write_atomic
+from artsim.common.progress import track
 from artsim.errors import ConfigError
-from artsim.files import atomic_file, write_atomic
-from artsim.objects import ArticulatedObject
-from artsim.progress import track
-from artsim.sample import Sample
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 
 Array = NDArray[np.float64]
 BINS = {"points": (0, 80, 400, 1200, NUM_POINTS + 1), "percent moved": (0, 10, 30, 101)}

@@ -18,18 +18,18 @@ import torch
 import tyro
 from torch import nn
 
-from artperl.actions import NUM_AXES, NUM_BINS
-from artperl.categories import objects_of
-from artperl.data import batches
-from artperl.embedding import by_boxes
-from artperl.fitting import Fitting, FittingOptions
-from artperl.networks.agent import Agent
-from artperl.networks.perception import Perception, perception_losses
-from artperl.ppo import PPOOptions, collect, update
-from artperl.problems import Problem, Problems
-from artperl.retrieval import ShapeBase
-from artperl.steps import autocast
-from artperl.training import BASE_SEEDS
+from artperl.agent.actions import NUM_AXES, NUM_BINS
+from artperl.agent.decision_process import Fitting, FittingOptions
+from artperl.agent.policy import Agent
+from artperl.agent.ppo import PPOOptions, collect, update
+from artperl.data.batches import batches
+from artperl.data.categories import objects_of
+from artperl.data.fitting_problems import Problem, Problems
+from artperl.perception.network import Perception, perception_losses
+from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.run import BASE_SEEDS
+from artperl.training.steps import autocast
 
 
 @dataclass(frozen=True)

@@ -24,14 +24,14 @@ import numpy as np
 import tyro
 
 from artsim import Camera, StateOptions, ViewOptions, generate, load, make_renderer, observe, sample_state, sample_view
+from artsim.common.progress import track
 from artsim.datasets.plan import SampleOptions, draw_sample
-from artsim.kinematics import Array
 from artsim.loading.sources import find_sources
-from artsim.object_file import ObjectCache, save_object
-from artsim.objects import ArticulatedObject
-from artsim.progress import track
+from artsim.model.kinematics import Array
+from artsim.model.object_file import ObjectCache, save_object
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import draw_visible
 from artsim.renderers.raycast import cast, pose
-from artsim.sample import draw_visible
 from benchmarks.demo_objects import demo_paths
 
 Scene = tuple[ArticulatedObject, Array, Camera]

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from artperl.benchmarks.artimage import row_samples
-from artperl.benchmarks.rows import find_estimator
-from artperl.categories import ARTIMAGE
+from artperl.data.categories import ARTIMAGE
+from artperl.evaluation.artimage import row_samples
+from artperl.evaluation.benchmark_rows import find_estimator
 
 WARM_UP = 5
 

@@ -19,8 +19,8 @@ from pathlib import Path
 import tyro
 
 from artsim import load
+from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
-from artsim.progress import track
 
 
 @dataclass(frozen=True)

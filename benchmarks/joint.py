@@ -16,10 +16,10 @@ from typing import Any
 import torch
 import tyro
 
-from artperl.benchmarks.basin import Joints, basin_problem, run_basin
-from artperl.checkpoint import load_estimator
-from artperl.pose import KINDS
-from artperl.problems import Labels
+from artperl.core.pose import KINDS
+from artperl.data.fitting_problems import Labels
+from artperl.estimator import load_estimator
+from artperl.evaluation.basin import Joints, basin_problem, run_basin
 
 LABELS: tuple[Labels, ...] = ("true", "perceived")
 JOINTS: dict[Joints, str] = {"halfway": "half-way", "near": "off by up to as much"}

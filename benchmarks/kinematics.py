@@ -22,13 +22,13 @@ import tyro
 from lxml import etree
 
 from artsim import load
-from artsim.kinematics import Array, invert_transform
+from artsim.common.progress import track
 from artsim.loading.sources import find_sources
-from artsim.objects import ArticulatedObject
-from artsim.progress import track
+from artsim.model.draws import StateOptions, sample_state
+from artsim.model.kinematics import Array, invert_transform
+from artsim.model.objects import ArticulatedObject
+from artsim.physics.simulators import LinkPoses, poses_in_file
 from artsim.renderers.bullet import import_pybullet, silent
-from artsim.sampling import StateOptions, sample_state
-from artsim.simulators import LinkPoses, poses_in_file
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """What the overlap of boxes by OMAD's definition is worth: ``python -m benchmarks.legacy_iou``.
 
 Published figures for ArtImage come from a routine that compares boxes in the rest frame, and takes one coordinate of
-one corner from another axis (:func:`artperl.boxes.iou_omad_legacy`). So its value depends on how the frame lies and on
-where in it a part is; of thin parts, on little else. ArtImage's frames have y up: blades of scissors point along x, and
-other objects have x to the side. Whether z points to the front or to the back is not published. Printed for each part:
-mean exact overlap at rest, which no frame changes, and the routine's, in the frame of our tables and in others. The
-last line is one JSON object.
+one corner from another axis (:func:`artperl.evaluation.box_overlap.iou_omad_legacy`). So its value depends on how the
+frame lies and on where in it a part is; of thin parts, on little else. ArtImage's frames have y up: blades of scissors
+point along x, and other objects have x to the side. Whether z points to the front or to the back is not published.
+Printed for each part: mean exact overlap at rest, which no frame changes, and the routine's, in the frame of our tables
+and in others. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from artperl.benchmarks.artimage import OBJECTS, Row, row_samples
-from artperl.benchmarks.rows import PUBLISHED, find_estimator
-from artperl.categories import ARTIMAGE
-from artperl.estimator import Estimator
-from artperl.evaluation import rest_centers
-from artperl.metrics import iou_omad_legacy, iou_rest_exact
-from artsim.progress import track
-from artsim.sample import Sample
+from artperl.data.categories import ARTIMAGE
+from artperl.evaluation.artimage import OBJECTS, Row, row_samples
+from artperl.evaluation.benchmark_rows import PUBLISHED, find_estimator
+from artperl.evaluation.metrics import iou_omad_legacy, iou_rest_exact
+from artperl.evaluation.scoring import rest_centers
+from artperl.methods.full import Estimator
+from artsim.common.progress import track
+from artsim.observing.sample import Sample
 
 FRAMES = {
     "as in our tables: x back, z up": np.eye(3),

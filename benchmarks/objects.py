@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 import tyro
 
 from artsim import make
+from artsim.checks.validity import check
+from artsim.common.progress import say, track
 from artsim.families import FAMILIES
-from artsim.progress import say, track
-from artsim.validity import check
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """How near procedural objects come to real ones: ``python -m benchmarks.realism --partnet DIR``.
 
-For every category with real objects, 500 procedural objects are compared with the real ones of the dev half of a
-frozen split: surfaces, boxes, joint placement and joint ranges, at a diagonal of 1 (:mod:`artsim.realism` says how).
-A table per category shows the median distance between two real objects (the yardstick), the share of real objects
-that are the nearest one of some procedural object (COV), the mean distance of a real object's nearest procedural one
-(MMD), and how many real objects have a procedural neighbour within the yardstick. The last line is one JSON object.
+For every category with real objects, 500 procedural objects are compared with the real ones of the dev half of a frozen
+split: surfaces, boxes, joint placement and joint ranges, at a diagonal of 1 (:mod:`artsim.checks.realism` says how). A
+table per category shows the median distance between two real objects (the yardstick), the share of real objects that
+are the nearest one of some procedural object (COV), the mean distance of a real object's nearest procedural one (MMD),
+and how many real objects have a procedural neighbour within the yardstick. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -22,11 +22,7 @@ import numpy as np
 import tyro
 
 from artsim import make
-from artsim.errors import ConfigError
-from artsim.families import FAMILIES
-from artsim.kinematics import Array
-from artsim.progress import track
-from artsim.realism import (
+from artsim.checks.realism import (
     MEASURES,
     REAL,
     Half,
@@ -40,6 +36,10 @@ from artsim.realism import (
     read_split,
     real_objects,
 )
+from artsim.common.progress import track
+from artsim.errors import ConfigError
+from artsim.families import FAMILIES
+from artsim.model.kinematics import Array
 
 SPLIT = Path(__file__).parent / "splits" / "partnet_dev.json"
 

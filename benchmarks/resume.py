@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from artsim.files import file_sha256
+from artsim.common.files import file_sha256
 from benchmarks.demo_objects import ASSETS
 
 ROOT = ASSETS.parent

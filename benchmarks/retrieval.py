@@ -17,18 +17,18 @@ import torch
 import tyro
 from torch import Tensor
 
-from artperl.benchmarks.artimage import row_samples
-from artperl.benchmarks.rows import find_estimator
-from artperl.categories import ARTIMAGE, objects_of
-from artperl.data import Clouds, Samples
-from artperl.embedding import box_embedding
-from artperl.estimator import Estimator
-from artperl.evaluation import TEST_SEEDS
-from artperl.networks.siamese import Siamese, contrastive_loss
-from artperl.shapes import Shapes
-from artperl.steps import one_cycle, set_rate
+from artperl.core.shapes import Shapes
+from artperl.data.batches import Clouds, Samples
+from artperl.data.categories import ARTIMAGE, objects_of
+from artperl.evaluation.artimage import row_samples
+from artperl.evaluation.benchmark_rows import find_estimator
+from artperl.evaluation.scoring import TEST_SEEDS
+from artperl.methods.full import Estimator
+from artperl.retrieval.box_embedding import box_embedding
+from artperl.retrieval.siamese import Siamese, contrastive_loss
+from artperl.training.steps import one_cycle, set_rate
+from artsim.common.progress import track
 from artsim.datasets.plan import SampleOptions
-from artsim.progress import track
 
 POINTS = 512
 OBJECTS = 800

@@ -21,13 +21,13 @@ import pybullet_data
 import torch
 import tyro
 
-from artperl.benchmarks.ablation import variants
-from artperl.checkpoint import load_estimator
-from artperl.evaluation import evaluate, samples_of, summary
-from artperl.settings import PRESETS
-from artperl.training import Training
+from artperl.estimator import load_estimator
+from artperl.evaluation.ablation import variants
+from artperl.evaluation.scoring import evaluate, samples_of, summary
+from artperl.training.options import PRESETS
+from artperl.training.run import Training
+from artsim.common.files import write_atomic
 from artsim.datasets.plan import SampleOptions
-from artsim.files import write_atomic
 from artsim.loading.urdf import load
 
 PUBLISHED = {

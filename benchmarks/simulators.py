@@ -16,10 +16,10 @@ from pathlib import Path
 import tyro
 
 from artsim import make
+from artsim.common.progress import say, track
 from artsim.export import export
 from artsim.families import FAMILIES
-from artsim.progress import say, track
-from artsim.simulators import AGREEMENT, Agreement, compare_simulators
+from artsim.physics.simulators import AGREEMENT, Agreement, compare_simulators
 
 
 @dataclass(frozen=True)

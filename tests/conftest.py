@@ -17,13 +17,13 @@ import pytest
 import trimesh
 from hypothesis import settings
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute, screw
 from artsim.errors import RenderError
 from artsim.families import make
-from artsim.kinematics import Joint, KinematicTree
-from artsim.objects import ArticulatedObject, Part
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
+from artsim.making.solids import box, cylinder, ring
+from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers import Renderer, make_renderer
-from artsim.solids import box, cylinder, ring
 
 T = TypeVar("T")
 ASSETS = Path(__file__).resolve().parent.parent / "urdf_assets"

@@ -18,25 +18,25 @@ from artsim.errors import ArtsimError
 
 def load(path: Path) -> str:
     import artsim
-    from artsim.inspect import describe
+    from artsim.drawing.inspect import describe
 
     return describe(artsim.load(path))
 
 
 def view(path: Path) -> str:
-    from artsim.view import view_path
+    from artsim.drawing.view import view_path
 
     return " ".join(str(written.absolute()) for written in view_path(path, samples=1))
 
 
 def base(path: Path) -> str:
-    from artperl.retrieval import ShapeBase
+    from artperl.retrieval.shape_base import ShapeBase
 
     return f"{len(ShapeBase.load(path))} objects"
 
 
 def estimator(path: Path) -> str:
-    from artperl.checkpoint import load_estimator
+    from artperl.estimator import load_estimator
 
     return str(load_estimator(path).options)
 
@@ -48,7 +48,7 @@ def dataset(path: Path) -> str:
 
 
 def motions(path: Path) -> str:
-    from artsim.record import open_motions
+    from artsim.physics.episode_file import open_motions
 
     return f"{len(open_motions(path))} motions"
 
@@ -66,7 +66,7 @@ def points(path: Path) -> str:
 
 
 def image(path: Path) -> str:
-    from artsim.files import open_image
+    from artsim.common.files import open_image
 
     return str(open_image(path).size)
 
@@ -107,6 +107,6 @@ if __name__ == "__main__":
 
     wanted = [(kind, Path(path)) for kind, path in json.loads(sys.argv[1])]
     if any(kind in ("base", "estimator", "points", "intrinsics") for kind, _ in wanted):
-        import artperl.checkpoint
+        import artperl.estimator
         import artperl.inputs  # noqa: F401  # as above
     print(json.dumps([forked(kind, path) for kind, path in wanted]))

@@ -14,8 +14,8 @@ import artsim
 from artsim.datasets.plan import SampleOptions
 from artsim.families import CATEGORIES, make
 from artsim.loading.sources import Source, family_sources, find_sources
-from artsim.objects import ArticulatedObject
-from artsim.sampling import StateOptions, ViewOptions
+from artsim.model.draws import StateOptions, ViewOptions
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS
 
 NUM_SAMPLES = 120

@@ -18,14 +18,14 @@ from artsim.appearance.finishes import FINISHES, draw_coats, draw_material, piec
 from artsim.appearance.painted import painted_coats
 from artsim.appearance.textures import TEXTURES, noise
 from artsim.loading.sources import find_sources
-from artsim.objects import Part
+from artsim.making.solids import box, cylinder
+from artsim.model.objects import Part
 from artsim.renderers import Renderer
 from artsim.renderers.base import two_sided_faces
 from artsim.renderers.sapien import SapienRenderer
+from artsim.renderers.scene import Scene, Thing
 from artsim.renderers.scenes import render_scene
 from artsim.scenes.props import placed
-from artsim.scenes.scene import Scene, Thing
-from artsim.solids import box, cylinder
 from tests.conftest import backend, rigid, solid
 
 MATT = Material((0.6, 0.4, 0.2), roughness=1.0, specular=0.0)

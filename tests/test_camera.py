@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from artsim.camera import Camera, look_at_transform, points_from_depth
 from artsim.errors import ConfigError
+from artsim.model.camera import Camera, look_at_transform, points_from_depth
 
 
 def camera(seed: int) -> Camera:

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from artsim.assembly import Assembly, prismatic, revolute
-from artsim.collision import PENETRATION, Sweep, sweep_states
-from artsim.objects import ArticulatedObject
-from artsim.solids import Solid, box, tray
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import Solid, box, tray
+from artsim.model.collision import PENETRATION, Sweep, sweep_states
+from artsim.model.objects import ArticulatedObject
 
 
 def assembly(*parts: tuple[str, Solid, object]) -> ArticulatedObject:

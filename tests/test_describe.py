@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.describe import HEIGHT, WIDTH, table
-from artsim.kinematics import Joint, KinematicTree
-from artsim.objects import ArticulatedObject, Part, Repair
-from artsim.sample import Sample
+from artsim.model.describe import HEIGHT, WIDTH, table
+from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.objects import ArticulatedObject, Part, Repair
+from artsim.observing.sample import Sample
 from tests.conftest import ASSETS, valve
 
 HOSTILE = "\x1b[2J\x1b]0;owned\x07\nrm -rf\u202e" + "x" * 300

@@ -10,8 +10,8 @@ import trimesh
 
 import artsim
 from artsim import Camera
-from artsim.kinematics import Joint, KinematicTree
-from artsim.objects import ArticulatedObject
+from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers import BACKGROUND, Frame, render
 from benchmarks.agreement import LIMITS, Agreement
 from benchmarks.differences import CLASSES, Scene, classify, grazing, slivers

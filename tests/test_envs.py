@@ -13,15 +13,15 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
 
 import artsim.envs
-from artsim.camera import Camera
 from artsim.datasets.verify import sample_problems
 from artsim.envs.articulated import ArticulatedEnv
-from artsim.episode import openness
 from artsim.errors import ArtsimError, ConfigError
 from artsim.families import make
-from artsim.kinematics import invert_transform
-from artsim.objects import ArticulatedObject
-from artsim.sampling import ViewOptions
+from artsim.model.camera import Camera
+from artsim.model.draws import ViewOptions
+from artsim.model.kinematics import invert_transform
+from artsim.model.objects import ArticulatedObject
+from artsim.physics.episode import openness
 from tests.conftest import ASSETS
 
 ID = "artsim/Articulated-v0"

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from artsim.assembly import Assembly, revolute
+from artsim.checks.strict_urdf import strict_kinematics, strict_urdf
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, export
 from artsim.export.robot import HELPER_SHARE, as_robot
 from artsim.export.usd import frame_along, principal_axes
 from artsim.families import FAMILIES, make
-from artsim.inertia import part_inertia
-from artsim.kinematics import Array, KinematicTree, transform_points
 from artsim.loading.urdf import load
-from artsim.objects import ArticulatedObject
-from artsim.solids import box
-from artsim.strict import strict_kinematics, strict_urdf
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import box
+from artsim.model.inertia import part_inertia
+from artsim.model.kinematics import Array, KinematicTree, transform_points
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS, installed, valve
 
 rng = np.random.default_rng(0)

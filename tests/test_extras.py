@@ -18,8 +18,8 @@ import pytest
 import artperl.cli
 import artsim
 import artsim.cli
+from artsim.common.extras import MODULES, explained, install_command, needs
 from artsim.errors import ConfigError, RenderError
-from artsim.extras import MODULES, explained, install_command, needs
 from artsim.renderers import RENDERERS
 from tests.conftest import ASSETS, BOX_LAPTOP, absent
 from tests.without import beyond_the_core, distributions_of, environment, normal
@@ -64,17 +64,17 @@ CALLS = {
     **{f"import artsim; artsim.make_renderer({name!r})": name.partition("-")[0] for name in RENDERERS[1:]},
     "import artperl; artperl.load_estimator('laptop')": "train",
     "import artsim.envs": "envs",
-    "import artperl.envs": "train",
-    "import artperl.training": "train",
-    "import artsim.collision": "sim",
-    "import artsim.validity": "sim",
+    "import artperl.training.gym_env": "train",
+    "import artperl.training.run": "train",
+    "import artsim.model.collision": "sim",
+    "import artsim.checks.validity": "sim",
     "import artsim; from artsim.export import export; export(artsim.make('globe'), 'e', ('mjcf',))": "sim",
     "import artsim; from artsim.export import export; export(artsim.make('globe'), 'e', ('usd',))": "sim",
-    "import artsim; from artsim.physics import Simulation; Simulation(artsim.make('globe'))": "pybullet",
-    "from artsim.view import contact_sheet; contact_sheet([])": "view",
-    "from artsim.recording import write_recording; write_recording([], None)": "view",
-    "from pathlib import Path; from artsim.simulators import in_mujoco; in_mujoco(Path('box.urdf'))": "sim",
-    "from pathlib import Path; from artsim.simulators import in_pybullet; in_pybullet(Path('box.urdf'))": "pybullet",
+    "import artsim; from artsim.physics.world import Simulation; Simulation(artsim.make('globe'))": "pybullet",
+    "from artsim.drawing.view import contact_sheet; contact_sheet([])": "view",
+    "from artsim.drawing.rerun_recording import write_recording; write_recording([], None)": "view",
+    "from pathlib import Path; from artsim.physics.simulators import in_mujoco; in_mujoco(Path('box.urdf'))": "sim",
+    "from pathlib import Path; from artsim.physics.simulators import in_pybullet as f; f(Path('box.urdf'))": "pybullet",
 }
 """Calls from Python, and the extra that each wants."""
 
@@ -291,8 +291,8 @@ def test_the_command_fits_where_the_package_runs(tmp_path: Path, monkeypatch: py
     assert install_command().endswith("pip install -e .")
     monkeypatch.chdir(tmp_path)
     assert install_command("train").endswith(f"pip install -e '{ROOT}[train]'")
-    installed = tmp_path / "site-packages" / "artsim" / "extras.py"
-    monkeypatch.setattr("artsim.extras.__file__", str(installed))
+    installed = tmp_path / "site-packages" / "artsim" / "common" / "extras.py"
+    monkeypatch.setattr("artsim.common.extras.__file__", str(installed))
     assert install_command("train,view").endswith("pip install 'artsim[train,view]'")
     with pytest.raises(ConfigError, match=r"Fix: .*pip install artsim$"), needs("films"):
         raise ModuleNotFoundError("No module named 'no_such_module'", name="no_such_module")

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import artsim
+from artsim.checks.validity import check
 from artsim.datasets.stream import FamilyStream
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.sources import FamilySource
-from artsim.validity import check
 from benchmarks.audit import Outcome, audit
 from tests.conftest import in_another_process
 

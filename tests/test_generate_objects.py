@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from artsim.checks.strict_urdf import strict_urdf
 from artsim.errors import ConfigError, DatasetError
 from artsim.export import FORMATS, export
 from artsim.export.batch import generate_objects
 from artsim.families import make
-from artsim.strict import strict_urdf
 from tests.conftest import installed
 
 

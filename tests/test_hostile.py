@@ -20,10 +20,10 @@ import pytest
 
 import artsim
 from artsim.cli import main
+from artsim.common.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
+from artsim.common.names import printable, safe_name
+from artsim.common.plain import from_plain
 from artsim.errors import ArtsimError, AssetError
-from artsim.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
-from artsim.names import printable, safe_name
-from artsim.plain import from_plain
 from tests.conftest import ASSETS
 
 CASES = Path(__file__).parent / "cases" / "hostile"
@@ -365,7 +365,7 @@ def test_a_file_is_read_up_to_its_limit_and_no_further(tmp_path: Path) -> None:
 
 
 def test_a_recording_names_its_motions_and_no_other_files(tmp_path: Path) -> None:
-    from artsim.record import open_motions
+    from artsim.physics.episode_file import open_motions
 
     for name in ("../../secret", "/etc/passwd", 7, None, "", "a" * 300):
         motion = {"name": name, "joint_state": [[0.0]], "joint_velocity": [[0.0]]}
@@ -377,7 +377,7 @@ def test_a_recording_names_its_motions_and_no_other_files(tmp_path: Path) -> Non
 
 def resaved(path: Path, **changes: Any) -> Path:
     """An object file with other arrays, or, for what is no array, another header."""
-    from artsim.object_file import save_object
+    from artsim.model.object_file import save_object
 
     save_object(artsim.load(ASSETS / "laptop"), path)
     with np.load(path) as archive:
@@ -440,7 +440,7 @@ def test_a_damaged_object_file_is_refused(changes: dict[str, Any], text: str, tm
 
 
 def test_a_value_of_another_type_is_named() -> None:
-    from artperl.search import EstimatorOptions
+    from artperl.fitting.search import EstimatorOptions
 
     assert from_plain(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
     assert from_plain(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from artsim.assembly import Assembly, prismatic
 from artsim.errors import AssetError
 from artsim.families import FAMILIES, make
-from artsim.inertia import joined_inertia, part_inertia
 from artsim.loading.urdf import load
-from artsim.objects import ArticulatedObject
-from artsim.solids import Solid, box
+from artsim.making.assembly import Assembly, prismatic
+from artsim.making.solids import Solid, box
+from artsim.model.inertia import joined_inertia, part_inertia
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS, valve
 
 

@@ -13,15 +13,15 @@ import pytest
 import trimesh
 
 import artsim.envs  # noqa: F401  # registers the task
-from artsim.camera import Camera
-from artsim.episode import openness
 from artsim.errors import AssetError, ConfigError
 from artsim.families import make
-from artsim.kinematics import invert_transform, transform_points
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import Camera
+from artsim.model.draws import joint_intervals
+from artsim.model.kinematics import invert_transform, transform_points
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import observe
+from artsim.physics.episode import openness
 from artsim.renderers import BACKGROUND, render
-from artsim.sample import observe
-from artsim.sampling import joint_intervals
 from tests.conftest import ASSETS, backend, installed, rigid, valve
 from tests.without import environment
 

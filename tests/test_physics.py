@@ -15,11 +15,11 @@ from artsim.export.mjcf import mjcf_text
 from artsim.export.robot import as_robot
 from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
-from artsim.inertia import joined_inertia, part_inertia
-from artsim.kinematics import Array, KinematicTree
 from artsim.loading.sources import find_sources
-from artsim.objects import ArticulatedObject
-from artsim.physics import PhysicsOptions, Simulation
+from artsim.model.inertia import joined_inertia, part_inertia
+from artsim.model.kinematics import Array, KinematicTree
+from artsim.model.objects import ArticulatedObject
+from artsim.physics.world import PhysicsOptions, Simulation
 from artsim.renderers.bullet import import_pybullet
 from tests.conftest import DEMO
 

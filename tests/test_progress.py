@@ -10,12 +10,12 @@ import termios
 
 import pytest
 
-from artsim import progress
-from artsim.progress import Lines, say, track
+from artsim.common import progress
+from artsim.common.progress import Lines, say, track
 
 SCRIPT = """
 import time
-from artsim import progress
+from artsim.common import progress
 progress.EVERY = 0.05
 with progress.track("views", total=4, initial=1, unit="view") as bar:
     for _ in range(3):

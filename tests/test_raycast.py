@@ -11,13 +11,13 @@ from scipy.stats import chi2, chisquare
 
 import artsim
 from artsim import Camera, StateOptions, ViewOptions, observe, render, sample_state, sample_view
-from artsim.camera import points_from_depth
 from artsim.errors import ConfigError, RenderError
-from artsim.kinematics import Joint
-from artsim.objects import Part
+from artsim.model.camera import points_from_depth
+from artsim.model.kinematics import Joint
+from artsim.model.objects import Part
+from artsim.observing.sample import draw_visible
 from artsim.renderers import BACKGROUND, make_renderer
 from artsim.renderers.raycast import bounding_corners, cast, pose
-from artsim.sample import draw_visible
 from tests.conftest import ASSETS, DEMO, rigid, solid
 
 

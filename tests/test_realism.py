@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.assembly import Assembly, JointSpec, prismatic, revolute
-from artsim.errors import AssetError
-from artsim.objects import ArticulatedObject
-from artsim.realism import (
+from artsim.checks.realism import (
     MEASURES,
     REAL,
     Realism,
@@ -23,7 +20,10 @@ from artsim.realism import (
     read_split,
     real_objects,
 )
-from artsim.solids import Solid, box
+from artsim.errors import AssetError
+from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
+from artsim.making.solids import Solid, box
+from artsim.model.objects import ArticulatedObject
 
 SPLIT = Path(__file__).parent.parent / "benchmarks" / "splits" / "partnet_dev.json"
 SURFACE, PARTS, BOXES, JOINTS, RANGES = range(5)

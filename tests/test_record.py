@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from artsim.camera import Camera
 from artsim.datasets.verify import sample_problems
-from artsim.episode import EpisodeOptions
 from artsim.errors import ArtsimError
-from artsim.record import Motion, carried, open_motions, record
-from artsim.sampling import ViewOptions
+from artsim.model.camera import Camera
+from artsim.model.draws import ViewOptions
+from artsim.physics.episode import EpisodeOptions
+from artsim.physics.episode_file import Motion, carried, open_motions, record
 from tests.conftest import ASSETS
 
 OPTIONS = EpisodeOptions(

@@ -22,11 +22,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import artsim
-from artsim import elementary, products
+from artsim.common import elementary, products
 from artsim.families import CATEGORIES
-from artsim.kinematics import Array
 from artsim.loading.primitives import capsule, cylinder, sphere
 from artsim.loading.xml_values import rotation_of
+from artsim.model.kinematics import Array
 from tests.reproduce import NUM_SAMPLES
 
 ROOT = Path(artsim.__file__).resolve().parent
@@ -239,4 +239,4 @@ def test_nothing_on_the_way_to_the_bytes_depends_on_the_processor(file: Path) ->
     found = [
         (line, what) for line, what in named(ast.parse("\n".join(lines))) if 'kind="stable"' not in lines[line - 1]
     ]
-    assert not found, f"use artsim.elementary, artsim.products, or argsort(..., kind='stable'): {found}"
+    assert not found, f"use artsim.common.elementary, artsim.common.products, or argsort(..., kind='stable'): {found}"

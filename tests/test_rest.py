@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
-from artsim.kinematics import Joint, KinematicTree, transform_points
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.sources import find_sources
-from artsim.objects import ArticulatedObject
+from artsim.model.kinematics import Joint, KinematicTree, transform_points
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS, solid
 
 

@@ -13,12 +13,12 @@ from trimesh.proximity import closest_point
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.verify import sample_problems
-from artsim.kinematics import invert_transform, transform_points
 from artsim.loading.sources import find_sources
-from artsim.objects import ArticulatedObject
+from artsim.model.draws import ViewPreset, bounding_sphere, joint_intervals, sample_scale
+from artsim.model.kinematics import invert_transform, transform_points
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 from artsim.renderers.base import BACKGROUND
-from artsim.sample import Sample
-from artsim.sampling import ViewPreset, bounding_sphere, joint_intervals, sample_scale
 from tests.conftest import ASSETS, DEMO
 
 REAL = ("Laptop", "Eyeglasses", "Dishwasher", "StorageFurniture", "Box", "Oven", "Faucet", "Knife")
@@ -107,8 +107,8 @@ def test_the_visible_fraction_is_visible_over_amodal_pixels() -> None:
     assert observe(obj, [0.0, 0.0], camera).visible_fraction == pytest.approx([0.5, 1.0], abs=0.05)
 
 
-def _slide() -> list[artsim.kinematics.Joint]:
-    return [artsim.kinematics.Joint("slide", "prismatic", 0, lower=-1.0, upper=1.0)]
+def _slide() -> list[artsim.model.kinematics.Joint]:
+    return [artsim.model.kinematics.Joint("slide", "prismatic", 0, lower=-1.0, upper=1.0)]
 
 
 def test_images_agree_with_the_cloud() -> None:

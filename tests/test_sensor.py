@@ -14,13 +14,13 @@ from artsim import Camera, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.verify import sample_problems, verify
 from artsim.errors import ConfigError
-from artsim.kinematics import Array
 from artsim.loading.sources import find_sources
-from artsim.noise import AxialNoise, DisparityQuantisation, EdgeDropout, FlyingPixels, LateralJitter, View
-from artsim.objects import ArticulatedObject
+from artsim.model.draws import StateOptions
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.noise import AxialNoise, DisparityQuantisation, EdgeDropout, FlyingPixels, LateralJitter, View
+from artsim.observing.sensor import SENSORS, Sensor
 from artsim.renderers import BACKGROUND
-from artsim.sampling import StateOptions
-from artsim.sensor import SENSORS, Sensor
 from tests.conftest import ASSETS
 
 DEPTHS = (0.6, 1.0, 1.7, 2.5, 4.0)

@@ -10,8 +10,8 @@ import pytest
 
 from artsim.export import export
 from artsim.families import FAMILIES, make
-from artsim.kinematics import KinematicTree
-from artsim.simulators import AGREEMENT, SIMULATORS, compare_simulators
+from artsim.model.kinematics import KinematicTree
+from artsim.physics.simulators import AGREEMENT, SIMULATORS, compare_simulators
 from tests.conftest import ASSETS, installed, valve
 
 
@@ -55,7 +55,7 @@ def test_a_joint_that_differs_is_found(simulator: str, tmp_path: Path, monkeypat
     x, y, z = obj.native_tree.joints[1].origin
     moved = replace(obj.native_tree.joints[1], origin=(x + 1e-4, y, z))
     obj = replace(obj, native_tree=KinematicTree([obj.native_tree.joints[0], moved]))
-    monkeypatch.setattr("artsim.simulators.load", lambda file: obj)
+    monkeypatch.setattr("artsim.physics.simulators.load", lambda file: obj)
     (found,) = compare_simulators(tmp_path, states=2, simulators=[simulator])
     assert found.metres > 1e-5
     assert "from where artsim does" in found.problem
@@ -68,8 +68,8 @@ def test_a_file_that_does_not_load_is_a_finding(
     export(obj, tmp_path)
     file = tmp_path / "mobility.urdf"
     file.write_text(file.read_text().replace('<child link="lid"/>', '<child link="nobody"/>'))
-    monkeypatch.setattr("artsim.simulators.load", lambda file: obj)
-    monkeypatch.setattr("artsim.simulators.poses_in_file", lambda file: lambda values: {})
+    monkeypatch.setattr("artsim.physics.simulators.load", lambda file: obj)
+    monkeypatch.setattr("artsim.physics.simulators.poses_in_file", lambda file: lambda values: {})
     (found,) = compare_simulators(tmp_path, simulators=[simulator])
     assert found.problem.startswith("does not load it")
     assert np.isinf(found.metres)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from artsim.checks.strict_urdf import strict_kinematics, strict_urdf
 from artsim.export import export
-from artsim.kinematics import Joint, KinematicTree
-from artsim.strict import strict_kinematics, strict_urdf
+from artsim.model.kinematics import Joint, KinematicTree
 from tests.conftest import ASSETS, valve
 
 Mutation = Callable[[etree._Element], object]

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from artsim.kinematics import Array
 from artsim.loading.urdf import load
-from artsim.objects import ArticulatedObject, Part
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject, Part
 from tests.conftest import ASSETS, DEMO
 
 INF, QUARTER = np.inf, np.pi / 2

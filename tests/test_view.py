@@ -13,9 +13,7 @@ from scipy.spatial import ConvexHull, Delaunay
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.plan import SampleOptions
-from artsim.errors import ArtsimError
-from artsim.loading.sources import find_sources
-from artsim.view import (
+from artsim.drawing.view import (
     PALETTE,
     axis_segment,
     box_corners,
@@ -26,6 +24,8 @@ from artsim.view import (
     spread,
     view_path,
 )
+from artsim.errors import ArtsimError
+from artsim.loading.sources import find_sources
 from tests.conftest import ASSETS
 
 

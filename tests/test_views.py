@@ -9,12 +9,12 @@ import pytest
 from scipy.stats import ks_2samp
 
 from artsim import StateOptions, ViewOptions, make, sample_state, sample_view
-from artsim.camera import look_at_transform
 from artsim.errors import ConfigError
-from artsim.kinematics import invert_transform
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import look_at_transform
+from artsim.model.draws import ViewPreset, bounding_sphere
+from artsim.model.kinematics import invert_transform
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers.views import draw_views
-from artsim.sampling import ViewPreset, bounding_sphere
 
 COUNT = 1500
 CAMERAS = ViewOptions(width=160, height=120)

@@ -18,8 +18,8 @@ import artsim
 from artsim import Camera, StateOptions, make, make_renderer, observe, sample_state
 from artsim.errors import ArtsimError, ConfigError, KinematicsError
 from artsim.families import FAMILIES
-from artsim.kinematics import Joint
-from artsim.objects import ArticulatedObject, Part
+from artsim.model.kinematics import Joint
+from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers import BACKGROUND, Frame, render_cameras
 from artsim.renderers.raycast import pose
 from artsim.renderers.views import Views

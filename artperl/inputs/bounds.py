@@ -16,8 +16,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.files import npy_header, read_bounded
 from artsim.errors import ArtsimError, ConfigError
-from artsim.files import npy_header, read_bounded
 
 MAX_BYTES = 80_000_000
 """Of a file: it is held beside its values as doubles."""

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from artperl.inputs.bounds import read_npy, read_npz
 from artperl.inputs.images import read_picture
 from artperl.inputs.intrinsics import check_matrix
-from artsim.camera import Camera
 from artsim.errors import ArtsimError, ConfigError
+from artsim.model.camera import Camera
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from artperl.inputs.bounds import guarded, read_file, read_npy, read_npz
 from artperl.inputs.intrinsics_formats import Hints, Stated, stated_camera
+from artsim.common.extras import needs
+from artsim.common.files import parse_json
 from artsim.errors import ArtsimError, ConfigError
-from artsim.extras import needs
-from artsim.files import parse_json
 
 Array = NDArray[np.float64]
 

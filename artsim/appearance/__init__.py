@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.appearance.textures import Image
-from artsim.kinematics import Array
-from artsim.objects import Part
+from artsim.model.kinematics import Array
+from artsim.model.objects import Part
 from artsim.renderers.base import two_sided_faces
 
 Colour = tuple[float, float, float]

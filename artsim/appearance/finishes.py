@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from artsim.appearance import Coat, Colour, Material
 from artsim.appearance.textures import TEXTURES
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject, Mesh, Part
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject, Mesh, Part
 
 Finish = Callable[[np.random.Generator, Colour], Material]
 """Makes a material of a tone."""

@@ -15,8 +15,8 @@ from PIL import Image as Pictures
 
 from artsim.appearance import Coat, Colour, Material
 from artsim.appearance.textures import Image
+from artsim.common.files import read_bounded
 from artsim.errors import AssetError
-from artsim.files import read_bounded
 from artsim.loading.bodies import merge_fixed_links
 from artsim.loading.mesh_files import Bounds
 from artsim.loading.mesh_files.obj import read_painted
@@ -24,7 +24,7 @@ from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.urdf import read_urdf
 from artsim.loading.urdf_xml import parse_robot
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 
 _MAX_PICTURE_BYTES = 50_000_000
 _MAX_PICTURE_PIXELS = 64_000_000

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.kinematics import Array
+from artsim.model.kinematics import Array
 
 Image = NDArray[np.uint8]
 """(H, W, 3) sRGB, row 0 on top."""

@@ -20,11 +20,11 @@ from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
-from artsim.kinematics import JOINT_TYPES
-from artsim.object_file import ObjectCache
-from artsim.objects import ArticulatedObject
+from artsim.model.kinematics import JOINT_TYPES
+from artsim.model.object_file import ObjectCache
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
-from artsim.sample import Sample
 
 _OPEN_SHARDS = 64
 _FAR = 1_000_000_007
@@ -153,7 +153,7 @@ class PaddedDataset:
     """Samples as dictionaries of equally shaped arrays; rows beyond a sample's parts are zero.
 
     ``part_valid (P,) bool`` marks the rows that are parts; ``joint_type (P,) int64`` indexes
-    ``artsim.kinematics.JOINT_TYPES``; infinite limits stay infinite.
+    ``artsim.model.kinematics.JOINT_TYPES``; infinite limits stay infinite.
     """
 
     def __init__(self, dataset: Dataset, max_parts: int):

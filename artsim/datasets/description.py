@@ -13,13 +13,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
+from artsim.common.names import printable
 from artsim.datasets import checked
 from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.errors import ConfigError, DatasetError
-from artsim.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
-from artsim.names import printable
 
 PLAN, DESCRIPTION, JOURNAL = "plan.json", "dataset.json", "progress.jsonl"
 

@@ -11,10 +11,7 @@ import numpy as np
 
 from artsim.datasets import checked
 from artsim.errors import ConfigError, RenderError
-from artsim.objects import ArticulatedObject
-from artsim.renderers import Renderer
-from artsim.sample import Sample, observe
-from artsim.sampling import (
+from artsim.model.draws import (
     Scale,
     StateMode,
     StateOptions,
@@ -24,6 +21,9 @@ from artsim.sampling import (
     sample_state,
     sample_view,
 )
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample, observe
+from artsim.renderers import Renderer
 
 _VIEW_ATTEMPTS = 50
 _SEEN_OFTEN_ENOUGH = 3

@@ -14,6 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from artsim.common.files import write_atomic
 from artsim.datasets.description import DESCRIPTION, JOURNAL, Begun, read_begun
 from artsim.datasets.draw import SampleOptions
 from artsim.datasets.origins import Origins, write_origins
@@ -24,9 +25,8 @@ from artsim.datasets.splits import check_shares
 from artsim.datasets.state import State, examine, leftover_problems
 from artsim.datasets.team import Team, locked
 from artsim.errors import AssetError, ConfigError, DatasetError
-from artsim.files import write_atomic
 from artsim.loading.sources import Source
-from artsim.sampling import view_sampler
+from artsim.model.draws import view_sampler
 
 LOAD_LIMIT = 300.0
 """Seconds that an object may take to load: a hundred times what the largest real ones take."""

@@ -10,12 +10,12 @@ from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
+from artsim.common.files import read_json
 from artsim.datasets import checked
 from artsim.datasets.description import write_if_other
 from artsim.datasets.plan import PlannedObject
 from artsim.errors import ArtsimError, AssetError, DatasetError
 from artsim.families import FAMILIES
-from artsim.files import read_json
 from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
 
 ORIGINS = ".sources.json"

@@ -20,7 +20,7 @@ from artsim.datasets.draw import SampleOptions as SampleOptions
 from artsim.datasets.draw import draw_sample as draw_sample
 from artsim.datasets.layout import at_place
 from artsim.datasets.splits import SPLITS, check_shares
-from artsim.objects import MAX_PARTS
+from artsim.model.objects import MAX_PARTS
 
 FORMAT = 2
 

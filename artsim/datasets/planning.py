@@ -8,15 +8,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from artsim.common.files import write_error
+from artsim.common.progress import track
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
 from artsim.datasets.state import STAGED
 from artsim.datasets.team import Lost, Team
 from artsim.datasets.worker import CompiledSource, Refused, compile_source
 from artsim.errors import AssetError
-from artsim.files import write_error
 from artsim.loading.sources import Source
-from artsim.progress import track
 
 _VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
 _LISTED = 6

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from artsim.common.files import write_atomic, write_error
+from artsim.common.progress import track
 from artsim.datasets.description import (
     DESCRIPTION,
     JOURNAL,
@@ -23,9 +25,7 @@ from artsim.datasets.state import STAGED, State, leftovers
 from artsim.datasets.team import Lost, Team
 from artsim.datasets.worker import CompiledSource, Refused, compile_source, make_shard
 from artsim.errors import DatasetError
-from artsim.files import write_atomic, write_error
 from artsim.loading.sources import Source
-from artsim.progress import track
 
 _OTHER_MAKER = "another processor, or another version of artsim or of a library, made it"
 

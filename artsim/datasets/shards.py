@@ -16,10 +16,10 @@ import orjson
 from numpy.typing import NDArray
 from PIL import Image
 
+from artsim.common.files import atomic_file, open_image, parse_npy
+from artsim.common.names import printable
 from artsim.errors import DatasetError
-from artsim.files import atomic_file, open_image, parse_npy
-from artsim.names import printable
-from artsim.sample import Sample
+from artsim.observing.sample import Sample
 
 _CLOUD = ("points", "part", "npcs")
 _PNG = ("part_mask", "rgb")

@@ -9,11 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from artsim.common.files import file_sha256
+from artsim.common.progress import track
 from artsim.datasets.description import JOURNAL, Begun
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
-from artsim.files import file_sha256
-from artsim.progress import track
 
 STAGED = "_staged_"
 """What the names of objects begin with that are not yet part of a plan."""

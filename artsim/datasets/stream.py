@@ -11,9 +11,9 @@ import numpy as np
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ConfigError
 from artsim.loading.sources import family_sources
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
-from artsim.sample import Sample
 
 STREAM_SEEDS = (1 << 31, 1 << 32)
 """Seeds of a stream's objects: none that a person would choose for a test set."""

@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from artsim.common.names import printable
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.splits import SPLITS
-from artsim.names import printable
 
 _CATEGORIES_SHOWN = 12
 _KINDS_SHOWN = 12

@@ -18,9 +18,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
+from artsim.common.files import write_error
 from artsim.datasets.worker import serve
 from artsim.errors import DatasetError
-from artsim.files import write_error
 
 K = TypeVar("K")
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artsim.camera import Camera
+from artsim.common.progress import track
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.description import DESCRIPTION, read_begun, read_description
 from artsim.datasets.plan import Plan, ShardRecord
@@ -18,13 +18,13 @@ from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.state import examine, leftover_problems, strangers
 from artsim.errors import ArtsimError, DatasetError
-from artsim.kinematics import Array, invert_transform, transform_points
-from artsim.object_file import load_object
-from artsim.objects import ArticulatedObject
-from artsim.progress import track
+from artsim.model.camera import Camera
+from artsim.model.draws import Scale
+from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.object_file import load_object
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 from artsim.renderers.raycast import cast, pose
-from artsim.sample import Sample
-from artsim.sampling import Scale
 
 _TOLERANCE = 1e-4
 """Of the object's diagonal: points are stored in single precision."""

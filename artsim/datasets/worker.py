@@ -14,17 +14,17 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from artsim.common.extras import explained
+from artsim.common.files import file_sha256
 from artsim.datasets.description import read_plan
 from artsim.datasets.draw import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.shards import OtherBytesError, write_shard
 from artsim.errors import ArtsimError, DatasetError
-from artsim.extras import explained
-from artsim.files import file_sha256
 from artsim.loading.sources import FamilySource, Source
-from artsim.object_file import ObjectCache, save_object
+from artsim.model.object_file import ObjectCache, save_object
+from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
-from artsim.sample import Sample
 
 _STEP = 16  # samples between two reports
 

@@ -6,8 +6,8 @@
 
 from __future__ import annotations
 
+from artsim.common.extras import needs
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
-from artsim.extras import needs
 
 with needs("artsim.envs"):
     import gymnasium

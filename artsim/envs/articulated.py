@@ -22,13 +22,13 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.datasets.dataset import pad_sample
-from artsim.episode import Episode, EpisodeOptions, openness
+from artsim.drawing.view import shaded
 from artsim.errors import ConfigError
-from artsim.kinematics import Array
-from artsim.physics import Control, Simulation
+from artsim.model.kinematics import Array
+from artsim.observing.sample import Sample
+from artsim.physics.episode import Episode, EpisodeOptions, openness
+from artsim.physics.world import Control, Simulation
 from artsim.renderers import render
-from artsim.sample import Sample
-from artsim.view import shaded
 
 Observation = dict[str, NDArray[Any]]
 

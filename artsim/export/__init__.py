@@ -19,7 +19,7 @@ from typing import Any
 from artsim.errors import ConfigError
 from artsim.export.robot import Robot, as_robot
 from artsim.export.text import obj_text
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 
 FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda"}
 """File written in each format."""

@@ -17,12 +17,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from artsim.common.files import read_json, write_atomic, write_error
+from artsim.common.progress import track
 from artsim.datasets.team import Lost, Team, locked
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
-from artsim.files import read_json, write_atomic, write_error
-from artsim.progress import track
 
 INDEX = "index.csv"
 _MAX_META = 1_000_000

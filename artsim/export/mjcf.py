@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from lxml import etree
 
+from artsim.common.extras import needs
 from artsim.errors import AssetError
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers, obj_text
-from artsim.extras import needs
 
 STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 """How stiffly joints follow others. MuJoCo weighs a metre of the one like a radian of the other, which by its default

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.names import safe_name
 from artsim.errors import AssetError
-from artsim.inertia import Inertia, joined_inertia, part_inertia
-from artsim.kinematics import Array, Joint
-from artsim.names import safe_name
-from artsim.objects import ArticulatedObject, Mesh
+from artsim.model.inertia import Inertia, joined_inertia, part_inertia
+from artsim.model.kinematics import Array, Joint
+from artsim.model.objects import ArticulatedObject, Mesh
 
 GRAVITY = 9.81
 DECAY = 0.5

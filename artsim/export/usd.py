@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from artsim.common.extras import needs
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
-from artsim.extras import needs
-from artsim.kinematics import Array
+from artsim.model.kinematics import Array
 
 
 def usd_text(robot: Robot) -> str:

@@ -13,9 +13,9 @@ from importlib import import_module
 
 import numpy as np
 
-from artsim.assembly import Assembly
 from artsim.errors import ConfigError
-from artsim.objects import ArticulatedObject
+from artsim.making.assembly import Assembly
+from artsim.model.objects import ArticulatedObject
 
 Family = Callable[[np.random.Generator], Assembly]
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import cos, sin
+from artsim.common.elementary import cos, sin
 from artsim.families.carton import carton
 from artsim.families.details import bow_handle, knob, rounded_tray
-from artsim.solids import Solid, box, cylinder, frame, hull, rounded_box, tray, union
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull, rounded_box, tray, union
 
 GAP = 0.0015
 

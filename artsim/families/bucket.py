@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import cos, hypot, power, sin
-from artsim.kinematics import Array
-from artsim.products import norm
-from artsim.solids import Solid, box, cylinder, ring, tube, vessel
+from artsim.common.elementary import cos, hypot, power, sin
+from artsim.common.products import norm
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, ring, tube, vessel
+from artsim.model.kinematics import Array
 
 SIDES = 20
 """Segments of the vessel's circle."""

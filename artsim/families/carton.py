@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, revolute
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, frame, hull, tray
+from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.solids import Solid, box, frame, hull, tray
+from artsim.model.kinematics import Array
 
 GAP = 0.0015
 

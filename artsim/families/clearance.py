@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.assembly import JointSpec
-from artsim.elementary import cos
-from artsim.kinematics import Array, Joint, KinematicTree
-from artsim.products import dot, matmul, norm, unit
-from artsim.solids import Solid, Vector, cylinder
+from artsim.common.elementary import cos
+from artsim.common.products import dot, matmul, norm, unit
+from artsim.making.assembly import JointSpec
+from artsim.making.solids import Solid, Vector, cylinder
+from artsim.model.kinematics import Array, Joint, KinematicTree
 
 Index = NDArray[np.int64]
 

@@ -8,9 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute
 from artsim.families.details import dial
-from artsim.solids import Solid, box, cylinder, hull, ring, rounded_box, rounded_rectangle, tray, tube, union, vessel
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import (
+    Solid,
+    box,
+    cylinder,
+    hull,
+    ring,
+    rounded_box,
+    rounded_rectangle,
+    tray,
+    tube,
+    union,
+    vessel,
+)
 
 GAP = 0.0015
 OUT = (-1.0, 0.0, 0.0)

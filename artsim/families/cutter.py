@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic
-from artsim.elementary import cos, sin, tan
-from artsim.solids import Solid, box, cylinder, prism, rounded_box, rounded_rectangle, union
+from artsim.common.elementary import cos, sin, tan
+from artsim.making.assembly import Assembly, continuous, prismatic
+from artsim.making.solids import Solid, box, cylinder, prism, rounded_box, rounded_rectangle, union
 
 GAP = 0.0005
 

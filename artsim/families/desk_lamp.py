@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, revolute
-from artsim.elementary import arcsin, arctan2, cos, sin
+from artsim.common.elementary import arcsin, arctan2, cos, sin
+from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
-from artsim.kinematics import Array
-from artsim.products import apply
-from artsim.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube
+from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube
+from artsim.model.kinematics import Array
 
 GAP = 0.001
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,11 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artsim.assembly import JointSpec, revolute
-from artsim.elementary import arctan2, cos, sin
-from artsim.kinematics import Array
-from artsim.products import unit
-from artsim.solids import (
+from artsim.common.elementary import arctan2, cos, sin
+from artsim.common.products import unit
+from artsim.making.assembly import JointSpec, revolute
+from artsim.making.solids import (
     Solid,
     Vector,
     box,
@@ -25,6 +24,7 @@ from artsim.solids import (
     tube,
     union,
 )
+from artsim.model.kinematics import Array
 
 
 def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:

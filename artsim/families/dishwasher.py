@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute
-from artsim.elementary import hypot
+from artsim.common.elementary import hypot
 from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
-from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
 
 GAP = 0.002
 

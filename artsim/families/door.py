@@ -11,11 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, prismatic, revolute
-from artsim.elementary import cos, sin
+from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.004
 PROUD = 0.014

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from artsim.assembly import Assembly, prismatic
 from artsim.families.details import bar_handle, bow_handle, knob, panel
-from artsim.kinematics import Array
-from artsim.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
+from artsim.making.assembly import Assembly, prismatic
+from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
+from artsim.model.kinematics import Array
 
 GAP = 0.002
 _FRONT = 0.018  # thickness of a front

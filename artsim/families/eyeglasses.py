@@ -12,11 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import arcsin, cos, hypot, power, sin
-from artsim.kinematics import Array
-from artsim.products import norm
-from artsim.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
+from artsim.common.elementary import arcsin, cos, hypot, power, sin
+from artsim.common.products import norm
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0006
 MM = 0.001

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
-from artsim.elementary import cos, sin
-from artsim.products import norm
-from artsim.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, rounded_box, tube, union
+from artsim.common.elementary import cos, sin
+from artsim.common.products import norm
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, rounded_box, tube, union
 
 GAP = 0.002
 UP = np.array([0.0, 0.0, 1.0])

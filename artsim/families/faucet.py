@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, continuous, revolute, screw
-from artsim.elementary import arcsin, cos, sin
-from artsim.kinematics import Array
-from artsim.products import unit
-from artsim.solids import Solid, Vector, cylinder, ellipsoid, hull_of, rounded_box, tube, union
+from artsim.common.elementary import arcsin, cos, sin
+from artsim.common.products import unit
+from artsim.making.assembly import Assembly, JointSpec, continuous, revolute, screw
+from artsim.making.solids import Solid, Vector, cylinder, ellipsoid, hull_of, rounded_box, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.001
 UP = np.array([0.0, 0.0, 1.0])

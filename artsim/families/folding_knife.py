@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import cos, power, sin
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, loft, prism, union
+from artsim.common.elementary import cos, power, sin
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, loft, prism, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0005
 RING = 16

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from artsim.assembly import JointSpec, prismatic, revolute
 from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, hull_of, rounded_box, tray
+from artsim.making.assembly import JointSpec, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tray
+from artsim.model.kinematics import Array
 
 GAP = 0.0015
 OUTWARD = (-1.0, 0.0, 0.0)

@@ -10,10 +10,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, revolute
-from artsim.elementary import cos, sin
-from artsim.products import apply, unit
-from artsim.solids import Solid, cylinder, ellipsoid, hull, revolved, ring, rotation_about, rounded_box, tube, union
+from artsim.common.elementary import cos, sin
+from artsim.common.products import apply, unit
+from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.solids import (
+    Solid,
+    cylinder,
+    ellipsoid,
+    hull,
+    revolved,
+    ring,
+    rotation_about,
+    rounded_box,
+    tube,
+    union,
+)
 
 GAP = 0.0015
 UP = np.array([0.0, 0.0, 1.0])

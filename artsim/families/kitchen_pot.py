@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, prismatic, revolute
-from artsim.elementary import cos, hypot, sin
+from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
+from artsim.model.kinematics import Array
 
 GAP = 0.0012
 STEEL = 2500.0  # kg/m^3, as walls are thicker than real ones

@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import tan
-from artsim.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+from artsim.common.elementary import tan
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
 
 GAP = 0.0008
 

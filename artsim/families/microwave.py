@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute
-from artsim.elementary import cos, sin
+from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, rounded_box, tray, union
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, rounded_box, tray, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0015
 

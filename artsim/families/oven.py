@@ -10,11 +10,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
-from artsim.elementary import arctan2
+from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.model.kinematics import Array
 
 GAP = 0.002
 

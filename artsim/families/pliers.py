@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import power, sin
-from artsim.kinematics import Array
-from artsim.products import norm
-from artsim.solids import Solid, box, cylinder, hull_of, loft, prism, union
+from artsim.common.elementary import power, sin
+from artsim.common.products import norm
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0006
 

@@ -14,11 +14,11 @@ from itertools import product
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec
-from artsim.elementary import cos, exp, log
-from artsim.kinematics import Array
-from artsim.products import apply, matmul, norm, unit
-from artsim.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, rounded_box, tube
+from artsim.common.elementary import cos, exp, log
+from artsim.common.products import apply, matmul, norm, unit
+from artsim.making.assembly import Assembly, JointSpec
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, rounded_box, tube
+from artsim.model.kinematics import Array
 
 GAP = 0.002
 _STUBS = np.concatenate([[0.0], 0.005 * exp(np.linspace(0.0, log(800.0), 50))])

@@ -11,10 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, prismatic
 from artsim.families.details import front_handle, rounded_shell, side_hinge
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.making.assembly import Assembly, prismatic
+from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.model.kinematics import Array
 
 GAP = 0.003
 

@@ -8,11 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
-from artsim.kinematics import Array
-from artsim.products import apply, matmul
-from artsim.solids import Solid, box, cylinder, hull, hull_of, ring, rotation_about, rounded_box, rounded_rectangle
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.solids import (
+    Solid,
+    box,
+    cylinder,
+    hull,
+    hull_of,
+    ring,
+    rotation_about,
+    rounded_box,
+    rounded_rectangle,
+)
+from artsim.model.kinematics import Array
 
 GAP = 0.0015
 

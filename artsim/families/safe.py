@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, revolute
-from artsim.elementary import cos, hypot, sin
+from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, ellipsoid, ring, rounded_box, tube, union
+from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring, rounded_box, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0015
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import arcsin, arctan2, cos, hypot, sin
-from artsim.kinematics import Array
-from artsim.products import dot, matmul, norm
-from artsim.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
+from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
+from artsim.common.products import dot, matmul, norm
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0005
 

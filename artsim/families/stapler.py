@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.assembly import Assembly, revolute
-from artsim.elementary import cos, sin
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_box, rounded_rectangle
+from artsim.common.elementary import cos, sin
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_box, rounded_rectangle
+from artsim.model.kinematics import Array
 
 GAP = 0.0008
 SKIRT = 0.0016

@@ -11,11 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, hull, union
+from artsim.making.assembly import Assembly
+from artsim.making.solids import Solid, box, cylinder, frame, hull, union
+from artsim.model.kinematics import Array
 
 # Of each kind: the ranges of width, depth and height of the body and of the height of what it stands on, in metres;
 # how likely a low cell is a drawer; how common the kind is.

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute
-from artsim.elementary import cos, power, sin
+from artsim.common.elementary import cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, hull, loft, rounded_box, rounded_rectangle, tube, union
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, rounded_box, rounded_rectangle, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.001
 

@@ -9,10 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.assembly import Assembly, JointSpec, revolute
-from artsim.elementary import sin, tan
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+from artsim.common.elementary import sin, tan
+from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+from artsim.model.kinematics import Array
 
 GAP = 0.0007
 

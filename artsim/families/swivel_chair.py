@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute
-from artsim.elementary import cos, sin
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, hull_of, ring, rounded_box, tube
+from artsim.common.elementary import cos, sin
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, rounded_box, tube
+from artsim.model.kinematics import Array
 
 GAP = 0.0025
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,10 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, prismatic, revolute
 from artsim.families.details import dial, push_button
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, hull_of, prism, rounded_box, rounded_rectangle, tube, union
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import (
+    Solid,
+    box,
+    cylinder,
+    frame,
+    hull_of,
+    prism,
+    rounded_box,
+    rounded_rectangle,
+    tube,
+    union,
+)
+from artsim.model.kinematics import Array
 
 GAP = 0.001
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, revolute
 from artsim.families.details import rounded_tray
-from artsim.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
+from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
 
 GAP = 0.0015
 

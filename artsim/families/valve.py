@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, revolute, screw
-from artsim.elementary import cos, sin
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
+from artsim.common.elementary import cos, sin
+from artsim.making.assembly import Assembly, continuous, revolute, screw
+from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
+from artsim.model.kinematics import Array
 
 GAP = 0.0015
 IRON = 4000.0  # kg/m^3, as real ones are hollow

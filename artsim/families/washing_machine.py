@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.assembly import Assembly, continuous, prismatic, revolute
-from artsim.elementary import cos, sin
+from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, hull, ring, rounded_box, tray, union, vessel
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull, ring, rounded_box, tray, union, vessel
+from artsim.model.kinematics import Array
 
 GAP = 0.002
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.assembly import Assembly, prismatic, revolute
 from artsim.families.details import bar_handle, grid_panel, swing_limits
-from artsim.kinematics import Array
-from artsim.solids import Solid, box, cylinder, frame, rounded_box
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, rounded_box
+from artsim.model.kinematics import Array
 
 GAP = 0.003
 PANE = 0.006

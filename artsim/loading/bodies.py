@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.products import apply, dot, matmul, unit
 from artsim.errors import AssetError
-from artsim.kinematics import Array
 from artsim.loading.robot import Robot, RobotJoint
-from artsim.objects import Part, Repair
-from artsim.products import apply, dot, matmul, unit
+from artsim.model.kinematics import Array
+from artsim.model.objects import Part, Repair
 
 
 @dataclass(eq=False)

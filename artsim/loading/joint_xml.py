@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from artsim.kinematics import Array
+from artsim.common.products import norm, unit
 from artsim.loading.robot import MimicRelation, RobotJoint
 from artsim.loading.xml_values import Element
-from artsim.objects import Repair
-from artsim.products import norm, unit
+from artsim.model.kinematics import Array
+from artsim.model.objects import Repair
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 KNOWN_TYPES = (*MOVING_TYPES, "fixed", "floating")

@@ -15,14 +15,14 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.files import read_bounded
 from artsim.errors import AssetError
-from artsim.files import read_bounded
-from artsim.kinematics import Array, transform_points
 from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
 from artsim.loading.robot import Geometry, MeshFile
-from artsim.objects import Repair
+from artsim.model.kinematics import Array, transform_points
+from artsim.model.objects import Repair
 
 __all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merged", "triangles"]
 

@@ -29,7 +29,7 @@ from urllib.parse import unquote
 from lxml import etree
 
 from artsim.errors import AssetError
-from artsim.objects import Repair
+from artsim.model.objects import Repair
 
 _MANIFEST_LEVELS, _NAME_LEVELS = 6, 3
 _MAX_MANIFEST_BYTES = 1_000_000

@@ -10,9 +10,9 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from artsim.common.files import parse_json, read_bounded
 from artsim.errors import AssetError
-from artsim.files import parse_json, read_bounded
-from artsim.objects import Repair
+from artsim.model.objects import Repair
 
 _MAX_SIDE_FILE = 8_000_000
 """Those of PartNet-Mobility take some hundred thousand bytes at most."""

@@ -1,6 +1,7 @@
 """Cylinders, capsules and spheres that a URDF file describes in numbers.
 
-The same bits on every processor, as :mod:`artsim.elementary` says; trimesh leaves them to BLAS and the C library.
+The same bits on every processor, as :mod:`artsim.common.elementary` says; trimesh leaves them to BLAS and the C
+library.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.elementary import cos, sin
-from artsim.kinematics import Array
-from artsim.objects import Mesh
-from artsim.products import unit
+from artsim.common.elementary import cos, sin
+from artsim.common.products import unit
+from artsim.model.kinematics import Array
+from artsim.model.objects import Mesh
 
 _SECTIONS = 64
 _SUBDIVISIONS = 4

@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from artsim.kinematics import Array, KinematicTree, transform_points
-from artsim.objects import Part, Repair
-from artsim.products import norm
+from artsim.common.products import norm
+from artsim.model.kinematics import Array, KinematicTree, transform_points
+from artsim.model.objects import Part, Repair
 
 _STATES = 61  # of a joint's range that are looked at before refining
 _HINGED_SHUT = np.deg2rad(15.0)  # a lid's limit may lie this far beyond the state in which it is shut

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from artsim.kinematics import Array
+from artsim.model.kinematics import Array
 
 
 @dataclass(frozen=True)

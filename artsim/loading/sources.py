@@ -12,7 +12,7 @@ from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.urdf import find_urdf, load, read_urdf
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 
 
 @dataclass(frozen=True)

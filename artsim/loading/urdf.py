@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.files import read_bounded
+from artsim.common.products import matmul, norm, unit
 from artsim.errors import AssetError
-from artsim.files import read_bounded
-from artsim.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
 from artsim.loading.bodies import (
     RigidBody,
     axis_in_base,
@@ -31,9 +31,9 @@ from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.robot import Link, Robot, RobotJoint
 from artsim.loading.urdf_xml import parse_robot
 from artsim.loading.xml_repair import unexpanded
-from artsim.object_file import load_object
-from artsim.objects import ArticulatedObject, Part, Repair, content_sha256
-from artsim.products import matmul, norm, unit
+from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
+from artsim.model.object_file import load_object
+from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
 
 _FAR = 20.0
 """Times the object's size that no slide goes: a cart on its track goes once, a drawer less."""

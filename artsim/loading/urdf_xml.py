@@ -18,7 +18,7 @@ from artsim.loading.joint_xml import read_joint
 from artsim.loading.robot import Box, Capsule, Cylinder, Geometry, Link, MeshFile, Robot, Shape, Sphere
 from artsim.loading.xml_repair import readable_xml, use_plain_names
 from artsim.loading.xml_values import Element
-from artsim.objects import Repair
+from artsim.model.objects import Repair
 
 SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
 

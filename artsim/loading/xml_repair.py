@@ -14,7 +14,7 @@ from pathlib import Path
 from lxml import etree
 
 from artsim.errors import AssetError
-from artsim.objects import Repair
+from artsim.model.objects import Repair
 
 WHERE = "XML"
 _BOMS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),

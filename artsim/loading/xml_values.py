@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from artsim.elementary import cos, sin
+from artsim.common.elementary import cos, sin
+from artsim.common.products import matmul, norm, unit
 from artsim.errors import AssetError
-from artsim.kinematics import Array, cross_matrix
-from artsim.objects import Repair
-from artsim.products import matmul, norm, unit
+from artsim.model.kinematics import Array, cross_matrix
+from artsim.model.objects import Repair
 
 # What C's strtod reads in decimal; Python's float would also take 1_0 and other scripts' digits.
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan)", re.IGNORECASE | re.ASCII)

@@ -7,9 +7,9 @@ from functools import cache
 
 from numpy.typing import ArrayLike
 
-from artsim.camera import Camera
 from artsim.errors import ConfigError
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import Camera
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND, CameraBatch, Frame, Renderer
 
 RENDERERS = ("raycast", "pybullet", "pybullet-egl", "sapien", "warp")

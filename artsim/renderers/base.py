@@ -9,10 +9,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.camera import Camera
-from artsim.describe import brief
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject, Part
+from artsim.model.camera import Camera
+from artsim.model.describe import brief
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject, Part
 
 BACKGROUND = 255
 """Part id of pixels that show no part."""

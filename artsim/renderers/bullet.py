@@ -20,15 +20,15 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from artsim.appearance import Coat, Lights, Patch, patches, subpixel
-from artsim.camera import Camera
+from artsim.common.extras import needs
 from artsim.errors import RenderError
-from artsim.extras import needs
-from artsim.kinematics import Array, transform_points
-from artsim.objects import ArticulatedObject, Part
+from artsim.model.camera import Camera
+from artsim.model.kinematics import Array, transform_points
+from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
 from artsim.renderers.kept import Kept
 from artsim.renderers.raycast import pose
-from artsim.scenes.scene import Scene, SceneFrame, split_ids
+from artsim.renderers.scene import Scene, SceneFrame, split_ids
 
 # As many objects as take turns in a plan; a process with several EGL contexts crashes inside PyBullet.
 _MAX_WORLDS = {"pybullet": 16, "pybullet-egl": 1}

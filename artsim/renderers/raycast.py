@@ -18,11 +18,11 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.camera import Camera
-from artsim.elementary import cos, tan
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject, Part
-from artsim.products import apply, matmul, unit
+from artsim.common.elementary import cos, tan
+from artsim.common.products import apply, matmul, unit
+from artsim.model.camera import Camera
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers.base import BACKGROUND, Frame
 
 _MISS = np.float32(1e30)
@@ -276,7 +276,7 @@ def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArra
 
     ``plane`` is (2, N), what :meth:`PosedObject.image_plane` gives.
     """
-    # Row by row of the rotation, not by BLAS: see `artsim.products`.
+    # Row by row of the rotation, not by BLAS: see `artsim.common.products`.
     x, y, z = posed.rotations[k][..., None]
     directions = plane[0] * x
     directions += plane[1] * y

@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike
 
 from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.appearance.painted import painted_coats
-from artsim.camera import Camera
+from artsim.common.extras import install_command
 from artsim.errors import RenderError
-from artsim.extras import install_command
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import Camera
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers.base import BACKGROUND, Frame, depth_range
 from artsim.renderers.kept import Kept
 from artsim.renderers.raycast import pose
 from artsim.renderers.sapien_stage import Shadows, Stage
-from artsim.scenes.scene import Scene, SceneFrame, split_ids
+from artsim.renderers.scene import Scene, SceneFrame, split_ids
 
 _MAX_STAGES = 16  # as many objects as take turns in a plan
 _PROBE_TIMEOUT = 120.0  # seconds

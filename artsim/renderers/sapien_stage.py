@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from artsim.appearance import Coat, Colour, Lights, Material, patches, subpixel
-from artsim.camera import Camera
-from artsim.kinematics import Array
-from artsim.objects import Part
+from artsim.model.camera import Camera
+from artsim.model.kinematics import Array
+from artsim.model.objects import Part
 
 _GAMMA = 2.2  # of the pictures that SAPIEN gives
 _SKY_LAMPS = 3  # of the ten spot lights with shadows that SAPIEN's shaders have

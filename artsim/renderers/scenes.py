@@ -7,11 +7,11 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from artsim.camera import Camera
 from artsim.errors import ConfigError
+from artsim.model.camera import Camera
 from artsim.renderers import Renderer, shared_renderer
 from artsim.renderers.base import BACKGROUND
-from artsim.scenes.scene import Scene, SceneFrame
+from artsim.renderers.scene import Scene, SceneFrame
 
 
 @runtime_checkable

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artsim.camera import Camera
-from artsim.elementary import cos, sin
+from artsim.common.elementary import cos, sin
+from artsim.common.products import apply, matmul, norm
 from artsim.errors import ConfigError
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
-from artsim.products import apply, matmul, norm
-from artsim.sampling import StateOptions, ViewOptions, half_width, posed_bounds, states_at
+from artsim.model.camera import Camera
+from artsim.model.draws import StateOptions, ViewOptions, half_width, posed_bounds, states_at
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.camera import Camera
+from artsim.common.extras import needs
 from artsim.errors import ConfigError, RenderError
-from artsim.extras import needs
-from artsim.kinematics import ROTATING, Array
-from artsim.objects import ArticulatedObject, Part
+from artsim.model.camera import Camera
+from artsim.model.kinematics import ROTATING, Array
+from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers.base import Frame
 from artsim.renderers.bullet import silent
 from artsim.renderers.views import Clouds, Images, Views

@@ -13,19 +13,19 @@ import tyro
 from artsim.appearance import Coat, Colour, Lights, Sun
 from artsim.appearance.finishes import draw_coats, repainted
 from artsim.appearance.painted import painted_coats
-from artsim.camera import Camera
-from artsim.elementary import cos, sin, tan
+from artsim.common.elementary import cos, sin, tan
+from artsim.common.products import norm
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
-from artsim.kinematics import Array, transform_points
 from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import find_sources
-from artsim.objects import ArticulatedObject
-from artsim.products import norm
-from artsim.sampling import StateOptions, sample_state
+from artsim.model.camera import Camera
+from artsim.model.draws import StateOptions, sample_state
+from artsim.model.kinematics import Array, transform_points
+from artsim.model.objects import ArticulatedObject
+from artsim.renderers.scene import Scene, Thing
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
-from artsim.scenes.scene import Scene, Thing
 
 _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""

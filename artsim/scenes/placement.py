@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from artsim.appearance import Coat
-from artsim.elementary import arccos, arctan2, cos
-from artsim.extras import needs
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject, Part
-from artsim.products import apply, dot, matmul, unit
-from artsim.scenes.scene import Thing, used_vertices
-from artsim.solids import rotation_about
+from artsim.common.elementary import arccos, arctan2, cos
+from artsim.common.extras import needs
+from artsim.common.products import apply, dot, matmul, unit
+from artsim.making.solids import rotation_about
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject, Part
+from artsim.renderers.scene import Thing, used_vertices
 
 GAP = 0.004
 """Metres between any two things."""
@@ -245,7 +245,7 @@ _models: weakref.WeakKeyDictionary[Part, tuple[float, Any]] = weakref.WeakKeyDic
 
 def _model(obj: ArticulatedObject, k: int) -> Any:
     """FCL's model of a part, kept as long as the part."""
-    from artsim.collision import surface_model
+    from artsim.model.collision import surface_model
 
     scale, model = _models.get(obj.parts[k], (0.0, None))
     if scale != obj.scale:

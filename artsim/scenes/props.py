@@ -8,12 +8,12 @@ import numpy as np
 
 from artsim.appearance import Coat, Material, plain_coat
 from artsim.appearance.finishes import draw_material, piece_of_face
-from artsim.elementary import cos, sin
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
-from artsim.products import matmul
-from artsim.scenes.scene import Thing, rigid
-from artsim.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
+from artsim.common.elementary import cos, sin
+from artsim.common.products import matmul
+from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.renderers.scene import Thing, rigid
 
 _THICKNESS = 0.06  # of floors and walls
 _ROOM_HEIGHT = 2.6

@@ -13,18 +13,18 @@ import orjson
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from artsim.camera import Camera
+from artsim.common.files import write_atomic
 from artsim.datasets.shards import npy_bytes, sample_members
 from artsim.errors import ConfigError
-from artsim.files import write_atomic
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
+from artsim.model.camera import Camera
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import ARTSIM_VERSION, Sample, observe
+from artsim.observing.sensor import Sensor, find_sensor
 from artsim.renderers import BACKGROUND, Frame, Renderer
 from artsim.renderers.raycast import pose, render_posed
+from artsim.renderers.scene import Scene, SceneFrame, Thing
 from artsim.renderers.scenes import render_scene
-from artsim.sample import ARTSIM_VERSION, Sample, observe
-from artsim.scenes.scene import Scene, SceneFrame, Thing
-from artsim.sensor import Sensor, find_sensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def observe_scene(
     renderer : str or Renderer
         As in :func:`artsim.renderers.scenes.render_scene`.
     noise : str or Sensor
-        Depth sensor: one of ``artsim.sensor.SENSORS``, or one of your own.
+        Depth sensor: one of ``artsim.observing.sensor.SENSORS``, or one of your own.
     seed : int
         Of noise, and of the choice of points; stored in the records.
     rgb_samples : int

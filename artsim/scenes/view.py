@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from artsim.camera import Camera
-from artsim.files import write_atomic
-from artsim.names import printable
+from artsim.common.files import write_atomic
+from artsim.common.names import printable
+from artsim.drawing.view import BOX_EDGES, PALETTE, axis_segment, box_corners
+from artsim.model.camera import Camera
+from artsim.observing.sample import Sample
 from artsim.renderers import BACKGROUND
-from artsim.sample import Sample
 from artsim.scenes.sample import SceneView, png_bytes, write_view
-from artsim.view import BOX_EDGES, PALETTE, axis_segment, box_corners
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
 _TINT = 0.62  # of a part's or instance's colour over the picture

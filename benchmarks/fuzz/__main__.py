@@ -22,10 +22,10 @@ from typing import Any
 
 import tyro
 
+from artsim.common.files import read_json, write_atomic
+from artsim.common.names import safe_name
+from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
-from artsim.files import read_json, write_atomic
-from artsim.names import safe_name
-from artsim.progress import track
 from benchmarks.fuzz.corpus import corpus
 from benchmarks.fuzz.inputs import Desk, input_at, input_of
 from benchmarks.fuzz.targets import TARGETS

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from artperl.settings import TrainOptions
-from artsim.assembly import Assembly, prismatic, revolute
-from artsim.object_file import save_object
-from artsim.objects import ArticulatedObject
-from artsim.solids import box
+from artperl.training.options import TrainOptions
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import box
+from artsim.model.object_file import save_object
+from artsim.model.objects import ArticulatedObject
 from benchmarks.fuzz.mutations import npy_bytes
 
 
@@ -358,7 +358,7 @@ def _datasets(folder: Path) -> Iterator[Seed]:
     from artsim.datasets.generate import generate
     from artsim.datasets.plan import SampleOptions
     from artsim.loading.sources import find_sources
-    from artsim.sampling import ViewOptions
+    from artsim.model.draws import ViewOptions
 
     (folder.parent / "pair").mkdir()
     (folder.parent / "pair" / "mobility.urdf").write_text(_TWO_BOXES)
@@ -382,7 +382,7 @@ def _datasets(folder: Path) -> Iterator[Seed]:
 def _runs(folder: Path) -> Iterator[Seed]:
     import torch
 
-    from artperl.run_folder import RunFolder
+    from artperl.training.run_folder import RunFolder
 
     state = {"options": asdict(TrainOptions()), "best": 1.5, "history": [{"step": 10, "laptop": {"parts": []}}]}
     RunFolder(folder).write(state, {"done": torch.tensor([10, 0, 0]), "perception.a": torch.zeros(3, 4)})
@@ -397,12 +397,12 @@ def _runs(folder: Path) -> Iterator[Seed]:
 def _estimators(folder: Path) -> Iterator[Seed]:
     import torch
 
-    from artperl.checkpoint import save_estimator
-    from artperl.embedding import by_boxes
-    from artperl.estimator import Estimator
-    from artperl.networks.boxes import Boxes
-    from artperl.networks.perception import Perception
-    from artperl.retrieval import ShapeBase
+    from artperl.boxes.network import Boxes
+    from artperl.estimator import save_estimator
+    from artperl.methods.full import Estimator
+    from artperl.perception.network import Perception
+    from artperl.retrieval.box_embedding import by_boxes
+    from artperl.retrieval.shape_base import ShapeBase
 
     torch.manual_seed(0)
     base = by_boxes(ShapeBase.of([small_object(), small_object()], points_per_part=8))

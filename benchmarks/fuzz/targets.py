@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from artperl.settings import TrainOptions
+from artperl.training.options import TrainOptions
 from artsim.errors import ArtsimError
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 
 
 class UnsoundError(Exception):
@@ -20,7 +20,7 @@ class UnsoundError(Exception):
 
 
 def _check_object(obj: ArticulatedObject) -> None:
-    from artsim.inspect import describe
+    from artsim.drawing.inspect import describe
 
     describe(obj).encode()
     if not np.isfinite(obj.bounds).all() or not obj.diagonal > 0.0:
@@ -43,21 +43,21 @@ def _object(folder: Path) -> None:
 
 
 def _base(folder: Path) -> None:
-    from artperl.retrieval import ShapeBase
+    from artperl.retrieval.shape_base import ShapeBase
 
     base = ShapeBase.load(folder / "base.npz")
     base.references(base.kind[:1])
 
 
 def _estimator(folder: Path) -> None:
-    from artperl.checkpoint import load_estimator
+    from artperl.estimator import load_estimator
 
     load_estimator(folder)
 
 
 def _state(folder: Path) -> None:
-    from artperl.run_folder import RunFolder, differences
-    from artperl.training import completed
+    from artperl.training.run import completed
+    from artperl.training.run_folder import RunFolder, differences
 
     state, _, _ = RunFolder(folder).read()
     known = json.loads(json.dumps(asdict(TrainOptions())))
@@ -76,7 +76,7 @@ def _dataset(folder: Path) -> None:
 
 
 def _motions(folder: Path) -> None:
-    from artsim.record import open_motions
+    from artsim.physics.episode_file import open_motions
 
     for motion in open_motions(folder):
         motion[0]

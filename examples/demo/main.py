@@ -6,14 +6,14 @@ import sys
 from pathlib import Path
 
 import artsim
-from artperl.settings import PRESETS
-from artperl.training import Training
+from artperl.training.options import PRESETS
+from artperl.training.run import Training
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.verify import verify
+from artsim.drawing.gallery import gallery
+from artsim.drawing.view import view_path
 from artsim.families import FAMILIES
-from artsim.gallery import gallery
 from artsim.loading.sources import family_sources, find_sources
-from artsim.view import view_path
 
 ASSETS = Path(__file__).resolve().parents[2] / "urdf_assets"
 

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 import artsim.envs  # noqa: F401  # registers artsim/Articulated-v0
-from artsim.sampling import ViewOptions
+from artsim.model.draws import ViewOptions
 
 
 def main(out: Path) -> None:

@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 
 import artsim
-from artsim.sensor import SENSORS, Sensor
+from artsim.observing.sensor import SENSORS, Sensor
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 import artsim
-from artperl.embedding import by_boxes
-from artperl.estimator import Estimator
-from artperl.evaluation import frozen_samples
-from artperl.retrieval import ShapeBase
-from artsim.sample import Sample
+from artperl.evaluation.scoring import frozen_samples
+from artperl.methods.full import Estimator
+from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.shape_base import ShapeBase
+from artsim.observing.sample import Sample
 from tests.artperl.worlds import Oracle
 
 

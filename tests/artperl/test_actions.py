@@ -8,7 +8,7 @@ import pytest
 import torch
 
 import artsim
-from artperl.actions import (
+from artperl.agent.actions import (
     MAGNITUDES,
     MOVE,
     NOTHING,
@@ -25,9 +25,9 @@ from artperl.actions import (
     residual,
     rotation_vector,
 )
-from artperl.pose import Theta, pose_parts
-from artperl.rotations import rotation_from_vector
-from artperl.shapes import Shapes
+from artperl.core.pose import Theta, pose_parts
+from artperl.core.rotations import rotation_from_vector
+from artperl.core.shapes import Shapes
 
 CATEGORIES = ("laptop", "drawer", "eyeglasses", "robot_arm")
 

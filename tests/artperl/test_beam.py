@@ -13,13 +13,13 @@ import torch
 from torch import Tensor
 
 import artsim
-from artperl.beam import _from_the_root_down, _grid, beam, half_turned
-from artperl.pose import Theta, Trees, pose_parts
-from artperl.refine import RefineOptions, refine
-from artperl.rotations import rotation_from_vector
-from artperl.shapes import Observed, Shapes
+from artperl.core.pose import Theta, Trees, pose_parts
+from artperl.core.rotations import rotation_from_vector
+from artperl.core.shapes import Observed, Shapes
+from artperl.fitting.beam_search import _from_the_root_down, _grid, beam, half_turned
+from artperl.fitting.levenberg_marquardt import RefineOptions, refine
 from artsim.datasets.plan import SampleOptions, draw_sample
-from artsim.kinematics import Joint, KinematicTree, Mimic
+from artsim.model.kinematics import Joint, KinematicTree, Mimic
 from artsim.renderers import shared_renderer
 
 _RIGID = RefineOptions(sigma_scale=0.0, sigma_aspect=0.0, sigma_stretch=0.0, sigma_shift=0.0)

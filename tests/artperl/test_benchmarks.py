@@ -11,19 +11,19 @@ import pytest
 import torch
 
 import artsim
-from artperl import cli, metrics
-from artperl.benchmarks.ablation import PartByPart, run_ablation, shuffled, variants
-from artperl.benchmarks.artimage import SPLIT, as_known, real_objects, reduced, row_samples, turned_round
-from artperl.benchmarks.basin import ANGLES, _apart, basin_problem, run_basin, turned
-from artperl.benchmarks.rows import PUBLISHED, against_published, run_rows
-from artperl.categories import ARTIMAGE, has_parts, objects_of
-from artperl.checkpoint import save_estimator
-from artperl.estimator import Estimator
-from artperl.evaluation import TEST_SEEDS, frozen_samples, true_poses
-from artperl.networks.agent import Agent
-from artperl.networks.perception import Perception
-from artperl.order import in_reading_order
-from artperl.search import EstimatorOptions
+from artperl import cli
+from artperl.agent.policy import Agent
+from artperl.core.part_order import in_reading_order
+from artperl.data.categories import ARTIMAGE, has_parts, objects_of
+from artperl.estimator import save_estimator
+from artperl.evaluation.ablation import PartByPart, run_ablation, shuffled, variants
+from artperl.evaluation.artimage import SPLIT, as_known, real_objects, reduced, row_samples, turned_round
+from artperl.evaluation.basin import ANGLES, _apart, basin_problem, run_basin, turned
+from artperl.evaluation.benchmark_rows import PUBLISHED, against_published, run_rows
+from artperl.evaluation.scoring import TEST_SEEDS, frozen_samples, metrics, true_poses
+from artperl.fitting.search import EstimatorOptions
+from artperl.methods.full import Estimator
+from artperl.perception.network import Perception
 from artsim.errors import AssetError, ConfigError
 from tests.artperl.worlds import Oracle, small_base, small_problem
 

@@ -14,16 +14,16 @@ import torch
 from numpy.typing import NDArray
 
 import artsim
-from artperl import box_training
-from artperl.batch import concatenate
-from artperl.boxes import iou_aligned
-from artperl.checkpoint import load_estimator
-from artperl.estimator import Estimator
-from artperl.evaluation import frozen_samples
-from artperl.evidence import PERCEIVED, SHARES, Evidence, roughness
-from artperl.networks.boxes import Boxes, box_losses
-from artperl.settings import TrainOptions
-from artperl.training import Training
+from artperl.boxes.evidence import PERCEIVED, SHARES, Evidence, roughness
+from artperl.boxes.network import Boxes, box_losses
+from artperl.core.batch import concatenate
+from artperl.estimator import load_estimator
+from artperl.evaluation.box_overlap import iou_aligned
+from artperl.evaluation.scoring import frozen_samples
+from artperl.methods.full import Estimator
+from artperl.training import boxes as box_training
+from artperl.training.options import TrainOptions
+from artperl.training.run import Training
 
 SIGNS = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 """Of the faces' outward normals."""
@@ -217,7 +217,7 @@ def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(
 ) -> None:
     """Given objects are in the base; in use, those that are seen will not be."""
     own = artsim.make("laptop", 7)
-    monkeypatch.setattr("artperl.training._given", lambda options: [own])
+    monkeypatch.setattr("artperl.training.run._given", lambda options: [own])
     training = Training(replace(STAGE, box_views=2), tmp_path, workers=0, progress=False)
     estimators = []
 
@@ -225,7 +225,7 @@ def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(
         estimators.append(estimator)
         return box_training.record(estimator, *arguments)
 
-    monkeypatch.setattr("artperl.training.record", watched)
+    monkeypatch.setattr("artperl.training.run.record", watched)
     training.run()
     (learnt_from,) = estimators
     assert own.object_id not in learnt_from.base.object_ids

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from artperl.cleaning import clean, draw
+from artperl.perception.preprocess import clean, draw
 from artsim.errors import ArtsimError
 
 

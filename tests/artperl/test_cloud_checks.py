@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from artperl.cleaning import clean
-from artperl.cloud_checks import cloud_warnings
-from artperl.estimator import Estimator
-from artsim.sample import Sample
+from artperl.methods.full import Estimator
+from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.preprocess import clean
+from artsim.observing.sample import Sample
 
 CASES = Path(__file__).parents[1] / "cases"
 CLOUD = np.load(CASES / "E00" / "c.npy").astype(np.float64)

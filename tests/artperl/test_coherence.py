@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from artperl.benchmarks.artimage import real_objects
-from artperl.coherence import coherent
-from artsim.kinematics import Array
+from artperl.evaluation.artimage import real_objects
+from artperl.perception.label_smoothing import coherent
+from artsim.model.kinematics import Array
 from tests.artperl.worlds import made, view
 
 

@@ -7,8 +7,8 @@ import pytest
 import torch
 from gymnasium.utils.env_checker import check_env
 
-from artperl.envs import ENV_ID, PoseFittingEnv, nothing
-from artperl.fitting import Fitting, FittingOptions
+from artperl.agent.decision_process import Fitting, FittingOptions
+from artperl.training.gym_env import ENV_ID, PoseFittingEnv, nothing
 from tests.conftest import installed
 
 OPTIONS = FittingOptions(steps=4, observed_points=64, reference_points=32)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from artperl.checkpoint import load_estimator
-from artperl.estimate import Estimate
-from artperl.evaluation import frozen_samples, true_poses
-from artsim.sample import Sample
+from artperl.core.estimate import Estimate
+from artperl.estimator import load_estimator
+from artperl.evaluation.scoring import frozen_samples, true_poses
+from artsim.observing.sample import Sample
 from benchmarks.errors import BINS, Told, in_bins, moving_parts
 
 _SEEDS = 1_300_000

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from artperl.estimate import Estimate, brought_to_rest, labels_by_boxes, slid, widen
-from artperl.evaluation import frozen_samples, true_poses
+from artperl.core.estimate import Estimate, brought_to_rest, labels_by_boxes, slid, widen
+from artperl.evaluation.scoring import frozen_samples, true_poses
 
 
 def test_points_are_of_a_part_whose_box_they_are_in() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from artperl import cli
-from artperl.estimate_command import estimator_folder
+from artperl.commands.estimate import estimator_folder
 from artsim.errors import ConfigError
 
 CASES = Path(__file__).parents[1] / "cases"

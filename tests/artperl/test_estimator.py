@@ -13,23 +13,22 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import artsim
-from artperl import metrics
-from artperl.categories import objects_of
-from artperl.checkpoint import load_estimator, save_estimator
-from artperl.data import Clouds, to_batch, training_rows
-from artperl.embedding import by_boxes
-from artperl.estimate import Calibration
-from artperl.estimator import Estimator
-from artperl.evaluation import TEST_SEEDS, frozen_samples, score, true_poses
-from artperl.networks.agent import Agent
-from artperl.networks.perception import Perception, Votes
-from artperl.pose import Theta
-from artperl.retrieval import ShapeBase
-from artperl.search import EstimatorOptions, astray, evened, turned_round
-from artperl.shapes import Shapes
-from artsim.camera import look_at_transform
+from artperl.agent.policy import Agent
+from artperl.core.estimate import Calibration
+from artperl.core.pose import Theta
+from artperl.core.shapes import Shapes
+from artperl.data.batches import Clouds, to_batch, training_rows
+from artperl.data.categories import objects_of
+from artperl.estimator import load_estimator, save_estimator
+from artperl.evaluation.scoring import TEST_SEEDS, frozen_samples, metrics, score, true_poses
+from artperl.fitting.search import EstimatorOptions, astray, evened, turned_round
+from artperl.methods.full import Estimator
+from artperl.perception.network import Perception, Votes
+from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ArtsimError, ConfigError, DatasetError
-from artsim.sample import Sample
+from artsim.model.camera import look_at_transform
+from artsim.observing.sample import Sample
 from tests.artperl.worlds import Oracle, true_votes
 
 

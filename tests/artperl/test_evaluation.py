@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from artperl.estimate import Calibration
-from artperl.estimator import Estimator
-from artperl.evaluation import (
+from artperl.core.estimate import Calibration
+from artperl.evaluation.scoring import (
     Scored,
     calibrate,
     compare,
@@ -23,8 +22,9 @@ from artperl.evaluation import (
     table,
     true_poses,
 )
+from artperl.methods.full import Estimator
 from artsim.errors import ArtsimError
-from artsim.sample import Sample
+from artsim.observing.sample import Sample
 
 
 def test_a_perfect_estimate_has_no_error(estimator: Estimator, sample: Sample) -> None:

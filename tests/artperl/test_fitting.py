@@ -9,8 +9,8 @@ from typing import Literal
 import pytest
 import torch
 
-from artperl.fitting import FAR, Fitting, FittingOptions, nearest
-from artperl.problems import Problem
+from artperl.agent.decision_process import FAR, Fitting, FittingOptions, nearest
+from artperl.data.fitting_problems import Problem
 from tests.artperl.worlds import small_problem
 
 OPTIONS = FittingOptions(observed_points=128, reference_points=48)

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from artperl import metrics
-from artperl.benchmarks.artimage import row_samples
-from artperl.categories import ARTIMAGE
-from artperl.checkpoint import load_estimator
-from artperl.evaluation import evaluate
+from artperl.data.categories import ARTIMAGE
+from artperl.estimator import load_estimator
+from artperl.evaluation.artimage import row_samples
+from artperl.evaluation.scoring import evaluate, metrics
 from tests.artperl import golden
 
 _DEGREES, _SHARE = 0.2, 0.005

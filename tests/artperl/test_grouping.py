@@ -8,11 +8,11 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from artperl.data import Clouds, Truth, to_batch, training_rows
-from artperl.evaluation import frozen_samples
-from artperl.grouping import clusters, differences, grouped
-from artperl.networks.perception import Votes
-from artsim.sample import Sample
+from artperl.data.batches import Clouds, Truth, to_batch, training_rows
+from artperl.evaluation.scoring import frozen_samples
+from artperl.perception.network import Votes
+from artperl.perception.part_grouping import clusters, differences, grouped
+from artsim.observing.sample import Sample
 from tests.artperl.worlds import true_votes
 
 ROWS = 10

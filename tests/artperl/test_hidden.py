@@ -9,12 +9,12 @@ import pytest
 import torch
 
 import artsim
-from artperl.hidden import uncovered
-from artperl.pose import Theta, theta_from_parts
-from artperl.shapes import Shapes
-from artsim.objects import ArticulatedObject
-from artsim.sample import Sample
-from artsim.sampling import ViewOptions, sample_view
+from artperl.core.pose import Theta, theta_from_parts
+from artperl.core.shapes import Shapes
+from artperl.fitting.occluded_parts import uncovered
+from artsim.model.draws import ViewOptions, sample_view
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 
 FRONT = ViewOptions(azimuth=(-10.0, 10.0), elevation=(-2.0, 2.0))
 """Frames hide temples from there."""

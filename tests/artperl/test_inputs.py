@@ -11,15 +11,15 @@ import pytest
 from PIL import Image
 
 import artsim
-from artperl.estimator import Estimator
-from artperl.evaluation import samples_of
+from artperl.evaluation.scoring import samples_of
 from artperl.inputs import points_of_depth, read_intrinsics, read_points
-from artperl.networks.perception import Perception
-from artperl.view import page
+from artperl.methods.full import Estimator
+from artperl.perception.network import Perception
+from artperl.viewer import page
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError
+from artsim.observing.sample import Sample
 from artsim.renderers import BACKGROUND
-from artsim.sample import Sample
 from tests.artperl.worlds import small_base
 
 

@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
-from artperl import metrics
-from artperl.boxes import intersection_volume
+from artperl.evaluation import metrics
+from artperl.evaluation.box_overlap import intersection_volume
 from benchmarks.legacy_iou import FRAMES
 
 Box = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import torch
 
-from artperl.fitting import Fitting
-from artperl.networks.moments import NUM_MOMENTS, moments
-from artperl.rotations import rotation_from_vector
+from artperl.agent.decision_process import Fitting
+from artperl.agent.moments import NUM_MOMENTS, moments
+from artperl.core.rotations import rotation_from_vector
 from tests.artperl.worlds import small_problem
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import artsim
-from artperl.categories import objects_of
-from artperl.data import Samples
-from artperl.order import as_seen, reordered, reordered_sample, visible_order
+from artperl.core.part_order import as_seen, reordered, reordered_sample, visible_order
+from artperl.data.batches import Samples
+from artperl.data.categories import objects_of
 from artsim.datasets.plan import SampleOptions
-from artsim.objects import ArticulatedObject
-from artsim.sampling import ViewOptions, sample_view
+from artsim.model.draws import ViewOptions, sample_view
+from artsim.model.objects import ArticulatedObject
 
 _DRAWN = ("points", "part", "npcs", "visible_fraction")
 """Which pixels are drawn depends on the order of the parts."""

@@ -7,15 +7,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from artperl.categories import ARTIMAGE, objects_of
-from artperl.checkpoint import load_estimator
-from artperl.data import Clouds, Samples, Truth, batches
-from artperl.evaluation import VALIDATION_SEEDS, frozen_samples
-from artperl.neighbours import nearest_by_products, nearest_by_trees
-from artperl.networks.perception import Perceived, Perception, Votes, perception_figures, perception_losses
-from artperl.networks.pointnet2 import Neighbourhoods, interpolated, strongest
+from artperl.core.neighbours import nearest_by_products, nearest_by_trees
+from artperl.core.pointnet2 import Neighbourhoods, interpolated, strongest
+from artperl.data.batches import Clouds, Samples, Truth, batches
+from artperl.data.categories import ARTIMAGE, objects_of
+from artperl.estimator import load_estimator
+from artperl.evaluation.scoring import VALIDATION_SEEDS, frozen_samples
+from artperl.perception.network import Perceived, Perception, Votes, perception_figures, perception_losses
 from artsim.datasets.plan import SampleOptions
-from artsim.sample import Sample
+from artsim.observing.sample import Sample
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_batch_n_is_always_the_same() -> None:
 
 
 def test_clouds_are_seen_in_several_batches_and_then_never_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("artperl.data._WINDOW", 3)
+    monkeypatch.setattr("artperl.data.batches._WINDOW", 3)
     stream = batches(["laptop"], 2, 32, 8, workers=0)
     centers = [set(next(stream)[0].center[:, 0].round(decimals=5).tolist()) for _ in range(12)]
     fresh = [now.difference(*centers[:n]) for n, now in enumerate(centers)]

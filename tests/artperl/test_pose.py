@@ -8,7 +8,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 import artsim
-from artperl.pose import (
+from artperl.core.pose import (
     Posed,
     Theta,
     Trees,
@@ -19,10 +19,10 @@ from artperl.pose import (
     pose_parts,
     theta_from_parts,
 )
-from artperl.rotations import rotation_from_vector
+from artperl.core.rotations import rotation_from_vector
 from artsim.errors import KinematicsError
-from artsim.kinematics import Joint, KinematicTree, Mimic
-from artsim.sampling import StateOptions, sample_state
+from artsim.model.draws import StateOptions, sample_state
+from artsim.model.kinematics import Joint, KinematicTree, Mimic
 
 
 def random_tree(rng: np.random.Generator, num_parts: int, mimic: bool = True) -> KinematicTree:

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.actions import MOVE, NUM_AXES, NUM_BINS, SCALE, action_mask
-from artperl.fitting import Fitting, FittingOptions
-from artperl.networks.agent import Agent
-from artperl.pose import KINDS
-from artperl.ppo import (
+from artperl.agent.actions import MOVE, NUM_AXES, NUM_BINS, SCALE, action_mask
+from artperl.agent.decision_process import Fitting, FittingOptions
+from artperl.agent.policy import Agent
+from artperl.agent.ppo import (
     PPOOptions,
     Rollout,
     acting,
@@ -23,6 +22,7 @@ from artperl.ppo import (
     ppo_losses,
     update,
 )
+from artperl.core.pose import KINDS
 from tests.artperl.worlds import small_problem
 from tests.conftest import installed
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 import torch
 
-from artperl import metrics
-from artperl.actions import residual
-from artperl.embedding import box_embedding
-from artperl.pose import pose_parts
-from artperl.problems import Problems, StartOptions, part_truth
+from artperl.agent.actions import residual
+from artperl.core.pose import pose_parts
+from artperl.data.fitting_problems import Problems, StartOptions, part_truth
+from artperl.evaluation import metrics
+from artperl.retrieval.box_embedding import box_embedding
 from tests.artperl.worlds import small_base
 
 

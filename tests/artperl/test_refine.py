@@ -9,17 +9,17 @@ import pytest
 import torch
 
 import artsim
-from artperl import metrics
-from artperl.energy import joint_energy, part_energy, refine_by_gradient
-from artperl.matching import Matches, Target, match
-from artperl.pose import Theta, Trees, clamp_state, pose_parts, theta_from_parts
-from artperl.refine import AxisPrior, RefineOptions, _maps, _moved, _rates, leaning, refine
-from artperl.rotations import rotate, rotation_from_vector
-from artperl.shapes import Observed, Shapes, spread_points
+from artperl.core.pose import Theta, Trees, clamp_state, pose_parts, theta_from_parts
+from artperl.core.rotations import rotate, rotation_from_vector
+from artperl.core.shapes import Observed, Shapes, spread_points
+from artperl.evaluation import metrics
+from artperl.fitting.correspondence import Matches, Target, match
+from artperl.fitting.levenberg_marquardt import AxisPrior, RefineOptions, _maps, _moved, _rates, leaning, refine
+from artperl.fitting.paper_energy import joint_energy, part_energy, refine_by_gradient
 from artsim.errors import ConfigError
-from artsim.objects import ArticulatedObject
-from artsim.sample import Sample
-from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 
 KNOWN_SHAPE = RefineOptions(sigma_scale=0.0, sigma_aspect=0.0, sigma_stretch=0.0, sigma_shift=0.0)
 

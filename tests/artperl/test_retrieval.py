@@ -11,13 +11,13 @@ import pytest
 import torch
 
 import artsim
-from artperl.categories import objects_of
-from artperl.embedding import by_boxes
-from artperl.grouping import Grouped
-from artperl.networks.perception import Perceived
-from artperl.retrieval import ShapeBase, moves, widened
-from artperl.search import references
-from artperl.shapes import Shapes
+from artperl.core.shapes import Shapes
+from artperl.data.categories import objects_of
+from artperl.fitting.search import references
+from artperl.perception.network import Perceived
+from artperl.perception.part_grouping import Grouped
+from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.shape_base import ShapeBase, moves, widened
 from artsim.errors import ConfigError, DatasetError
 from tests.artperl.worlds import small_base
 

@@ -18,10 +18,10 @@ import pytest
 import torch
 
 from artperl import cli
-from artperl.box_training import _load as load_records
-from artperl.run_folder import RunFolder, differences
-from artperl.tensor_files import read_tensors, write_tensors
-from artperl.training import Training
+from artperl.core.tensor_files import read_tensors, write_tensors
+from artperl.training.boxes import _load as load_records
+from artperl.training.run import Training
+from artperl.training.run_folder import RunFolder, differences
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from tests.artperl.test_training import TINY, ends_alike
 from tests.conftest import ASSETS
@@ -31,7 +31,7 @@ OPTIONS = replace(TINY, perception_steps=2, dense_steps=0, agent_rollouts=0, val
 CHILD = """
 import os, signal, sys
 from pathlib import Path
-from artperl.training import Training
+from artperl.training.run import Training
 from tests.artperl.test_run_folder import OPTIONS
 
 place = Path.replace
@@ -243,7 +243,7 @@ def full_disk(monkeypatch: pytest.MonkeyPatch, after: int) -> Iterator[None]:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
-        patched.setattr("artsim.files.os.fsync", fsync)
+        patched.setattr("artsim.common.files.os.fsync", fsync)
         yield
 
 

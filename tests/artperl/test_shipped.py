@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from artperl import metrics
-from artperl.benchmarks.artimage import real_objects
-from artperl.benchmarks.basin import basin_problem, run_basin
-from artperl.categories import ARTIMAGE
-from artperl.checkpoint import WEIGHTS, folder_of, load_estimator, read_settings
-from artperl.evaluation import evaluate, frozen_samples, samples_of
+from artperl.data.categories import ARTIMAGE
+from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings
+from artperl.evaluation.artimage import real_objects
+from artperl.evaluation.basin import basin_problem, run_basin
+from artperl.evaluation.scoring import evaluate, frozen_samples, metrics, samples_of
 from artsim.datasets.plan import SampleOptions
-from artsim.sampling import StateOptions, ViewOptions
+from artsim.model.draws import StateOptions, ViewOptions
 
 _SEEDS = 1_200_000
 """Neither of streams and bases, nor of the test and validation sets."""

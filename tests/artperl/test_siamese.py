@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from artperl.networks.siamese import Siamese, contrastive_loss
+from artperl.retrieval.siamese import Siamese, contrastive_loss
 
 
 def test_the_loss_is_that_of_equation_2() -> None:

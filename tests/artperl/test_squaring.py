@@ -10,12 +10,12 @@ import torch
 from numpy.typing import NDArray
 
 import artsim
-from artperl.pose import Theta, clamp_state, pose_parts, theta_from_parts
-from artperl.rotations import rotation_from_vector
-from artperl.shapes import Shapes
-from artperl.squaring import normals_of, squared
-from artsim.sample import Sample
-from artsim.sampling import StateOptions, ViewOptions, sample_state, sample_view
+from artperl.core.pose import Theta, clamp_state, pose_parts, theta_from_parts
+from artperl.core.rotations import rotation_from_vector
+from artperl.core.shapes import Shapes
+from artperl.fitting.normal_alignment import normals_of, squared
+from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.observing.sample import Sample
 
 
 def seen(category: str, seed: int) -> tuple[Shapes, Sample, Theta]:

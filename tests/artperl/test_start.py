@@ -9,17 +9,17 @@ import pytest
 import torch
 
 import artsim
-from artperl import metrics
-from artperl.data import Clouds, Samples, Truth, to_batch, training_rows
-from artperl.networks.perception import Perceived
-from artperl.pose import Theta, joint_states, pose_parts
-from artperl.problems import part_truth
-from artperl.retrieval import ShapeBase
-from artperl.rotations import rotation_from_vector
-from artperl.shapes import Shapes
-from artperl.start import adapted, by_another_part, part_poses, procrustes, sized, start
+from artperl.core.pose import Theta, joint_states, pose_parts
+from artperl.core.rotations import rotation_from_vector
+from artperl.core.shapes import Shapes
+from artperl.data.batches import Clouds, Samples, Truth, to_batch, training_rows
+from artperl.data.fitting_problems import part_truth
+from artperl.evaluation import metrics
+from artperl.fitting.initial_pose import adapted, by_another_part, part_poses, procrustes, sized, start
+from artperl.perception.network import Perceived
+from artperl.retrieval.shape_base import ShapeBase
 from artsim.datasets.plan import SampleOptions
-from artsim.sample import Sample
+from artsim.observing.sample import Sample
 
 
 def test_procrustes_recovers_a_motion_without_noise() -> None:

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import artsim
-from artperl.benchmarks.artimage import real_objects
-from artperl.data import batches
-from artperl.stretch import stretch, stretchable
-from artsim.kinematics import Array, KinematicTree
-from artsim.sample import Sample
+from artperl.data.batches import batches
+from artperl.data.stretching import stretch, stretchable
+from artperl.evaluation.artimage import real_objects
+from artsim.model.kinematics import Array, KinematicTree
+from artsim.observing.sample import Sample
 from tests.artperl.worlds import made, view
 
 CATEGORIES = ("drawer", "storage_furniture", "laptop", "dishwasher", "eyeglasses", "scissors", "robot_arm", "window")

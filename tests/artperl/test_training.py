@@ -16,16 +16,16 @@ import torch
 from safetensors.torch import load_file
 
 from artperl import cli
-from artperl.checkpoint import load_estimator, read_settings, save_estimator
-from artperl.data import Given, Recorded, batches
-from artperl.evaluation import TEST_SEEDS, VALIDATION_SEEDS
-from artperl.fitting import FittingOptions
-from artperl.networks.boxes import Boxes
-from artperl.order import visible_order
-from artperl.ppo import PPOOptions
-from artperl.settings import PRESETS, TrainOptions
-from artperl.steps import one_cycle
-from artperl.training import BASE_SEEDS, Training
+from artperl.agent.decision_process import FittingOptions
+from artperl.agent.ppo import PPOOptions
+from artperl.boxes.network import Boxes
+from artperl.core.part_order import visible_order
+from artperl.data.batches import Given, Recorded, batches
+from artperl.estimator import load_estimator, read_settings, save_estimator
+from artperl.evaluation.scoring import TEST_SEEDS, VALIDATION_SEEDS
+from artperl.training.options import PRESETS, TrainOptions
+from artperl.training.run import BASE_SEEDS, Training
+from artperl.training.steps import one_cycle
 from artsim import generate
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions
@@ -71,7 +71,7 @@ def test_a_stopped_run_ends_as_if_it_had_not_been(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: tuple[str, int]
 ) -> None:
     stage, after = stop
-    monkeypatch.setattr("artperl.training.write_scalars", _interrupt(stage, after))
+    monkeypatch.setattr("artperl.training.run.write_scalars", _interrupt(stage, after))
     with pytest.raises(KeyboardInterrupt):
         Training(TINY, tmp_path, workers=0, progress=False).run()
     monkeypatch.undo()

@@ -8,15 +8,15 @@ import numpy as np
 import torch
 
 import artsim
-from artperl.data import Truth, to_batch, training_rows
-from artperl.embedding import by_boxes
-from artperl.networks.perception import Perceived, Perception, Votes
-from artperl.problems import Problem, Problems
-from artperl.retrieval import ShapeBase
+from artperl.data.batches import Truth, to_batch, training_rows
+from artperl.data.fitting_problems import Problem, Problems
+from artperl.perception.network import Perceived, Perception, Votes
+from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.shape_base import ShapeBase
 from artsim.datasets.plan import SampleOptions, draw_sample
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
 from artsim.renderers import shared_renderer
-from artsim.sample import Sample
 
 
 @cache

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from artsim.families import make
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 
 
 def digests(folder: Path) -> dict[str, str]:

@@ -22,10 +22,10 @@ from artsim.datasets.dataset import pad_sample
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.shards import sample_from_members, sample_members
 from artsim.errors import ConfigError, DatasetError
-from artsim.kinematics import JOINT_TYPES
 from artsim.loading.sources import find_sources
-from artsim.object_file import ObjectCache
-from artsim.sample import Sample
+from artsim.model.kinematics import JOINT_TYPES
+from artsim.model.object_file import ObjectCache
+from artsim.observing.sample import Sample
 from tests.conftest import ASSETS, DEMO, in_another_process
 
 

@@ -22,9 +22,9 @@ import artsim
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.verify import verify
 from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError
-from artsim.kinematics import Array
 from artsim.loading.sources import Source, find_sources
-from artsim.sampling import sample_view
+from artsim.model.draws import sample_view
+from artsim.model.kinematics import Array
 from tests.conftest import ASSETS, BOX_LAPTOP
 
 OPTIONS = SampleOptions(num_points=128)

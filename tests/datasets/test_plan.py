@@ -15,8 +15,8 @@ from artsim.datasets.draw import SampleOptions, draw_sample
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import SPLITS, assign_splits, unique_keys
 from artsim.errors import ConfigError
+from artsim.model.draws import StateOptions, ViewOptions
 from artsim.renderers import make_renderer
-from artsim.sampling import StateOptions, ViewOptions
 from tests.conftest import ASSETS
 
 

@@ -22,7 +22,7 @@ from artsim.datasets.shards import write_shard
 from artsim.datasets.verify import verify
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import Source, family_sources, find_sources
-from artsim.object_file import ObjectCache
+from artsim.model.object_file import ObjectCache
 from artsim.renderers import make_renderer
 from tests.conftest import BOX_LAPTOP
 from tests.datasets.common import digests

@@ -11,12 +11,12 @@ import pytest
 import artsim
 from artsim.datasets.draw import SampleOptions, check_visible
 from artsim.datasets.verify import verify
+from artsim.drawing.inspect import describe
 from artsim.errors import AssetError, RenderError
 from artsim.families import make
-from artsim.inspect import describe
-from artsim.kinematics import Array
 from artsim.loading.sources import Source, family_sources, find_sources
-from artsim.sampling import ViewOptions, sample_view
+from artsim.model.draws import ViewOptions, sample_view
+from artsim.model.kinematics import Array
 from tests.conftest import ASSETS, BOX_LAPTOP, rigid
 from tests.datasets.common import Troublesome, digests
 

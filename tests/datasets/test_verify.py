@@ -19,7 +19,7 @@ from artsim.datasets.draw import SampleOptions
 from artsim.datasets.shards import ShardReader, write_shard
 from artsim.datasets.verify import sample_problems, verify
 from artsim.loading.sources import find_sources
-from artsim.sample import Sample
+from artsim.observing.sample import Sample
 from tests.conftest import ASSETS
 
 

@@ -14,10 +14,10 @@ import trimesh
 
 import artsim
 from artsim.errors import ArtsimError, AssetError
-from artsim.kinematics import transform_points
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.urdf import load
-from artsim.objects import ArticulatedObject
+from artsim.model.kinematics import transform_points
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS, BOX_LAPTOP
 
 QUIRKS = ASSETS / "quirks"
@@ -111,7 +111,7 @@ def test_a_part_moves_as_its_joint_says(box_laptop: Path) -> None:
 
 
 def test_an_object_file_reads_back_the_same(tmp_path: Path) -> None:
-    from artsim.object_file import load_object, save_object
+    from artsim.model.object_file import load_object, save_object
 
     obj = load(ASSETS / "cabinet")
     save_object(obj, tmp_path / "cabinet.npz")

@@ -9,8 +9,8 @@ import pytest
 
 from artsim import load
 from artsim.errors import AssetError
-from artsim.objects import ArticulatedObject
-from artsim.sampling import StateOptions, sample_state
+from artsim.model.draws import StateOptions, sample_state
+from artsim.model.objects import ArticulatedObject
 
 CASES = Path(__file__).parent.parent / "cases"
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from artsim import load
 from artsim.errors import AssetError
 from artsim.loading.xml_values import rotation_of
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import installed
 
 BOX = '<box size="0.2 0.1 0.05"/>'

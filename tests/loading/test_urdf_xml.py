@@ -10,7 +10,7 @@ import pytest
 
 from artsim import load
 from artsim.errors import AssetError
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
 from tests.conftest import BOX_LAPTOP, installed
 
 BODY = BOX_LAPTOP[BOX_LAPTOP.index("<robot") :]

@@ -17,7 +17,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from artsim.extras import needs
+from artsim.common.extras import needs
 
 ENV_ID = "ArtSimArticulated-v1"
 EPISODE_LENGTH = 100

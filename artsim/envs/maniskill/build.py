@@ -14,11 +14,11 @@ from sapien.wrapper.articulation_builder import LinkBuilder
 from scipy.spatial.transform import Rotation
 
 from artsim.appearance import Coat
-from artsim.embodied import embodied
 from artsim.envs.maniskill.places import T_world_object
 from artsim.export.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
+from artsim.model.convex_bodies import embodied
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
 from artsim.renderers.sapien_stage import render_body
 
 OBJECT_BIT = 28
@@ -56,7 +56,7 @@ class Built:
 def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], number: int, gravity: bool) -> Built:
     """Put an object on the ground of a sub-scene, its base fixed.
 
-    Damping, friction and masses are those of :func:`artsim.export.robot.as_robot`, as in :mod:`artsim.physics`; a
+    Damping, friction and masses are those of :func:`artsim.export.robot.as_robot`, as in :mod:`artsim.physics.world`; a
     loaded object moves as its convex hulls do, and looks as its own surface does.
 
     Parameters

@@ -13,12 +13,12 @@ from mani_skill.utils.structs import Pose
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from artsim.camera import Camera
 from artsim.envs.maniskill.places import T_world_object
-from artsim.episode import widest_state
-from artsim.kinematics import Array
-from artsim.objects import ArticulatedObject
-from artsim.sampling import ViewOptions, sample_view
+from artsim.model.camera import Camera
+from artsim.model.draws import ViewOptions, sample_view
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.physics.episode import widest_state
 
 # SAPIEN's camera looks along x with z up.
 SAPIEN_FROM_CV = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

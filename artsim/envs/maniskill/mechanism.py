@@ -14,7 +14,7 @@ from torch import Tensor
 
 from artsim.envs.maniskill.build import Built
 from artsim.envs.maniskill.truth import Truth
-from artsim.kinematics import Array
+from artsim.model.kinematics import Array
 
 
 class Mechanism:

@@ -15,8 +15,8 @@ from artsim.envs.maniskill import ENV_ID
 from artsim.envs.maniskill.goal import LEAST_OPEN, Goal
 from artsim.envs.maniskill.places import ROBOTS
 from artsim.errors import ConfigError
-from artsim.objects import ArticulatedObject
-from artsim.sampling import Scale, ViewOptions
+from artsim.model.draws import Scale, ViewOptions
+from artsim.model.objects import ArticulatedObject
 
 REWARD_MODES = ("normalized_dense", "dense", "sparse", "none")
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.camera import look_at_transform
 from artsim.envs.maniskill.goal import LEAST_OPEN, MOST_OPEN, Goal
-from artsim.episode import widest_state
-from artsim.kinematics import ROTATING, Array
-from artsim.objects import ArticulatedObject
-from artsim.sampling import bounding_sphere, joint_intervals
+from artsim.model.camera import look_at_transform
+from artsim.model.draws import bounding_sphere, joint_intervals
+from artsim.model.kinematics import ROTATING, Array
+from artsim.model.objects import ArticulatedObject
+from artsim.physics.episode import widest_state
 
 _READY = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4, 0.04, 0.04)
 ROBOTS = {

@@ -26,9 +26,9 @@ from artsim.envs.maniskill.mechanism import Mechanism
 from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
 from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_start
 from artsim.envs.maniskill.truth import Record, Truth, truth_of
-from artsim.episode import Episode, EpisodeOptions
 from artsim.errors import ConfigError
-from artsim.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject
+from artsim.physics.episode import Episode, EpisodeOptions
 from artsim.renderers.sapien import import_sapien
 
 CAMERA = "base_camera"

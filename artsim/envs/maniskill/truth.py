@@ -11,9 +11,9 @@ import torch
 from torch import Tensor
 
 from artsim.envs.maniskill.places import T_world_object, handle
-from artsim.kinematics import JOINT_TYPES, ROTATING, Array
-from artsim.objects import ArticulatedObject
-from artsim.sampling import joint_intervals
+from artsim.model.draws import joint_intervals
+from artsim.model.kinematics import JOINT_TYPES, ROTATING, Array
+from artsim.model.objects import ArticulatedObject
 
 Record = dict[str, Tensor]
 
@@ -67,7 +67,7 @@ class Truth:
         return torch.where(self.free, way / (self.high - self.low).clamp(min=1e-9), 0.0)
 
     def openness(self, q: Tensor) -> Tensor:
-        """(B,) as :func:`artsim.episode.openness` tells it."""
+        """(B,) as :func:`artsim.physics.episode.openness` tells it."""
         rest = self.fixed["joint_rest"]
         share = (q - rest).abs() / (self.far - rest).abs().clamp(min=1e-9)
         return torch.where(self.free, share, 0.0).sum(1) / self.free.sum(1).clamp(min=1)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.files import parse_json
+from artsim.common.files import parse_json
 from artsim.loading.mesh_files.gltf_buffers import Buffers, Items, integer
 from artsim.loading.mesh_files.polygons import fans, strips
 from artsim.loading.mesh_files.surface import (

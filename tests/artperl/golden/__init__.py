@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from artperl.benchmarks.artimage import real_objects
-from artperl.categories import ARTIMAGE
-from artperl.estimate import Estimate
-from artperl.evaluation import frozen_samples, samples_of
+from artperl.core.estimate import Estimate
+from artperl.data.categories import ARTIMAGE
+from artperl.evaluation.artimage import real_objects
+from artperl.evaluation.scoring import frozen_samples, samples_of
+from artsim.common.files import write_atomic
 from artsim.datasets.plan import SampleOptions
-from artsim.files import write_atomic
-from artsim.sampling import ViewOptions
+from artsim.model.draws import ViewOptions
 
 CLOUDS, ESTIMATES = (Path(__file__).with_name(name) for name in ("clouds.npz", "estimates.json"))
 NUM_POINTS = 2048

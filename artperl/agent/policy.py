@@ -1,0 +1,98 @@
+"""The fitting agent: one policy for every tree (ArtPERL, section 4.3).
+
+A shared encoder describes each part by its observed points and by the reference's, with the offsets between them and
+their moments. The policy of a part reads these, what is known of its joint, the same of its parent, whose own error
+its joint is not to make up for, and the whole object. Its weights are shared by all parts, with one head for each type
+of joint, so that the number of parts is not built in.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from artperl.agent.actions import NUM_AXES, NUM_BINS
+from artperl.agent.decision_process import View
+from artperl.agent.moments import NUM_MOMENTS, moments
+from artperl.core.pose import KINDS
+
+_HEADS = {"free": 0, "revolute": 1, "continuous": 1, "prismatic": 2, "screw": 1, "fixed": 3}
+"""Head of each kind of joint."""
+
+
+class Agent(nn.Module):
+    """Policy and value.
+
+    Parameters
+    ----------
+    width : int
+        Channels of the encoder's first layer.
+    """
+
+    head_of: Tensor
+
+    def __init__(self, width: int = 64):
+        super().__init__()
+        self.width = width
+        features = 2 * width
+        self.observed = _encoder(6, width, features)
+        self.reference = _encoder(6, width, features)
+        self.kind = nn.Embedding(len(KINDS), 16)
+        described = 4 * features + 16 + 6 + 2 + 1 + NUM_MOMENTS
+        self.part = nn.Sequential(nn.Linear(described, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU())
+        self.whole = nn.Sequential(nn.Linear(128, 128), nn.ReLU())
+        self.local = nn.Sequential(nn.Linear(384, 128), nn.ReLU())
+        self.heads = nn.Linear(128, (max(_HEADS.values()) + 1) * NUM_AXES * NUM_BINS)
+        self.value = nn.Sequential(nn.Linear(128, 64), nn.ReLU(), nn.Linear(64, 1))
+        self.register_buffer("head_of", torch.tensor([_HEADS[kind] for kind in KINDS]), persistent=False)
+
+    def forward(self, view: View) -> tuple[Tensor, Tensor]:
+        """Logits (B, P, 9, 11) of the bins, and value (B,)."""
+        seen = self.observed(torch.cat([view.observed, view.offset], dim=-1))
+        have = self.reference(torch.cat([view.reference, view.back], dim=-1))
+        B, P = view.valid.shape
+        mean, top, share = _pool_parts(seen, view.part, P)
+        described = torch.cat(
+            [
+                mean,
+                top,
+                have.mean(2),
+                have.amax(2),
+                self.kind(view.kind),
+                view.joint.clamp(-4, 4),
+                view.state,
+                share,
+                moments(view),
+            ],
+            -1,
+        )
+        part = self.part(described)
+        valid = view.valid[..., None]
+        whole = self.whole(part.masked_fill(~valid, -torch.inf).amax(1))
+        above = part.gather(1, view.parent[..., None].expand(-1, -1, part.shape[-1]))
+        local = self.local(torch.cat([part, above, whole[:, None].expand(-1, P, -1)], dim=-1))
+        logits = self.heads(local).reshape(B, P, -1, NUM_AXES, NUM_BINS)
+        head = self.head_of[view.kind][..., None, None, None].expand(-1, -1, 1, NUM_AXES, NUM_BINS)
+        return logits.gather(2, head)[:, :, 0].float(), self.value(whole)[:, 0].float()
+
+
+def _encoder(inputs: int, width: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, outputs), nn.ReLU())
+
+
+def _pool_parts(features: Tensor, part: Tensor, rows: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Mean, maximum (B, P, C) of each part's points, and its share of all points (B, P, 1).
+
+    Products and bags, since scattering is several times slower, above all backwards.
+    """
+    B, N, C = features.shape
+    member = functional.one_hot(part, rows).to(features.dtype).transpose(1, 2)
+    count = member.sum(2, keepdim=True)
+    mean = (member @ features) / count.clamp(min=1.0)
+    first = torch.arange(B, device=part.device)[:, None]
+    order = (part.argsort(dim=1) + first * N).flatten()
+    ends = count[..., 0].long().flatten().cumsum(0)
+    begins = ends - count[..., 0].long().flatten()
+    top = functional.embedding_bag(order, features.reshape(B * N, C), begins, mode="max")
+    return mean, top.reshape(B, rows, C), count / N

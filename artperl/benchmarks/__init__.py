@@ -1,1 +1,0 @@
-"""Protocols that fill the paper's tables."""

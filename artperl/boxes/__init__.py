@@ -1,0 +1,1 @@
+"""Boxes of parts from where their points are."""

@@ -1,0 +1,1 @@
+"""What everything in artperl builds on: rotations, trees and poses, shapes, clouds, estimates."""

@@ -1,0 +1,207 @@
+"""An estimate: 9D poses of the parts of one object, and what is worked out from them and the points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from artperl.core.listing import listed, short
+from artperl.core.pose import Posed
+from artperl.core.shapes import Observed, Shapes
+
+Array = NDArray[np.float64]
+
+_ENOUGH_TO_WIDEN = 32
+"""Points of a part from which they say how large it is."""
+_OUTERMOST = 0.004
+"""Of a cloud's points, that lie too far out on each side of a part to say how large it is."""
+_SEEN = 0.03
+"""A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Confidence as a logistic function of what a fit says about itself.
+
+    The defaults are guesses; :func:`artperl.evaluation.scoring.calibrate` fits them to a validation set.
+    """
+
+    bias: float = 2.0
+    residual: float = -100.0
+    """Weight of the residual, in diagonals."""
+    disagreement: float = -30.0
+    """Weight of the median distance between where perception and the fit place the points in the rest frame."""
+    visibility: float = 10.0
+    """Weight of the share of the surface that shows, of the part that shows least: what shows of others fits as well
+    where that one is wrong."""
+
+    def __call__(self, residual: float, disagreement: float, visibility: float) -> float:
+        score = self.bias + self.residual * residual + self.disagreement * disagreement + self.visibility * visibility
+        return float(1.0 / (1.0 + np.exp(-score)))
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """9D poses of the K parts of one object. Camera frame, metres, radians.
+
+    Attributes
+    ----------
+    rotation : (K, 3, 3) float
+        Of ``T_camera_part``.
+    translation : (K, 3) float
+        Box centres.
+    size : (K, 3) float
+        Box sizes.
+    T_camera_part : (K, 4, 4) float
+        Maps the estimated object's rest frame, as carried by each part, to the camera.
+    state : (K,) float
+        0 for the root.
+    joint_type : tuple of str, length K
+    joint_parent : (K,) int64
+    joint_axis, joint_origin : (K, 3) float
+        As posed.
+    part : (N,) int64
+        Part of each given point; -1 for points that are not finite, or outliers.
+    reference : str
+        Retrieved object.
+    residual : float
+        Root of the mean robust squared distance of the cloud from the fitted reference, over the diagonal; parts count
+        by the root of how many points they have.
+    disagreement : float
+        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
+    visibility : (K,) float
+        Share of each part's surface that is seen. A part with 0 is inferred from its joint's limits, not measured.
+    confidence : float
+        0 to 1.
+    trajectory : (S, K, 4, 4) float
+        ``T_camera_part`` at the start, after each step of the agent where it was needed, and in the end.
+    milliseconds : dict
+        By stage.
+    part_names : tuple of str, length K
+        Such as "base" and "lid"; ``part_<k>`` where they are unknown.
+    joint_limits : (K, 2) float
+        Least and largest state of each joint, as the reference has them: radians, and metres of slides at the
+        estimated size. Infinite for what turns without end, 0 for the root.
+    warnings : tuple of str
+        What looks wrong with the cloud, one sentence with its fix each.
+    """
+
+    rotation: Array
+    translation: Array
+    size: Array
+    T_camera_part: Array
+    state: Array
+    joint_type: tuple[str, ...]
+    joint_parent: NDArray[np.int64]
+    joint_axis: Array
+    joint_origin: Array
+    part: NDArray[np.int64]
+    reference: str
+    residual: float
+    disagreement: float
+    visibility: Array
+    confidence: float
+    trajectory: Array
+    milliseconds: dict[str, float]
+    part_names: tuple[str, ...] = ()
+    joint_limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def state_unit(self) -> tuple[str, ...]:
+        """Unit of each part's state and limits, length K: "rad", "m", or "" for what does not move."""
+        units = {"free": "", "fixed": "", "prismatic": "m"}
+        return tuple(units.get(kind, "rad") for kind in self.joint_type)
+
+    def __str__(self) -> str:
+        return listed(self)
+
+    def __repr__(self) -> str:
+        return short(self)
+
+
+def slid(estimate: Estimate, farther: Array) -> Estimate:
+    """The estimate with parts that have slid farther (K,), metres, along their axes, and are where they were.
+
+    Where they are at rest changes, and with them where everything is at rest that they carry.
+    """
+    T, rotation = estimate.T_camera_part.copy(), estimate.rotation
+    shift = farther[:, None] * estimate.joint_axis
+    for k, parent in enumerate(estimate.joint_parent):
+        if parent >= 0:
+            shift[k] += rotation[k] @ rotation[parent].T @ shift[parent]
+    T[:, :3, 3] += shift
+    trajectory = np.concatenate([estimate.trajectory[:-1], T[None]])
+    return replace(estimate, T_camera_part=T, state=estimate.state + farther, trajectory=trajectory)
+
+
+def labels_by_boxes(
+    points: Array, T_camera_part: Array, center: Array, size: Array, log_odds: Array, distance: float
+) -> NDArray[np.int64]:
+    """(N,) parts of points (N, 3), given both the odds (N, P) of each part and how far out of its box a point lies.
+
+    Parameters
+    ----------
+    T_camera_part : (K, 4, 4) float
+    center, size : (K, 3) float
+        Boxes in the rest frame, metres.
+    distance : float
+        Metres that weigh as much as odds of 1 to e.
+    """
+    out = np.stack([
+        np.linalg.norm(np.maximum(np.abs((points - T[:3, 3]) @ T[:3, :3] - middle) - 0.5 * whole, 0.0), axis=1)
+        for T, middle, whole in zip(T_camera_part, center, size, strict=True)
+    ], axis=1)  # fmt: skip
+    score = log_odds[:, : len(size)] - (out / distance) ** 2
+    return np.where(np.isnan(score).any(axis=1), -1, score.argmax(axis=1))
+
+
+def brought_to_rest(posed: Array, T_camera_part: Array) -> Array:
+    """(K, 3) one posed point of each part, in the rest frame that its part carries (K, 4, 4)."""
+    rest: Array = np.einsum("kji,kj->ki", T_camera_part[:, :3, :3], posed - T_camera_part[:, :3, 3])
+    return rest
+
+
+def widen(rotation: Array, center: Array, size: Array, points: Array, part: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Boxes that hold the points of their parts, but for the outermost few on each side.
+
+    As many are left out of a small part as of a large one: they are points of its neighbours, while the feet of a
+    cabinet may be no more than a percent of its points. What is fitted is a reference's shape, which real parts stick
+    out of; points never make a box smaller, since a part is seen from one side only.
+
+    Parameters
+    ----------
+    rotation, center, size : (K, 3, 3), (K, 3), (K, 3) float
+    points : (N, 3) float
+    part : (N,) int
+        -1 for points of no part.
+
+    Returns
+    -------
+    center, size : (K, 3) float
+    """
+    center, size = center.copy(), size.copy()
+    outermost = round(_OUTERMOST * len(points))
+    for k in range(len(size)):
+        own = points[part == k]
+        if len(own) >= _ENOUGH_TO_WIDEN:
+            across, left_out = np.sort((own - center[k]) @ rotation[k], axis=0), min(outermost, len(own) // 4)
+            low = np.minimum(-0.5 * size[k], across[left_out])
+            high = np.maximum(0.5 * size[k], across[-1 - left_out])
+            center[k] += rotation[k] @ (0.5 * (low + high))
+            size[k] = high - low
+    return center, size
+
+
+def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
+    """(P,) share of the surface of each part, of the first object, that has an observed point of the part near it."""
+    points = posed.points(shapes.points, shapes.box_center)[0].numpy()
+    seen = np.zeros(len(points))
+    cloud, part = observed.points[0].numpy(), observed.part[0].numpy()
+    for k in np.unique(part):
+        near = cKDTree(cloud[part == k]).query(points[k], distance_upper_bound=_SEEN * float(shapes.diagonal[0]))[0]
+        seen[k] = np.isfinite(near).mean()
+    return seen

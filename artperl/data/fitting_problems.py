@@ -1,0 +1,208 @@
+"""Fitting problems to learn from: fresh objects seen by a camera, a reference for each, a start and the goal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from artperl.agent.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
+from artperl.core.batch import Batch
+from artperl.core.pose import Theta, clamp_state, theta_from_parts
+from artperl.core.shapes import Observed, Shapes
+from artperl.data.batches import Clouds, samples_from
+from artperl.data.categories import Parts
+from artperl.fitting.initial_pose import adapted, sized
+from artperl.perception.network import Perception
+from artperl.perception.part_grouping import perceive
+from artperl.retrieval.box_embedding import box_embedding
+from artperl.retrieval.shape_base import ShapeBase
+from artsim.datasets.plan import SampleOptions
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
+
+References = Literal["retrieved", "deformed"]
+"""What is fitted: one of the objects of the base that are most like the observed one; or the observed object itself,
+stretched at random, which has the right tree where no base could hold all that there are."""
+
+Labels = Literal["perceived", "true"]
+"""Which part each point is said to be of: what perception says; or the truth, for an agent that is to learn more trees
+than its perception can tell apart yet."""
+
+_STRETCH = (0.25, 0.1)
+"""Half-widths of the logarithms by which deformed references are stretched: as a whole, and each part on its own."""
+_SHIFT = 0.03
+"""Half-width, in diagonals, of what joints of deformed references are off by."""
+
+
+@dataclass(frozen=True)
+class StartOptions:
+    """How far from the goal episodes begin: half-widths of uniform distributions."""
+
+    rotation: float = 1.0
+    """Radians, about a random axis."""
+    translation: float = 0.3
+    """Radii of the observed cloud."""
+    scale: float = 0.15
+    """Logarithm, along each axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(Batch):
+    """B fitting problems.
+
+    Attributes
+    ----------
+    shapes : Shapes
+        The references.
+    observed : Observed
+    start, goal : Theta
+    """
+
+    shapes: Shapes
+    observed: Observed
+    start: Theta
+    goal: Theta
+
+
+class Problems:
+    """Endless, reproducible batches of problems: batch ``n`` is always the same.
+
+    Parameters
+    ----------
+    categories : sequence of str
+    base : ShapeBase
+        References are drawn from the few that are most like the object.
+    batch_size, num_points : int
+    seed : int
+    start : StartOptions, optional
+    sample : SampleOptions, optional
+        View preset, noise and the like.
+    choices : int
+        Among how many of the nearest references to draw.
+    perception : Perception, optional
+        Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
+        it.
+    parts : Parts
+    given : sequence of ArticulatedObject
+        See :func:`artperl.data.batches.samples_from`.
+    views_per_object : int
+        Problems in a row of the same object.
+    references : References
+    dataset : str or Path, optional
+        See :class:`artperl.data.batches.Recorded`.
+    """
+
+    def __init__(
+        self,
+        categories: Sequence[str],
+        base: ShapeBase,
+        batch_size: int = 64,
+        num_points: int = 512,
+        seed: int = 0,
+        start: StartOptions | None = None,
+        sample: SampleOptions | None = None,
+        choices: int = 4,
+        perception: Perception | None = None,
+        parts: Parts = "artimage",
+        given: Sequence[ArticulatedObject] = (),
+        views_per_object: int = 2,
+        references: References = "retrieved",
+        dataset: str | Path | None = None,
+    ):
+        options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
+        rows = base.shapes.trees.num_rows
+        self.samples = samples_from(dataset, categories, options, seed, views_per_object, rows, parts, given)
+        self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
+        self.start, self.perception, self.references = start or StartOptions(), perception, references
+
+    def __getitem__(self, n: int) -> Problem:
+        generator = torch.Generator().manual_seed(self.seed * 1_000_003 + n)
+        samples = [self.samples[i] for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
+        rows = self.base.shapes.trees.num_rows
+        truth = [part_truth(sample, rows) for sample in samples]
+        valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
+        if self.references == "deformed":
+            objects = [self.samples.object(i) for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
+            shapes = deformed(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
+        else:
+            query = box_embedding(valid, box_center, box_size)
+            nearest, _ = self.base.nearest(query, min(self.choices, len(self.base)))
+            pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
+            shapes = self.base.shapes[nearest.gather(1, pick)[:, 0]]
+        shapes = sized(shapes, torch.tensor([sample.diagonal for sample in samples]))
+        goal = theta_from_parts(shapes.trees, shapes.box_center, shapes.box_size, rotation, center, size)
+        goal = Theta(**{**vars(goal), "state": clamp_state(shapes.trees, goal.state)})
+        points = torch.from_numpy(np.stack([s.points for s in samples]))
+        part = torch.from_numpy(np.stack([s.part for s in samples]).astype(np.int64))
+        observed = Observed.of(points, part if self.perception is None else self._labels(points))
+        radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
+        return Problem(shapes, observed, perturbed(shapes, goal, radius, self.start, generator), goal)
+
+    @torch.inference_mode()
+    def _labels(self, points: Tensor) -> Tensor:
+        assert self.perception is not None
+        clouds = Clouds.of(points.to(self.perception.device))
+        return perceive(self.perception.eval(), clouds.points).part.to("cpu", copy=True)
+
+
+def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
+    """Of one sample, padded to ``rows`` parts: which rows are parts; the 9D poses (rotation, box centre in the camera
+    frame, box size, metres); and the boxes in the rest frame, in diagonals.
+    """
+    K = len(sample.joint_type)
+
+    def pad(values: np.ndarray) -> Tensor:
+        padded = np.zeros((rows, *values.shape[1:]), dtype=np.float32)
+        padded[:K] = values
+        return torch.from_numpy(padded)
+
+    rotation = pad(sample.T_camera_part[:, :3, :3])
+    rotation[K:] = rotation[0]
+    center = (
+        np.einsum("kij,kj->ki", sample.T_camera_part[:, :3, :3], sample.box_center) + sample.T_camera_part[:, :3, 3]
+    )
+    boxes = pad(sample.box_center / sample.diagonal), pad(sample.box_size / sample.diagonal)
+    return torch.arange(rows) < K, rotation, pad(center), pad(sample.box_size), *boxes
+
+
+def deformed(shapes: Shapes, generator: torch.Generator) -> Shapes:
+    """Other objects with the same trees: stretched as a whole and part by part, their joints somewhere else."""
+    B, P = shapes.trees.valid.shape
+
+    def drawn(*size: int) -> Tensor:
+        return 2.0 * torch.rand(*size, generator=generator) - 1.0
+
+    whole, own = _STRETCH
+    shift = _SHIFT * shapes.diagonal[:, None, None] * drawn(B, P, 3)
+    return adapted(
+        shapes,
+        replace(Theta.at_rest(shapes.trees), log_scale=whole * drawn(B, 3), stretch=own * drawn(B, P, 3), shift=shift),
+    )
+
+
+def perturbed(shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator) -> Theta:
+    """Starts around goals, with the reference's own shape, and joint states anywhere in their limits."""
+    B, P = shapes.trees.valid.shape
+    plain = Theta(
+        goal.rotation, goal.translation, goal.log_scale, goal.state, torch.zeros_like(goal.shift),
+        torch.zeros_like(goal.stretch),
+    )  # fmt: skip
+    step = 2.0 * torch.rand(B, P, NUM_AXES, generator=generator) - 1.0
+    axis = torch.nn.functional.normalize(torch.randn(B, 3, generator=generator), dim=-1)
+    step[:, 0, TURN] = axis * (options.rotation * step[:, 0, :1])
+    step[:, 0, MOVE] *= options.translation
+    step[:, 0, SCALE] *= options.scale
+    step[:, 1:, MOVE] = 0.0
+    step[:, 1:, STATE] = 0.0
+    moved = move(shapes, plain, step, radius)
+    trees = shapes.trees
+    low = torch.where(torch.isfinite(trees.lower), trees.lower, trees.rest - torch.pi)
+    high = torch.where(torch.isfinite(trees.upper), trees.upper, trees.rest + torch.pi)
+    drawn = low + torch.rand(B, P, generator=generator) * (high - low)
+    return Theta(**{**vars(moved), "state": torch.where(trees.free, drawn, moved.state)})

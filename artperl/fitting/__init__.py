@@ -1,0 +1,1 @@
+"""Fitting a reference to a cloud (ArtPERL, section 4.4)."""

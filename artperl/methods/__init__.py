@@ -1,0 +1,1 @@
+"""From a cloud to an estimate: each method is one page."""

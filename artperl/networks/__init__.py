@@ -1,1 +1,0 @@
-"""Networks of artperl, in plain torch."""

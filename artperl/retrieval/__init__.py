@@ -1,0 +1,1 @@
+"""References for what is perceived (ArtPERL, section 4.2)."""

@@ -1,0 +1,119 @@
+"""What a training run depends on, and presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from artperl.agent.decision_process import FittingOptions
+from artperl.agent.ppo import PPOOptions
+from artperl.data.categories import Parts
+from artperl.data.fitting_problems import Labels, References, StartOptions
+from artsim.datasets.plan import SampleOptions
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """What a run depends on."""
+
+    categories: tuple[str, ...] = ("laptop",)
+    """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
+    parts: Parts = "artimage"
+    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
+    objects of the families."""
+    max_parts: int | None = None
+    """The most parts that an object may have."""
+    files: tuple[str, ...] = ()
+    """URDF files, object folders, or folders of them: objects to learn from instead of categories, which are empty
+    then."""
+    package_roots: tuple[tuple[str, str], ...] = ()
+    """Name and folder of the packages that these files name, where they are not found as they are."""
+    real: bool = False
+    """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
+    dataset: str | None = None
+    """Folder of a dataset to learn from, its train split, instead of fresh objects."""
+    start_from: str | None = None
+    """Folder of an estimator whose networks are learnt on; by default they begin at random."""
+    seed: int = 0
+    device: str = "cpu"
+    """Where the networks learn: cpu, cuda."""
+    base_objects: int = 64
+    """Reference objects of each category."""
+    reference_points: int = 192
+    """Points of each part of a reference."""
+    width: int = 48
+    """Channels of perception's finest level."""
+    perception_steps: int = 4000
+    """Batches of stage 1."""
+    dense_steps: int = 1000
+    """Batches in its end, of fewer, denser clouds: of as many points as the estimator looks at."""
+    denser: int = 2
+    """Times the points of a training cloud that the estimator looks at: weights carry over."""
+    stretched: float = 0.0
+    """Share of these clouds whose objects are stretched between the edges of their parts."""
+    noisy: float = 0.0
+    """Share of the others that are as a depth sensor, a D435, sees them."""
+    perception_rate: float = 2e-3
+    mixed_precision: bool = True
+    """Networks multiply in bfloat16 while they learn, where the processor can."""
+    batch_size: int = 32
+    num_points: int = 1024
+    """Points of a cloud."""
+    agent_rollouts: int = 150
+    """Batches of episodes of stage 2; 0 goes without an agent."""
+    cloning_share: float = 0.6
+    """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
+    references: References = "retrieved"
+    """What the agent learns to fit."""
+    labels: Labels = "perceived"
+    """Which part the agent is told that each point is of."""
+    agent_rate: float = 1e-3
+    episodes: int = 64
+    """Episodes of a rollout."""
+    box_views: int = 2500
+    """Fresh views of stage 3, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
+    box_steps: int = 12000
+    """Batches that boxes are learnt in."""
+    box_width: int = 80
+    """Channels of the network that they are learnt by."""
+    validate_every: int = 1000
+    """Steps of stage 1 between tests."""
+    validate_rollouts: int = 50
+    """Rollouts of stage 2 between tests."""
+    test_objects: int = 40
+    """Unseen objects of each category, others for validation than for the test at the end; files share so many."""
+    foreign_categories: int = 12
+    """Other categories, of which two objects each show what confidence must be low for."""
+    validation_views: int = 4
+    """Views of each object when the estimator is validated."""
+    test_views: int = 4
+    """Views of each object when the best estimator is tested."""
+    sample: SampleOptions = field(default_factory=SampleOptions)
+    ppo: PPOOptions = field(default_factory=PPOOptions)
+    fitting: FittingOptions = field(default_factory=FittingOptions)
+    start: StartOptions = field(default_factory=StartOptions)
+
+    @property
+    def votes(self) -> bool:
+        """Whether perception finds parts by votes: of families' objects with any parts, nobody knows how many."""
+        return self.parts == "any" and not self.files
+
+
+PRESETS = {
+    "quick": TrainOptions(
+        base_objects=32, width=32, perception_steps=500, dense_steps=0, batch_size=24, num_points=768,
+        agent_rollouts=12, episodes=48, box_views=0, validate_every=250, validate_rollouts=12, test_objects=20,
+        validation_views=2,
+    ),
+    "full": TrainOptions(),
+    "gpu": TrainOptions(
+        device="cuda", width=64, perception_steps=20000, dense_steps=5000, batch_size=64, agent_rollouts=1000,
+        episodes=256,
+    ),
+    "joint": TrainOptions(
+        parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
+        perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0,
+        box_width=40, validate_every=2000, test_objects=8, validation_views=2,
+    ),
+}  # fmt: skip
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one
+category, on a GPU; joint: one estimator for many categories, with any parts."""

@@ -1,0 +1,1 @@
+"""Gates that objects and files pass."""

@@ -1,0 +1,125 @@
+"""Optional dependencies: which extra brings each of them, and one sentence for whoever lacks one.
+
+Every import of an optional dependency stands in :func:`needs`, or is reached through a program whose last net is
+:func:`explained`: nobody has to read a traceback to learn what to install.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from artsim.errors import ArtsimError, ConfigError
+
+MODULES = {
+    "pybullet": ("PyBullet", "pybullet"),
+    "pybullet_data": ("PyBullet", "pybullet"),
+    "gymnasium": ("gymnasium", "envs"),
+    "sapien": ("SAPIEN", "sapien"),
+    "mani_skill": ("ManiSkill", "maniskill"),
+    "warp": ("Warp", "warp"),
+    "matplotlib": ("matplotlib", "view"),
+    "rerun": ("rerun-sdk", "view"),
+    "fcl": ("python-fcl", "sim"),
+    "mujoco": ("MuJoCo", "sim"),
+    "pxr": ("usd-core", "sim"),
+    "yourdfpy": ("yourdfpy", "sim"),
+    "torch": ("torch", "train"),
+    "tensorboard": ("tensorboard", "train"),
+    "safetensors": ("safetensors", "train"),
+    "yaml": ("PyYAML", "train"),
+    "hypothesis": ("hypothesis", "dev"),
+    "pytest": ("pytest", "dev"),
+    "stable_baselines3": ("stable-baselines3", "dev"),
+    "webdataset": ("webdataset", "dev"),
+}
+"""Optional modules: what each is called, and the extra that brings it."""
+
+_OURS = ("artsim", "artperl", "benchmarks")
+
+
+@contextlib.contextmanager
+def needs(where: str, kind: type[ArtsimError] = ConfigError, extra: str = "") -> Iterator[None]:
+    """Import optional dependencies in this block; what is missing, or does not start, becomes one sentence.
+
+    Parameters
+    ----------
+    where : str
+        What they are for.
+    kind : type of ArtsimError
+        Raised when one cannot be imported.
+    extra : str
+        Extras to install, separated by commas; by default the one that brings the missing module.
+
+    Raises
+    ------
+    ArtsimError
+        Of the type ``kind``, with the command that installs what is missing, or the reason why it does not start.
+    """
+    try:
+        yield
+    except ImportError as error:
+        if of_ours(error):
+            raise
+        raise explained(error, where, kind, extra) from error
+
+
+def of_ours(error: ImportError) -> bool:
+    """Whether a module of this project is what cannot be imported: a fault whose traceback is wanted."""
+    return (error.name or "").partition(".")[0] in _OURS
+
+
+def explained(
+    error: ImportError, where: str | None, kind: type[ArtsimError] = ConfigError, extra: str = ""
+) -> ArtsimError:
+    """The readable form of a failed import; parameters as of :func:`needs`."""
+    module = (error.name or "").partition(".")[0]
+    name, own = MODULES.get(module, (module, ""))
+    fix = install_command(extra or own)
+    if isinstance(error, ModuleNotFoundError) and module and importlib.util.find_spec(module) is None:
+        return kind(f"{name} is not installed", where, fix)
+    if re.search(r"\.so\b|shared object|DLL|\.dylib", str(error)):
+        fix = "install the system library that it names (scripts/install-system.sh does it on Debian and Ubuntu)"
+    return kind(f"{name or 'a module'} is installed, but cannot be imported ({error})", where, fix)
+
+
+def install_command(extra: str = "") -> str:
+    """Shell command that installs extras of this very artsim, from its clone if it runs from one.
+
+    Parameters
+    ----------
+    extra : str
+        Names of extras, separated by commas; empty for the core alone.
+    """
+    extras = f"[{extra}]" if extra else ""
+    clone = _clone()
+    if clone is None:
+        return f"{_pip()} install {shlex.quote('artsim' + extras)}"
+    with contextlib.suppress(OSError):  # the current folder may be gone
+        if Path.cwd() == clone:
+            return f"{_pip()} install -e {shlex.quote('.' + extras)}"
+    return f"{_pip()} install -e {shlex.quote(str(clone) + extras)}"
+
+
+def _clone() -> Path | None:
+    """Folder of the source tree that this package runs from; None once it is installed by itself."""
+    folder = Path(__file__).resolve().parents[2]
+    try:
+        return folder if 'name = "artsim"' in (folder / "pyproject.toml").read_text(encoding="utf-8") else None
+    except (OSError, ValueError):
+        return None
+
+
+def _pip() -> str:
+    """What installs into the environment of this process, whichever one the shell is in."""
+    if importlib.util.find_spec("pip") is None:  # as in environments that uv makes
+        return "uv pip"
+    found = shutil.which("pip")
+    own = found is not None and Path(found).parent == Path(sys.executable).parent
+    return "pip" if own else f"{shlex.quote(sys.executable)} -m pip"

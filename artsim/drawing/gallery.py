@@ -1,0 +1,68 @@
+"""A gallery of procedural objects: each category's objects in a few joint states, as one picture."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from artsim.common.names import printable
+from artsim.drawing.view import shaded
+from artsim.model.draws import ViewOptions, joint_intervals, sample_view
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.renderers import render
+
+_TILE = 260  # pixels
+_HEADER = 22
+
+
+def gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_row: int = 3) -> bytes:
+    """PNG with every object at rest and opened further and further.
+
+    Parameters
+    ----------
+    objects : sequence of ArticulatedObject
+    states : int
+        Pictures of each object.
+    objects_per_row : int
+    """
+    rows = -(-len(objects) // objects_per_row)
+    width = objects_per_row * states * _TILE
+    sheet = Image.new("RGB", (width, rows * (_TILE + _HEADER)), "white")
+    draw = ImageDraw.Draw(sheet)
+    font = ImageFont.load_default(size=15)
+    for number, obj in enumerate(objects):
+        row, column = divmod(number, objects_per_row)
+        x, y = column * states * _TILE, row * (_TILE + _HEADER)
+        title = printable(f"{obj.category} {obj.object_id}: {len(obj)} parts")
+        draw.text((x + 6, y + 2), title, "black", font)
+        for i, q in enumerate(opened_states(obj, states)):
+            sheet.paste(Image.fromarray(portrait(obj, q)), (x + i * _TILE, y + _HEADER))
+    buffer = io.BytesIO()
+    sheet.quantize(256).save(buffer, "PNG", optimize=True)  # a third of the size
+    return buffer.getvalue()
+
+
+def opened_states(obj: ArticulatedObject, count: int) -> list[Array]:
+    """At rest, then every joint on its way to its farther limit, the last time by 0.4 to 0.9 of the way."""
+    rng = np.random.default_rng(0)
+    rest = obj.tree.rest
+    low, high = joint_intervals(obj).T
+    far = np.where(high - rest >= rest - low, high, low)
+    share = rng.uniform(0.4, 0.9, len(rest))
+    steps = np.linspace(0.0, 1.0, count)
+    return [obj.tree.complete_state(rest + step * share * (far - rest)) for step in steps]
+
+
+def portrait(obj: ArticulatedObject, q: Array, size: int = _TILE) -> NDArray[np.uint8]:
+    """(size, size, 3) picture of one state from the front left, above."""
+    options = ViewOptions(
+        azimuth=(35.0, 35.0), elevation=(25.0, 25.0), fill=(0.95, 0.95), width=2 * size, height=2 * size
+    )
+    camera = sample_view(obj, q, options, np.random.default_rng(0))
+    image = Image.fromarray(shaded(render(obj, q, camera), camera))
+    return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))

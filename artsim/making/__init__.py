@@ -1,0 +1,1 @@
+"""Solids and assemblies that procedural objects are made of."""

@@ -1,0 +1,153 @@
+"""Assemblies: solids put together by joints, as the families of procedural objects describe them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from artsim.common.products import unit
+from artsim.errors import AssetError, KinematicsError
+from artsim.making.solids import Solid, Vector
+from artsim.model.kinematics import Joint, KinematicTree, Mimic
+from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
+
+
+@dataclass(frozen=True)
+class JointSpec:
+    """A joint to a parent part; see :func:`revolute` and its siblings.
+
+    Axis and origin are written in the assembly's frame, at rest. State 0 is the rest state.
+    """
+
+    type: str
+    parent: str
+    axis: Vector
+    origin: Vector = (0.0, 0.0, 0.0)
+    lower: float = -np.inf
+    upper: float = np.inf
+    pitch: float = 0.0
+    mimic: tuple[str, float] | None = None
+    """Part whose joint is followed, and the multiplier."""
+
+
+def revolute(parent: str, axis: Vector, origin: Vector, lower: float, upper: float, **more: Any) -> JointSpec:
+    """Hinge about an axis through ``origin``, limits in radians."""
+    return JointSpec("revolute", parent, axis, origin, lower, upper, **more)
+
+
+def continuous(parent: str, axis: Vector, origin: Vector, **more: Any) -> JointSpec:
+    """Freely turning joint."""
+    return JointSpec("continuous", parent, axis, origin, **more)
+
+
+def prismatic(
+    parent: str, axis: Vector, lower: float, upper: float, origin: Vector = (0.0, 0.0, 0.0), **more: Any
+) -> JointSpec:
+    """Slide along an axis, limits in metres; ``origin`` is where the axis is drawn."""
+    return JointSpec("prismatic", parent, axis, origin, lower, upper, **more)
+
+
+def screw(parent: str, axis: Vector, origin: Vector, lower: float, upper: float, pitch: float) -> JointSpec:
+    """Thread: turns and advances ``pitch`` metres for each radian."""
+    return JointSpec("screw", parent, axis, origin, lower, upper, pitch)
+
+
+class Assembly:
+    """A list of parts, the root first and parents before children.
+
+    The frame is the family's own choice as long as Z is up and the front faces -X; :meth:`build` moves the origin to
+    the centre of the rest-state box.
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[Part] = []
+        self._joints: list[JointSpec | None] = []
+
+    def add(
+        self, name: str, solid: Solid, joint: JointSpec | None = None, label: str | None = None, density: float = 600.0
+    ) -> str:
+        """Add a part.
+
+        Parameters
+        ----------
+        name : str
+            Unique: "lid", "drawer_2".
+        solid : Solid
+            As it stands at rest.
+        joint : JointSpec, optional
+            None for the root.
+        label : str, optional
+            Semantic name; the name without a trailing number by default.
+        density : float
+            kg/m^3.
+
+        Returns
+        -------
+        str
+            The name.
+
+        Raises
+        ------
+        KinematicsError
+            When another part has this name.
+        AssetError
+            When a piece of the solid is empty.
+        """
+        if any(part.name == name for part in self._parts):
+            raise KinematicsError(f"two parts are called {name!r}")
+        if not solid.pieces or any(piece.is_empty() for piece in solid.pieces):
+            raise AssetError("a piece of its solid encloses nothing", name, "look for swapped corners or flat outlines")
+        stem, _, number = name.rpartition("_")
+        vertices, faces = solid.union()
+        body = Body(solid.piece_meshes(), density)
+        self._parts.append(Part(name, label or (stem if number.isdigit() else name), vertices, faces, body))
+        self._joints.append(joint)
+        return name
+
+    def build(self, category: str, object_id: str) -> ArticulatedObject:
+        """The object, in its rest frame.
+
+        Raises
+        ------
+        KinematicsError
+            When the joints do not form a tree.
+        """
+        bounds = np.stack([part.bounds for part in self._parts])
+        center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
+        index = {part.name: k for k, part in enumerate(self._parts)}
+        joints = tuple(self._joint(k, spec, index, center) for k, spec in enumerate(self._joints))
+        parts = tuple(part.moved(-center) for part in self._parts)
+        tree = KinematicTree(joints)
+        content = [part.vertices.tobytes() + part.faces.tobytes() for part in parts]
+        return ArticulatedObject(
+            object_id=object_id,
+            category=category,
+            parts=parts,
+            native_tree=tree,
+            sha256=content_sha256([repr(tree.to_dict()).encode(), *content]),
+            source=f"{category}:{object_id}",
+            source_joints={joint.name: (k, 1.0) for k, joint in enumerate(joints) if k > 0},
+        )
+
+    def _joint(self, k: int, spec: JointSpec | None, index: dict[str, int], center: Any) -> Joint:
+        if spec is None:
+            return Joint("root", "free", -1)
+        name = self._parts[k].name
+        if spec.parent not in index:
+            raise KinematicsError(f"no part is called {spec.parent!r}", f"joint of {name!r}")
+        x, y, z = unit(spec.axis).tolist()
+        ox, oy, oz = (np.asarray(spec.origin, dtype=np.float64) - center).tolist()
+        mimic = None if spec.mimic is None else Mimic(index[spec.mimic[0]], spec.mimic[1])
+        return Joint(
+            name=f"{name}_joint",
+            type=spec.type,
+            parent=index[spec.parent],
+            axis=(x, y, z),
+            origin=(ox, oy, oz),
+            lower=float(spec.lower),
+            upper=float(spec.upper),
+            pitch=float(spec.pitch),
+            mimic=mimic,
+        )

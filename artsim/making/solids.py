@@ -1,0 +1,358 @@
+"""Solids to build objects from: every solid is a union of convex pieces.
+
+The pieces serve as exact collision geometry; their boolean union is the watertight visual mesh. Shapes that are not
+convex (trays, rings, tubes, bowls) are made of convex pieces from the start, so nothing has to be decomposed later.
+Metres, radians; Z is up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from manifold3d import Manifold, OpType
+from numpy.typing import ArrayLike, NDArray
+
+from artsim.common.elementary import cos, sin
+from artsim.common.products import apply, dot, matmul, unit
+from artsim.model.kinematics import Array, cross_matrix
+
+Vector = Sequence[float] | Array
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A union of convex pieces.
+
+    Attributes
+    ----------
+    pieces : tuple of Manifold
+        Each convex. They may overlap or touch one another.
+    """
+
+    pieces: tuple[Manifold, ...] = ()
+
+    def __add__(self, other: Solid) -> Solid:
+        return Solid(self.pieces + other.pieces)
+
+    def moved(self, offset: Vector) -> Solid:
+        """Translated by (x, y, z)."""
+        x, y, z = (float(v) for v in offset)
+        return Solid(tuple(p.translate((x, y, z)) for p in self.pieces))
+
+    def turned(self, axis: Vector, angle: float, about: Vector = (0.0, 0.0, 0.0)) -> Solid:
+        """Rotated by ``angle`` radians about an axis through the point ``about``."""
+        rotation = rotation_about(axis, angle)
+        point = np.asarray(about, dtype=np.float64)
+        return self._mapped(rotation, point - apply(rotation, point))
+
+    def rotated(self, rotation: Array) -> Solid:
+        """Turned about the origin by a (3, 3) rotation."""
+        return self._mapped(rotation, np.zeros(3))
+
+    def mirrored(self, axis: int, about: float = 0.0) -> Solid:
+        """Reflected in the plane where coordinate ``axis`` (0, 1, 2) equals ``about``."""
+        linear, offset = np.eye(3), np.zeros(3)
+        linear[axis, axis], offset[axis] = -1.0, 2.0 * about
+        return self._mapped(linear, offset)
+
+    def scaled(self, factors: Vector) -> Solid:
+        """Scaled by (x, y, z) factors about the origin."""
+        return self._mapped(np.diag(np.asarray(factors, dtype=np.float64)), np.zeros(3))
+
+    def _mapped(self, linear: Array, offset: Array) -> Solid:
+        matrix = np.column_stack([linear, offset])
+        return Solid(tuple(p.transform(matrix) for p in self.pieces))
+
+    def bounds(self) -> Array:
+        """(2, 3) corners of the axis-aligned box."""
+        boxes = np.array([p.bounding_box() for p in self.pieces])
+        return np.stack([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
+
+    def union(self) -> tuple[Array, NDArray[np.int32]]:
+        """Vertices (V, 3) and faces (F, 3) of the watertight surface."""
+        return mesh_of(Manifold.batch_boolean(list(self.pieces), OpType.Add))
+
+    def piece_meshes(self) -> tuple[tuple[Array, NDArray[np.int32]], ...]:
+        """Vertices and faces of every convex piece."""
+        return tuple(mesh_of(p) for p in self.pieces)
+
+
+def mesh_of(manifold: Manifold) -> tuple[Array, NDArray[np.int32]]:
+    """Vertices (V, 3) and faces (F, 3) of a manifold."""
+    mesh = manifold.to_mesh64()
+    vertices = np.ascontiguousarray(np.asarray(mesh.vert_properties)[:, :3], dtype=np.float64)
+    return vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
+
+
+def rotation_about(axis: Vector, angle: float) -> Array:
+    """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
+    cross = cross_matrix(unit(axis))
+    rotation: Array = np.eye(3) + sin(angle) * cross + (1.0 - cos(angle)) * matmul(cross, cross)
+    return rotation
+
+
+def union(solids: Iterable[Solid]) -> Solid:
+    """All pieces of several solids."""
+    return Solid(tuple(p for solid in solids for p in solid.pieces))
+
+
+# --- convex shapes ---------------------------------------------------------------------------------------------------
+
+
+def hull(points: ArrayLike) -> Solid:
+    """Convex hull of (N, 3) points."""
+    return Solid((Manifold.hull_points(np.asarray(points, dtype=np.float64)),))
+
+
+def hull_of(*solids: Solid) -> Solid:
+    """Convex hull of whole solids."""
+    return Solid((Manifold.batch_hull([p for s in solids for p in s.pieces]),))
+
+
+def box(low: Vector, high: Vector) -> Solid:
+    """Axis-aligned box between two corners."""
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    return Solid((Manifold.cube(high - low).translate(low),))
+
+
+def rounded_box(low: Vector, high: Vector, radius: float, axis: int | None = None, steps: int = 3) -> Solid:
+    """Box whose edges are round.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+    radius : float
+        Cut to just under half of the smallest side concerned.
+    axis : int, optional
+        Round only the four edges along this coordinate axis; all twelve by default.
+    steps : int
+        Segments of a quarter circle.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    sides = high - low
+    across = [i for i in range(3) if i != axis]
+    radius = float(min(radius, 0.499 * sides[across].min()))
+    if axis is None:
+        angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
+        corner = np.array(
+            [(cos(a) * cos(b), sin(a) * cos(b), sin(b)) for b in angles[:-1] for a in angles] + [(0.0, 0.0, 1.0)]
+        )
+        signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        half = 0.5 * sides - radius
+        points = (signs[:, None] * (half + radius * corner)).reshape(-1, 3) + 0.5 * (low + high)
+        return hull(points)
+    outline = rounded_rectangle(low[across], high[across], radius, steps)
+    return prism(outline, low[axis], high[axis], axis)
+
+
+def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) -> Array:
+    """(N, 2) outline of a rectangle with round corners."""
+    center = 0.5 * (np.asarray(low, dtype=np.float64) + np.asarray(high))
+    half = 0.5 * (np.asarray(high, dtype=np.float64) - low)
+    radius = min(radius, float(half.min()))
+    angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
+    quarter = np.stack([cos(angles), sin(angles)], axis=1) * radius + (half - radius)
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    return np.concatenate([quarter[:: x * y] * (x, y) for x, y in signs]) + center
+
+
+def prism(outline: ArrayLike, low: float, high: float, axis: int = 2) -> Solid:
+    """Convex polygon, extruded along a coordinate axis from ``low`` to ``high``.
+
+    Parameters
+    ----------
+    outline : (N, 2) float
+        In the two other coordinates, in the order x, y, z. Its convex hull is taken.
+    """
+    outline = np.asarray(outline, dtype=np.float64)
+    points = np.empty((2, len(outline), 3))
+    across = [i for i in range(3) if i != axis]
+    points[:, :, across] = outline
+    points[0, :, axis], points[1, :, axis] = low, high
+    return hull(points.reshape(-1, 3))
+
+
+def cylinder(start: Vector, end: Vector, radius: float, end_radius: float | None = None, sections: int = 24) -> Solid:
+    """Cylinder, cone or frustum between two points."""
+    far = radius if end_radius is None else end_radius
+    direction = np.asarray(end, dtype=np.float64) - start
+    rings = [circle(start, direction, radius, sections), circle(end, direction, far, sections)]
+    return hull(np.concatenate(rings))
+
+
+def circle(center: Vector, normal: Vector, radius: float, sections: int = 24) -> Array:
+    """(sections, 3) points of a circle."""
+    u, v = _across(normal)
+    angles = np.arange(sections) * (2.0 * np.pi / sections)
+    return np.asarray(center) + radius * (cos(angles)[:, None] * u + sin(angles)[:, None] * v)
+
+
+def _across(normal: Vector) -> tuple[Array, Array]:
+    """Two unit vectors that complete a normal to a right-handed frame."""
+    w = unit(normal)
+    u = unit(np.cross(np.eye(3)[np.argmin(np.abs(w))], w))
+    return u, np.cross(w, u)
+
+
+def ellipsoid(center: Vector, radii: Vector | float, sections: int = 16) -> Solid:
+    """Ellipsoid with its axes along x, y and z; a sphere when ``radii`` is one number."""
+    factors = np.broadcast_to(np.asarray(radii, dtype=np.float64), (3,))
+    return Solid((Manifold.sphere(1.0, sections).scale(factors).translate(np.asarray(center, dtype=np.float64)),))
+
+
+# --- shapes of several pieces ----------------------------------------------------------------------------------------
+
+
+def tube(path: ArrayLike, radius: float | Sequence[float], sections: int = 12, closed: bool = False) -> Solid:
+    """Round rod along a polyline.
+
+    Parameters
+    ----------
+    path : (N, 3) float
+    radius : float or (N,) float
+    closed : bool
+        Joins the last point to the first.
+    """
+    return loft(_rings(np.asarray(path, dtype=np.float64), radius, sections, closed), closed)
+
+
+def _rings(path: Array, radius: float | Sequence[float], sections: int, closed: bool) -> list[Array]:
+    """A circle across the path at each of its points, turned as little as possible from one to the next."""
+    radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), (len(path),))
+    steps = np.roll(path, -1, axis=0) - path if closed else np.diff(path, axis=0)
+    steps = unit(steps)
+    before = np.roll(steps, 1, axis=0) if closed else np.concatenate([steps[:1], steps])
+    after = steps if closed else np.concatenate([steps, steps[-1:]])
+    u, _ = _across(after[0])
+    angles = np.arange(sections) * (2.0 * np.pi / sections)
+    rings = []
+    for point, r, a, b in zip(path, radii, before, after, strict=True):
+        tangent = unit(a + b)
+        u = unit(u - dot(u, tangent) * tangent)
+        v = np.cross(tangent, u)
+        rings.append(point + r * (cos(angles)[:, None] * u + sin(angles)[:, None] * v))
+    return rings
+
+
+def loft(rings: Sequence[ArrayLike], closed: bool = False) -> Solid:
+    """Hull of each two neighbours in a row of (M, 3) cross-sections."""
+    pairs = pairwise([*rings, rings[0]] if closed else rings)
+    return union(hull(np.concatenate([np.asarray(a), np.asarray(b)])) for a, b in pairs)
+
+
+def ring(
+    center: Vector,
+    normal: Vector,
+    inner: float,
+    outer: float,
+    height: float,
+    sections: int = 24,
+    arc: tuple[float, float] = (0.0, 2.0 * np.pi),
+) -> Solid:
+    """Flat ring (annulus) or a sector of one, ``height`` thick along its normal, centred on ``center``."""
+    return revolved([(inner, -0.5 * height), (outer, -0.5 * height), (outer, 0.5 * height), (inner, 0.5 * height)],
+                    center, normal, sections, arc)  # fmt: skip
+
+
+def revolved(
+    outline: ArrayLike,
+    center: Vector = (0.0, 0.0, 0.0),
+    axis: Vector = (0.0, 0.0, 1.0),
+    sections: int = 24,
+    arc: tuple[float, float] = (0.0, 2.0 * np.pi),
+) -> Solid:
+    """Convex outline turned about an axis, in as many wedges as there are sections.
+
+    Parameters
+    ----------
+    outline : (N, 2) float
+        Distance from the axis and position along it.
+    arc : 2 float
+        First and last angle, radians.
+    """
+    u, v = _across(axis)
+    w = unit(axis)
+    outline = np.asarray(outline, dtype=np.float64)
+    angles = np.linspace(*arc, sections + 1)
+    slices = [np.asarray(center) + outline[:, :1] * (cos(a) * u + sin(a) * v) + outline[:, 1:] * w for a in angles]
+    return loft(slices)
+
+
+def vessel(
+    profile: ArrayLike, wall: float, center: Vector = (0.0, 0.0, 0.0), sections: int = 24, floor: bool = True
+) -> Solid:
+    """Round open vessel about the vertical: bucket, pot, bowl.
+
+    Parameters
+    ----------
+    profile : (N, 2) float
+        Outer radius and height, from the bottom up.
+    wall : float
+        Thickness, horizontally, and of the floor.
+    """
+    profile = np.asarray(profile, dtype=np.float64)
+    x, y, z = center
+    sides = union(
+        revolved([(r0 - wall, z0), (r0, z0), (r1, z1), (r1 - wall, z1)], center, (0, 0, 1), sections)
+        for (r0, z0), (r1, z1) in pairwise(profile)
+    )
+    if not floor:
+        return sides
+    (r0, z0), (r1, z1) = profile[:2]
+    top = r0 + (r1 - r0) * wall / (z1 - z0)
+    return sides + cylinder((x, y, z + z0), (x, y, z + z0 + wall), r0, top, sections)
+
+
+def tray(low: Vector, high: Vector, wall: float, floor: float | None = None, axis: int = 2, side: int = 1) -> Solid:
+    """Open box: a floor and four walls.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Outer corners.
+    wall, floor : float
+        Thickness; the floor is as thick as the walls by default.
+    axis, side : int
+        It is open towards ``side`` (1 or -1) of coordinate ``axis``: upward by default.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    depth = wall if floor is None else floor
+    bottom_low, bottom_high, wall_low, wall_high = low.copy(), high.copy(), low.copy(), high.copy()
+    if side > 0:
+        bottom_high[axis] = wall_low[axis] = low[axis] + depth
+    else:
+        bottom_low[axis] = wall_high[axis] = high[axis] - depth
+    opening = [i for i in range(3) if i != axis]
+    return box(bottom_low, bottom_high) + frame(wall_low, wall_high, [wall] * 4, opening[0], opening[1])
+
+
+def frame(low: Vector, high: Vector, widths: Sequence[float], first: int = 1, second: int = 2) -> Solid:
+    """Box with a rectangular hole through it.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Outer corners.
+    widths : 4 float
+        Of the bars at the low and high end of coordinate ``first``, then of coordinate ``second``.
+    first, second : int
+        The two coordinates of the plane of the frame.
+    """
+    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    solids = []
+    inner_low, inner_high = low.copy(), high.copy()
+    for axis, near, far in ((first, widths[0], widths[1]), (second, widths[2], widths[3])):
+        for size, at_low in ((near, True), (far, False)):
+            if size <= 0:
+                continue
+            bar_low, bar_high = inner_low.copy(), inner_high.copy()
+            if at_low:
+                bar_high[axis] = low[axis] + size
+            else:
+                bar_low[axis] = high[axis] - size
+            solids.append(box(bar_low, bar_high))
+        inner_low[axis], inner_high[axis] = low[axis] + near, high[axis] - far
+    return union(solids)

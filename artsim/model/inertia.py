@@ -1,0 +1,89 @@
+"""Mass, centre of mass and inertia of parts, from their closed surface and the density of what they are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.common.products import apply, dot
+from artsim.errors import AssetError
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """What a rigid body opposes to being pushed and turned.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    center : (3,) float
+        Centre of mass in the rest frame, at rest, metres.
+    tensor : (3, 3) float
+        About the centre of mass, along the axes of the rest frame, kg m^2.
+    """
+
+    mass: float
+    center: Array
+    tensor: Array
+
+    def about(self, point: Array, axis: Array) -> float:
+        """Moment of inertia about an axis (unit, (3,)) through a point, kg m^2."""
+        arm = np.cross(axis, self.center - point)
+        return float(dot(axis, apply(self.tensor, axis)) + self.mass * dot(arm, arm))
+
+    def principal(self) -> tuple[Array, Array]:
+        """Moments (3,), ascending, about the principal axes, and these axes (3, 3): right-handed, one a column."""
+        moments, axes = np.linalg.eigh(self.tensor)
+        axes[:, 2] *= np.sign(np.linalg.det(axes))
+        return moments, axes
+
+    def share(self, fraction: float) -> Inertia:
+        """A fraction of the body's mass, spread in space as the whole is."""
+        return Inertia(fraction * self.mass, self.center, fraction * self.tensor)
+
+
+def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
+    """Mass, centre of mass and inertia tensor of part k, at rest, at the object's scale.
+
+    They are those of the solid that the part's surface encloses (integrals over a polyhedron in closed form), filled
+    with its body's density.
+
+    Raises
+    ------
+    AssetError
+        When nothing says what the part is made of, or its surface encloses no solid.
+    """
+    import trimesh
+
+    part = obj.parts[k]
+    where = f"{obj.category} {obj.object_id}: part {part.name!r}"
+    if part.body is None:
+        raise AssetError("has no body, so no density", where, "only procedural objects (artsim.make) have one")
+    triangles = (part.vertices * obj.scale)[part.faces]
+    with np.errstate(divide="ignore", invalid="ignore"):  # without a volume, which is looked at below
+        found = trimesh.triangles.mass_properties(triangles, density=part.body.density, skip_inertia=False)
+    inertia = Inertia(float(found.mass), np.asarray(found.center_mass), np.asarray(found.inertia))
+    moments = np.linalg.eigvalsh(inertia.tensor) if np.isfinite(inertia.tensor).all() else np.zeros(3)
+    # Moments of any real body are positive, and none is larger than the sum of the other two.
+    if not (inertia.mass > 0 and moments[0] > 0 and moments[2] <= moments[:2].sum() * (1 + 1e-9)):
+        raise AssetError(
+            f"its surface encloses no solid (mass {inertia.mass:.3g} kg)", where, "build it as a union of closed solids"
+        )
+    return inertia
+
+
+def joined_inertia(inertias: Iterable[Inertia]) -> Inertia:
+    """Several bodies as one (parallel axis theorem)."""
+    bodies = list(inertias)
+    mass = sum(body.mass for body in bodies)
+    center = np.sum([body.mass * body.center for body in bodies], axis=0) / mass
+    tensor = np.zeros((3, 3))
+    for body in bodies:
+        arm = body.center - center
+        tensor += body.tensor + body.mass * (dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
+    return Inertia(mass, center, tensor)

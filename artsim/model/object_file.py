@@ -1,0 +1,185 @@
+"""Objects compiled into one compact file each, and a bounded cache of them."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.common.files import parse_json, read_npz, write_atomic
+from artsim.common.names import printable
+from artsim.errors import AssetError, KinematicsError
+from artsim.model.kinematics import LARGEST, Array, KinematicTree
+from artsim.model.objects import MAX_PARTS, ArticulatedObject, Part, Repair
+
+_CACHE_BYTES = 250_000_000
+_COMPILED_FORMAT = 1
+
+
+def save_object(obj: ArticulatedObject, path: Path) -> None:
+    """Write an object as one compact ``.npz`` that :func:`load_object` reads back without the source folder."""
+    header = {
+        "format": _COMPILED_FORMAT,
+        "object_id": obj.object_id,
+        "category": obj.category,
+        "names": [p.name for p in obj.parts],
+        "labels": [p.label for p in obj.parts],
+        "tree": obj.native_tree.to_dict(),
+        "sha256": obj.sha256,
+        "scale": obj.scale,
+        "T_base_rest": obj.T_base_rest.tolist(),
+        "repairs": [[r.where, r.what] for r in obj.repairs if not r.note],
+        "notes": [[r.where, r.what] for r in obj.repairs if r.note],
+        "source_joints": {name: list(v) for name, v in obj.source_joints.items()},
+    }
+    vertices = np.concatenate([p.vertices for p in obj.parts])
+    faces = np.concatenate([p.faces for p in obj.parts])
+    buffer = io.BytesIO()
+    np.savez(
+        buffer,
+        header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
+        vertices=vertices,
+        faces=faces,
+        vertex_counts=np.array([len(p.vertices) for p in obj.parts]),
+        face_counts=np.array([len(p.faces) for p in obj.parts]),
+    )
+    write_atomic(path, buffer.getvalue())
+
+
+def load_object(path: Path) -> ArticulatedObject:
+    """Read an object written by :func:`save_object`.
+
+    Raises
+    ------
+    AssetError
+        When the file is missing, damaged or of another format.
+    """
+    arrays = read_npz(path, "object file")
+    try:
+        return _object(arrays, str(path))
+    except (ValueError, KinematicsError) as error:
+        reason = error.what if isinstance(error, KinematicsError) else error
+        raise AssetError(f"not an artsim object file ({reason})", path, "generate it again") from error
+
+
+def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObject:
+    """The object that the arrays of a file describe; a ValueError or KinematicsError says why there is none."""
+    lacking = {"header", "vertices", "faces", "vertex_counts", "face_counts"} - arrays.keys()
+    if lacking:
+        raise ValueError(f"lacks {', '.join(sorted(lacking))}")
+    header = parse_json(arrays["header"].tobytes())
+    if not isinstance(header, dict):
+        raise ValueError("its header is not a set of named values")
+    if header.get("format") != _COMPILED_FORMAT:
+        raise ValueError(f"its format is {header.get('format')!r:.20}, not {_COMPILED_FORMAT}")
+    tree = KinematicTree.from_dict(header.get("tree"))
+    if not np.isfinite(tree.complete_state(tree.rest)).all():
+        raise ValueError("its rest state is not finite")
+    names, labels = _texts(header.get("names"), len(tree)), _texts(header.get("labels"), len(tree))
+    object_id, category, sha256 = _texts([header.get(key) for key in ("object_id", "category", "sha256")], 3)
+    (scale,) = _numbers([header.get("scale")], (1,))
+    if not 0.0 < scale <= LARGEST:
+        raise ValueError(f"its scale is {scale}")
+    repairs, notes = header.get("repairs"), header.get("notes", [])  # older files have no notes
+    if not isinstance(repairs, list) or not isinstance(notes, list):
+        raise ValueError("its repairs are no list")
+    return ArticulatedObject(
+        object_id=object_id,
+        category=category,
+        parts=_parts(arrays, names, labels),
+        native_tree=tree,
+        sha256=sha256,
+        scale=float(scale),
+        T_base_rest=_numbers(header.get("T_base_rest"), (4, 4)),
+        repairs=(
+            *(Repair(where, what) for where, what in (_texts(repair, 2) for repair in repairs)),
+            *(Repair(where, what, note=True) for where, what in (_texts(note, 2) for note in notes)),
+        ),
+        source=source,
+        source_joints=_source_joints(header.get("source_joints"), len(tree)),
+    )
+
+
+def _parts(arrays: Mapping[str, NDArray[Any]], names: Sequence[str], labels: Sequence[str]) -> tuple[Part, ...]:
+    """Names, labels and meshes of the parts, of which at least one has triangles."""
+    if len(names) > MAX_PARTS:
+        raise ValueError(f"it has {len(names)} parts; part ids fit {MAX_PARTS}")
+    vertices, faces = arrays["vertices"], arrays["faces"]
+    for array, kinds, what in ((vertices, "f", "vertices"), (faces, "iu", "faces")):
+        if array.dtype.kind not in kinds or array.ndim != 2 or array.shape[1] != 3:
+            raise ValueError(f"its {what} are {array.dtype} of shape {array.shape}")
+    if not (np.abs(vertices) <= LARGEST).all():
+        raise ValueError("a vertex is not finite, or out of range")
+    if len(faces) == 0 or not np.ptp(vertices, axis=0).any():
+        raise ValueError("it has no triangle, or no extent")
+    ends = []
+    for name, total in (("vertex_counts", len(vertices)), ("face_counts", len(faces))):
+        counts = arrays[name]
+        if counts.dtype.kind not in "iu" or counts.shape != (len(names),) or (counts < 0).any():
+            raise ValueError(f"its {name} do not fit {len(names)} parts")
+        if sum(counts.tolist()) != total:
+            raise ValueError(f"its {name} add up to {sum(counts.tolist())}, not {total}")
+        ends.append(np.cumsum(counts.astype(np.int64))[:-1])
+    parts = []
+    for name, label, v, f in zip(names, labels, np.split(vertices, ends[0]), np.split(faces, ends[1]), strict=True):
+        if len(f) and not 0 <= int(f.min()) <= int(f.max()) < len(v):
+            raise ValueError(f"a triangle of part {printable(name)} has a corner that does not exist")
+        parts.append(Part(name, label, v.astype(np.float64, copy=False), f.astype(np.int32, copy=False)))
+    return tuple(parts)
+
+
+def _texts(values: object, count: int) -> tuple[str, ...]:
+    if not isinstance(values, list) or len(values) != count or not all(isinstance(value, str) for value in values):
+        raise ValueError(f"{values!r:.60} is not {count} texts")
+    return tuple(values)
+
+
+def _numbers(values: object, shape: tuple[int, ...]) -> Array:
+    """Nested lists of finite numbers as an array of that shape."""
+    try:
+        array = np.array(values)
+    except ValueError:  # lists of different lengths
+        array = np.empty(0)
+    if array.dtype.kind not in "iuf" or array.shape != shape or not (np.abs(array) <= LARGEST).all():
+        raise ValueError(f"{values!r:.60} is not numbers of shape {shape}")
+    return array.astype(np.float64)
+
+
+def _source_joints(joints: object, count: int) -> dict[str, tuple[int, float]]:
+    if not isinstance(joints, dict):
+        raise ValueError("its source joints are not a set of named values")
+    found = {}
+    for name, joint in joints.items():
+        if not isinstance(joint, list) or len(joint) != 2 or type(joint[0]) is not int or not 0 <= joint[0] < count:
+            raise ValueError(f"source joint {printable(name)} is {joint!r:.60}")
+        found[name] = joint[0], float(_numbers(joint[1:], (1,))[0])
+    return found
+
+
+class ObjectCache:
+    """Compiled objects of a dataset folder, the least recently used dropped once they take too much memory."""
+
+    def __init__(self, folder: Path, max_bytes: int = _CACHE_BYTES):
+        self.folder = folder
+        self.max_bytes = max_bytes
+        self._objects: OrderedDict[str, ArticulatedObject] = OrderedDict()
+
+    def __getitem__(self, key: str) -> ArticulatedObject:
+        obj = self._objects.get(key)
+        if obj is None:
+            obj = self._objects[key] = load_object(self.folder / f"{key}.npz")
+            while len(self._objects) > 1 and sum(map(_memory, self._objects.values())) > self.max_bytes:
+                self._objects.popitem(last=False)
+        self._objects.move_to_end(key)
+        return obj
+
+
+def _memory(obj: ArticulatedObject) -> int:
+    """Bytes that an object takes with its acceleration structures (measured: about 180 for each triangle)."""
+    return 40_000 + 180 * obj.num_faces

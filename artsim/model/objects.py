@@ -1,0 +1,262 @@
+"""The articulated object: a kinematic tree, the meshes of its parts and what is known about it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artsim.common.names import printable
+from artsim.common.products import norm
+from artsim.errors import AssetError, ConfigError, KinematicsError
+from artsim.model.describe import brief, object_line, object_text
+from artsim.model.kinematics import LARGEST, Array, KinematicTree
+
+if TYPE_CHECKING:
+    import trimesh
+
+_MAX_REPAIR = 1000
+"""Characters of a repair as text: names out of files may be of any length."""
+
+MAX_PARTS = 254
+"""Part ids are stored in a byte; 255 marks the background."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """One thing in a source file that was mended or left out while loading.
+
+    Attributes
+    ----------
+    where : str
+        Element concerned, for example ``joint 'joint_2'``.
+    what : str
+        What was found and what was done about it.
+    note : bool
+        Whether the object is all that the file says, nothing of which was assumed, changed or dropped.
+    """
+
+    where: str
+    what: str
+    note: bool = False
+
+    def __str__(self) -> str:
+        return printable(f"{self.where}: {self.what}", _MAX_REPAIR)
+
+
+Mesh = tuple[Array, NDArray[np.int32]]
+"""Vertices (V, 3) and triangles (F, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What physics needs of a part.
+
+    Attributes
+    ----------
+    pieces : tuple of Mesh
+        Convex collision geometry in the rest frame, at rest, native units. Their union is the part's surface.
+    density : float
+        kg/m^3.
+    """
+
+    pieces: tuple[Mesh, ...]
+    density: float
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One rigid part.
+
+    Attributes
+    ----------
+    name : str
+        Link name in the source file.
+    label : str
+        Semantic name where the source gives one ("lid", "drawer"), else the link name.
+    vertices : (V, 3) float
+        In the rest frame, at rest, native units (before the object's scale).
+    faces : (F, 3) int32
+        Triangles; empty for a part without geometry.
+    body : Body or None
+        Where the source knows it: procedural objects do.
+    """
+
+    name: str
+    label: str
+    vertices: Array
+    faces: NDArray[np.int32]
+    body: Body | None = None
+
+    __repr__ = brief
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3) corners of the axis-aligned box of the surface, native units; NaN without geometry."""
+        if len(self.faces) == 0:
+            return np.full((2, 3), np.nan)
+        named = np.zeros(len(self.vertices), dtype=bool)
+        named[self.faces] = True  # sorting millions of numbers would take seconds
+        used = self.vertices[named]
+        # Which of 0.0 and -0.0 is the smaller depends on the processor: adding 0.0 leaves one of them.
+        return np.stack([used.min(axis=0), used.max(axis=0)]) + 0.0
+
+    def moved(self, offset: Array) -> Part:
+        """The part translated by (3,) metres."""
+        body = self.body
+        if body is not None:
+            body = replace(body, pieces=tuple((vertices + offset, faces) for vertices, faces in body.pieces))
+        return replace(self, vertices=self.vertices + offset, body=body)
+
+
+@dataclass(frozen=True, eq=False)
+class ArticulatedObject:
+    """A kinematic tree with geometry, in its rest frame.
+
+    The rest frame has Z up and the front towards -X; its origin is the centre of the axis-aligned box
+    of the whole object in its rest state.
+
+    Attributes
+    ----------
+    object_id, category : str
+    parts : tuple of Part
+        Root first, parents before children.
+    native_tree : KinematicTree
+        In native units (before ``scale``).
+    sha256 : str
+        Digest of the source content.
+    scale : float
+        Size of this object over its native size; every public length below includes it.
+    T_base_rest : (4, 4) float
+        Maps the rest frame to the source file's base-link frame, native units.
+    repairs : tuple of Repair
+    source : str
+        Where the object came from.
+    source_joints : mapping
+        For each joint of the source file: (part index, multiplier), so that the file's own joint value is
+        ``multiplier * q[part]``. Screw parts list two file joints.
+    """
+
+    object_id: str
+    category: str
+    parts: tuple[Part, ...]
+    native_tree: KinematicTree
+    sha256: str
+    scale: float = 1.0
+    T_base_rest: Array = None  # type: ignore[assignment]  # identity, set below
+    repairs: tuple[Repair, ...] = ()
+    source: str = ""
+    source_joints: Mapping[str, tuple[int, float]] = None  # type: ignore[assignment]  # empty, set below
+
+    def __post_init__(self) -> None:
+        if self.T_base_rest is None:
+            object.__setattr__(self, "T_base_rest", np.eye(4))
+        if self.source_joints is None:
+            object.__setattr__(self, "source_joints", {})
+        if len(self.parts) != len(self.native_tree):
+            raise KinematicsError(
+                f"{len(self.parts)} parts do not fit a tree of {len(self.native_tree)}", self.object_id
+            )
+        if len(self.parts) > MAX_PARTS:
+            raise AssetError(f"{len(self.parts)} parts; part ids fit {MAX_PARTS}", self.source or self.object_id)
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __str__(self) -> str:
+        return object_text(self)
+
+    def __repr__(self) -> str:
+        return object_line(self)
+
+    @cached_property
+    def tree(self) -> KinematicTree:
+        """The kinematic tree at the object's scale."""
+        return self.native_tree if self.scale == 1.0 else self.native_tree.scaled(self.scale)
+
+    @cached_property
+    def part_bounds(self) -> Array:
+        """(K, 2, 3) box corners of each part in the rest frame, metres; without geometry, its joint's origin twice."""
+        bounds = np.stack([p.bounds for p in self.parts])
+        empty = np.isnan(bounds[:, 0, 0])
+        bounds[empty] = self.native_tree.origins[empty, None, :]
+        return bounds * self.scale
+
+    @cached_property
+    def box_center(self) -> Array:
+        """(K, 3) centre of each part's amodal box in the rest frame, metres."""
+        return self.part_bounds.mean(axis=1)
+
+    @cached_property
+    def box_size(self) -> Array:
+        """(K, 3) side lengths of each part's amodal box in the rest frame, metres."""
+        return self.part_bounds[:, 1] - self.part_bounds[:, 0]
+
+    @cached_property
+    def has_surface(self) -> NDArray[np.bool_]:
+        """(K,) whether each part has geometry."""
+        return np.array([len(p.faces) > 0 for p in self.parts])
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3) corners of the box of the whole object in its rest state, metres."""
+        solid = self.has_surface
+        return np.stack([self.part_bounds[solid, 0].min(axis=0), self.part_bounds[solid, 1].max(axis=0)])
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the box of the whole object in its rest state, metres."""
+        return float(norm(self.bounds[1] - self.bounds[0]))
+
+    @property
+    def num_faces(self) -> int:
+        """Triangles over all parts."""
+        return sum(len(p.faces) for p in self.parts)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether no joint can move."""
+        low, high = self.tree.limits[self.tree.free_joints].T
+        return not bool((high > low).any())
+
+    def scaled(self, scale: float) -> ArticulatedObject:
+        """The same object at ``scale`` times its native size; geometry is shared, not copied."""
+        if not 1.0 / LARGEST <= scale <= LARGEST:
+            raise ConfigError(f"an object cannot have scale {scale}")
+        return replace(self, scale=float(scale))
+
+    def with_diagonal(self, diagonal: float) -> ArticulatedObject:
+        """The same object scaled so that its rest-state box has this diagonal, metres."""
+        return self.scaled(diagonal / (self.diagonal / self.scale))
+
+    def source_state(self, q: ArrayLike) -> dict[str, float]:
+        """Joint values in the source file's own names and convention for a (K,) state of this object.
+
+        Lengths are in native units, so that the values can be given to any simulator that loads the file.
+        """
+        q = self.tree.complete_state(q)
+        native = np.array([q[k] / (self.scale if t == "prismatic" else 1.0) for k, t in enumerate(self.tree.types)])
+        return {name: multiplier * float(native[k]) for name, (k, multiplier) in self.source_joints.items()}
+
+    def part_mesh(self, k: int) -> trimesh.Trimesh:
+        """Part k as a trimesh in the rest frame, at rest, metres."""
+        import trimesh
+
+        part = self.parts[k]
+        return trimesh.Trimesh(part.vertices * self.scale, part.faces, process=False)
+
+
+def content_sha256(chunks: Sequence[bytes]) -> str:
+    """Hex digest of byte strings, each with its length so that boundaries count."""
+    digest = hashlib.sha256()
+    for chunk in chunks:
+        digest.update(len(chunk).to_bytes(8, "little"))
+        digest.update(chunk)
+    return digest.hexdigest()
