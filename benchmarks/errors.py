@@ -25,8 +25,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
-from artperl.data.batches import Clouds
 from artperl.data.categories import ARTIMAGE, objects_of
 from artperl.evaluation import metrics
 from artperl.evaluation.artimage import real_objects

@@ -25,9 +25,10 @@ from artperl.agent.ppo import PPOOptions, collect, update
 from artperl.data.batches import batches
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
-from artperl.perception.network import Perception, perception_losses
+from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.perception_losses import perception_losses
 from artperl.training.run import BASE_SEEDS
 from artperl.training.steps import autocast
 

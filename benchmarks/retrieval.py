@@ -17,9 +17,10 @@ import torch
 import tyro
 from torch import Tensor
 
+from artperl.core.clouds import Clouds
 from artperl.core.shapes import Shapes
-from artperl.data.batches import Clouds, Samples
 from artperl.data.categories import ARTIMAGE, objects_of
+from artperl.data.sources import Samples
 from artperl.evaluation.artimage import row_samples
 from artperl.evaluation.benchmark_rows import find_estimator
 from artperl.evaluation.scoring import TEST_SEEDS

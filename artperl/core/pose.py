@@ -393,3 +393,19 @@ def _into_limits(trees: Trees, state: Tensor) -> Tensor:
         outside = (state < trees.lower) | (state > trees.upper)
         state = torch.where(hinge & inside & outside, other, state)
     return state
+
+
+@dataclass(frozen=True, eq=False)
+class AxisPrior(Batch):
+    """How the axes of an object's hinges may lean away from its reference's, of B objects.
+
+    Attributes
+    ----------
+    covariance : (B, 3 P, 3 P) float
+        Of the rotation vectors that take the reference's axes to the object's: axes may well lean together.
+    leans : (B, P) bool
+        Joints whose axes lean at all.
+    """
+
+    covariance: Tensor
+    leans: Tensor

@@ -13,10 +13,11 @@ from torch import Tensor
 
 from artperl.agent.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.core.batch import Batch
+from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.data.batches import Clouds, samples_from
 from artperl.data.categories import Parts
+from artperl.data.sources import samples_from
 from artperl.fitting.initial_pose import adapted, sized
 from artperl.perception.network import Perception
 from artperl.perception.part_grouping import perceive
@@ -90,12 +91,12 @@ class Problems:
         it.
     parts : Parts
     given : sequence of ArticulatedObject
-        See :func:`artperl.data.batches.samples_from`.
+        See :func:`artperl.data.sources.samples_from`.
     views_per_object : int
         Problems in a row of the same object.
     references : References
     dataset : str or Path, optional
-        See :class:`artperl.data.batches.Recorded`.
+        See :class:`artperl.data.sources.Recorded`.
     """
 
     def __init__(

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from artperl.agent.policy import Agent
 from artperl.core.batch import concatenate
+from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.rotations import rotate
 from artperl.core.shapes import Observed
-from artperl.data.batches import Clouds
 from artperl.evaluation.scoring import evaluate, summary
 from artperl.fitting.initial_pose import part_poses, start
 from artperl.fitting.levenberg_marquardt import refine

@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, parent_pose, pose_parts, theta_from_parts
 from artperl.core.rotations import rotate
 from artperl.core.shapes import Shapes
-from artperl.data.batches import Clouds
 from artperl.perception.network import Perceived
 from artsim.model.camera import look_at_transform
 

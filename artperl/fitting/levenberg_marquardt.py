@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from artperl.core.batch import Batch
-from artperl.core.pose import Posed, Theta, Trees, clamp_state, complete_state, joint_axes, parent_pose
+from artperl.core.pose import AxisPrior, Posed, Theta, Trees, clamp_state, complete_state, joint_axes, parent_pose
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.correspondence import GLIDE, Matches, Target, match
@@ -58,22 +58,6 @@ class RefineOptions:
     def __post_init__(self) -> None:
         if not 0 <= self.iterations <= 10_000 or not 0.0 < self.robust_end <= self.robust_start:
             raise ConfigError("refinement needs a number of iterations and 0 < robust_end <= robust_start")
-
-
-@dataclass(frozen=True, eq=False)
-class AxisPrior(Batch):
-    """How the axes of an object's hinges may lean away from its reference's, of B objects.
-
-    Attributes
-    ----------
-    covariance : (B, 3 P, 3 P) float
-        Of the rotation vectors that take the reference's axes to the object's: axes may well lean together.
-    leans : (B, P) bool
-        Joints whose axes lean at all.
-    """
-
-    covariance: Tensor
-    leans: Tensor
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,10 @@ from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Agent
 from artperl.core.batch import concatenate
+from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.rotations import rotate
 from artperl.core.shapes import Observed, Shapes
-from artperl.data.batches import Clouds
 from artperl.fitting.beam_search import beam, half_turned
 from artperl.fitting.initial_pose import by_another_part, facing, start
 from artperl.fitting.levenberg_marquardt import Refined, RefineOptions, refine

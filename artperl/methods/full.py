@@ -21,10 +21,10 @@ from torch import Tensor
 from artperl.agent.policy import Agent
 from artperl.boxes.evidence import Evidence, roughness
 from artperl.boxes.network import Boxes
+from artperl.core.clouds import Clouds
 from artperl.core.estimate import Calibration, Estimate, brought_to_rest, labels_by_boxes, slid, visibility, widen
 from artperl.core.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Shapes
-from artperl.data.batches import Clouds
 from artperl.fitting.normal_alignment import squared
 from artperl.fitting.occluded_parts import uncovered
 from artperl.fitting.search import Clock, EstimatorOptions, Found, find

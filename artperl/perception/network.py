@@ -15,14 +15,6 @@ from torch.nn import functional
 
 from artperl.core.batch import Batch
 from artperl.core.pointnet2 import PointNet2, exact
-from artperl.data.batches import Truth
-
-_SHARP = 0.05
-"""Huber loss turns linear at this distance, in diagonals."""
-_THIN = 0.1
-"""Diagonals that are added to a box's side before an error is taken over it."""
-_JOINT_SHARP = 0.2
-"""Huber loss of joints turns linear there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +76,7 @@ class Votes(Batch):
     box : (B, N, 6) float
         Centre and size of the part's box.
     joint : (B, N, 9) float
-        The part's joint as :attr:`artperl.data.batches.Truth.joint` has it.
+        The part's joint as :attr:`artperl.data.truth.Truth.joint` has it.
     level_logits : (B, N, P) float
         How many joints are between the root and the part.
     """
@@ -126,7 +118,7 @@ class Perception(nn.Module):
         return self.context.weight.device
 
     def forward(self, points: Tensor) -> Perceived | Votes:
-        """(B, N, 3) points as in :class:`artperl.data.batches.Clouds`."""
+        """(B, N, 3) points as in :class:`artperl.core.clouds.Clouds`."""
         return self._read(*(values.float() for values in self.backbone(points)))
 
     @exact
@@ -156,62 +148,3 @@ class Perception(nn.Module):
             box_size=0.5 * functional.softplus(boxes[..., 3:]),
             log_diagonal=whole[:, -1],
         )
-
-
-def perception_losses(perceived: Perceived | Votes, truth: Truth) -> dict[str, Tensor]:
-    """Losses by name; their sum is minimised.
-
-    Coordinates are scored by the likelihood of a Laplace distribution of the spread that the network itself expects, so
-    that points whose place cannot be told (a lid seen edge-on) do not drown the others.
-    """
-    distance = (
-        functional.huber_loss(perceived.canonical, truth.canonical, reduction="none", delta=_SHARP).sum(-1) / _SHARP
-    )
-    spread = perceived.spread.clamp(-6.0, 2.0)
-    losses = {
-        "canonical": 5.0 * distance.mean(),
-        "spread": 0.2 * (distance.detach() * (-spread).exp() + spread).mean(),
-        "diagonal": 2.0 * (perceived.log_diagonal - truth.diagonal.log()).abs().mean(),
-    }
-    of_parts = _vote_losses(perceived, truth) if isinstance(perceived, Votes) else _number_losses(perceived, truth)
-    return losses | of_parts
-
-
-def _number_losses(perceived: Perceived, truth: Truth) -> dict[str, Tensor]:
-    weight = truth.part_valid.float()
-    boxes = torch.cat([perceived.box_center - truth.box_center, perceived.box_size - truth.box_size], dim=-1)
-    return {
-        "part": functional.cross_entropy(perceived.part_logits.flatten(0, 1), truth.part.flatten()),
-        "valid": 0.2 * functional.binary_cross_entropy_with_logits(perceived.valid_logits, weight),
-        "boxes": 2.0 * (boxes.abs().sum(-1) * weight).sum() / weight.sum(),
-    }
-
-
-def _vote_losses(votes: Votes, truth: Truth) -> dict[str, Tensor]:
-    """A part counts by the root of how many points it has; errors of boxes are taken over their sides."""
-    count = functional.one_hot(truth.part, truth.part_valid.shape[1]).sum(1)
-    weight = truth.of_points(count).float().rsqrt()
-    weight = weight / weight.sum(1, keepdim=True) / len(weight)
-    size = truth.of_points(truth.box_size)
-    box = torch.cat([truth.of_points(truth.box_center), size], dim=-1)
-    off = (votes.box - box) / (size + _THIN).repeat(1, 1, 2)
-    apart = functional.huber_loss(off, torch.zeros_like(off), reduction="none", delta=_SHARP).sum(-1) / _SHARP
-    joint = functional.huber_loss(votes.joint, truth.of_points(truth.joint), reduction="none", delta=_JOINT_SHARP)
-    level = functional.cross_entropy(
-        votes.level_logits.flatten(0, 1), truth.of_points(truth.level).flatten(), reduction="none"
-    )
-    return {
-        "boxes": (apart * weight).sum(),
-        "joints": 0.5 * (joint.sum(-1) * weight).sum() / _JOINT_SHARP,
-        "level": 0.5 * (level.view_as(weight) * weight).sum(),
-    }
-
-
-def perception_figures(perceived: Perceived | Votes, truth: Truth) -> dict[str, float]:
-    """How well it does, for people: share of points with the right part (level, of votes), and error of coordinates."""
-    if isinstance(perceived, Votes):
-        right = perceived.level_logits.argmax(-1) == truth.of_points(truth.level)
-    else:
-        right = perceived.part == truth.part
-    off = (perceived.canonical - truth.canonical).norm(dim=-1).median()
-    return {"accuracy": right.float().mean().item(), "coordinates": off.item()}

@@ -49,7 +49,7 @@ class Grouped(Perceived):
     Attributes
     ----------
     joint : (B, P, 9) float
-        As :func:`artperl.data.batches.joint_rows` has it.
+        As :func:`artperl.core.clouds.joint_rows` has it.
     parent : (B, P) int64
     """
 

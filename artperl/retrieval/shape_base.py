@@ -14,10 +14,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from artperl.core.pose import KINDS, Trees
+from artperl.core.clouds import joint_rows
+from artperl.core.pose import KINDS, AxisPrior, Trees
 from artperl.core.shapes import Shapes
-from artperl.data.batches import joint_rows
-from artperl.fitting.levenberg_marquardt import AxisPrior
 from artsim.common.files import atomic_file, parse_json, read_npz
 from artsim.errors import ConfigError, DatasetError, KinematicsError
 from artsim.model.kinematics import Joint, KinematicTree
@@ -137,7 +136,7 @@ class ShapeBase:
 
     @cached_property
     def joints(self) -> Tensor:
-        """(B, P, 9) joints as :func:`artperl.data.batches.joint_rows` has them."""
+        """(B, P, 9) joints as :func:`artperl.core.clouds.joint_rows` has them."""
         trees, shapes = self.shapes.trees, self.shapes
         parts = zip(trees.axis, trees.origin, shapes.box_center, shapes.diagonal, strict=True)
         rows = [

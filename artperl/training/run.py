@@ -30,9 +30,10 @@ from artperl.agent.decision_process import Fitting
 from artperl.agent.policy import Agent
 from artperl.agent.ppo import collect, update
 from artperl.boxes.network import Boxes
-from artperl.data.batches import SENSOR, Recorded, Source, batches, samples_from
+from artperl.data.batches import SENSOR, batches
 from artperl.data.categories import arranged, objects_of
 from artperl.data.fitting_problems import Problems
+from artperl.data.sources import Recorded, Source, samples_from
 from artperl.estimator import load_estimator, read_settings, save_estimator
 from artperl.evaluation.artimage import real_train_objects
 from artperl.evaluation.scoring import (
@@ -52,11 +53,12 @@ from artperl.evaluation.scoring import (
 )
 from artperl.fitting.search import EstimatorOptions
 from artperl.methods.full import Estimator
-from artperl.perception.network import Perception, perception_figures, perception_losses
+from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.training.boxes import learn, record
 from artperl.training.options import TrainOptions
+from artperl.training.perception_losses import perception_figures, perception_losses
 from artperl.training.report import rounded, scalars, write_report, write_scalars
 from artperl.training.run_folder import RunFolder, differences
 from artperl.training.steps import Stop, autocast, one_cycle, set_rate

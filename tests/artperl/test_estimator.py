@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 import artsim
 from artperl.agent.policy import Agent
+from artperl.core.clouds import Clouds
 from artperl.core.estimate import Calibration
 from artperl.core.pose import Theta
 from artperl.core.shapes import Shapes
-from artperl.data.batches import Clouds, to_batch, training_rows
 from artperl.data.categories import objects_of
+from artperl.data.truth import to_batch, training_rows
 from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.scoring import TEST_SEEDS, frozen_samples, metrics, score, true_poses
 from artperl.fitting.search import EstimatorOptions, astray, evened, turned_round

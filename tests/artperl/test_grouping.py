@@ -8,7 +8,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from artperl.data.batches import Clouds, Truth, to_batch, training_rows
+from artperl.core.clouds import Clouds
+from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.evaluation.scoring import frozen_samples
 from artperl.perception.network import Votes
 from artperl.perception.part_grouping import clusters, differences, grouped

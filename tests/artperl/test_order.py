@@ -9,8 +9,8 @@ import pytest
 
 import artsim
 from artperl.core.part_order import as_seen, reordered, reordered_sample, visible_order
-from artperl.data.batches import Samples
 from artperl.data.categories import objects_of
+from artperl.data.sources import Samples
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import ViewOptions, sample_view
 from artsim.model.objects import ArticulatedObject

@@ -7,13 +7,17 @@ import pytest
 import torch
 from torch import Tensor
 
+from artperl.core.clouds import Clouds
 from artperl.core.neighbours import nearest_by_products, nearest_by_trees
 from artperl.core.pointnet2 import Neighbourhoods, interpolated, strongest
-from artperl.data.batches import Clouds, Samples, Truth, batches
+from artperl.data.batches import batches
 from artperl.data.categories import ARTIMAGE, objects_of
+from artperl.data.sources import Samples
+from artperl.data.truth import Truth
 from artperl.estimator import load_estimator
 from artperl.evaluation.scoring import VALIDATION_SEEDS, frozen_samples
-from artperl.perception.network import Perceived, Perception, Votes, perception_figures, perception_losses
+from artperl.perception.network import Perceived, Perception, Votes
+from artperl.training.perception_losses import perception_figures, perception_losses
 from artsim.datasets.plan import SampleOptions
 from artsim.observing.sample import Sample
 

@@ -9,12 +9,12 @@ import pytest
 import torch
 
 import artsim
-from artperl.core.pose import Theta, Trees, clamp_state, pose_parts, theta_from_parts
+from artperl.core.pose import AxisPrior, Theta, Trees, clamp_state, pose_parts, theta_from_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes, spread_points
 from artperl.evaluation import metrics
 from artperl.fitting.correspondence import Matches, Target, match
-from artperl.fitting.levenberg_marquardt import AxisPrior, RefineOptions, _maps, _moved, _rates, leaning, refine
+from artperl.fitting.levenberg_marquardt import RefineOptions, _maps, _moved, _rates, leaning, refine
 from artperl.fitting.paper_energy import joint_energy, part_energy, refine_by_gradient
 from artsim.errors import ConfigError
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view

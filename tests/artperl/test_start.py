@@ -9,11 +9,13 @@ import pytest
 import torch
 
 import artsim
+from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, joint_states, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Shapes
-from artperl.data.batches import Clouds, Samples, Truth, to_batch, training_rows
 from artperl.data.fitting_problems import part_truth
+from artperl.data.sources import Samples
+from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.evaluation import metrics
 from artperl.fitting.initial_pose import adapted, by_another_part, part_poses, procrustes, sized, start
 from artperl.perception.network import Perceived

@@ -20,7 +20,8 @@ from artperl.agent.decision_process import FittingOptions
 from artperl.agent.ppo import PPOOptions
 from artperl.boxes.network import Boxes
 from artperl.core.part_order import visible_order
-from artperl.data.batches import Given, Recorded, batches
+from artperl.data.batches import batches
+from artperl.data.sources import Given, Recorded
 from artperl.estimator import load_estimator, read_settings, save_estimator
 from artperl.evaluation.scoring import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.training.options import PRESETS, TrainOptions

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 
 import artsim
-from artperl.data.batches import Truth, to_batch, training_rows
 from artperl.data.fitting_problems import Problem, Problems
+from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase

@@ -1,0 +1,61 @@
+"""Clouds at a common place and size, and what tells the joints of parts apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from torch import Tensor
+
+from artperl.core.batch import Batch
+from artsim.model.kinematics import ROTATING, Array
+
+
+@dataclass(frozen=True, eq=False)
+class Clouds(Batch):
+    """B partial clouds of N points, brought to a common place and size.
+
+    Attributes
+    ----------
+    points : (B, N, 3) float
+        ``(camera-frame points - center) / radius``, in random order.
+    center : (B, 3) float
+        Mean of the points, metres, camera frame.
+    radius : (B,) float
+        Root of the mean squared distance from it, times two, metres.
+    """
+
+    points: Tensor
+    center: Tensor
+    radius: Tensor
+
+    @staticmethod
+    def of(points: Tensor) -> Clouds:
+        """Clouds of (B, N, 3) camera-frame points."""
+        center = points.mean(1)
+        local = points - center[:, None]
+        radius = 2.0 * local.square().sum(-1).mean(1).sqrt().clamp(min=1e-9)
+        return Clouds(local / radius[:, None, None], center, radius)
+
+
+def joint_rows(kinds: Sequence[str], axis: Array, origin: Array, center: Array, diagonal: float) -> Array:
+    """(K, 9) what tells the joints of K parts apart: zeros for the root and where a part is fixed.
+
+    The direction of a slide (3), that of a turning axis (3), and where the nearest point of this axis is from the
+    centre of the part's box, in diagonals (3).
+
+    Parameters
+    ----------
+    kinds : sequence of str, length K
+        Types of joints.
+    axis, origin, center : (K, 3) float
+        In the rest frame; axes of length 1.
+    diagonal : float
+        Of the object.
+    """
+    sliding, turning = (np.isin(kinds, types)[:, None] for types in ("prismatic", list(ROTATING)))
+    away = origin - center
+    pivot = (away - (away * axis).sum(-1, keepdims=True) * axis) / diagonal
+    rows: Array = np.concatenate([axis * sliding, axis * turning, pivot * turning], axis=1)
+    return rows

@@ -1,0 +1,83 @@
+"""What is true of clouds, as tensors: what networks learn to say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from artperl.core.batch import Batch
+from artperl.core.clouds import Clouds, joint_rows
+from artsim.model.kinematics import Array
+from artsim.observing.sample import Sample
+
+
+@dataclass(frozen=True, eq=False)
+class Truth(Batch):
+    """What is true of B clouds. Lengths of the rest frame are in diagonals of the object.
+
+    Attributes
+    ----------
+    part : (B, N) int64
+    canonical : (B, N, 3) float
+        Where each point lies in the rest frame, at rest.
+    part_valid : (B, P) bool
+    box_center, box_size : (B, P, 3) float
+    joint : (B, P, 9) float
+        See :func:`joint_rows`.
+    level : (B, P) int64
+        How many joints are between the root and the part.
+    diagonal : (B,) float
+        Over the cloud's radius.
+    """
+
+    part: Tensor
+    canonical: Tensor
+    part_valid: Tensor
+    box_center: Tensor
+    box_size: Tensor
+    joint: Tensor
+    level: Tensor
+    diagonal: Tensor
+
+    def of_points(self, rows: Tensor) -> Tensor:
+        """(B, N, ...) of each point's part, from (B, P, ...) of each part."""
+        return torch.stack([own[part] for own, part in zip(rows, self.part, strict=True)])
+
+
+def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
+    """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
+    K = len(sample.joint_type)
+    points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
+    joint = joint_rows(
+        sample.joint_type, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal
+    )  # fmt: skip
+    level = np.zeros(num_rows, dtype=np.int64)
+    for k in range(1, K):
+        level[k] = level[sample.joint_parent[k]] + 1
+
+    def pad(rows: Array) -> Array:
+        padded = np.zeros((num_rows, *rows.shape[1:]), dtype=np.float32)
+        padded[:K] = rows
+        return padded
+
+    return {
+        "points": points.astype(np.float32),
+        "part": part,
+        "canonical": (sample.rest_points[:num_points] / sample.diagonal).astype(np.float32),
+        "part_valid": np.arange(num_rows) < K,
+        "box_center": pad(sample.box_center / sample.diagonal),
+        "box_size": pad(sample.box_size / sample.diagonal),
+        "joint": pad(joint),
+        "level": level,
+        "diagonal": np.float32(sample.diagonal),
+    }
+
+
+def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
+    """Collated rows of :func:`training_rows` as records."""
+    clouds = Clouds.of(rows["points"])
+    names = ("part", "canonical", "part_valid", "box_center", "box_size", "joint", "level")
+    return clouds, Truth(**{name: rows[name] for name in names}, diagonal=rows["diagonal"] / clouds.radius)
