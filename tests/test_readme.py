@@ -1,4 +1,4 @@
-"""README and docs stay true: commands and options exist, links lead somewhere, and what is shown works in order."""
+"""README and docs stay true: commands and options exist, links lead somewhere, and the blocks shown work in order."""
 
 from __future__ import annotations
 
@@ -25,14 +25,20 @@ from tests.conftest import ASSETS
 
 ROOT = ASSETS.parent
 README = ROOT / "README.md"
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "examples").glob("*/README.md"))]
+TUTORIAL = ROOT / "docs" / "tutorial.md"
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]
 PROGRAMS: dict[str, Any] = {
     "artsim": artsim.cli.Verb,
     "artperl": artperl.cli.Verb,
     "generate.py": artsim.cli.Generate,
     "train.py": artperl.cli.Train,
 }
-BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README.read_text(), re.MULTILINE | re.DOTALL)
+BLOCKS = [
+    (kind, block)
+    for page in (README, TUTORIAL)
+    for kind, block in re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
+    if kind in ("sh", "python")
+]
 
 
 def commands(text: str) -> list[list[str]]:
@@ -108,18 +114,23 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
 
 
 def test_readme_is_short_and_installs_before_it_runs_anything() -> None:
-    text = README.read_text()
-    assert len(text.splitlines()) <= 150
+    assert len(README.read_text().splitlines()) <= 150
     kind, first = BLOCKS[0]
     assert kind == "sh"
     assert [line.split()[0] for line in first.splitlines()] == ["python3", ".", "pip"]
+
+
+def test_readme_and_the_index_of_docs_link_every_page() -> None:
+    for index in (README, ROOT / "docs" / "README.md"):
+        linked = {(index.parent / link).resolve() for link in re.findall(r"\]\(([^)#\s]+)", index.read_text())}
+        assert set((ROOT / "docs").glob("*.md")) - {index} <= linked, index
 
 
 def test_readme_lists_every_extra_and_make_target() -> None:
     text = README.read_text()
     extras = metadata("artsim").get_all("Provides-Extra") or []
     assert len(extras) > 5
-    table = text[text.index("| extra |") : text.index("## Two commands")]
+    table = text[text.index("| extra |") : text.index("## Ten lines")]
     assert set(extras) <= set(re.findall(r"`([\w]+)`", table))
     targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     for page in PAGES:
@@ -149,7 +160,7 @@ if __name__ == "__main__":
 """
 
 
-def test_what_readme_shows_works_in_order(tmp_path: Path) -> None:
+def test_what_readme_and_tutorial_show_works_in_order(tmp_path: Path) -> None:
     """Shell and Python blocks, in one new folder, as a reader pastes them."""
     (tmp_path / "urdf_assets").symlink_to(ASSETS)
     (tmp_path / "reader.py").write_text(READER)
