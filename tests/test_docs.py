@@ -60,6 +60,19 @@ def test_pages_describe_what_is_and_not_what_was(page: Path) -> None:
     assert not told, f"{page.name} says {told}. Fix: move history to CHANGELOG.md, attempts to docs/experiments.md"
 
 
+def test_symbols_of_the_glossary_stand_in_the_files_that_it_names() -> None:
+    rows = re.findall(r"^\|([^|]*)\|([^|]*)\|.*\|([^|]*)\|$", (ROOT / "docs" / "glossary.md").read_text(), re.M)
+    named = [
+        (symbol, ROOT / where)
+        for _, symbols, wheres in rows
+        for symbol in re.findall(r"`([\w.]+)`", symbols)
+        for where in re.findall(r"`([\w/]+\.py)`", wheres)
+    ]
+    assert len(named) > 40
+    absent = [f"{symbol}: {path.name}" for symbol, path in named if symbol.split(".")[-1] not in path.read_text()]
+    assert not absent
+
+
 def test_no_page_rests_on_a_script_that_is_not_in_the_repository() -> None:
     for page in PAGES:
         assert not re.search(r"[(;,] ?scripts?\b(?![/-])[^()]{0,40}\)", page.read_text()), page.name
