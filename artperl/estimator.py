@@ -25,8 +25,8 @@ from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.files import read_bounded, read_json, write_atomic
+from artsim.common.json_records import from_plain
 from artsim.common.names import printable
-from artsim.common.plain import from_plain
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import MAX_PARTS
 

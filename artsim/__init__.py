@@ -12,10 +12,12 @@ from artsim.families import make
 from artsim.loading.urdf import load
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.frame import Frame
 from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import ARTSIM_VERSION, Sample, observe
-from artsim.renderers import Frame, make_renderer, render, render_cameras
+from artsim.observing.capture import observe
+from artsim.observing.sample import ARTSIM_VERSION, Sample
+from artsim.renderers import make_renderer, render, render_cameras
 
 __version__ = ARTSIM_VERSION
 

@@ -20,7 +20,7 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
-from artsim.scenes.maker import SceneCameraOptions, SceneOptions
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
 
 _LISTED = 50
 """Lines of a list before the rest is only counted."""
@@ -218,9 +218,9 @@ class Scene:
     """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
 
     def run(self) -> None:
-        from artsim.scenes.maker import make_scene, scene_camera
-        from artsim.scenes.sample import observe_scene
-        from artsim.scenes.view import write_overview
+        from artsim.drawing.scene_overview import write_overview
+        from artsim.scenes.ground_truth import observe_scene
+        from artsim.scenes.random_scene import make_scene, scene_camera
 
         if min(self.scenes, self.views) < 1:
             raise ConfigError("there is nothing to make", "scenes, views", "use 1 or more of each")
@@ -260,7 +260,7 @@ class View:
     """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
-        from artsim.drawing.view import view_path
+        from artsim.drawing.contact_sheet import view_path
 
         for written in view_path(self.path, self.out, self.samples, self.split, self.rerun, self.package_root):
             print(f"wrote {written}")

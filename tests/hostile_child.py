@@ -24,7 +24,7 @@ def load(path: Path) -> str:
 
 
 def view(path: Path) -> str:
-    from artsim.drawing.view import view_path
+    from artsim.drawing.contact_sheet import view_path
 
     return " ".join(str(written.absolute()) for written in view_path(path, samples=1))
 

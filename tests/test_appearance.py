@@ -21,10 +21,9 @@ from artsim.loading.sources import find_sources
 from artsim.making.solids import box, cylinder
 from artsim.model.objects import Part
 from artsim.renderers import Renderer
-from artsim.renderers.base import two_sided_faces
 from artsim.renderers.sapien import SapienRenderer
 from artsim.renderers.scene import Scene, Thing
-from artsim.renderers.scenes import render_scene
+from artsim.renderers.scene_renderer import render_scene
 from artsim.scenes.props import placed
 from tests.conftest import backend, rigid, solid
 
@@ -92,7 +91,7 @@ def test_patches_are_the_whole_surface_split_by_material() -> None:
         for patch in patches(part, coat):
             a, b, c = patch.vertices.reshape(-1, 3, 3).astype(float).transpose(1, 0, 2)
             area += 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-        whole = trimesh.Trimesh(part.vertices, two_sided_faces(part), process=False)
+        whole = trimesh.Trimesh(part.vertices, part.two_sided_faces(), process=False)
         assert area == pytest.approx(whole.area, rel=1e-5)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.model.describe import HEIGHT, WIDTH, table
+from artsim.common.tables import HEIGHT, WIDTH, table
 from artsim.model.kinematics import Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject, Part, Repair
 from artsim.observing.sample import Sample

@@ -10,9 +10,10 @@ import trimesh
 
 import artsim
 from artsim import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers import BACKGROUND, Frame, render
+from artsim.renderers import render
 from benchmarks.agreement import LIMITS, Agreement
 from benchmarks.differences import CLASSES, Scene, classify, grazing, slivers
 from tests.conftest import ASSETS, rigid, solid

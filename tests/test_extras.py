@@ -71,7 +71,7 @@ CALLS = {
     "import artsim; from artsim.export import export; export(artsim.make('globe'), 'e', ('mjcf',))": "sim",
     "import artsim; from artsim.export import export; export(artsim.make('globe'), 'e', ('usd',))": "sim",
     "import artsim; from artsim.physics.world import Simulation; Simulation(artsim.make('globe'))": "pybullet",
-    "from artsim.drawing.view import contact_sheet; contact_sheet([])": "view",
+    "from artsim.drawing.contact_sheet import contact_sheet; contact_sheet([])": "view",
     "from artsim.drawing.rerun_recording import write_recording; write_recording([], None)": "view",
     "from pathlib import Path; from artsim.physics.simulators import in_mujoco; in_mujoco(Path('box.urdf'))": "sim",
     "from pathlib import Path; from artsim.physics.simulators import in_pybullet as f; f(Path('box.urdf'))": "pybullet",

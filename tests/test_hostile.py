@@ -21,8 +21,8 @@ import pytest
 import artsim
 from artsim.cli import main
 from artsim.common.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
+from artsim.common.json_records import from_plain
 from artsim.common.names import printable, safe_name
-from artsim.common.plain import from_plain
 from artsim.errors import ArtsimError, AssetError
 from tests.conftest import ASSETS
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from artsim.renderers.kept import MAX_FACES, Kept
+from artsim.renderers.geometry_cache import MAX_FACES, Kept
 
 
 @dataclass

@@ -17,11 +17,12 @@ from artsim.errors import AssetError, ConfigError
 from artsim.families import make
 from artsim.model.camera import Camera
 from artsim.model.draws import joint_intervals
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import observe
+from artsim.observing.capture import observe
 from artsim.physics.episode import openness
-from artsim.renderers import BACKGROUND, render
+from artsim.renderers import render
 from tests.conftest import ASSETS, backend, installed, rigid, valve
 from tests.without import environment
 

@@ -13,10 +13,11 @@ import artsim
 from artsim import Camera, StateOptions, ViewOptions, observe, render, sample_state, sample_view
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import points_from_depth
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import Joint
 from artsim.model.objects import Part
-from artsim.observing.sample import draw_visible
-from artsim.renderers import BACKGROUND, make_renderer
+from artsim.observing.capture import draw_visible
+from artsim.renderers import make_renderer
 from artsim.renderers.raycast import bounding_corners, cast, pose
 from tests.conftest import ASSETS, DEMO, rigid, solid
 

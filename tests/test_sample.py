@@ -15,10 +15,10 @@ from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.verify import sample_problems
 from artsim.loading.sources import find_sources
 from artsim.model.draws import ViewPreset, bounding_sphere, joint_intervals, sample_scale
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
-from artsim.renderers.base import BACKGROUND
 from tests.conftest import ASSETS, DEMO
 
 REAL = ("Laptop", "Eyeglasses", "Dishwasher", "StorageFurniture", "Box", "Oven", "Faucet", "Knife")

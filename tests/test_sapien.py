@@ -17,8 +17,9 @@ import artsim
 from artsim import Camera, make_renderer, observe
 from artsim.datasets.verify import sample_problems
 from artsim.loading.sources import find_sources
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers import BACKGROUND, Frame, Renderer
+from artsim.renderers import Renderer
 from benchmarks.agreement import LIMITS, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
 from tests.without import environment

@@ -18,17 +18,18 @@ from PIL import Image
 from artsim import Camera, make
 from artsim.appearance import Lights, Material, Sun, plain_coat
 from artsim.datasets.shards import sample_from_members
+from artsim.drawing.scene_overview import overview
 from artsim.errors import ConfigError
 from artsim.making.solids import box
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
-from artsim.renderers import BACKGROUND, Renderer
+from artsim.renderers import Renderer
 from artsim.renderers.scene import Scene, Thing, rigid
-from artsim.renderers.scenes import render_scene
-from artsim.scenes.maker import SceneCameraOptions, SceneOptions, make_scene, scene_camera, with_appearance
+from artsim.renderers.scene_renderer import render_scene
+from artsim.scenes.ground_truth import SceneView, observe_scene, write_view
 from artsim.scenes.placement import Area, Arrangement, apart, resting_rotation
 from artsim.scenes.props import DISTRACTORS, distractor, placed
-from artsim.scenes.sample import SceneView, observe_scene, write_view
-from artsim.scenes.view import overview
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera, with_appearance
 from benchmarks.agreement import LIMITS
 from tests.conftest import backend
 

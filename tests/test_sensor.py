@@ -16,11 +16,11 @@ from artsim.datasets.verify import sample_problems, verify
 from artsim.errors import ConfigError
 from artsim.loading.sources import find_sources
 from artsim.model.draws import StateOptions
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.noise import AxialNoise, DisparityQuantisation, EdgeDropout, FlyingPixels, LateralJitter, View
 from artsim.observing.sensor import SENSORS, Sensor
-from artsim.renderers import BACKGROUND
 from tests.conftest import ASSETS
 
 DEPTHS = (0.6, 1.0, 1.7, 2.5, 4.0)

@@ -13,17 +13,8 @@ from scipy.spatial import ConvexHull, Delaunay
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.plan import SampleOptions
-from artsim.drawing.view import (
-    PALETTE,
-    axis_segment,
-    box_corners,
-    contact_sheet,
-    shaded,
-    show_sample,
-    show_states,
-    spread,
-    view_path,
-)
+from artsim.drawing.annotation import PALETTE, axis_segment, box_corners, shaded
+from artsim.drawing.contact_sheet import contact_sheet, show_sample, show_states, spread, view_path
 from artsim.errors import ArtsimError
 from artsim.loading.sources import find_sources
 from tests.conftest import ASSETS

@@ -14,7 +14,7 @@ from artsim.model.camera import look_at_transform
 from artsim.model.draws import ViewPreset, bounding_sphere
 from artsim.model.kinematics import invert_transform
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.views import draw_views
+from artsim.renderers.view_batch import draw_views
 
 COUNT = 1500
 CAMERAS = ViewOptions(width=160, height=120)

@@ -18,11 +18,12 @@ import artsim
 from artsim import Camera, StateOptions, make, make_renderer, observe, sample_state
 from artsim.errors import ArtsimError, ConfigError, KinematicsError
 from artsim.families import FAMILIES
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Joint
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers import BACKGROUND, Frame, render_cameras
+from artsim.renderers import render_cameras
 from artsim.renderers.raycast import pose
-from artsim.renderers.views import Views
+from artsim.renderers.view_batch import Views
 from artsim.renderers.warp import WarpRenderer
 from benchmarks.agreement import Agreement, draw_scenes
 from benchmarks.differences import Scene

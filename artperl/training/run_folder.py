@@ -20,7 +20,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artsim.common.files import parse_json, read_bounded, write_atomic, write_error
-from artsim.datasets.team import locked
+from artsim.datasets.worker_pool import locked
 from artsim.errors import DatasetError
 
 _MAX_JSON = 64_000_000

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from artsim.appearance.textures import Image
 from artsim.model.kinematics import Array
 from artsim.model.objects import Part
-from artsim.renderers.base import two_sided_faces
 
 Colour = tuple[float, float, float]
 
@@ -144,7 +143,7 @@ def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
     scale : float
         Of the object: textures keep their size in metres.
     """
-    faces = two_sided_faces(part)
+    faces = part.two_sided_faces()
     twice = len(faces) // max(len(part.faces), 1)
     corners = part.vertices[faces].astype(np.float64)
     normals = corner_normals(part.vertices, faces)

@@ -35,7 +35,7 @@ from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import observe
+from artsim.observing.capture import observe
 
 MEASURES = ("surface", "parts", "boxes", "joints", "ranges")
 

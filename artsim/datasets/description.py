@@ -15,7 +15,7 @@ from typing import Any
 
 from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
 from artsim.common.names import printable
-from artsim.datasets import checked
+from artsim.datasets import json_values
 from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
@@ -110,7 +110,7 @@ def read_description(folder: Path) -> tuple[Plan, list[ShardRecord], dict[str, A
     document = _document(folder, DESCRIPTION)
     plan = _plan(document, path)
     try:
-        shards = checked.sequence(document["shards"], "shards", MAX_SHARDS)
+        shards = json_values.sequence(document["shards"], "shards", MAX_SHARDS)
         if len(shards) != plan.num_shards:  # compared before the plan's own are listed: a forged plan has any number
             raise ValueError(f"it lists {len(shards)} shards instead of {plan.num_shards}")
         records = [ShardRecord.from_dict(shard) for shard in shards]
@@ -126,7 +126,7 @@ def _document(folder: Path, name: str) -> dict[str, Any]:
     path = folder / name
     data = read_bounded(path, MAX_JSON_BYTES, name, DatasetError, fix=repair_command(folder))
     try:
-        document = dict(checked.mapping(parse_json(data), "it"))
+        document = dict(json_values.mapping(parse_json(data), "it"))
         if document["format"] not in (1, FORMAT):
             raise DatasetError(
                 f"format {document['format']!r:.20} is not {FORMAT}", path, "read it with the artsim that wrote it"
@@ -147,9 +147,9 @@ def _plan(document: Mapping[str, Any], path: Path) -> Plan:
     try:
         plan: Plan = (Plan if document["format"] == FORMAT else PlanFormat1).from_dict(document)
         for entries in (document["left_out"], document["repeated"]):
-            for entry in checked.sequence(entries, "sources", 10_000_000):
+            for entry in json_values.sequence(entries, "sources", 10_000_000):
                 for name in ("source", "source_sha256"):
-                    checked.text(checked.mapping(entry, "source")[name], name)
+                    json_values.text(json_values.mapping(entry, "source")[name], name)
     except (ValueError, KeyError, ConfigError) as error:
         raise _damaged(path, error) from error
     return plan

@@ -16,14 +16,14 @@ from typing import Any
 
 from artsim.common.files import write_atomic
 from artsim.datasets.description import DESCRIPTION, JOURNAL, Begun, read_begun
-from artsim.datasets.draw import SampleOptions
+from artsim.datasets.new_plan import new_plan
 from artsim.datasets.origins import Origins, write_origins
 from artsim.datasets.plan import FORMAT, MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
-from artsim.datasets.planning import new_plan
 from artsim.datasets.restore import journal_line, remove_leftovers, restore
+from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares
 from artsim.datasets.state import State, examine, leftover_problems
-from artsim.datasets.team import Team, locked
+from artsim.datasets.worker_pool import Team, locked
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler

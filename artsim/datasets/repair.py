@@ -13,7 +13,7 @@ from artsim.datasets.plan import FORMAT
 from artsim.datasets.problems import Problem
 from artsim.datasets.restore import remove_leftovers, restore
 from artsim.datasets.state import examine, leftover_problems, strangers
-from artsim.datasets.team import Team, locked
+from artsim.datasets.worker_pool import Team, locked
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 

@@ -22,8 +22,8 @@ from artsim.datasets.origins import Origins
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem
 from artsim.datasets.state import STAGED, State, leftovers
-from artsim.datasets.team import Lost, Team
 from artsim.datasets.worker import CompiledSource, Refused, compile_source, make_shard
+from artsim.datasets.worker_pool import Lost, Team
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 

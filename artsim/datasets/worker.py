@@ -17,8 +17,8 @@ from typing import Any
 from artsim.common.extras import explained
 from artsim.common.files import file_sha256
 from artsim.datasets.description import read_plan
-from artsim.datasets.draw import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
 from artsim.datasets.plan import Plan, Shard, ShardRecord
+from artsim.datasets.sample_options import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
 from artsim.datasets.shards import OtherBytesError, write_shard
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import FamilySource, Source

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.common.names import printable
-from artsim.drawing.view import shaded
+from artsim.drawing.annotation import shaded
 from artsim.model.draws import ViewOptions, joint_intervals, sample_view
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject

@@ -22,7 +22,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.datasets.dataset import pad_sample
-from artsim.drawing.view import shaded
+from artsim.drawing.annotation import shaded
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array
 from artsim.observing.sample import Sample

@@ -19,7 +19,7 @@ from typing import Any
 
 from artsim.common.files import read_json, write_atomic, write_error
 from artsim.common.progress import track
-from artsim.datasets.team import Lost, Team, locked
+from artsim.datasets.worker_pool import Lost, Team, locked
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from artsim.common.products import apply, dot, matmul, unit
 from artsim.errors import AssetError
-from artsim.loading.robot import Robot, RobotJoint
+from artsim.loading.urdf_document import Robot, RobotJoint
 from artsim.model.kinematics import Array
 from artsim.model.objects import Part, Repair
 

@@ -23,7 +23,7 @@ import numpy as np
 from lxml import etree
 
 from artsim.common.products import norm, unit
-from artsim.loading.robot import MimicRelation, RobotJoint
+from artsim.loading.urdf_document import MimicRelation, RobotJoint
 from artsim.loading.xml_values import Element
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair

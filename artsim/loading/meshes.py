@@ -20,7 +20,7 @@ from artsim.errors import AssetError
 from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
-from artsim.loading.robot import Geometry, MeshFile
+from artsim.loading.urdf_document import Geometry, MeshFile
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import Repair
 

@@ -28,7 +28,7 @@ from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, che
 from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_state import canonical_category, rest_state
-from artsim.loading.robot import Link, Robot, RobotJoint
+from artsim.loading.urdf_document import Link, Robot, RobotJoint
 from artsim.loading.urdf_xml import parse_robot
 from artsim.loading.xml_repair import unexpanded
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic, transform_points

@@ -1,4 +1,4 @@
-"""From the bytes of a URDF file to a checked :class:`~artsim.loading.robot.Robot`.
+"""From the bytes of a URDF file to a checked :class:`~artsim.loading.urdf_document.Robot`.
 
 The file is untrusted: no document type, no entities, bounded size, every number finite. What can be mended is mended
 and recorded; what cannot raises an error that names the element.
@@ -15,7 +15,7 @@ from lxml import etree
 
 from artsim.errors import AssetError
 from artsim.loading.joint_xml import read_joint
-from artsim.loading.robot import Box, Capsule, Cylinder, Geometry, Link, MeshFile, Robot, Shape, Sphere
+from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, Link, MeshFile, Robot, Shape, Sphere
 from artsim.loading.xml_repair import readable_xml, use_plain_names
 from artsim.loading.xml_values import Element
 from artsim.model.objects import Repair

@@ -28,7 +28,8 @@ from artsim.model.draws import (
 )
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import Sample, observe
+from artsim.observing.capture import observe
+from artsim.observing.sample import Sample
 from artsim.observing.sensor import find_sensor
 from artsim.physics.world import Control, PhysicsOptions, Simulation
 

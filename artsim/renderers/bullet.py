@@ -23,10 +23,11 @@ from artsim.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.common.extras import needs
 from artsim.errors import RenderError
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
-from artsim.renderers.kept import Kept
+from artsim.renderers.base import depth_range
+from artsim.renderers.geometry_cache import Kept
 from artsim.renderers.raycast import pose
 from artsim.renderers.scene import Scene, SceneFrame, split_ids
 
@@ -156,7 +157,7 @@ class _World:
         if len(solid.part.faces) == 0:
             return
         if solid.coat is None:
-            yield self._body(_obj_text(solid.part.vertices, two_sided_faces(solid.part)), solid.part.name, folder)
+            yield self._body(_obj_text(solid.part.vertices, solid.part.two_sided_faces()), solid.part.name, folder)
             return
         for patch in patches(solid.part, solid.coat, solid.scale):
             body = self._body(_patch_text(patch, solid.scale), solid.part.name, folder)

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.elementary import cos, tan
 from artsim.common.products import apply, matmul, unit
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.base import BACKGROUND, Frame
 
 _MISS = np.float32(1e30)
 

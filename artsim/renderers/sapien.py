@@ -16,9 +16,10 @@ from artsim.appearance.painted import painted_coats
 from artsim.common.extras import install_command
 from artsim.errors import RenderError
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.base import BACKGROUND, Frame, depth_range
-from artsim.renderers.kept import Kept
+from artsim.renderers.base import depth_range
+from artsim.renderers.geometry_cache import Kept
 from artsim.renderers.raycast import pose
 from artsim.renderers.sapien_stage import Shadows, Stage
 from artsim.renderers.scene import Scene, SceneFrame, split_ids

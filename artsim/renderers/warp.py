@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.extras import needs
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
+from artsim.model.frame import Frame
 from artsim.model.kinematics import ROTATING, Array
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.base import Frame
 from artsim.renderers.bullet import silent
-from artsim.renderers.views import Clouds, Images, Views
+from artsim.renderers.view_batch import Clouds, Images, Views
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from artperl.training.options import PRESETS
 from artperl.training.run import Training
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.verify import verify
+from artsim.drawing.contact_sheet import view_path
 from artsim.drawing.gallery import gallery
-from artsim.drawing.view import view_path
 from artsim.families import FAMILIES
 from artsim.loading.sources import family_sources, find_sources
 

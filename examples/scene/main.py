@@ -5,9 +5,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from artsim.scenes.maker import SceneCameraOptions, SceneOptions, make_scene, scene_camera
-from artsim.scenes.sample import observe_scene
-from artsim.scenes.view import write_overview
+from artsim.drawing.scene_overview import write_overview
+from artsim.scenes.ground_truth import observe_scene
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera
 
 SEED = 17
 

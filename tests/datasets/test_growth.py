@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import artsim
 from artsim.datasets import generate as generating
-from artsim.datasets.draw import SampleOptions
 from artsim.datasets.generate import GenerateResult
 from artsim.datasets.layout import at_place
+from artsim.datasets.new_plan import planned_objects
 from artsim.datasets.plan import Plan
-from artsim.datasets.planning import planned_objects
+from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import SPLITS, showing_order
 from artsim.datasets.verify import verify
 from artsim.datasets.worker import CompiledSource

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
-from artsim.datasets.draw import SampleOptions, draw_sample
 from artsim.datasets.plan import Plan, PlannedObject
+from artsim.datasets.sample_options import SampleOptions, draw_sample
 from artsim.datasets.splits import SPLITS, assign_splits, unique_keys
 from artsim.errors import ConfigError
 from artsim.model.draws import StateOptions, ViewOptions

@@ -15,9 +15,9 @@ import pytest
 
 import artsim
 from artsim.datasets.description import document_bytes
-from artsim.datasets.draw import SampleOptions, draw_sample
 from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.repair import repair
+from artsim.datasets.sample_options import SampleOptions, draw_sample
 from artsim.datasets.shards import write_shard
 from artsim.datasets.verify import verify
 from artsim.errors import ArtsimError, DatasetError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.datasets.draw import SampleOptions, check_visible
+from artsim.datasets.sample_options import SampleOptions, check_visible
 from artsim.datasets.verify import verify
 from artsim.drawing.inspect import describe
 from artsim.errors import AssetError, RenderError

@@ -11,7 +11,7 @@ import pytest
 from artsim import load
 from artsim.errors import AssetError
 from artsim.loading.meshes import _TRIANGLES, LoadLimits, MeshReader
-from artsim.loading.robot import Box, Capsule, Cylinder, Geometry, MeshFile, Sphere
+from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, MeshFile, Sphere
 from tests.loading.mesh_builders import SQUARE, area, dae, urdf
 
 CASES = Path(__file__).parent.parent / "cases"

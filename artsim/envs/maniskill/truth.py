@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from artsim.envs.maniskill.goal import APART, LEAST_OPEN, MOST_OPEN, Goal
 from artsim.envs.maniskill.places import T_world_object, handle
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import JOINT_TYPES, ROTATING, Array
@@ -147,6 +148,18 @@ def truth_of(objects: Sequence[ArticulatedObject], max_joints: int, device: Any)
         mimic=torch.stack([_mimic(obj, rows)[0] for obj in objects]).to(device),
         mimic_offset=torch.stack([_mimic(obj, rows)[1] for obj in objects]).to(device),
     )
+
+
+def start_and_goal(goal: Goal, truth: Truth, draw: Tensor) -> tuple[Tensor, Tensor]:
+    """(B, P) joint states at which episodes begin, and which are to be reached, from (2, B, P) uniform draws."""
+    rest, span = truth.fixed["joint_rest"], truth.high - truth.low
+    if goal == "random":
+        share = torch.remainder(draw[0] + APART + (1.0 - 2.0 * APART) * draw[1], 1.0)
+        start, end = truth.low + draw[0] * span, truth.low + share * span
+    else:
+        opened = rest + (LEAST_OPEN + (MOST_OPEN - LEAST_OPEN) * draw[0]) * (truth.far - rest)
+        start, end = (rest, opened) if goal == "open" else (opened, rest)
+    return truth.complete_state(start), truth.complete_state(end)
 
 
 def _padded(array: Array, rows: int) -> Array:

@@ -10,11 +10,11 @@ from PIL import Image, ImageDraw
 
 from artsim.common.files import write_atomic
 from artsim.common.names import printable
-from artsim.drawing.view import BOX_EDGES, PALETTE, axis_segment, box_corners
+from artsim.drawing.annotation import BOX_EDGES, PALETTE, axis_segment, box_corners
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND
 from artsim.observing.sample import Sample
-from artsim.renderers import BACKGROUND
-from artsim.scenes.sample import SceneView, png_bytes, write_view
+from artsim.scenes.ground_truth import SceneView, png_bytes, write_view
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
 _TINT = 0.62  # of a part's or instance's colour over the picture
@@ -29,7 +29,7 @@ def overview(view: SceneView) -> NDArray[np.uint8]:
 
 
 def write_overview(view: SceneView, folder: Path) -> None:
-    """Write a view's files (see :func:`artsim.scenes.sample.write_view`), and ``overview.png``."""
+    """Write a view's files (see :func:`artsim.scenes.ground_truth.write_view`), and ``overview.png``."""
     write_view(view, folder)
     write_atomic(folder / "overview.png", png_bytes(overview(view)))
 

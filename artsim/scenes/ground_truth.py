@@ -17,14 +17,16 @@ from artsim.common.files import write_atomic
 from artsim.datasets.shards import npy_bytes, sample_members
 from artsim.errors import ConfigError
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import ARTSIM_VERSION, Sample, observe
+from artsim.observing.capture import observe
+from artsim.observing.sample import ARTSIM_VERSION, Sample
 from artsim.observing.sensor import Sensor, find_sensor
-from artsim.renderers import BACKGROUND, Frame, Renderer
+from artsim.renderers import Renderer
 from artsim.renderers.raycast import pose, render_posed
 from artsim.renderers.scene import Scene, SceneFrame, Thing
-from artsim.renderers.scenes import render_scene
+from artsim.renderers.scene_renderer import render_scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,7 @@ def observe_scene(
     num_points : int
         Of each instance's cloud.
     renderer : str or Renderer
-        As in :func:`artsim.renderers.scenes.render_scene`.
+        As in :func:`artsim.renderers.scene_renderer.render_scene`.
     noise : str or Sensor
         Depth sensor: one of ``artsim.observing.sensor.SENSORS``, or one of your own.
     seed : int

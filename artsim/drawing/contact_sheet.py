@@ -4,52 +4,30 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from artsim.common.extras import needs
 from artsim.common.files import write_atomic
 from artsim.common.names import printable, safe_name
 from artsim.datasets.dataset import Dataset
+from artsim.drawing.annotation import BOX_EDGES, PALETTE, Shown, axis_segment, box_corners, shaded
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, ViewOptions, joint_intervals, sample_state, sample_view
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import Sample, observe
-from artsim.renderers import BACKGROUND, Frame, render
+from artsim.observing.capture import observe
+from artsim.observing.sample import Sample
+from artsim.renderers import render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's colours, told apart with any colour vision; then lighter ones.
-PALETTE = np.array(
-    [(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (213, 94, 0), (240, 228, 66),
-     (110, 110, 110), (146, 108, 196), (140, 190, 90), (170, 120, 90), (90, 200, 200)]
-)  # fmt: skip
-_LIGHT = np.array([0.35, -0.55, -0.76])  # towards the light, camera frame
-BOX_EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
 _SAMPLES_PER_ROW = 2
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A sample with the frame it was seen in."""
-
-    sample: Sample
-    frame: Frame
-    title: str
-
-    @property
-    def camera(self) -> Camera:
-        """The sample's camera."""
-        s = self.sample
-        return Camera(s.K, s.width, s.height, s.T_world_camera)
 
 
 def view_path(
@@ -201,36 +179,6 @@ def draw_cloud(axes: Axes, shown: Shown) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
     _bare(axes)
-
-
-def box_corners(sample: Sample, k: int) -> Array:
-    """(8, 3) corners of part k's box in the camera frame."""
-    signs = np.array([[i & 1, i & 2, i & 4] for i in range(8)], dtype=bool) - 0.5
-    return transform_points(sample.T_camera_part[k], sample.box_center[k] + signs * sample.box_size[k])
-
-
-def axis_segment(sample: Sample, k: int) -> tuple[Array, Array]:
-    """Start and end of an arrow along joint k's axis, camera frame: about a third of the object long."""
-    axis, origin = sample.joint_axis_camera[k], sample.joint_origin_camera[k]
-    # The origin may lie anywhere on the axis, and a slide has no line of its own: draw where the part is.
-    center = transform_points(sample.T_camera_part[k], sample.box_center[k][None])[0]
-    middle = center if sample.joint_type[k] == "prismatic" else origin + axis * ((center - origin) @ axis)
-    half = 0.18 * sample.diagonal * axis
-    return middle - half, middle + half
-
-
-def shaded(frame: Frame, camera: Camera) -> NDArray[np.uint8]:
-    """(H, W, 3) part colours, lit by the surface's orientation."""
-    height, width = frame.depth.shape
-    points = camera.unproject(np.arange(height * width), frame.depth.ravel()).reshape(height, width, 3)
-    across, down = np.gradient(points, axis=1), np.gradient(points, axis=0)
-    normal = np.cross(across, down)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    light = 0.45 + 0.55 * np.abs(normal @ _LIGHT)
-    seen = frame.part_ids != BACKGROUND
-    image = np.full((height, width, 3), 255.0)
-    image[seen] = PALETTE[frame.part_ids[seen] % len(PALETTE)] * light[seen][:, None]
-    return image.clip(0, 255).astype(np.uint8)
 
 
 def _crop(axes: Axes, shown: Shown) -> None:

@@ -13,8 +13,8 @@ from artsim.common.progress import track
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
 from artsim.datasets.state import STAGED
-from artsim.datasets.team import Lost, Team
 from artsim.datasets.worker import CompiledSource, Refused, compile_source
+from artsim.datasets.worker_pool import Lost, Team
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from artsim.datasets import checked
+from artsim.datasets import json_values
 from artsim.errors import ConfigError, RenderError
 from artsim.model.draws import (
     Scale,
@@ -22,7 +22,8 @@ from artsim.model.draws import (
     sample_view,
 )
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import Sample, observe
+from artsim.observing.capture import observe
+from artsim.observing.sample import Sample
 from artsim.renderers import Renderer
 
 _VIEW_ATTEMPTS = 50
@@ -70,27 +71,31 @@ class SampleOptions:
         ValueError, ConfigError
             When a value is of another type, or makes no sense.
         """
-        own = checked.mapping(data, "sample")
-        states, views = checked.mapping(own["states"], "states"), checked.mapping(own["views"], "views")
+        own = json_values.mapping(data, "sample")
+        states, views = json_values.mapping(own["states"], "states"), json_values.mapping(own["views"], "views")
         unknown = own.keys() - {f.name for f in fields(SampleOptions)} | views.keys() - _VIEW_FIELDS.keys()
         if unknown:
             raise ValueError(f"sample has no option {min(unknown)!r:.40}")
         scale, opened = own["scale"], states["fraction_open"]
-        ranges = checked.mapping(states["joint_range"], "joint_range")
+        ranges = json_values.mapping(states["joint_range"], "joint_range")
         return SampleOptions(
-            num_points=checked.whole(own["num_points"], "num_points", 1, 1_000_000),
-            scale=scale if scale in ("native", "unit") else checked.pair(scale, "scale"),
+            num_points=json_values.whole(own["num_points"], "num_points", 1, 1_000_000),
+            scale=scale if scale in ("native", "unit") else json_values.pair(scale, "scale"),
             states=StateOptions(
-                checked.one_of(states["mode"], "mode", get_args(StateMode)),
-                None if opened is None else checked.pair(opened, "fraction_open"),
-                {checked.text(name, "joint_range"): checked.pair(value, name) for name, value in ranges.items()},
+                json_values.one_of(states["mode"], "mode", get_args(StateMode)),
+                None if opened is None else json_values.pair(opened, "fraction_open"),
+                {
+                    json_values.text(name, "joint_range"): json_values.pair(value, name)
+                    for name, value in ranges.items()
+                },
             ),
             views=ViewOptions(**{name: _VIEW_FIELDS[name](value, name) for name, value in views.items()}),
-            renderer=checked.one_of(own["renderer"], "renderer", get_args(RendererName)),
+            renderer=json_values.one_of(own["renderer"], "renderer", get_args(RendererName)),
             images=tuple(
-                checked.one_of(v, "image", get_args(ImageName)) for v in checked.sequence(own["images"], "images", 3)
+                json_values.one_of(v, "image", get_args(ImageName))
+                for v in json_values.sequence(own["images"], "images", 3)
             ),
-            noise=checked.one_of(own.get("noise", "none"), "noise", get_args(SensorName)),  # older plans do not say
+            noise=json_values.one_of(own.get("noise", "none"), "noise", get_args(SensorName)),  # older plans do not say
         )
 
 
@@ -99,14 +104,14 @@ def _optional(check: Callable[[Any, str], Any]) -> Callable[[Any, str], Any]:
 
 
 _VIEW_FIELDS: dict[str, Callable[[Any, str], Any]] = {
-    "preset": lambda value, name: checked.one_of(value, name, get_args(ViewPreset)),
-    "azimuth": _optional(checked.pair),
-    "elevation": _optional(checked.pair),
-    "fill": checked.pair,
-    "width": lambda value, name: checked.whole(value, name, 1, 8192),
-    "height": lambda value, name: checked.whole(value, name, 1, 8192),
-    "fov": checked.number,
-    "custom": _optional(checked.text),
+    "preset": lambda value, name: json_values.one_of(value, name, get_args(ViewPreset)),
+    "azimuth": _optional(json_values.pair),
+    "elevation": _optional(json_values.pair),
+    "fill": json_values.pair,
+    "width": lambda value, name: json_values.whole(value, name, 1, 8192),
+    "height": lambda value, name: json_values.whole(value, name, 1, 8192),
+    "fov": json_values.number,
+    "custom": _optional(json_values.text),
 }
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from artsim.errors import ConfigError
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND
 from artsim.renderers import Renderer, shared_renderer
-from artsim.renderers.base import BACKGROUND
 from artsim.renderers.scene import Scene, SceneFrame
 
 
