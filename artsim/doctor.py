@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
-from artsim.common.extras import explained, install_command
+from artsim.common.extras import import_failure, install_command
 from artsim.errors import ArtsimError, ConfigError, RenderError
 
 SIZE = 128
@@ -97,7 +97,7 @@ def _broken(backend: str, problem: str, fix: str = "") -> Finding:
     return Finding(backend, works=False, problem=problem, fix=fix or _FIXES[backend])
 
 
-def table(findings: list[Finding]) -> str:
+def finding_table(findings: list[Finding]) -> str:
     """Findings as text: a line for each backend, and one more for what to do about those that do not work."""
     width = max(len("device"), *(len(finding.device) for finding in findings))
     lines = [f"{'backend':<14}{'works':<7}{'device':<{width + 2}}frames/s at {SIZE}x{SIZE}"]
@@ -230,7 +230,7 @@ def _answer(backend: str) -> Finding:
     except ArtsimError as error:
         return _broken(backend, error.what, error.fix or "")
     except ImportError as error:
-        told = explained(error, backend)
+        told = import_failure(error, backend)
         return _broken(backend, told.what, "" if isinstance(error, ModuleNotFoundError) else told.fix or "")
     except Exception as error:  # backends fail in many ways
         return _broken(backend, f"{type(error).__name__}: {error}")

@@ -21,7 +21,7 @@ import pytest
 import artsim
 from artsim.cli import main
 from artsim.common.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
-from artsim.common.json_records import from_plain
+from artsim.common.json_records import from_json_values
 from artsim.common.names import printable, safe_name
 from artsim.errors import ArtsimError, AssetError
 from tests.conftest import ASSETS
@@ -442,14 +442,14 @@ def test_a_damaged_object_file_is_refused(changes: dict[str, Any], text: str, tm
 def test_a_value_of_another_type_is_named() -> None:
     from artperl.fitting.search import EstimatorOptions
 
-    assert from_plain(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
-    assert from_plain(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf
+    assert from_json_values(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
+    assert from_json_values(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf
     for name, value in (("beam", True), ("beam", 2.0), ("coherent", 1), ("azimuths", 3), ("seen_from", [1.0]),
                         ("refine", []), ("refine", {"tolerance": "a"}), ("elevation", float("nan"))):  # fmt: skip
         with pytest.raises(ValueError, match=r"is |not a set"):
-            from_plain(EstimatorOptions, {name: value})
+            from_json_values(EstimatorOptions, {name: value})
     with pytest.raises(ValueError, match="no field 'x'"):
-        from_plain(EstimatorOptions, {"x": 1})
+        from_json_values(EstimatorOptions, {"x": 1})
 
 
 def test_a_urdf_file_that_leads_out_of_its_folder_is_refused(tmp_path: Path) -> None:

@@ -13,11 +13,11 @@ from artperl.core.part_order import reordered_sample, visible_order
 from artperl.data.categories import Parts, arranged, has_parts
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions, draw_sample
-from artsim.datasets.stream import FamilyStream
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import shared_renderer
+from artsim.stream import FamilyStream
 
 _ATTEMPTS = 200
 

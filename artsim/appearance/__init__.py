@@ -153,7 +153,7 @@ def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
         own = material_of_face == number
         if not own.any():
             continue
-        uv = _wrapped(corners[own] * scale, across[own], material.tile)
+        uv = _texture_places(corners[own] * scale, across[own], material.tile)
         if coat.uv is not None:
             # The second copy of a face has its corners in the opposite order.
             laid = np.concatenate([coat.uv, coat.uv[:, ::-1]][:twice])[own]
@@ -186,7 +186,7 @@ def corner_normals(vertices: Array, faces: NDArray[np.int32]) -> NDArray[np.floa
     return normals
 
 
-def _wrapped(corners: Array, normals: Array, tile: float) -> Array:
+def _texture_places(corners: Array, normals: Array, tile: float) -> Array:
     """(F, 3, 2) places on a texture laid onto each face from the side that it faces most; grain along the longer.
 
     Parameters

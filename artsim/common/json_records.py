@@ -13,7 +13,7 @@ T = TypeVar("T")
 _MAX_ITEMS = 10_000
 
 
-def from_plain(kind: type[T], data: object) -> T:
+def from_json_values(kind: type[T], data: object) -> T:
     """A dataclass of ``kind``, inverse of ``dataclasses.asdict`` and JSON for fields of plain types.
 
     Fields may be bool, int, float, str, Literal, tuples of these, dataclasses of these, and any of them or None. A
@@ -61,7 +61,7 @@ def _fitting(hint: Any, value: object, name: str) -> Any:
             if len(kinds) == len(value):
                 return tuple(_fitting(kind, item, name) for kind, item in zip(kinds, value, strict=True))
     elif is_dataclass(hint) and isinstance(hint, type):
-        return from_plain(hint, value)
+        return from_json_values(hint, value)
     elif hint is float:
         if isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value):
             return float(value)

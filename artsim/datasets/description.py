@@ -161,7 +161,7 @@ def _damaged(path: Path, error: Exception) -> DatasetError:
 
 
 @dataclass(frozen=True)
-class Begun:
+class StartedDataset:
     """What the descriptions in a folder say.
 
     Attributes
@@ -184,7 +184,7 @@ class Begun:
     problems: tuple[Problem, ...]
 
 
-def read_begun(folder: Path) -> Begun | None:
+def read_started(folder: Path) -> StartedDataset | None:
     """What is known of the dataset in a folder; None when nothing is.
 
     Raises
@@ -217,17 +217,17 @@ def read_begun(folder: Path) -> Begun | None:
             found.append(Problem(PLAN, "is missing", fix))
         elif begun is not None and begun != wanted:
             found.append(Problem(PLAN, f"is not the plan of {DESCRIPTION}", fix))
-        return Begun(wanted, plan, tuple(records), True, tuple(found))
+        return StartedDataset(wanted, plan, tuple(records), True, tuple(found))
     if begun is not None:
-        records = _claimed(folder)
+        records = _shards_of_journal(folder)
         found = [Problem(name, error.what.removeprefix(f"{name} "), fix) for name, error in problems]
-        return Begun(begun, _plan(begun, folder / PLAN), tuple(records), False, tuple(found))
+        return StartedDataset(begun, _plan(begun, folder / PLAN), tuple(records), False, tuple(found))
     if problems:
         raise problems[0][1]
     return None
 
 
-def _claimed(folder: Path) -> list[ShardRecord]:
+def _shards_of_journal(folder: Path) -> list[ShardRecord]:
     """Shards that a damaged ``dataset.json`` and the journal of a stopped run speak of."""
     entries: list[Any] = []
     try:

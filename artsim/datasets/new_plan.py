@@ -13,8 +13,8 @@ from artsim.common.progress import track
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
 from artsim.datasets.state import STAGED
-from artsim.datasets.worker import CompiledSource, Refused, compile_source
-from artsim.datasets.worker_pool import Lost, Team
+from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source
+from artsim.datasets.worker_pool import WorkerLost, WorkerPool
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
 
@@ -27,7 +27,7 @@ def new_plan(
     folder: Path,
     asked: Plan,
     sources: Sequence[Source],
-    team: Team,
+    team: WorkerPool,
     skip_broken: bool,
     load_limit: float,
     progress: bool,
@@ -40,7 +40,7 @@ def new_plan(
     asked : Plan
         Without objects.
     sources : sequence of Source
-    team : Team
+    team : WorkerPool
     skip_broken : bool
         Leave out what is of no use, instead of stopping.
     load_limit : float
@@ -62,15 +62,15 @@ def new_plan(
         staging.mkdir(exist_ok=True)
     except OSError as error:
         raise write_error(error, staging) from error
-    answers: dict[int, CompiledSource | Refused] = {}
+    answers: dict[int, CompiledSource | RefusedSource] = {}
     tasks = (
         (i, (source, f"{STAGED}{i}.npz", asked.seed, asked.sample, asked.strict)) for i, source in enumerate(sources)
     )
     with track("objects", total=len(sources), unit="object", shown=progress) as bar:
         for i, answer in team.run(compile_source, tasks, load_limit):
-            answers[i] = Refused(f"{sources[i].name}: {answer.why}") if isinstance(answer, Lost) else answer
+            answers[i] = RefusedSource(f"{sources[i].name}: {answer.why}") if isinstance(answer, WorkerLost) else answer
             bar.update()
-    used, repeated, left_out = _sorted_out(sources, [answers[i] for i in range(len(sources))])
+    used, repeated, left_out = _sort_out(sources, [answers[i] for i in range(len(sources))])
     if (left_out and not skip_broken) or not used:
         raise _unusable(left_out, len(sources), asked.strict)
     objects = list(planned_objects([source for source, _ in used], [compiled for _, compiled in used], asked))
@@ -86,8 +86,8 @@ def new_plan(
     }
 
 
-def _sorted_out(
-    sources: Sequence[Source], answers: Sequence[CompiledSource | Refused]
+def _sort_out(
+    sources: Sequence[Source], answers: Sequence[CompiledSource | RefusedSource]
 ) -> tuple[list[tuple[Source, CompiledSource]], list[dict[str, str]], list[dict[str, str]]]:
     """Sources that are used, those that name an object again, and those that are of no use."""
     used: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
@@ -95,7 +95,7 @@ def _sorted_out(
     left_out: list[dict[str, str]] = []
     for source, answer in zip(sources, answers, strict=True):
         entry = {"source": source.name, "source_sha256": source.sha256}
-        if isinstance(answer, Refused):
+        if isinstance(answer, RefusedSource):
             left_out.append({**entry, "why": answer.why})
         elif used.setdefault((answer.category, answer.object_id, answer.identity), (source, answer))[0] is not source:
             repeated.append(entry)  # the same object named twice counts once

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from artsim.common.progress import track
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.description import DESCRIPTION, read_begun, read_description
+from artsim.datasets.description import DESCRIPTION, read_description, read_started
 from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
@@ -53,7 +53,7 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
         When the folder holds no dataset, or one that is not complete yet.
     """
     folder = Path(folder)
-    begun = read_begun(folder)
+    begun = read_started(folder)
     if begun is None or not (begun.complete or (folder / DESCRIPTION).exists()):
         read_description(folder)  # raises
     assert begun is not None

@@ -30,7 +30,7 @@ _PATIENCE = 10.0
 
 
 @dataclass(frozen=True)
-class Lost:
+class WorkerLost:
     """The answer of a task whose process died or took too long, and how that came about."""
 
     why: str
@@ -47,7 +47,7 @@ class _Member:
     since: float = 0.0
 
 
-class Team:
+class WorkerPool:
     """The worker processes of a run: started when first given work, stopped at the end however it comes.
 
     Parameters
@@ -71,11 +71,11 @@ class Team:
         tasks: Iterable[tuple[K, tuple[Any, ...]]],
         limit: float | None = None,
         progress: Callable[[int], object] = lambda count: None,
-    ) -> Iterator[tuple[K, T | Lost]]:
+    ) -> Iterator[tuple[K, T | WorkerLost]]:
         """Do tasks, in any order.
 
         A process that dies is replaced, and its task done again alone in a new one: what it died of may have been the
-        memory that the others took. When it dies again, the answer is :class:`Lost`.
+        memory that the others took. When it dies again, the answer is :class:`WorkerLost`.
 
         Parameters
         ----------
@@ -141,12 +141,12 @@ class Team:
                             "start the run from a module, or below `if __name__ == '__main__':`",
                         )
                     if alone:
-                        yield task[0], Lost(f"a worker process died of it ({_cause(member.process.exitcode)})")
+                        yield task[0], WorkerLost(f"a worker process died of it ({_cause(member.process.exitcode)})")
                     else:
                         again.append(task)
                 elif limit is not None and member.greeted and time.monotonic() > member.since + limit:
                     self._end(member)
-                    yield task[0], Lost(f"it took over {limit:g} s")
+                    yield task[0], WorkerLost(f"it took over {limit:g} s")
 
     def _busy(self) -> list[_Member]:
         return [member for member in self._members if member.task is not None]
@@ -186,7 +186,7 @@ class Team:
         member.process.join()
         member.connection.close()
 
-    def __enter__(self) -> Team:
+    def __enter__(self) -> WorkerPool:
         return self
 
     def __exit__(
@@ -224,7 +224,7 @@ def _cause(exit_code: int | None) -> str:
 
 
 @contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def folder_lock(folder: Path) -> Iterator[None]:
     """Keep a second run out of the folder; the lock goes with the process, however it ends."""
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -52,7 +52,7 @@ def axis_segment(sample: Sample, k: int) -> tuple[Array, Array]:
     return middle - half, middle + half
 
 
-def shaded(frame: Frame, camera: Camera) -> NDArray[np.uint8]:
+def shade_parts(frame: Frame, camera: Camera) -> NDArray[np.uint8]:
     """(H, W, 3) part colours, lit by the surface's orientation."""
     height, width = frame.depth.shape
     points = camera.unproject(np.arange(height * width), frame.depth.ravel()).reshape(height, width, 3)

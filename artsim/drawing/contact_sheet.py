@@ -13,7 +13,7 @@ from artsim.common.extras import needs
 from artsim.common.files import write_atomic
 from artsim.common.names import printable, safe_name
 from artsim.datasets.dataset import Dataset
-from artsim.drawing.annotation import BOX_EDGES, PALETTE, Shown, axis_segment, box_corners, shaded
+from artsim.drawing.annotation import BOX_EDGES, PALETTE, Shown, axis_segment, box_corners, shade_parts
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
 from artsim.model.camera import Camera
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _SAMPLES_PER_ROW = 2
 
 
-def view_path(
+def write_contact_sheet(
     path: Path,
     out: Path | None = None,
     samples: int = 12,
@@ -148,7 +148,7 @@ def draw_depth(axes: Axes, shown: Shown) -> None:
 
 def draw_parts(axes: Axes, shown: Shown) -> None:
     """Shaded parts, each with its box, and the joint axes: solid for turning, dashed for sliding."""
-    axes.imshow(shaded(shown.frame, shown.camera), interpolation="nearest")
+    axes.imshow(shade_parts(shown.frame, shown.camera), interpolation="nearest")
     sample = shown.sample
     for k in range(len(sample.joint_type)):
         colour = PALETTE[k % len(PALETTE)] / 255

@@ -68,7 +68,7 @@ def parts_picture(view: SceneView) -> NDArray[np.uint8]:
     frame = view.frame
     shown = frame.part_ids != BACKGROUND
     number = 3 * frame.instance_ids.astype(np.int64) + frame.part_ids
-    canvas = _canvas(_tinted(view, shown, number))
+    canvas = _canvas(_tint(view, shown, number))
     draw = ImageDraw.Draw(canvas)
     for i, sample in enumerate(view.samples):
         if sample is not None:
@@ -76,14 +76,14 @@ def parts_picture(view: SceneView) -> NDArray[np.uint8]:
                 _draw_box(draw, sample, k, view.camera, (3 * i + k) % len(PALETTE))
             for k in range(1, len(sample.joint_type)):
                 _draw_axis(draw, sample, k, view.camera)
-    return _reduced(canvas)
+    return _reduce(canvas)
 
 
 def instances_picture(view: SceneView) -> NDArray[np.uint8]:
     """(H, W, 3) a colour for each articulated object, the rectangle around it, its name and how much of it is seen."""
     ids = view.frame.instance_ids
     shown = ids < len(view.scene.instances)
-    canvas = _canvas(_tinted(view, shown, ids.astype(np.int64)))
+    canvas = _canvas(_tint(view, shown, ids.astype(np.int64)))
     draw = ImageDraw.Draw(canvas)
     for i, thing in enumerate(view.scene.instances):
         if not view.boxes[i].any():
@@ -96,10 +96,10 @@ def instances_picture(view: SceneView) -> NDArray[np.uint8]:
         place = (left + 4, max(top - size - 6, 2))
         draw.rectangle(draw.textbbox(place, text, font_size=size), fill=colour)
         draw.text(place, text, fill=(255, 255, 255), font_size=size)
-    return _reduced(canvas)
+    return _reduce(canvas)
 
 
-def _tinted(view: SceneView, shown: NDArray[np.bool_], number: NDArray[np.int64]) -> NDArray[np.uint8]:
+def _tint(view: SceneView, shown: NDArray[np.bool_], number: NDArray[np.int64]) -> NDArray[np.uint8]:
     """The picture without much colour, but for pixels that have a number."""
     grey = colour_picture(view).mean(axis=2, keepdims=True)
     picture = np.repeat(0.55 * grey + 110.0, 3, axis=2)
@@ -141,5 +141,5 @@ def _canvas(picture: NDArray[np.uint8]) -> Image.Image:
     return Image.fromarray(picture).resize((width * _OVER, height * _OVER), Image.Resampling.BILINEAR)
 
 
-def _reduced(canvas: Image.Image) -> NDArray[np.uint8]:
+def _reduce(canvas: Image.Image) -> NDArray[np.uint8]:
     return np.asarray(canvas.resize((canvas.width // _OVER, canvas.height // _OVER), Image.Resampling.BOX))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from artsim.common.names import safe_name
 from artsim.errors import AssetError
-from artsim.model.inertia import Inertia, joined_inertia, part_inertia
+from artsim.model.inertia import Inertia, combine_inertias, part_inertia
 from artsim.model.kinematics import Array, Joint
 from artsim.model.objects import ArticulatedObject, Mesh
 
@@ -161,7 +161,7 @@ def as_robot(obj: ArticulatedObject) -> Robot:
         raise AssetError("is not at rest at q = 0", where, "only procedural objects (artsim.make) can be exported")
     own = [part_inertia(obj, k) for k in range(len(obj))]
     carried = [
-        joined_inertia(own[j] for j in range(k, len(obj)) if _carries(tree.parents, k, j)) for k in range(len(obj))
+        combine_inertias(own[j] for j in range(k, len(obj)) if _carries(tree.parents, k, j)) for k in range(len(obj))
     ]
     used = {part.name for part in obj.parts} | {joint.name for joint in tree.joints}
     links: list[Link] = []

@@ -77,7 +77,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Link:
+class UrdfLink:
     """A link.
 
     Attributes
@@ -107,7 +107,7 @@ class MimicRelation:
 
 
 @dataclass(frozen=True)
-class RobotJoint:
+class UrdfJoint:
     """A joint.
 
     Attributes
@@ -135,8 +135,8 @@ class RobotJoint:
 
 
 @dataclass(frozen=True)
-class Robot:
+class UrdfRobot:
     """Links and joints in the document's order."""
 
-    links: tuple[Link, ...]
-    joints: tuple[RobotJoint, ...]
+    links: tuple[UrdfLink, ...]
+    joints: tuple[UrdfJoint, ...]

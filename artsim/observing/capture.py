@@ -14,7 +14,7 @@ from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.noise import Look, View
+from artsim.observing.noise import Look, PixelView
 from artsim.observing.sample import ARTSIM_VERSION, IMAGES, Sample
 from artsim.observing.sensor import Sensor, find_sensor
 from artsim.renderers import Renderer, shared_renderer
@@ -183,7 +183,7 @@ def _sensed(look: Look, around: Look, camera: Camera, sensor: Sensor, key: int) 
         depth, part = look(row, column)
         hit = (part != BACKGROUND).nonzero()[0]
         reading, shown = np.zeros_like(depth), np.full_like(part, BACKGROUND)
-        reading[hit] = sensor.read(View(around, camera, row[hit], column[hit], depth[hit], key))
+        reading[hit] = sensor.read(PixelView(around, camera, row[hit], column[hit], depth[hit], key))
         shown[reading > 0] = part[reading > 0]
         return reading, shown
 

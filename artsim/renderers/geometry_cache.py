@@ -10,7 +10,7 @@ MAX_FACES = 1_500_000
 """Triangles kept loaded."""
 
 
-class Loaded(Protocol):
+class LoadedGeometry(Protocol):
     """Geometry that a backend holds."""
 
     num_faces: int
@@ -20,10 +20,10 @@ class Loaded(Protocol):
         ...
 
 
-L = TypeVar("L", bound=Loaded)
+L = TypeVar("L", bound=LoadedGeometry)
 
 
-class Kept(Generic[L]):
+class GeometryCache(Generic[L]):
     """Loaded geometry by key; the least recently used is dropped.
 
     Parameters

@@ -153,7 +153,7 @@ def used_vertices(part: Part) -> Array:
     return found
 
 
-def rigid(name: str, mesh: Mesh) -> ArticulatedObject:
+def rigid_object(name: str, mesh: Mesh) -> ArticulatedObject:
     """An object of one part that no joint moves.
 
     Parameters

@@ -55,10 +55,10 @@ def render_scene(
     drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
     if isinstance(drawer, SceneRenderer):
         return drawer.render_scene(scene, cameras, samples)
-    return [_composed(scene, camera, drawer) for camera in cameras]
+    return [_compose(scene, camera, drawer) for camera in cameras]
 
 
-def _composed(scene: Scene, camera: Camera, drawer: Renderer) -> SceneFrame:
+def _compose(scene: Scene, camera: Camera, drawer: Renderer) -> SceneFrame:
     """The nearest of all things, each drawn by itself; of equally near ones, the first."""
     shape = (camera.height, camera.width)
     depth = np.full(shape, np.inf, dtype=np.float32)

@@ -11,7 +11,7 @@ import numpy as np
 import tyro
 
 from artsim.appearance import Coat, Colour, Lights, Sun
-from artsim.appearance.finishes import draw_coats, repainted
+from artsim.appearance.finishes import draw_coats, repaint_coats
 from artsim.appearance.painted import painted_coats
 from artsim.common.elementary import cos, sin, tan
 from artsim.common.products import norm
@@ -133,7 +133,7 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
     solids = [*zip(objects, states, coats, strict=True), *((obj, np.zeros(1), coat) for obj, coat in others)]
     for attempt in range(_ATTEMPTS):
         area = _area(solids, on_table, attempt)
-        things = _arranged(solids, area, rng)
+        things = _arrange(solids, area, rng)
         if things is not None:
             break
     else:
@@ -155,7 +155,7 @@ def with_appearance(scene: Scene, seed: int) -> Scene:
     rng = np.random.default_rng([seed, 2])
 
     def repaint(thing: Thing, articulated: bool) -> Thing:
-        coats = draw_coats(thing.obj, rng) if articulated else repainted(thing.coats, rng)
+        coats = draw_coats(thing.obj, rng) if articulated else repaint_coats(thing.coats, rng)
         return replace(thing, coats=coats)
 
     return Scene(
@@ -169,13 +169,13 @@ def with_appearance(scene: Scene, seed: int) -> Scene:
 def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
     """The objects of a scene, files in a usual size."""
     rng = np.random.default_rng([seed, 0])
-    made = [_drawn(category, options.place != "floor", rng) for category in options.categories]
+    made = [_draw_object(category, options.place != "floor", rng) for category in options.categories]
     sources = find_sources(options.objects, options.package_root) if options.objects else []
     loaded = [source.load() for source in sources]
     return [*made, *(_in_usual_size(obj, int(rng.integers(2**31))) for obj in loaded), *options.obj]
 
 
-def _drawn(category: str, small: bool, rng: np.random.Generator) -> ArticulatedObject:
+def _draw_object(category: str, small: bool, rng: np.random.Generator) -> ArticulatedObject:
     """A procedural object: one that fits a table, if that is wanted, and the category has such."""
     seeds = rng.integers(2**31, size=_DRAWS).tolist()
     first = obj = make(category, seeds[0])
@@ -208,7 +208,7 @@ def _area(solids: list[_Placeable], on_table: bool, attempt: int) -> Area:
     return Area((-0.5 * depth, -0.5 * width), (0.5 * depth, 0.5 * width))
 
 
-def _arranged(solids: list[_Placeable], area: Area, rng: np.random.Generator) -> list[Thing] | None:
+def _arrange(solids: list[_Placeable], area: Area, rng: np.random.Generator) -> list[Thing] | None:
     """All things put down, the largest first; None where they do not fit."""
     arrangement = Arrangement(area)
     placed: dict[int, Thing] = {}
@@ -244,11 +244,11 @@ def draw_lights(supports: Sequence[Thing], rng: np.random.Generator) -> Lights:
         float(-sin(elevation)),
     )
     warm = rng.uniform(-0.06, 0.1)
-    sun = Sun(direction, _tinted(rng.uniform(0.8, 1.1), warm), float(np.deg2rad(rng.uniform(2.0, 6.0))))
-    return Lights(sun, _tinted(rng.uniform(0.46, 0.6), -0.3 * warm), _tinted(rng.uniform(0.08, 0.12), 0.0))
+    sun = Sun(direction, _tint(rng.uniform(0.8, 1.1), warm), float(np.deg2rad(rng.uniform(2.0, 6.0))))
+    return Lights(sun, _tint(rng.uniform(0.46, 0.6), -0.3 * warm), _tint(rng.uniform(0.08, 0.12), 0.0))
 
 
-def _tinted(strength: float, warm: float) -> Colour:
+def _tint(strength: float, warm: float) -> Colour:
     return (strength * (1.0 + warm), strength, strength * (1.0 - warm))
 
 

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from artsim.drawing.scene_overview import write_overview
-from artsim.scenes.ground_truth import observe_scene
-from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera
+from artsim.drawing import write_overview
+from artsim.scenes import SceneCameraOptions, SceneOptions, make_scene, observe_scene, scene_camera
 
 SEED = 17
 

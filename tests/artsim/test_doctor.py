@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from artsim.doctor import BACKENDS, Finding, examine, table
+from artsim.doctor import BACKENDS, Finding, examine, finding_table
 from artsim.errors import ConfigError
 from artsim.renderers import RENDERERS
 from tests.conftest import absent
@@ -82,7 +82,9 @@ def test_without_a_vulkan_driver_sapien_names_the_script(monkeypatch: pytest.Mon
 
 
 def test_the_table_has_a_mend_below_each_backend_that_does_not_work() -> None:
-    text = table([Finding("raycast", True, "CPU", 1234.5), Finding("sapien", False, problem="no driver", fix="do it")])
+    text = finding_table(
+        [Finding("raycast", True, "CPU", 1234.5), Finding("sapien", False, problem="no driver", fix="do it")]
+    )
     lines = text.splitlines()
     assert lines[1].split() == ["raycast", "yes", "CPU", "1234"]
     assert lines[2].split() == ["sapien", "no"]

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from artsim.appearance import Coat
 from artsim.envs.maniskill.places import T_world_object
 from artsim.export.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
-from artsim.model.convex_bodies import embodied
+from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers.sapien_stage import render_body
@@ -75,7 +75,7 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], 
     AssetError
         When a part encloses no solid.
     """
-    robot = as_robot(embodied(obj))
+    robot = as_robot(add_bodies(obj))
     builder = scene.create_articulation_builder()
     T = T_world_object(obj)
     builder.initial_pose = sapien_pose(T[:3, 3], T[:3, :3])

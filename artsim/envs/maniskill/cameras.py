@@ -18,7 +18,7 @@ from artsim.model.camera import Camera
 from artsim.model.draws import ViewOptions, sample_view
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.physics.episode import widest_state
+from artsim.physics.episode import most_open_state
 
 # SAPIEN's camera looks along x with z up.
 SAPIEN_FROM_CV = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -27,7 +27,7 @@ CV_FROM_SAPIEN = SAPIEN_FROM_CV.T
 
 def look(obj: ArticulatedObject, views: ViewOptions, rng: np.random.Generator) -> Camera:
     """A camera that sees the object wherever its joints are, in the world's frame."""
-    camera = sample_view(obj, widest_state(obj), views, rng)
+    camera = sample_view(obj, most_open_state(obj), views, rng)
     return replace(camera, T_world_camera=T_world_object(obj) @ camera.T_world_camera)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
-from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, named
+from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, quote_name
 from artsim.loading.mesh_files.text import Rows, first_numbers, numbers, numbers_per_row, plain_text, substitute
 
 _HARMLESS = ("vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", "mg", "lod", "bevel", "c_interp",
@@ -182,7 +182,7 @@ def _tell_others(found: Statements, draft: Draft) -> None:
         if statement in ("l", "p"):
             draft.left_out(count, "lines" if statement == "l" else "points")
         elif statement not in _HARMLESS_WORDS:
-            draft.left_out(count, f"rows that begin with {named(statement)}")
+            draft.left_out(count, f"rows that begin with {quote_name(statement)}")
 
 
 def _declared(data: bytes) -> int:

@@ -14,7 +14,7 @@ from PIL import Image
 import artsim
 from artsim import Camera, make
 from artsim.appearance import Coat, Lights, Material, Sun, corner_normals, patches, plain_coat, subpixel
-from artsim.appearance.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repainted
+from artsim.appearance.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repaint_coats
 from artsim.appearance.painted import painted_coats
 from artsim.appearance.textures import TEXTURES, noise
 from artsim.loading.sources import find_sources
@@ -24,7 +24,7 @@ from artsim.renderers import Renderer
 from artsim.renderers.sapien import SapienRenderer
 from artsim.renderers.scene import Scene, Thing
 from artsim.renderers.scene_renderer import render_scene
-from artsim.scenes.props import placed
+from artsim.scenes.props import place_solid
 from tests.conftest import backend, rigid, solid
 
 MATT = Material((0.6, 0.4, 0.2), roughness=1.0, specular=0.0)
@@ -135,7 +135,7 @@ def test_every_finish_makes_a_material() -> None:
         material = draw_material(name, np.random.default_rng(0))
         assert all(0.0 <= value <= 1.0 for value in (*material.colour, material.roughness, material.metallic))
     coats = (Coat((MATT, MATT), np.zeros(1, np.int64)),)
-    (new,) = repainted(coats, np.random.default_rng(0))
+    (new,) = repaint_coats(coats, np.random.default_rng(0))
     assert new.materials[0] is new.materials[1]
     assert new.materials[0].colour != MATT.colour
 
@@ -215,7 +215,7 @@ def seen_from_above(things: tuple[Thing, ...], lights: Lights, renderer: Rendere
 
 
 def floor(size: float = 2.0) -> Thing:
-    return placed("floor", box((-size, -size, -0.1), (size, size, 0.0)), MATT)
+    return place_solid("floor", box((-size, -size, -0.1), (size, size, 0.0)), MATT)
 
 
 def test_a_sun_of_strength_1_shows_a_surface_in_its_own_colour(sapien: Renderer) -> None:
@@ -232,13 +232,13 @@ def test_a_sky_of_strength_1_shows_a_level_surface_in_its_own_colour(sapien: Ren
     assert open_air == pytest.approx(MATT.colour, abs=0.02)
     walls = [((-0.3, -0.3, 0.0), (0.3, -0.2, 0.5)), ((-0.3, 0.2, 0.0), (0.3, 0.3, 0.5)),
              ((-0.3, -0.2, 0.0), (-0.2, 0.2, 0.5)), ((0.2, -0.2, 0.0), (0.3, 0.2, 0.5))]  # fmt: skip
-    shaft = tuple(placed("wall", box(*corners), MATT) for corners in walls)
+    shaft = tuple(place_solid("wall", box(*corners), MATT) for corners in walls)
     assert (seen_from_above((floor(), *shaft), sky, sapien, samples=8)[32, 32] < 0.75 * open_air).all()
 
 
 def test_things_cast_shadows_where_geometry_says(sapien: Renderer) -> None:
     sun = Lights(Sun((1.0, 0.0, -1.0), (1.0, 1.0, 1.0)), NONE, NONE)
-    plate = placed("plate", box((-0.3, -0.1, 0.199), (-0.1, 0.1, 0.2)), MATT)
+    plate = place_solid("plate", box((-0.3, -0.1, 0.199), (-0.1, 0.1, 0.2)), MATT)
     picture = seen_from_above((floor(), plate), sun, sapien)[..., 0]
     # Up in the image is +x, 64 pixels a metre on the ground: the shadow lies at x from -0.1 to 0.1.
     row = {x: round(32 - 64 * x - 0.5) for x in (-0.42, 0.02, 0.3)}
@@ -249,7 +249,7 @@ def test_things_cast_shadows_where_geometry_says(sapien: Renderer) -> None:
 
 
 def test_wide_suns_soften_the_edges_of_shadows(sapien: Renderer) -> None:
-    plate = placed("plate", box((-0.9, -0.5, 0.499), (-0.5, 0.5, 0.5)), MATT)
+    plate = place_solid("plate", box((-0.9, -0.5, 0.499), (-0.5, 0.5, 0.5)), MATT)
 
     def penumbra(radius: float) -> int:
         sun = Lights(Sun((1.0, 0.0, -1.0), (1.0, 1.0, 1.0), radius), NONE, NONE)

@@ -13,10 +13,10 @@ from artsim.checks.realism import (
     MEASURES,
     REAL,
     Realism,
-    between,
     distances,
     draw_split,
     likeness,
+    pair_distances,
     read_split,
     real_objects,
 )
@@ -149,7 +149,7 @@ def test_near_by_every_measure_need_not_be_near_at_once() -> None:
 
 
 def test_without_a_pair_of_real_objects_nothing_is_near() -> None:
-    realism = Realism(np.zeros((1, 1, 5)), between([likeness(cabinet(None))]))
+    realism = Realism(np.zeros((1, 1, 5)), pair_distances([likeness(cabinet(None))]))
     assert np.isnan(realism.yardstick).all()
     assert not realism.near.any()
 
@@ -188,5 +188,5 @@ def test_every_real_laptop_has_a_procedural_neighbour(partnet_dir: Path) -> None
     real = [likeness(obj) for obj in real_objects("laptop", partnet_dir, read_split(SPLIT), "dev")]
     made = [likeness(artsim.make("laptop", seed)) for seed in range(100)]
     to_real = np.array([[distances(a, b) for b in real] for a in made])
-    near = Realism(to_real, between(real)).near
+    near = Realism(to_real, pair_distances(real)).near
     assert near.mean() > 0.93, dict(zip(MEASURES, near.mean(axis=0), strict=True))

@@ -18,7 +18,7 @@ import pytest
 import artperl.cli
 import artsim
 import artsim.cli
-from artsim.common.extras import MODULES, explained, install_command, needs
+from artsim.common.extras import MODULES, import_failure, install_command, needs
 from artsim.errors import ConfigError, RenderError
 from artsim.renderers import RENDERERS
 from tests.conftest import BOX_LAPTOP, ROOT, absent
@@ -272,10 +272,12 @@ def test_a_library_of_the_system_that_is_missing_is_named(tmp_path: Path, monkey
 
 
 def test_what_an_optional_module_itself_lacks_is_told_by_its_name() -> None:
-    error = explained(ModuleNotFoundError("No module named 'colorlibrary'", name="colorlibrary"), "films", extra="view")
+    error = import_failure(
+        ModuleNotFoundError("No module named 'colorlibrary'", name="colorlibrary"), "films", extra="view"
+    )
     assert str(error).startswith("films: colorlibrary is not installed. Fix: ")
     assert "[view]" in str(error)
-    too_old = explained(ModuleNotFoundError("No module named 'numpy.later'", name="numpy.later"), "films")
+    too_old = import_failure(ModuleNotFoundError("No module named 'numpy.later'", name="numpy.later"), "films")
     assert "numpy is installed, but cannot be imported (No module named 'numpy.later')" in str(too_old)
 
 

@@ -13,8 +13,8 @@ from scipy.spatial import ConvexHull, Delaunay
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.plan import SampleOptions
-from artsim.drawing.annotation import PALETTE, axis_segment, box_corners, shaded
-from artsim.drawing.contact_sheet import contact_sheet, show_sample, show_states, spread, view_path
+from artsim.drawing.annotation import PALETTE, axis_segment, box_corners, shade_parts
+from artsim.drawing.contact_sheet import contact_sheet, show_sample, show_states, spread, write_contact_sheet
 from artsim.errors import ArtsimError
 from artsim.loading.sources import find_sources
 from tests.conftest import ASSETS
@@ -49,7 +49,7 @@ def test_axis_arrows_lie_on_the_joint_axes(name: str) -> None:
 def test_parts_are_drawn_in_their_own_colours() -> None:
     obj = artsim.load(ASSETS / "cabinet")
     shown = next(iter(show_states(obj, 1)))
-    image = shaded(shown.frame, shown.camera)
+    image = shade_parts(shown.frame, shown.camera)
     for k in range(len(obj)):
         mean = image[shown.frame.part_ids == k].mean(axis=0)
         assert np.argmin([np.linalg.norm(mean / mean.sum() - c / c.sum()) for c in PALETTE[:4]]) == k
@@ -59,12 +59,12 @@ def test_a_sheet_shows_as_many_samples_as_there_are(tmp_path: Path) -> None:
     sources = find_sources([ASSETS / "laptop", ASSETS / "quirks" / "merged"])
     options = SampleOptions(num_points=64, images=("depth", "part_mask"))
     artsim.generate(sources, tmp_path / "out", 5, sample=options, progress=False, splits=(1, 0, 0))
-    written = view_path(tmp_path / "out", samples=40, rerun=tmp_path / "deep" / "out.rrd")
+    written = write_contact_sheet(tmp_path / "out", samples=40, rerun=tmp_path / "deep" / "out.rrd")
     assert [path.name for path in written] == ["contact_sheet.png", "out.rrd"]
     image = Image.open(written[0])
     assert image.size[0] == 1920
     with pytest.raises(ArtsimError, match="no sample to draw"):
-        view_path(tmp_path / "out", split="val")
+        write_contact_sheet(tmp_path / "out", split="val")
 
 
 def test_stored_images_and_rendered_ones_look_the_same(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ import pytest
 
 import artsim
 from artsim.checks.validity import check
-from artsim.datasets.stream import FamilyStream
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.sources import FamilySource
+from artsim.stream import FamilyStream
 from benchmarks.audit import Outcome, audit
 from tests.conftest import ROOT, in_another_process
 

@@ -12,7 +12,7 @@ from artsim.families import FAMILIES, make
 from artsim.loading.urdf import load
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.solids import Solid, box
-from artsim.model.inertia import joined_inertia, part_inertia
+from artsim.model.inertia import combine_inertias, part_inertia
 from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS, valve
 
@@ -49,7 +49,7 @@ def test_halves_joined_are_the_whole() -> None:
 
     whole = part_inertia(solid(box((0, 0, 0), (2, 1, 1))), 0)
     halves = solid(box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (2, 1, 1)))
-    joined = joined_inertia(part_inertia(halves, k) for k in range(2))
+    joined = combine_inertias(part_inertia(halves, k) for k in range(2))
     assert joined.mass == pytest.approx(whole.mass)
     np.testing.assert_allclose(joined.tensor, whole.tensor, rtol=1e-12, atol=1e-12)
     # A rod about its end: m l^2 / 3, and the same of its cross-section.

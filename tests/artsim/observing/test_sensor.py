@@ -19,7 +19,14 @@ from artsim.model.draws import StateOptions
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.noise import AxialNoise, DisparityQuantisation, EdgeDropout, FlyingPixels, LateralJitter, View
+from artsim.observing.noise import (
+    AxialNoise,
+    DisparityQuantisation,
+    EdgeDropout,
+    FlyingPixels,
+    LateralJitter,
+    PixelView,
+)
 from artsim.observing.sensor import SENSORS, Sensor
 from tests.conftest import ASSETS
 
@@ -96,7 +103,7 @@ def test_the_incidence_of_a_tilted_plane_is_the_angle_between_ray_and_normal() -
     seen_by, tilt = camera(100.0), np.deg2rad(35.0)
     true = plane(1.5, tilt, seen_by)
     row, column = np.divmod(np.arange(true.size), seen_by.width)
-    view = View(lambda r, c: (true[r, c], np.zeros(len(r), np.uint8)), seen_by, row, column, true.ravel(), key=0)
+    view = PixelView(lambda r, c: (true[r, c], np.zeros(len(r), np.uint8)), seen_by, row, column, true.ravel(), key=0)
     ray = seen_by.directions(np.arange(true.size))
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     expected = np.arccos(ray @ (np.array([0.0, 0.0, np.cos(tilt)]) - np.sin(tilt) * DOWNHILL))
@@ -141,7 +148,7 @@ def test_flying_pixels_before_an_empty_background_stay_within_reach() -> None:
 def test_chance_at_a_pixel_is_normal_and_independent_of_its_neighbours() -> None:
     seen_by = camera(size=300)
     row, column = np.divmod(np.arange(300 * 300), 300)
-    view = View(lambda r, c: (np.ones(len(r), np.float32), r), seen_by, row, column, np.ones(len(row)), key=7)
+    view = PixelView(lambda r, c: (np.ones(len(r), np.float32), r), seen_by, row, column, np.ones(len(row)), key=7)
     normal = view.normal(0)
     assert kstest(normal, "norm").pvalue > 1e-3
     for other in (np.roll(normal, 1), np.roll(normal, 300), view.normal(1), view.normal(10)):

@@ -14,7 +14,7 @@ from artsim.errors import ArtsimError
 from artsim.model.camera import Camera
 from artsim.model.draws import ViewOptions
 from artsim.physics.episode import EpisodeOptions
-from artsim.physics.episode_file import Motion, carried, open_motions, record
+from artsim.physics.episode_file import Motion, follow_points, open_motions, record
 from tests.conftest import ASSETS
 
 OPTIONS = EpisodeOptions(
@@ -53,7 +53,7 @@ def test_joints_go_as_fast_as_recorded(motions: list[Motion]) -> None:
 def test_carried_points_are_never_before_what_is_seen(motions: list[Motion]) -> None:
     for motion in motions:
         first, last = motion[0], motion[-1]
-        points = carried(first.points, first.part, first, last)
+        points = follow_points(first.points, first.part, first, last)
         image = Camera(last.K, last.width, last.height, np.eye(4)).project(points)
         column, row = np.floor(image[:, :2]).astype(int).T
         inside = (column >= 0) & (row >= 0) & (column < last.width) & (row < last.height)
@@ -61,7 +61,7 @@ def test_carried_points_are_never_before_what_is_seen(motions: list[Motion]) -> 
         seen = last.depth[row[inside], column[inside]]
         pixel = 3 * points[inside, 2] / last.K[0, 0]  # depth within a pixel, on a steep surface
         assert np.mean(points[inside, 2] > seen - pixel) > 0.97
-        np.testing.assert_allclose(carried(points, first.part, last, first), first.points, atol=1e-6)
+        np.testing.assert_allclose(follow_points(points, first.part, last, first), first.points, atol=1e-6)
 
 
 def test_a_motion_depends_on_its_number_and_the_seed_alone(motions: list[Motion], tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from artsim.export.robot import as_robot
 from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
 from artsim.loading.sources import find_sources
-from artsim.model.inertia import joined_inertia, part_inertia
+from artsim.model.inertia import combine_inertias, part_inertia
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.world import PhysicsOptions, Simulation
@@ -55,7 +55,7 @@ def test_a_pushed_drawer_accelerates_by_force_over_mass(one_drawer: ArticulatedO
     for _ in range(30):
         simulation.step([force])
     seconds = 30 * simulation.options.control_step
-    expected = force / joined_inertia(part_inertia(one_drawer, j) for j in range(k, len(one_drawer))).mass
+    expected = force / combine_inertias(part_inertia(one_drawer, j) for j in range(k, len(one_drawer))).mass
     assert simulation.velocity[k] / seconds == pytest.approx(expected, rel=0.001)
     assert simulation.state[k] == pytest.approx(0.5 * expected * seconds**2, rel=0.02)
 

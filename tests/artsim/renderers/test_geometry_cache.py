@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from artsim.renderers.geometry_cache import MAX_FACES, Kept
+from artsim.renderers.geometry_cache import MAX_FACES, GeometryCache
 
 
 @dataclass
@@ -18,7 +18,7 @@ class Geometry:
 
 def test_the_least_recently_used_is_dropped_before_another_is_loaded() -> None:
     closed: list[int] = []
-    kept: Kept[Geometry] = Kept(2)
+    kept: GeometryCache[Geometry] = GeometryCache(2)
 
     def use(faces: int) -> list[int]:
         """Loads, and the geometry that was let go before it had loaded."""
@@ -40,7 +40,7 @@ def test_the_least_recently_used_is_dropped_before_another_is_loaded() -> None:
 
 def test_triangles_are_bounded_but_one_large_object_is_loaded_all_the_same() -> None:
     closed: list[int] = []
-    kept: Kept[Geometry] = Kept(100)
+    kept: GeometryCache[Geometry] = GeometryCache(100)
     for key, faces in enumerate((MAX_FACES // 2, MAX_FACES // 2, 10)):
         kept.get(key, faces, lambda faces=faces: Geometry(faces, closed))
     assert closed == [MAX_FACES // 2]

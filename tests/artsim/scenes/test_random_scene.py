@@ -24,11 +24,11 @@ from artsim.making.solids import box
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
 from artsim.renderers import Renderer
-from artsim.renderers.scene import Scene, Thing, rigid
+from artsim.renderers.scene import Scene, Thing, rigid_object
 from artsim.renderers.scene_renderer import render_scene
 from artsim.scenes.ground_truth import SceneView, observe_scene, write_view
-from artsim.scenes.placement import Area, Arrangement, apart, resting_rotation
-from artsim.scenes.props import DISTRACTORS, distractor, placed
+from artsim.scenes.placement import Area, Arrangement, are_apart, resting_rotation
+from artsim.scenes.props import DISTRACTORS, distractor, place_solid
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera, with_appearance
 from benchmarks.agreement import LIMITS
 from tests.conftest import backend
@@ -63,7 +63,7 @@ def view(table_scene: Scene) -> SceneView:
 
 def block(size: tuple[float, float, float], center: tuple[float, float, float]) -> Thing:
     half, middle = np.array(size) / 2, np.array(center)
-    return placed("block", box(middle - half, middle + half), GREY)
+    return place_solid("block", box(middle - half, middle + half), GREY)
 
 
 def solids(thing: Thing) -> list[Manifold]:
@@ -253,11 +253,11 @@ def test_upright_things_stand_and_pencils_lie() -> None:
         assert np.array_equal(resting_rotation(make(category, 0)), np.eye(3))
     assert resting_rotation(make("scissors", 0))[2, 2] > 0.999  # flat, but for the thickness of one blade
     pencil = trimesh.creation.cylinder(0.003, 0.15, sections=12)
-    lying = resting_rotation(rigid("pencil", (np.asarray(pencil.vertices), np.asarray(pencil.faces, np.int32))))
+    lying = resting_rotation(rigid_object("pencil", (np.asarray(pencil.vertices), np.asarray(pencil.faces, np.int32))))
     assert abs(lying[2, 2]) < 1e-6
     cone = trimesh.creation.cone(0.05, 0.1)
     cone.apply_transform(trimesh.transformations.rotation_matrix(np.pi, [1, 0, 0]))
-    turned = resting_rotation(rigid("cone", (np.asarray(cone.vertices), np.asarray(cone.faces, np.int32))))
+    turned = resting_rotation(rigid_object("cone", (np.asarray(cone.vertices), np.asarray(cone.faces, np.int32))))
     assert turned[2, 2] != 1.0
 
 
@@ -266,7 +266,7 @@ def test_things_keep_their_distance(gap: float, free: bool) -> None:
     one = block((0.2, 0.2, 0.2), (0.0, 0.0, 0.1))
     turn = trimesh.transformations.rotation_matrix(np.pi / 4, [0, 0, 1])
     turn[0, 3] = 0.1 + gap + 0.1 * np.sqrt(2.0)
-    assert apart(one, placed("block", box((-0.1, -0.1, 0.0), (0.1, 0.1, 0.2)), GREY, turn)) == free
+    assert are_apart(one, place_solid("block", box((-0.1, -0.1, 0.0), (0.1, 0.1, 0.2)), GREY, turn)) == free
 
 
 def test_boxes_that_overlap_do_not_matter_where_surfaces_do_not_meet() -> None:
@@ -274,13 +274,13 @@ def test_boxes_that_overlap_do_not_matter_where_surfaces_do_not_meet() -> None:
     thing = Thing(frame, frame.tree.rest, np.eye(4), ())
     low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
     between = block((0.01, 0.01, 0.01), tuple(0.5 * (low + high) + [0.02, 0.0, 0.0]))  # type: ignore[arg-type]
-    assert apart(thing, between)
+    assert are_apart(thing, between)
     assert ((between.vertices > low) & (between.vertices < high)).all()
 
 
 def test_no_room_is_said() -> None:
     arrangement = Arrangement(Area((-0.1, -0.1), (0.1, 0.1)))
-    obj = rigid("slab", (np.asarray(trimesh.creation.box((0.15, 0.15, 0.1)).vertices),
+    obj = rigid_object("slab", (np.asarray(trimesh.creation.box((0.15, 0.15, 0.1)).vertices),
                          np.asarray(trimesh.creation.box((0.15, 0.15, 0.1)).faces, np.int32)))  # fmt: skip
     coats = (plain_coat(obj.parts[0], GREY),)
     assert arrangement.put(obj, np.zeros(1), coats, np.random.default_rng(0)) is not None
