@@ -15,6 +15,8 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
 
+__all__ = ["FamilyStream"]
+
 STREAM_SEEDS = (1 << 31, 1 << 32)
 """Seeds of a stream's objects: none that a person would choose for a test set."""
 
