@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image
 
-import artsim
 from artsim import Camera, make
 from artsim.appearance import Coat, Lights, Material, Sun, corner_normals, patches, plain_coat, subpixel
-from artsim.appearance.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repaint_coats
-from artsim.appearance.painted import painted_coats
-from artsim.appearance.textures import TEXTURES, noise
-from artsim.loading.sources import find_sources
-from artsim.making.solids import box, cylinder
+from artsim.appearance.finishes import draw_coats
+from artsim.making.solids import box
 from artsim.model.objects import Part
 from artsim.renderers import Renderer
 from artsim.renderers.sapien import SapienRenderer
@@ -36,34 +30,6 @@ def sapien() -> Iterator[Renderer]:
     renderer = backend("sapien")
     yield renderer
     renderer.close()
-
-
-@pytest.mark.parametrize("name", sorted(TEXTURES))
-def test_textures_are_pictures_of_about_their_tone_and_the_same_for_the_same_chance(name: str) -> None:
-    tone = np.array([0.6, 0.5, 0.4])
-    first, again, other = (TEXTURES[name](np.random.default_rng(seed), tone) for seed in (1, 1, 2))
-    assert first.dtype == np.uint8
-    assert first.shape == (512, 512, 3)
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-    if name != "screen":
-        assert np.abs(first.mean(axis=(0, 1)) / 255.0 - tone).max() < 0.12
-
-
-@pytest.mark.parametrize("name", sorted(set(TEXTURES) - {"screen"}))
-def test_textures_repeat_without_a_seam(name: str) -> None:
-    picture = TEXTURES[name](np.random.default_rng(0), (0.6, 0.5, 0.4)).astype(float)
-    for axis in (0, 1):
-        steps = np.abs(picture - np.roll(picture, 1, axis)).mean(axis=(1 - axis, 2))
-        assert steps[0] <= 1.5 * np.sort(steps)[-8:].mean()
-
-
-def test_noise_has_no_mean_unit_deviation_and_the_stretch_that_was_asked_for() -> None:
-    values = noise(np.random.default_rng(0), 256, 1.0, (20.0, 1.0))
-    assert values.mean() == pytest.approx(0.0, abs=1e-9)
-    assert values.std() == pytest.approx(1.0)
-    across, down = (np.abs(np.diff(values, axis=axis)).mean() for axis in (1, 0))
-    assert down > 3 * across
 
 
 def test_spheres_look_round_and_boxes_have_edges() -> None:
@@ -93,117 +59,6 @@ def test_patches_are_the_whole_surface_split_by_material() -> None:
             area += 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
         whole = trimesh.Trimesh(part.vertices, part.two_sided_faces(), process=False)
         assert area == pytest.approx(whole.area, rel=1e-5)
-
-
-def test_every_face_knows_the_piece_that_it_lies_on() -> None:
-    body, knob = box((0, 0, 0), (1, 1, 1)), cylinder((0.5, 0.5, 0.9), (0.5, 0.5, 1.2), 0.1)
-    vertices, faces = (body + knob).union()
-    number = piece_of_face(vertices, faces, (body + knob).piece_meshes())
-    middles = vertices[faces].mean(axis=1)
-    assert (number == ((middles[:, 2] > 1.0 + 1e-9) | (np.hypot(*(middles[:, :2] - 0.5).T) < 0.1) & (
-        middles[:, 2] > 0.5))).mean() == 1.0  # fmt: skip
-
-
-def test_laptops_have_dark_keys_and_a_lit_screen() -> None:
-    obj = make("laptop", 0)
-    base, lid = draw_coats(obj, np.random.default_rng(0))
-    assert max(base.materials[1].colour) < 0.15
-    keys = base.material_of_face == 1
-    assert 0.2 < keys.mean() < 1.0
-    assert (obj.parts[0].vertices[obj.parts[0].faces[keys]][..., 2] > obj.parts[0].bounds[0, 2]).all()
-    shown = lid.material_of_face == 2
-    assert lid.materials[2].emission > 0
-    assert lid.uv is not None
-    assert np.isfinite(lid.uv[shown]).all()
-    assert lid.uv[shown].min() == pytest.approx(0.0)
-    assert lid.uv[shown].max() == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("category", ["drawer", "scissors", "globe", "random_tree", "kitchen_pot"])
-def test_coats_fit_their_parts_and_come_from_chance_alone(category: str) -> None:
-    obj = make(category, 1)
-    first, again, other = (draw_coats(obj, np.random.default_rng(seed)) for seed in (0, 0, 9))
-    for part, coat, same in zip(obj.parts, first, again, strict=True):
-        assert len(coat.material_of_face) == len(part.faces)
-        assert coat.material_of_face.max(initial=0) < len(coat.materials)
-        assert [m.colour for m in coat.materials] == [m.colour for m in same.materials]
-    assert [m.colour for c in first for m in c.materials] != [m.colour for c in other for m in c.materials]
-
-
-def test_every_finish_makes_a_material() -> None:
-    for name in FINISHES:
-        material = draw_material(name, np.random.default_rng(0))
-        assert all(0.0 <= value <= 1.0 for value in (*material.colour, material.roughness, material.metallic))
-    coats = (Coat((MATT, MATT), np.zeros(1, np.int64)),)
-    (new,) = repaint_coats(coats, np.random.default_rng(0))
-    assert new.materials[0] is new.materials[1]
-    assert new.materials[0].colour != MATT.colour
-
-
-# --- colours of files ------------------------------------------------------------------------------------------------
-
-OBJ = """mtllib look.mtl
-v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
-usemtl red\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4
-usemtl picture\nf 1/1 2/2 5/3
-"""
-URDF = """<robot name="thing"><link name="base">
-<visual><geometry><mesh filename="thing.obj"/></geometry></visual>
-</link></robot>"""
-
-
-def painted(folder: Path, materials: str) -> tuple[Coat, ...] | None:
-    (folder / "thing.obj").write_text(OBJ)
-    (folder / "look.mtl").write_text(materials)
-    (folder / "thing.urdf").write_text(URDF)
-    return painted_coats(artsim.load(folder / "thing.urdf"))
-
-
-def test_colours_and_pictures_of_wavefront_files_are_shown(tmp_path: Path) -> None:
-    Image.fromarray(np.full((4, 4, 3), (10, 200, 30), np.uint8)).save(tmp_path / "green.png")
-    coats = painted(tmp_path, "newmtl red\nKd 1 0 0\nnewmtl picture\nKd 1 1 1\nmap_Kd green.png\n")
-    assert coats is not None
-    (coat,) = coats
-    looks = [coat.materials[number] for number in coat.material_of_face]
-    assert sorted(look.texture is not None for look in looks) == [False, False, True]
-    assert [look.colour for look in looks if look.texture is None] == [(1.0, 0.0, 0.0)] * 2
-    textured = next(i for i, look in enumerate(looks) if look.texture is not None)
-    texture = looks[textured].texture
-    assert texture is not None
-    assert (texture == (10, 200, 30)).all()
-    assert coat.uv is not None
-    assert coat.uv[textured] == pytest.approx(np.array([(0, 0), (1, 0), (1, 1)]))
-
-
-@pytest.mark.parametrize("name", ["nowhere.png", "../../secret.png", "/etc/passwd", "broken.png"])
-def test_pictures_that_are_missing_broken_or_outside_leave_the_plain_colour(name: str, tmp_path: Path) -> None:
-    folder = tmp_path / "a" / "b"
-    folder.mkdir(parents=True)
-    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "secret.png")
-    (folder / "broken.png").write_bytes(b"\x89PNG no picture")
-    coats = painted(folder, f"newmtl red\nKd 1 0 0\nnewmtl picture\nKd 0 0 1\nmap_Kd {name}\n")
-    assert coats is not None
-    assert {material.colour for material in coats[0].materials} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
-    assert all(material.texture is None for material in coats[0].materials)
-
-
-def test_objects_without_colours_of_their_own_say_so(tmp_path: Path, box_laptop: Path) -> None:
-    assert painted_coats(artsim.load(box_laptop)) is None
-    assert painted_coats(make("laptop", 0)) is None
-
-
-@pytest.mark.parametrize("category", ["Laptop", "Box", "StorageFurniture", "Faucet"])
-def test_real_objects_bring_their_own_looks(category: str, partnet_dir: Path) -> None:
-    obj = find_sources([partnet_dir / category])[0].load()
-    coats = painted_coats(obj)
-    assert coats is not None
-    for part, coat in zip(obj.parts, coats, strict=True):
-        assert len(coat.material_of_face) == len(part.faces)
-        assert coat.uv is not None
-        assert coat.uv.shape == (len(part.faces), 3, 2)
-
-
-# --- light -----------------------------------------------------------------------------------------------------------
 
 
 def seen_from_above(things: tuple[Thing, ...], lights: Lights, renderer: Renderer, samples: int = 1) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,8 @@ from hypothesis import strategies as st
 import artsim
 from artsim.datasets import generate as generating
 from artsim.datasets.generate import GenerateResult
-from artsim.datasets.layout import at_place
-from artsim.datasets.new_plan import planned_objects
-from artsim.datasets.plan import Plan
 from artsim.datasets.sample_options import SampleOptions
-from artsim.datasets.splits import SPLITS, showing_order
 from artsim.datasets.verify import verify
-from artsim.datasets.worker import CompiledSource
 from artsim.errors import DatasetError
 from artsim.loading.sources import family_sources
 from tests.artsim.datasets.test_plan import plan
@@ -55,7 +49,7 @@ def test_an_extended_dataset_has_the_bytes_of_a_large_one(large: Path, tmp_path:
         make(out, 50)
 
 
-@pytest.mark.parametrize("where", ["restore", "examine", "_extended"])
+@pytest.mark.parametrize("where", ["restore", "examine", "_extend"])
 def test_an_extension_that_is_killed_goes_on(
     where: str, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -63,7 +57,7 @@ def test_an_extension_that_is_killed_goes_on(
     original = getattr(generating, where)
 
     def killed(*arguments: object, **more: object) -> None:
-        if where == "_extended":
+        if where == "_extend":
             original(*arguments, **more)
         raise KeyboardInterrupt
 
@@ -83,52 +77,3 @@ def test_what_a_sample_is_does_not_depend_on_how_many_there_are(objects: int, fe
     for shard in small.shards():
         same = shard == grown[shard.name] and small.indices(shard) == big.indices(grown[shard.name])
         assert (small.recipe(shard) == big.recipe(grown[shard.name])) == same
-
-
-@given(st.integers(1, 60), st.integers(0, 100), st.integers(0, 59))
-def test_a_split_that_grows_keeps_what_lies_in_finished_laps(objects: int, rounds: int, more: int) -> None:
-    """Laps end after 8, 16, 32, 48, ... rounds, so that at least half of what is there is kept from 8 rounds on."""
-    finished = max(end for end in [0, 8, *range(16, 116, 16)] if end <= rounds)
-    kept = [at_place(place, objects, rounds) for place in range(finished * objects)]
-    assert kept == [at_place(place, objects, rounds + more) for place in range(finished * objects)]
-    assert kept == [at_place(place, objects) for place in range(finished * objects)]
-    assert 2 * finished >= rounds or rounds < 8
-    assert sorted(at_place(p, objects, rounds) for p in range(rounds * objects)) == [
-        (r, n) for r in range(rounds) for n in range(objects)
-    ]
-
-
-@given(st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from(SPLITS)), min_size=1, max_size=200))
-def test_the_first_objects_shown_are_of_every_category_and_split_by_its_share(objects: list[tuple[str, str]]) -> None:
-    order = showing_order(objects)
-    assert sorted(order) == list(range(len(objects)))
-    for stratum in set(objects):
-        share = objects.count(stratum) / len(objects)
-        for count in (len(objects) // 3, len(objects) // 2):
-            shown = sum(objects[n] == stratum for n in order[:count])
-            assert abs(shown - share * count) <= 5  # one for each of the nine strata, at worst half of them
-
-
-def test_splits_and_keys_do_not_depend_on_geometry() -> None:
-    """Another processor may round a vertex otherwise: then geometry and digests differ, but no object changes sides."""
-    asked = Plan(0, 10, 8, (0.5, 0.25, 0.25), SampleOptions(), ())
-    sources = family_sources(["laptop"], 40)
-
-    def compiled(processor: str) -> list[CompiledSource]:
-        return [
-            CompiledSource("", s.sha256, s.category, "same", f"{processor}{s.seed}", 2, False, (), f"{processor}")
-            for s in sources
-        ]
-
-    one, two = (list(planned_objects(sources, compiled(name), asked)) for name in ("one", "two"))
-    assert [o.sha256 for o in one] != [o.sha256 for o in two]
-    assert [(o.key, o.split) for o in one] == [(o.key, o.split) for o in two]
-    assert {o.split for o in one} == set(SPLITS)
-
-
-def test_objects_of_one_content_share_a_split_whatever_they_are_called() -> None:
-    asked = Plan(0, 10, 8, (0.4, 0.3, 0.3), SampleOptions(), ())
-    source = CompiledSource("", "5" * 64, "laptop", "1", "6" * 64, 2, False, (), "")
-    compiled = [replace(source, identity=f"{n // 2:064x}", object_id=str(n)) for n in range(40)]
-    planned = list(planned_objects(family_sources(["laptop"], 40), compiled, asked))
-    assert all(one.split == two.split for one, two in zip(planned[::2], planned[1::2], strict=True))

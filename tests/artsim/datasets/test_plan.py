@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 import artsim
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.sample_options import SampleOptions, draw_sample
-from artsim.datasets.splits import SPLITS, assign_splits, unique_keys
-from artsim.errors import ConfigError
+from artsim.datasets.splits import SPLITS, assign_splits
 from artsim.model.draws import StateOptions, ViewOptions
 from artsim.renderers import make_renderer
 from tests.conftest import ASSETS
@@ -76,51 +75,6 @@ def test_what_a_sample_shows_does_not_depend_on_the_shard_size(objects: int, one
     assert [a.object_of(i) for i in range(300)] == [b.object_of(i) for i in range(300)]
 
 
-SHARES = [(0.8, 0.1, 0.1), (1.0, 1.0, 1.0), (0.0, 0.5, 0.5), (0.3, 0.0, 0.7), (1.0, 0.0, 0.0)]
-
-
-@given(
-    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 30).map(str)), min_size=1),
-    st.sampled_from(SHARES),
-    st.integers(0, 99),
-)
-def test_splits_are_by_content(objects: list[tuple[str, str]], shares: tuple[float, float, float], seed: int) -> None:
-    """Whatever the category: a file found under two names must not be trained on and tested with."""
-    splits = assign_splits(objects, shares, seed)
-    pairs = {(content, split) for (_, content), split in zip(objects, splits, strict=True)}
-    assert len(pairs) == len({content for _, content in objects})
-    assert assign_splits(objects[::-1], shares, seed) == splits[::-1]
-
-
-@given(st.integers(1, 50), st.sampled_from(SHARES), st.integers(0, 99))
-def test_splits_have_their_shares_of_each_category(count: int, shares: tuple[float, float, float], seed: int) -> None:
-    objects = [(category, f"{category}{i}") for category in "ab" for i in range(count)]
-    splits = assign_splits(objects, shares, seed)
-    for mine in (splits[:count], splits[count:]):
-        for split, share in zip(SPLITS, shares, strict=True):
-            assert abs(mine.count(split) - share / sum(shares) * count) <= 1
-        assert ("train" in mine) == (shares[0] > 0)
-
-
-def test_splits_do_not_move_when_other_categories_come() -> None:
-    one = [("a", str(i)) for i in range(20)]
-    assert assign_splits(one, (1, 1, 1), 3) == assign_splits([*one, ("b", "x")], (1, 1, 1), 3)[:20]
-
-
-def test_shares_that_make_no_sense_are_refused() -> None:
-    for shares in ((0.0, 0.0, 0.0), (-1.0, 1.0, 1.0), (np.nan, 1.0, 1.0), (np.inf, 1.0, 1.0)):
-        with pytest.raises(ConfigError, match="are not shares"):
-            assign_splits([("a", "b")], shares, 0)
-
-
-def test_keys_are_unique_and_safe() -> None:
-    named = [("box", "../../x"), ("box", "1"), ("box", "1"), ("Box", "1"), ("a b", "1"), ("a_b", "1"), ("c", "1" * 999)]
-    keys = unique_keys([(category, name, f"{i:064x}") for i, (category, name) in enumerate(named)])
-    assert len({key.lower() for key in keys}) == len(named)
-    assert max(map(len, keys)) < 200
-    assert not any("/" in key or "." in key for key in keys)
-
-
 def test_a_plan_survives_json() -> None:
     options = SampleOptions(
         num_points=100,
@@ -132,17 +86,6 @@ def test_a_plan_survives_json() -> None:
     p = plan(9, 50)
     p = Plan(p.seed, p.num_samples, p.shard_size, p.fractions, options, p.objects)
     assert Plan.from_dict(json.loads(json.dumps(p.to_dict()))) == p
-
-
-def test_a_sample_depends_on_seed_and_index_only() -> None:
-    obj, renderer = artsim.load(ASSETS / "scissors"), make_renderer("raycast")
-    first = draw_sample(obj, SampleOptions(), 3, 17, renderer)
-    for index in range(5):
-        draw_sample(obj, SampleOptions(), 3, index, renderer)
-    again = draw_sample(obj, SampleOptions(), 3, 17, make_renderer("raycast"))
-    assert np.array_equal(first.points, again.points)
-    assert not np.array_equal(first.points, draw_sample(obj, SampleOptions(), 4, 17, renderer).points)
-    assert not np.array_equal(first.points, draw_sample(obj, SampleOptions(), 3, 18, renderer).points)
 
 
 def test_views_that_never_see_the_object_end_in_an_error() -> None:

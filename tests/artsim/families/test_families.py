@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -16,9 +15,8 @@ from artsim.checks.validity import check
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.sources import FamilySource
-from artsim.stream import FamilyStream
 from benchmarks.audit import Outcome, audit
-from tests.conftest import ROOT, in_another_process
+from tests.conftest import ROOT
 
 GUIDE = ROOT / "docs" / "adding_a_category.md"
 CATEGORIES = sorted(FAMILIES)
@@ -86,19 +84,6 @@ def test_unknown_categories_and_seeds_are_refused() -> None:
         make("lapptop")
     with pytest.raises(ConfigError, match="negative"):
         make("laptop", -1)
-
-
-def test_a_stream_never_ends_and_repeats_itself_exactly() -> None:
-    stream = FamilyStream(["laptop", "drawer"], views_per_object=2)
-    first = list(itertools.islice(stream, 8))
-    assert [s.category for s in first] == ["laptop"] * 2 + ["drawer"] * 2 + ["laptop"] * 2 + ["drawer"] * 2
-    assert len({s.object_sha256 for s in first}) == 4
-    np.testing.assert_array_equal(in_another_process(stream, 5).points, first[5].points)
-    odd = list(itertools.islice(FamilyStream(["laptop", "drawer"], views_per_object=2, start=1, step=2), 4))
-    assert [s.index for s in odd] == [2, 3, 6, 7]
-    np.testing.assert_array_equal(odd[0].points, first[2].points)
-    twice = FamilyStream(["laptop", "drawer", "drawer"], views_per_object=1)
-    assert [twice.object(n).category for n in range(6)] == ["laptop", "drawer", "drawer"] * 2
 
 
 def test_a_dataset_of_made_objects_is_sound(tmp_path: Path) -> None:

@@ -110,18 +110,6 @@ def test_a_part_moves_as_its_joint_says(box_laptop: Path) -> None:
     assert lid[:, 2].max() > 0.29  # opens upwards
 
 
-def test_an_object_file_reads_back_the_same(tmp_path: Path) -> None:
-    from artsim.model.object_file import load_object, save_object
-
-    obj = load(ASSETS / "cabinet")
-    save_object(obj, tmp_path / "cabinet.npz")
-    again = load_object(tmp_path / "cabinet.npz")
-    assert again.native_tree == obj.native_tree
-    assert again.sha256 == obj.sha256
-    assert again.repairs == obj.repairs
-    assert all(np.array_equal(a.vertices, b.vertices) for a, b in zip(obj.parts, again.parts, strict=True))
-
-
 def test_the_digest_follows_the_content(tmp_path: Path) -> None:
     shutil.copytree(ASSETS / "scissors", tmp_path / "scissors")
     before = load(tmp_path / "scissors").sha256

@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from manifold3d import Manifold, Mesh64
 from PIL import Image
 
-from artsim import Camera, make
-from artsim.appearance import Lights, Material, Sun, plain_coat
+from artsim import Camera
+from artsim.appearance import Lights, Material, Sun
 from artsim.datasets.shards import sample_from_members
 from artsim.drawing.scene_overview import overview
 from artsim.errors import ConfigError
@@ -24,11 +23,10 @@ from artsim.making.solids import box
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
 from artsim.renderers import Renderer
-from artsim.renderers.scene import Scene, Thing, rigid_object
+from artsim.renderers.scene import Scene, Thing
 from artsim.renderers.scene_renderer import render_scene
 from artsim.scenes.ground_truth import SceneView, observe_scene, write_view
-from artsim.scenes.placement import Area, Arrangement, are_apart, resting_rotation
-from artsim.scenes.props import DISTRACTORS, distractor, place_solid
+from artsim.scenes.props import place_solid
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera, with_appearance
 from benchmarks.agreement import LIMITS
 from tests.conftest import backend
@@ -246,56 +244,6 @@ def test_files_of_a_view_say_what_it_holds(view: SceneView, tmp_path: Path) -> N
     sample = view.samples[1]
     assert sample is not None
     assert np.array_equal(sample_from_members(members, "instance_1").points, sample.points)
-
-
-def test_upright_things_stand_and_pencils_lie() -> None:
-    for category in ("refrigerator", "storage_furniture", "laptop", "stapler", "kitchen_pot"):
-        assert np.array_equal(resting_rotation(make(category, 0)), np.eye(3))
-    assert resting_rotation(make("scissors", 0))[2, 2] > 0.999  # flat, but for the thickness of one blade
-    pencil = trimesh.creation.cylinder(0.003, 0.15, sections=12)
-    lying = resting_rotation(rigid_object("pencil", (np.asarray(pencil.vertices), np.asarray(pencil.faces, np.int32))))
-    assert abs(lying[2, 2]) < 1e-6
-    cone = trimesh.creation.cone(0.05, 0.1)
-    cone.apply_transform(trimesh.transformations.rotation_matrix(np.pi, [1, 0, 0]))
-    turned = resting_rotation(rigid_object("cone", (np.asarray(cone.vertices), np.asarray(cone.faces, np.int32))))
-    assert turned[2, 2] != 1.0
-
-
-@pytest.mark.parametrize(("gap", "free"), [(0.0039, False), (0.0041, True)])
-def test_things_keep_their_distance(gap: float, free: bool) -> None:
-    one = block((0.2, 0.2, 0.2), (0.0, 0.0, 0.1))
-    turn = trimesh.transformations.rotation_matrix(np.pi / 4, [0, 0, 1])
-    turn[0, 3] = 0.1 + gap + 0.1 * np.sqrt(2.0)
-    assert are_apart(one, place_solid("block", box((-0.1, -0.1, 0.0), (0.1, 0.1, 0.2)), GREY, turn)) == free
-
-
-def test_boxes_that_overlap_do_not_matter_where_surfaces_do_not_meet() -> None:
-    frame = make("eyeglasses", 0)
-    thing = Thing(frame, frame.tree.rest, np.eye(4), ())
-    low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
-    between = block((0.01, 0.01, 0.01), tuple(0.5 * (low + high) + [0.02, 0.0, 0.0]))  # type: ignore[arg-type]
-    assert are_apart(thing, between)
-    assert ((between.vertices > low) & (between.vertices < high)).all()
-
-
-def test_no_room_is_said() -> None:
-    arrangement = Arrangement(Area((-0.1, -0.1), (0.1, 0.1)))
-    obj = rigid_object("slab", (np.asarray(trimesh.creation.box((0.15, 0.15, 0.1)).vertices),
-                         np.asarray(trimesh.creation.box((0.15, 0.15, 0.1)).faces, np.int32)))  # fmt: skip
-    coats = (plain_coat(obj.parts[0], GREY),)
-    assert arrangement.put(obj, np.zeros(1), coats, np.random.default_rng(0)) is not None
-    assert arrangement.put(obj, np.zeros(1), coats, np.random.default_rng(0)) is None
-
-
-@pytest.mark.parametrize("name", sorted(DISTRACTORS))
-def test_distractors_are_closed_solids_of_a_handy_size(name: str) -> None:
-    for seed in range(5):
-        solid, materials = DISTRACTORS[name](np.random.default_rng(seed))
-        assert len(materials) == len(solid.pieces)
-        mesh = trimesh.Trimesh(*solid.union(), process=False)
-        assert mesh.is_volume
-        assert 0.02 < mesh.extents.max() < 0.3
-    assert len(distractor(np.random.default_rng(0))[1]) == 1
 
 
 @pytest.mark.parametrize(
