@@ -2,6 +2,21 @@
 
 Stable names; docs/api.md lists them with those of the public packages. Everything else is private. Heavy backends are
 imported when first used.
+
+Rooms, from the ground up. Each imports only rooms that come before it (import-linter holds this, see pyproject.toml):
+
+- common, errors: what every module may use.
+- model: an articulated object, its kinematics, cameras and frames. No backend.
+- making, families: objects from a seed.
+- loading: objects from files.
+- appearance: materials and light.
+- renderers: one scene in, one frame out.
+- observing: frames to labelled samples; sensor noise.
+- datasets, then stream: samples to disk and back, or without end.
+- scenes: several objects. checks: gates for simulators.
+- export: objects as URDF, MJCF and USD.
+- physics: objects that move. drawing: pictures.
+- envs: reinforcement learning. doctor, cli: programs.
 """
 
 from __future__ import annotations

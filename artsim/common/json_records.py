@@ -38,20 +38,20 @@ def from_json_values(kind: type[T], data: object) -> T:
     unknown = [name for name in data if name not in known]
     if unknown:
         raise ValueError(f"{kind.__name__} has no field {unknown[0]!r}")
-    values = {name: _fitting(hints[name], value, name) for name, value in data.items()}
+    values = {name: _as_type(hints[name], value, name) for name, value in data.items()}
     try:
         return kind(**values)
     except TypeError as error:  # a field without a default is missing
         raise ValueError(str(error)) from error
 
 
-def _fitting(hint: Any, value: object, name: str) -> Any:
+def _as_type(hint: Any, value: object, name: str) -> Any:
     """The value as the type of a field has it."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
         if value is None and type(None) in inner:
             return None
-        return _fitting(next(kind for kind in inner if kind is not type(None)), value, name)
+        return _as_type(next(kind for kind in inner if kind is not type(None)), value, name)
     if origin is Literal:
         if isinstance(value, (str, int)) and value in inner:
             return value
@@ -59,7 +59,7 @@ def _fitting(hint: Any, value: object, name: str) -> Any:
         if isinstance(value, (list, tuple)) and len(value) <= _MAX_ITEMS:
             kinds = (inner[0],) * len(value) if len(inner) == 2 and inner[1] is Ellipsis else inner
             if len(kinds) == len(value):
-                return tuple(_fitting(kind, item, name) for kind, item in zip(kinds, value, strict=True))
+                return tuple(_as_type(kind, item, name) for kind, item in zip(kinds, value, strict=True))
     elif is_dataclass(hint) and isinstance(hint, type):
         return from_json_values(hint, value)
     elif hint is float:

@@ -117,7 +117,7 @@ def read_description(folder: Path) -> tuple[Plan, list[ShardRecord], dict[str, A
         if [record.shard for record in records] != plan.shards():
             raise ValueError("its shards are not those of its plan")
     except (ValueError, KeyError) as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     return plan, records, document
 
 
@@ -139,7 +139,7 @@ def _document(folder: Path, name: str) -> dict[str, Any]:
             if seal != _seal(document):
                 raise ValueError("it is not as it was written: its own sha256 is another")
     except (ValueError, KeyError) as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     return document
 
 
@@ -151,11 +151,11 @@ def _plan(document: Mapping[str, Any], path: Path) -> Plan:
                 for name in ("source", "source_sha256"):
                     json_values.text(json_values.mapping(entry, "source")[name], name)
     except (ValueError, KeyError, ConfigError) as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     return plan
 
 
-def _damaged(path: Path, error: Exception) -> DatasetError:
+def _damage_error(path: Path, error: Exception) -> DatasetError:
     reason = f"{error.args[0]!r:.60} is missing" if isinstance(error, KeyError) else str(error)
     return DatasetError(f"{path.name} is damaged ({reason})", path.parent, repair_command(path.parent))
 

@@ -145,7 +145,7 @@ def generate(
                     begun = _extend(folder, begun, num_samples)
                 write_origins(folder, sources)
                 state = examine(folder, begun, workers, progress)
-                damaged = _damaged(folder, begun, state) if grown_from is None else set()
+                damaged = _damaged_files(folder, begun, state) if grown_from is None else set()
                 restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
         finally:
             remove_leftovers(folder)
@@ -170,7 +170,7 @@ def _result(folder: Path, begun: StartedDataset, made: int, start: float) -> Gen
     return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
 
 
-def _damaged(folder: Path, begun: StartedDataset, state: State) -> set[str]:
+def _damaged_files(folder: Path, begun: StartedDataset, state: State) -> set[str]:
     """Files that were there before, or were said to be, and have to be made again."""
     finished = {record.name for record in begun.records}
     shards = {shard.name for shard in state.shards if shard.name in finished}
@@ -226,7 +226,7 @@ def _start(folder: Path, asked: Plan, sources: Sequence[Source]) -> StartedDatas
     del wanted["objects"]
     if asked.num_samples > begun.plan.num_samples:
         del wanted["num_samples"]  # it is to grow
-    differing = _differing(wanted, begun.document)
+    differing = _differences(wanted, begun.document)
     document = begun.document
     have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
     if have != {(s.name, s.sha256) for s in sources}:
@@ -250,13 +250,13 @@ def _refuse_strangers(folder: Path) -> None:
         raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
 
 
-def _differing(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
+def _differences(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
     """Names of the entries of ``wanted`` that are stored otherwise, such as 'sample.views.fov'."""
     names: list[str] = []
     for name, value in wanted.items():
         there = stored.get(name)
         if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
-            names += _differing(value, there, f"{prefix}{name}.")
+            names += _differences(value, there, f"{prefix}{name}.")
         elif value != there:
             names.append(prefix + name)
     return names

@@ -51,7 +51,7 @@ class Origins:
 
     def __init__(self, folder: Path, sources: Sequence[Source] = ()):
         self._files: dict[str, list[FileSource]] = defaultdict(list)
-        for source in [*sources, *_noted(folder)]:
+        for source in [*sources, *_read_origins(folder)]:
             if isinstance(source, FileSource):
                 self._files[source.sha256].append(source)
 
@@ -65,7 +65,7 @@ class Origins:
         return list(self._files[planned.source_sha256])
 
 
-def _noted(folder: Path) -> list[FileSource]:
+def _read_origins(folder: Path) -> list[FileSource]:
     """Files that are still where they were, and still as they were."""
     try:
         noted = read_json(folder / ORIGINS, ORIGINS, DatasetError)

@@ -113,7 +113,7 @@ def _make_objects(
     with track("objects", total=len(attempts), unit="object", shown=progress and bool(attempts)) as bar:
         for staged, answer in team.run(compile_source, tasks):
             planned = attempts[staged][0]
-            problem = _not_as_planned(planned, answer)
+            problem = _plan_difference(planned, answer)
             if problem is None:
                 _put(folder / "objects" / staged, folder / planned.file)
                 done.add(planned)
@@ -129,7 +129,7 @@ def _make_objects(
     return {planned for planned in state.objects if planned not in done}
 
 
-def _not_as_planned(planned: PlannedObject, answer: CompiledSource | RefusedSource | WorkerLost) -> str | None:
+def _plan_difference(planned: PlannedObject, answer: CompiledSource | RefusedSource | WorkerLost) -> str | None:
     """Why what was loaded is not the object that was planned."""
     if isinstance(answer, RefusedSource | WorkerLost):
         return answer.why

@@ -63,7 +63,7 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
             f"cd {shlex.quote(str(where.parent))} && git lfs pull",
         )
     repairs: list[Repair] = []
-    text = _decoded(data, repairs)
+    text = _decode(data, repairs)
     start, stray = _prolog(text)
     if text[start : start + 14].lower() == "<!doctype html":
         raise AssetError("is a web page, not URDF", where, "download the raw file")
@@ -74,7 +74,7 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
     return ("\n" * text.count("\n", 0, start) + _with_prefixes(body, repairs)).encode(), repairs
 
 
-def _decoded(data: bytes, repairs: list[Repair]) -> str:
+def _decode(data: bytes, repairs: list[Repair]) -> str:
     """Text by its byte order mark, else as declared, else as UTF-8, which most files are whatever they declare."""
     for mark, encoding in _BOMS:
         if data.startswith(mark):

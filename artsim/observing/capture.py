@@ -86,11 +86,11 @@ def observe(
         drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
         frame = drawer.render(obj, q, camera, T_world_object)
         look = _lookup(frame)
-        pixels, depth, part = draw_visible(posed, _sensed(look, look, camera, sensor, key), num_points, rng)
+        pixels, depth, part = draw_visible(posed, _read_sensor(look, look, camera, sensor, key), num_points, rng)
         visible_fraction = _exact_visible_fraction(posed, frame)
     else:
         rays, look = _Rays(posed), _in_any_order(posed)
-        pixels, depth, part = draw_visible(posed, _sensed(rays, look, camera, sensor, key), num_points, rng)
+        pixels, depth, part = draw_visible(posed, _read_sensor(rays, look, camera, sensor, key), num_points, rng)
         visible_fraction = rays.visible_fraction()
     if len(pixels) == 0:
         raise RenderError("the camera does not see the object", obj.object_id, "move the camera or the object")
@@ -162,7 +162,7 @@ def _in_any_order(posed: PosedObject) -> Look:
     return look
 
 
-def _sensed(look: Look, around: Look, camera: Camera, sensor: Sensor, key: int) -> Look:
+def _read_sensor(look: Look, around: Look, camera: Camera, sensor: Sensor, key: int) -> Look:
     """What a sensor reports: pixels without a return show nothing.
 
     Parameters

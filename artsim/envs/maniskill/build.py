@@ -103,7 +103,7 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], 
         made_joint.set_friction(joints[name].friction / weights[name])
     part_links = [link for link in robot.links if link.part >= 0]
     place = [0, *(names.index(joint.name) for joint in robot.obj.tree.joints[1:])]
-    follow, offset = _following(robot, names)
+    follow, offset = _mimic_gears(robot, names)
     return Built(
         articulation,
         [by_name[link.name] for link in part_links],
@@ -202,7 +202,7 @@ def _weights(robot: Robot) -> dict[str, float]:
     return {joint.name: mass[joint.child] * GRAVITY for joint in robot.joints}
 
 
-def _following(robot: Robot, names: list[str]) -> tuple[Array, Array]:
+def _mimic_gears(robot: Robot, names: list[str]) -> tuple[Array, Array]:
     """(D, F) and (D,): degrees of freedom as a linear function of the free joints."""
     unit = np.eye(len(robot.obj))
     states = [robot.states(q) for q in (np.zeros(len(robot.obj)), *unit[robot.obj.tree.free_joints])]

@@ -115,7 +115,7 @@ def truth_of(objects: Sequence[ArticulatedObject], max_joints: int, device: Any)
     rows = max_joints + 1
 
     def stack(of: Callable[[ArticulatedObject], Any], dtype: torch.dtype = torch.float32) -> Tensor:
-        return torch.from_numpy(np.stack([_padded(np.asarray(of(obj)), rows) for obj in objects])).to(device, dtype)
+        return torch.from_numpy(np.stack([_pad(np.asarray(of(obj)), rows) for obj in objects])).to(device, dtype)
 
     def each(of: Callable[[ArticulatedObject], Any]) -> Tensor:
         return torch.tensor(np.array([of(obj) for obj in objects]), dtype=torch.float32, device=device)
@@ -162,7 +162,7 @@ def start_and_goal(goal: Goal, truth: Truth, draw: Tensor) -> tuple[Tensor, Tens
     return truth.complete_state(start), truth.complete_state(end)
 
 
-def _padded(array: Array, rows: int) -> Array:
+def _pad(array: Array, rows: int) -> Array:
     padded = np.zeros((rows, *array.shape[1:]), dtype=array.dtype)
     padded[: len(array)] = array
     return padded
@@ -180,4 +180,4 @@ def _mimic(obj: ArticulatedObject, rows: int) -> tuple[Tensor, Tensor]:
     columns = obj.tree.complete_state(np.eye(len(obj))) - offset  # row j: what joint j moves
     matrix = np.zeros((rows, rows))
     matrix[: len(obj), : len(obj)] = columns.T
-    return torch.from_numpy(matrix).float(), torch.from_numpy(_padded(offset, rows)).float()
+    return torch.from_numpy(matrix).float(), torch.from_numpy(_pad(offset, rows)).float()

@@ -38,7 +38,7 @@ class Document:
     """
 
     def __init__(self, data: bytes, bounds: Bounds):
-        self.root = _parsed(data, bounds)
+        self.root = _parse(data, bounds)
         self.num_primitives = 0
         self.points: dict[etree._Element, Array] = {}
         self._ids: dict[str, etree._Element] = {}
@@ -59,7 +59,7 @@ class Document:
         return self.find(instance.get("url"))
 
 
-def _parsed(data: bytes, bounds: Bounds) -> etree._Element:
+def _parse(data: bytes, bounds: Bounds) -> etree._Element:
     if data.count(b"<") > _MAX_TAGS:
         raise AssetError(
             f"the mesh has over {_MAX_TAGS} XML tags", bounds.where, "export it again with one list of numbers a mesh"

@@ -182,7 +182,7 @@ class _Scene:
         moves = columns.get("TRANSLATION", np.zeros((count, 3)))
         turns = columns.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
         scales = columns.get("SCALE", np.ones((count, 3)))
-        return [compose_affine(T, _composed(*parts)) for parts in zip(moves, turns, scales, strict=True)]
+        return [compose_affine(T, _compose(*parts)) for parts in zip(moves, turns, scales, strict=True)]
 
     def _declared(self, node: Items) -> int:
         """Triangles that a node's mesh declares, by the sizes of its accessors alone."""
@@ -278,10 +278,10 @@ def _transform(node: Items) -> Array:
     move = _numbers(node.array("translation") or [0, 0, 0], 3, what)
     turn = _numbers(node.array("rotation") or [0, 0, 0, 1], 4, what)
     scale = _numbers(node.array("scale") or [1, 1, 1], 3, what)
-    return _composed(np.array(move), np.array(turn), np.array(scale))
+    return _compose(np.array(move), np.array(turn), np.array(scale))
 
 
-def _composed(move: Array, turn: Array, scale: Array) -> Array:
+def _compose(move: Array, turn: Array, scale: Array) -> Array:
     """(4, 4) transform that scales, turns by a quaternion (x, y, z, w), then moves."""
     x, y, z, w = turn.tolist()
     length = math.sqrt(x * x + y * y + z * z + w * w)

@@ -156,7 +156,7 @@ class Draft:
             self.left_out(int((~usable).sum()), "triangles", NO_POINT)
             vertices, faces = join_pieces([(vertices, faces[usable])])
             corners = None if corners is None else corners[usable]
-        return Surface(vertices, faces.astype(np.int32), _shortened(self.notes), corners)
+        return Surface(vertices, faces.astype(np.int32), _shorten(self.notes), corners)
 
 
 def join_pieces(pieces: list[tuple[Array, Indices]]) -> tuple[Array, Indices]:
@@ -186,7 +186,7 @@ def join_pieces(pieces: list[tuple[Array, Indices]]) -> tuple[Array, Indices]:
     return all_vertices[used[:-1]], number[all_faces]
 
 
-def _shortened(notes: list[str]) -> tuple[str, ...]:
+def _shorten(notes: list[str]) -> tuple[str, ...]:
     """Each note once, with how often it was made; the last ones in a word."""
     counted = [text if count == 1 else f"{text} ({count} times)" for text, count in Counter(notes).items()]
     if len(counted) <= _MAX_NOTES:
