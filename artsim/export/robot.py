@@ -228,7 +228,7 @@ def _joint(obj: ArticulatedObject, joint: Joint, parent: int, child: int, carrie
     if joint.mimic is not None:
         mimic = (obj.tree.joints[joint.mimic.source].name, joint.mimic.multiplier, joint.mimic.offset)
     kind = "continuous" if joint.type == "screw" else joint.type
-    return _follower(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
+    return _link_joint(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
 
 
 def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:
@@ -236,10 +236,10 @@ def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -
     lower, upper = sorted((joint.lower * joint.pitch, joint.upper * joint.pitch))
     if not (np.isfinite(lower) and np.isfinite(upper)):
         raise AssetError("a screw without limits cannot be written", f"joint {joint.name!r}", "limit it")
-    return _follower(name, "prismatic", parent, child, joint, lower, upper, carried, (joint.name, joint.pitch, 0.0))
+    return _link_joint(name, "prismatic", parent, child, joint, lower, upper, carried, (joint.name, joint.pitch, 0.0))
 
 
-def _follower(
+def _link_joint(
     name: str,
     kind: str,
     parent: int,
