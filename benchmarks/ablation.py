@@ -75,6 +75,7 @@ VARIANTS: dict[str, Variant] = {
     "labels of perception alone": Variant(
         patches=((search, "relabel", lambda shapes, observed, theta, logits: observed.part),)
     ),
+    "shape free at once": Variant(patches=((levenberg_marquardt, "_RIGID_ITERATIONS", 0),)),
     "no outline term": Variant(patches=((search, "refine", _no_outline),)),
     "no second try": Variant({"retry_residual": float("inf")}),
     "no agent": Variant(change=lambda e: replace(e, agent=None)),
