@@ -13,7 +13,7 @@ import artsim
 from artperl.core.pose import Theta, clamp_state, pose_parts, theta_from_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Shapes
-from artperl.fitting.normal_alignment import normals_of, squared
+from artperl.fitting.normal_alignment import align_normals, normals_of
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.observing.sample import Sample
 
@@ -60,7 +60,7 @@ def test_what_has_flat_sides_faces_where_they_do(category: str) -> None:
         shapes, sample, truth = seen(category, seed)
         wrong = off(shapes, truth, 1.5, seed)
         shown = np.bincount(sample.part, minlength=len(sample.box_size)) >= 200
-        right = squared(shapes, wrong, sample.points.astype(np.float64), sample.part.astype(np.int64))
+        right = align_normals(shapes, wrong, sample.points.astype(np.float64), sample.part.astype(np.int64))
         before += degrees_apart(shapes, wrong, truth)[shown].tolist()
         after += degrees_apart(shapes, right, truth)[shown].tolist()
     assert np.median(before) > 1.0
@@ -74,7 +74,7 @@ def test_plates_that_bulge_are_turned_less_far_off() -> None:
     for seed in range(12):
         shapes, sample, truth = seen("laptop", seed)
         wrong = off(shapes, truth, 1.5, seed)
-        right = squared(shapes, wrong, sample.points.astype(np.float64), sample.part.astype(np.int64))
+        right = align_normals(shapes, wrong, sample.points.astype(np.float64), sample.part.astype(np.int64))
         before.append(degrees_apart(shapes, wrong, truth))
         after.append(degrees_apart(shapes, right, truth))
     assert np.median(after) < 0.3 * np.median(before)
@@ -83,7 +83,7 @@ def test_plates_that_bulge_are_turned_less_far_off() -> None:
 def test_the_middle_of_the_points_stays_where_it_is() -> None:
     shapes, sample, truth = seen("drawer", 1)
     wrong, points = off(shapes, truth, 1.0, 1), sample.points.astype(np.float64)
-    right = squared(shapes, wrong, points, sample.part.astype(np.int64))
+    right = align_normals(shapes, wrong, points, sample.part.astype(np.int64))
     assert not torch.equal(right.rotation, wrong.rotation)
     middle = torch.from_numpy(points.mean(axis=0))
     places = [(middle - theta.translation[0]) @ theta.rotation[0] for theta in (wrong, right)]
@@ -101,8 +101,8 @@ def test_where_the_camera_stands_does_not_matter(seed: int) -> None:
         moved = (R @ theta.translation[..., None])[..., 0] + t
         return replace(theta, rotation=R @ theta.rotation, translation=moved)
 
-    here = elsewhere(squared(shapes, wrong, points, part))
-    there = squared(shapes, elsewhere(wrong), points @ R.numpy().T + t.numpy(), part)
+    here = elsewhere(align_normals(shapes, wrong, points, part))
+    there = align_normals(shapes, elsewhere(wrong), points @ R.numpy().T + t.numpy(), part)
     assert torch.allclose(here.rotation, there.rotation, atol=1e-6)
     assert torch.allclose(here.translation, there.translation, atol=1e-6)
     assert torch.allclose(here.state, there.state, atol=1e-6)
@@ -115,7 +115,7 @@ def test_what_is_round_or_rough_stays_as_it_is() -> None:
     ball /= np.linalg.norm(ball, axis=1, keepdims=True)
     rough = sample.points + rng.normal(size=sample.points.shape) * 0.02
     for points in (ball, rough, ball * 0.0):
-        same = squared(shapes, truth, points.astype(np.float64), part)
+        same = align_normals(shapes, truth, points.astype(np.float64), part)
         assert torch.equal(same.rotation, truth.rotation)
         assert torch.equal(same.translation, truth.translation)
         assert torch.equal(same.state, truth.state)
@@ -125,14 +125,14 @@ def test_states_stay_within_their_limits_and_few_points_do_no_harm() -> None:
     shapes, sample, truth = seen("laptop", 2)
     points, part = sample.points.astype(np.float64), sample.part.astype(np.int64)
     shut = replace(shapes, trees=replace(shapes.trees, upper=truth.state - 0.02))
-    turned = squared(shut, replace(truth, state=clamp_state(shut.trees, truth.state)), points, part)
+    turned = align_normals(shut, replace(truth, state=clamp_state(shut.trees, truth.state)), points, part)
     assert (turned.state <= shut.trees.upper + 1e-12)[0, 1].all()
     for count in (0, 1, 5, 50):
         for label in (part[:count], 0 * part[:count], 0 * part[:count] + 1):  # of one part alone
-            some = squared(shapes, truth, points[:count], label)
+            some = align_normals(shapes, truth, points[:count], label)
             assert torch.isfinite(some.rotation).all()
             assert torch.isfinite(some.state).all()
-    unlabelled = squared(shapes, off(shapes, truth, 1.0, 0), points, np.full(len(part), -1))
+    unlabelled = align_normals(shapes, off(shapes, truth, 1.0, 0), points, np.full(len(part), -1))
     assert torch.equal(unlabelled.rotation, off(shapes, truth, 1.0, 0).rotation)
 
 

@@ -11,7 +11,7 @@ import torch
 import artsim
 from artperl.core.pose import Theta, theta_from_parts
 from artperl.core.shapes import Shapes
-from artperl.fitting.occluded_parts import uncovered
+from artperl.fitting.occluded_parts import pose_occluded_parts
 from artsim.model.draws import ViewOptions, sample_view
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
@@ -38,7 +38,7 @@ def true_theta(obj: ArticulatedObject, sample: Sample) -> Theta:
 
 
 def found(shapes: Shapes, theta: Theta, sample: Sample) -> Theta:
-    return uncovered(shapes, theta, sample.points.astype(np.float64), sample.part.astype(np.int64))
+    return pose_occluded_parts(shapes, theta, sample.points.astype(np.float64), sample.part.astype(np.int64))
 
 
 @pytest.mark.parametrize("degrees", [40.0, 60.0, 80.0])
@@ -110,18 +110,20 @@ def test_what_moves_with_a_hinge_that_shows_stays_too() -> None:
     part[np.flatnonzero(part == 0)[:300]] = 2  # it shows plenty
     opened = replace(truth, state=truth.state * 0.0)
     points = sample.points.astype(np.float64)
-    assert uncovered(shapes, opened, points, part).state[0, 1] > 0.0
-    assert torch.equal(uncovered(coupled, opened, points, part).state, opened.state)
+    assert pose_occluded_parts(shapes, opened, points, part).state[0, 1] > 0.0
+    assert torch.equal(pose_occluded_parts(coupled, opened, points, part).state, opened.state)
 
 
 def test_points_that_come_twice_change_next_to_nothing() -> None:
     shapes, sample, truth = seen("eyeglasses", 3, 60.0, FRONT)
     points, part = sample.points.astype(np.float64), sample.part.astype(np.int64)
     opened = replace(truth, state=truth.state * 0.0)
-    once, twice = (uncovered(shapes, opened, *(np.repeat(x, n, axis=0) for x in (points, part))) for n in (1, 2))
+    once, twice = (
+        pose_occluded_parts(shapes, opened, *(np.repeat(x, n, axis=0) for x in (points, part))) for n in (1, 2)
+    )
     assert (once.state - truth.state).abs().max() < np.radians(3.5)
     assert (twice.state - once.state).abs().max() < np.radians(3.5)
-    same = uncovered(shapes, opened, points[:1].repeat(50, axis=0), np.zeros(50, dtype=np.int64))
+    same = pose_occluded_parts(shapes, opened, points[:1].repeat(50, axis=0), np.zeros(50, dtype=np.int64))
     assert torch.equal(same.state, opened.state)
 
 
@@ -130,4 +132,4 @@ def test_few_points_do_no_harm() -> None:
     for count in (2, 5, 50):
         points, part = sample.points[:count].astype(np.float64), sample.part[:count].astype(np.int64)
         for label in (part, 0 * part, 0 * part - 1):
-            assert torch.isfinite(uncovered(shapes, truth, points, label).state).all()
+            assert torch.isfinite(pose_occluded_parts(shapes, truth, points, label).state).all()
