@@ -440,7 +440,7 @@ def test_a_damaged_object_file_is_refused(changes: dict[str, Any], text: str, tm
 
 
 def test_a_value_of_another_type_is_named() -> None:
-    from artperl.fitting.search import EstimatorOptions
+    from artperl.fitting.options import EstimatorOptions
 
     assert from_plain(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
     assert from_plain(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf
