@@ -22,7 +22,7 @@ def load_estimator(name: str | Path, **changes: Any) -> Estimator:
     name : str or Path
     **changes
         Of its options, such as ``seen_from=(-75.0, 75.0)``, degrees, where the camera is known to be in front of the
-        object. :class:`artperl.fitting.search.EstimatorOptions` has them all.
+        object. :class:`artperl.fitting.options.EstimatorOptions` has them all.
 
     Raises
     ------

@@ -19,7 +19,7 @@ from artperl.agent.policy import Agent
 from artperl.boxes.network import Boxes
 from artperl.core.estimate import Calibration
 from artperl.core.tensor_files import write_tensors
-from artperl.fitting.search import EstimatorOptions
+from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
@@ -81,7 +81,7 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
     device : torch.device or str
         Where it works, such as "cuda".
     **changes
-        Of its :class:`~artperl.fitting.search.EstimatorOptions`, such as ``seen_from=(-75.0, 75.0)``.
+        Of its :class:`~artperl.fitting.options.EstimatorOptions`, such as ``seen_from=(-75.0, 75.0)``.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
     """
     unknown = ", ".join(changes.keys() - {field.name for field in fields(EstimatorOptions)})
     if unknown:
-        raise ConfigError("an estimator has no such option", unknown, "see artperl.fitting.search.EstimatorOptions")
+        raise ConfigError("an estimator has no such option", unknown, "see artperl.fitting.options.EstimatorOptions")
     folder = folder_of(name)
     settings = read_settings(folder)
     try:

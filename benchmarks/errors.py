@@ -25,6 +25,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.data.categories import ARTIMAGE, objects_of
@@ -33,7 +34,6 @@ from artperl.evaluation.artimage import real_objects
 from artperl.evaluation.benchmark_rows import find_estimator
 from artperl.evaluation.pictures import overlays
 from artperl.evaluation.scoring import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
-from artperl.fitting.search import Clock
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perceived
 from artsim.common.files import atomic_file, write_atomic

@@ -11,10 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.core.batch import Batch
+from artperl.core.estimate import Estimate, brought_to_rest
+
+Array = NDArray[np.float64]
 
 SHARES = (0.0, 0.004, 0.02, 0.1, 0.5)
 """Of a part's points, that lie farther out than a candidate: labels near a border are not always right."""
@@ -169,3 +173,33 @@ def _siblings(outermost: Tensor, seen: Tensor) -> Tensor:
     other = (seen & (number > 0) & (number != number[:, None]))[..., None]
     farthest = outermost.masked_fill(~other, -torch.inf).amax(1)
     return torch.where(other.any(1), farthest, outermost)
+
+
+def evidence_of_estimate(
+    estimate: Estimate, points: Array, part: NDArray[np.int64], perceived_center: Tensor, perceived_size: Tensor,
+    noise: Tensor, rows: int,
+) -> tuple[Evidence, float]:  # fmt: skip
+    """Evidence for the boxes of one estimate, padded to that many rows, and its unit in metres.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    points : (M, 3) float
+        Camera frame, metres.
+    part : (M,) int64
+    perceived_center, perceived_size : (P, 3) float
+        Metres.
+    noise : () float
+        :func:`roughness` of the points, metres.
+    rows : int
+    """
+    T, K = estimate.T_camera_part, len(estimate.size)
+    slides = np.array(estimate.joint_type)[:, None] == "prismatic"
+    arrays = (
+        points, T, np.where(slides, estimate.joint_axis, 0.0), brought_to_rest(estimate.translation, T), estimate.size,
+    )  # fmt: skip
+    cloud, poses, axis, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
+    evidence, unit = Evidence.of(
+        cloud, torch.from_numpy(part), poses, axis, center, size, perceived_center[:K], perceived_size[:K], noise
+    )  # fmt: skip
+    return evidence.padded(rows), float(unit)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from torch import Tensor
 
 from artperl.core.listing import listed, short
-from artperl.core.pose import Posed
+from artperl.core.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 
 Array = NDArray[np.float64]
@@ -99,13 +102,13 @@ class Estimate:
     joint_axis: Array
     joint_origin: Array
     part: NDArray[np.int64]
-    reference: str
-    residual: float
-    disagreement: float
     visibility: Array
-    confidence: float
     trajectory: Array
-    milliseconds: dict[str, float]
+    reference: str = ""
+    residual: float = np.inf
+    disagreement: float = np.inf
+    confidence: float = 0.0
+    milliseconds: dict[str, float] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()
     joint_limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
     warnings: tuple[str, ...] = ()
@@ -136,27 +139,6 @@ def slid(estimate: Estimate, farther: Array) -> Estimate:
     T[:, :3, 3] += shift
     trajectory = np.concatenate([estimate.trajectory[:-1], T[None]])
     return replace(estimate, T_camera_part=T, state=estimate.state + farther, trajectory=trajectory)
-
-
-def labels_by_boxes(
-    points: Array, T_camera_part: Array, center: Array, size: Array, log_odds: Array, distance: float
-) -> NDArray[np.int64]:
-    """(N,) parts of points (N, 3), given both the odds (N, P) of each part and how far out of its box a point lies.
-
-    Parameters
-    ----------
-    T_camera_part : (K, 4, 4) float
-    center, size : (K, 3) float
-        Boxes in the rest frame, metres.
-    distance : float
-        Metres that weigh as much as odds of 1 to e.
-    """
-    out = np.stack([
-        np.linalg.norm(np.maximum(np.abs((points - T[:3, 3]) @ T[:3, :3] - middle) - 0.5 * whole, 0.0), axis=1)
-        for T, middle, whole in zip(T_camera_part, center, size, strict=True)
-    ], axis=1)  # fmt: skip
-    score = log_odds[:, : len(size)] - (out / distance) ** 2
-    return np.where(np.isnan(score).any(axis=1), -1, score.argmax(axis=1))
 
 
 def brought_to_rest(posed: Array, T_camera_part: Array) -> Array:
@@ -205,3 +187,57 @@ def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
         near = cKDTree(cloud[part == k]).query(points[k], distance_upper_bound=_SEEN * float(shapes.diagonal[0]))[0]
         seen[k] = np.isfinite(near).mean()
     return seen
+
+
+def estimate_of_fit(
+    shapes: Shapes, observed: Observed, path: Sequence[Theta], points: Array, part: NDArray[np.int64]
+) -> Estimate:
+    """What a fitted reference says of K parts and of labelled points; nothing yet of how sure it is.
+
+    Parameters
+    ----------
+    shapes : Shapes
+        Of one row.
+    observed : Observed
+    path : sequence of Theta
+        States of one row, the start first, the fit last.
+    points : (N, 3) float
+        Camera frame, metres.
+    part : (N,) int64
+    """
+    theta, trees = path[-1], shapes.trees
+    K = int(trees.valid[0].sum())
+    posed = pose_parts(trees, theta, shapes.box_center)
+    axis, origin = joint_axes(trees, posed)
+    poses = [_transforms(shapes, step)[:K] for step in path]
+    limits = torch.stack([trees.lower, trees.upper], dim=-1)
+    limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
+    rotation, center = _first(posed.rotation)[:K], _first(posed.center)[:K]
+    translation, size = widen(rotation, center, _first(shapes.box_size * posed.scale)[:K], points, part)
+    return Estimate(
+        rotation=rotation,
+        translation=translation,
+        size=size,
+        T_camera_part=poses[-1],
+        state=_first(joint_states(trees, theta))[:K],
+        joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),
+        joint_parent=np.where(np.arange(K) == 0, -1, trees.parent[0, :K].numpy()),
+        joint_axis=_first(axis)[:K],
+        joint_origin=_first(origin)[:K],
+        part=part,
+        visibility=visibility(shapes, observed, posed)[:K],
+        trajectory=np.stack(poses),
+        joint_limits=_first(limits)[:K],
+    )
+
+
+def _transforms(shapes: Shapes, theta: Theta) -> Array:
+    posed = pose_parts(shapes.trees, theta, shapes.box_center)
+    transforms = np.tile(np.eye(4), (posed.rotation.shape[1], 1, 1))
+    transforms[:, :3, :3], transforms[:, :3, 3] = _first(posed.rotation), _first(posed.translation)
+    return transforms
+
+
+def _first(values: Tensor) -> Array:
+    """The first row, in double precision."""
+    return values[0].double().numpy()

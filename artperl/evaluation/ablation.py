@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from artperl.agent.policy import Agent
 from artperl.core.batch import concatenate
+from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.core.pose import Theta, pose_parts
@@ -20,7 +21,6 @@ from artperl.core.shapes import Observed
 from artperl.evaluation.scoring import evaluate, summary
 from artperl.fitting.initial_pose import part_poses, start
 from artperl.fitting.levenberg_marquardt import refine
-from artperl.fitting.search import Clock
 from artperl.methods.full import Estimator
 from artperl.perception.preprocess import clean, draw
 from artperl.retrieval.box_embedding import box_embedding

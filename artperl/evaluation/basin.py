@@ -15,8 +15,8 @@ from artperl.core.pose import Theta, clamp_state, pose_parts
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, Problem, Problems, References
 from artperl.evaluation.metrics import rotation_error
+from artperl.fitting.hypotheses import agent_steps
 from artperl.fitting.levenberg_marquardt import refine
-from artperl.fitting.search import agent_steps
 from artperl.methods.full import Estimator
 
 Joints = Literal["halfway", "near"]

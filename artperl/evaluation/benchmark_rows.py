@@ -63,7 +63,7 @@ def run_rows(
     say : callable
         Gets the lines.
     seen_from : (float, float), optional
-        See :class:`artperl.fitting.search.EstimatorOptions`.
+        See :class:`artperl.fitting.options.EstimatorOptions`.
 
     Returns
     -------

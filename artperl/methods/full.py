@@ -1,9 +1,6 @@
-"""From a cloud to the 9D pose of every part, in one call (ArtPERL, section 4).
+"""The method "full", from a cloud to the 9D pose of every part (ArtPERL, section 4, extended).
 
-Perception says which part each point belongs to and where it lies in the object's rest frame;
-:mod:`artperl.fitting.search` finds the reference and the pose that explain it; :mod:`artperl.fitting.occluded_parts`
-turns what hardly shows to where it would not, :mod:`artperl.fitting.normal_alignment` the rest as its flat surfaces
-face; last, a network moves the faces of its boxes to where the cloud, seen from there, says that they are.
+In the order of the paper: perception and retrieval (4.2), the fit on Theta (4.1, 4.3, 4.4), boxes.
 """
 
 from __future__ import annotations
@@ -19,21 +16,25 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.agent.policy import Agent
-from artperl.boxes.evidence import Evidence, roughness
+from artperl.boxes.evidence import Evidence, evidence_of_estimate, roughness
 from artperl.boxes.network import Boxes
+from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
-from artperl.core.estimate import Calibration, Estimate, brought_to_rest, labels_by_boxes, slid, visibility, widen
-from artperl.core.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
-from artperl.core.shapes import Shapes
+from artperl.core.estimate import Calibration, Estimate, estimate_of_fit, slid
+from artperl.core.labels import labels_by_boxes
+from artperl.core.pose import reach
+from artperl.fitting.hypotheses import Context, References
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.occluded_parts import pose_occluded_parts
-from artperl.fitting.search import Clock, EstimatorOptions, Found, find
+from artperl.fitting.options import EstimatorOptions
+from artperl.fitting.search import Fit, find_fit
 from artperl.perception.cloud_checks import cloud_warnings
-from artperl.perception.label_smoothing import coherent
+from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.perception.part_grouping import grouped
 from artperl.perception.preprocess import as_cloud, clean, draw
 from artperl.retrieval.part_names import part_names
+from artperl.retrieval.references import references
 from artperl.retrieval.shape_base import ShapeBase
 
 Array = NDArray[np.float64]
@@ -47,44 +48,34 @@ _OUTSIDE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """What is kept of perception once a cloud is fitted.
+class Cloud:
+    """One cloud as it is given, and as perception sees it.
 
     Attributes
     ----------
-    log_odds : (N, P) float
-        Of each point to be of each part; NaN for outliers.
-    box_center, box_size : (P, 3) float
-        In the rest frame, metres.
-    chosen : (M,) int64
-        Points by which faces of boxes are looked for.
-    roughness : () float
-        Of these, metres.
-    lower : (K,) float
-        Least states of the joints, radians or metres.
+    points : (N, 3) float
+        Camera frame, metres.
+    good : (G,) int64
+        Those that show the object.
+    few : (F,) int64
+        Of these, as many as late stages look at.
+    tensor : (1, M, 3) float
+        Of these, those that perception sees, on its device.
     """
 
-    log_odds: Array
-    box_center: Tensor
-    box_size: Tensor
-    chosen: NDArray[np.int64]
-    roughness: Tensor
-    lower: Array
+    points: Array
+    good: NDArray[np.int64]
+    few: NDArray[np.int64]
+    tensor: Tensor
 
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Torch works on one thread.
-
-    An estimate is thousands of small operations. A second thread hardly helps with them, and where another process has
-    its core, all wait for it: four times as long.
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
+    @staticmethod
+    def of(points: ArrayLike, count: int, device: torch.device) -> Cloud:
+        """A cloud without what no sensor measures and without outliers."""
+        every = as_cloud(points)
+        good = clean(every)
+        seen = every[good[draw(len(good), count, np.random.default_rng(0))]].astype(np.float32)
+        few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
+        return Cloud(every, good, few, torch.from_numpy(seen)[None].to(device))
 
 
 @dataclass(eq=False)
@@ -102,7 +93,7 @@ class Estimator:
     options : EstimatorOptions, optional
     calibration : Calibration, optional
     boxes : Boxes, optional
-        Without one, boxes are the reference's, widened to hold the points.
+        Without one, boxes are the reference's, enlarged to hold the points.
     """
 
     perception: Perception
@@ -118,8 +109,6 @@ class Estimator:
         if self.boxes is not None:
             self.boxes.to(self.perception.device)
 
-    @torch.inference_mode()
-    @_one_thread()
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.
 
@@ -134,154 +123,144 @@ class Estimator:
         ArtsimError
             When there is no object to be seen in the cloud.
         """
-        clock = Clock()
-        estimate, seen = self._fit(points, clock)
-        if self.boxes is None:
-            return estimate
-        cloud, T, part = as_cloud(points), estimate.T_camera_part, estimate.part
-        with clock("boxes"):
-            for _ in range(_LOOKS):
-                evidence, unit = _evidence(cloud, replace(estimate, part=part), seen, self.boxes.num_rows)
-                boxes = self.boxes(evidence.to(self.perception.device))
-                center, size, farther = (_numpy(values.cpu() * unit)[: len(estimate.size)] for values in boxes)
-                part = labels_by_boxes(cloud, T, center, size, seen.log_odds, _OUTSIDE * unit)
-        posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
-        farther = np.maximum(farther, np.minimum(seen.lower - estimate.state, 0.0))
-        return slid(replace(estimate, translation=posed, size=size, part=part), farther)
+        with _one_thread(), torch.inference_mode():
+            clock = Clock()
+            estimate, evidence = self._posed(points, clock)
+            return self._with_boxes(estimate, evidence, clock)
 
-    @torch.inference_mode()
-    @_one_thread()
-    def examined(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
+    def evidence(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
-        estimate, seen = self._fit(points, Clock())
-        return estimate, *_evidence(points, estimate, seen, self.perception.num_rows)
+        with _one_thread(), torch.inference_mode():
+            estimate, known = self._posed(points, Clock())
+            return estimate, *known.evidence(estimate, self.perception.num_rows)
+
+    def _posed(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Known]:
+        """The estimate with the boxes of the reference, and what is known for better ones."""
+        with clock("clean"):
+            cloud = Cloud.of(points, self.options.num_points, self.perception.device)
+            warnings = cloud_warnings(cloud.points, cloud.good)
+        clouds = Clouds.of(cloud.tensor)
+        perceived = self.perceive(clouds, clock)
+        with clock("retrieval"):
+            row, shapes = references(self.base, perceived, min(self.options.references, len(self.base)))
+            priors = {int(n): self.base.axis_prior(int(n)) for n in row}
+        context = Context(
+            cloud.tensor, clouds, perceived, References(shapes, row), priors, self.agent, self.options
+        )  # fmt: skip
+        fit = find_fit(context, clock).to("cpu")
+        with clock("labels"):
+            near = cKDTree(fit.observed.points[0].numpy()).query(cloud.points[cloud.good], workers=1)[1]
+            part = np.full(len(cloud.points), -1)
+            part[cloud.good] = fit.observed.part[0].numpy()[near]
+        few = cloud.points[cloud.few], part[cloud.few]
+        if self.options.uncovered:
+            with clock("occluded parts"):
+                fit = fit.ending(pose_occluded_parts(fit.shapes, fit.theta, *few))
+        if self.options.squared:
+            with clock("normals"):
+                fit = fit.ending(align_normals(fit.shapes, fit.theta, *few))
+        with clock("report"):
+            log_odds = np.full((len(part), self.perception.num_rows), np.nan)
+            log_odds[cloud.good] = perceived.part_logits.log_softmax(-1)[0].double().cpu().numpy()[near]
+            estimate = estimate_of_fit(fit.shapes, fit.observed, fit.path, cloud.points, part)
+            estimate = self._reported(replace(estimate, warnings=warnings, milliseconds=clock.milliseconds), fit)
+            return estimate, _Known.of(cloud, log_odds, perceived, clouds, fit)
 
     def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
         """What is perceived of one cloud."""
         with clock("perception"):
             seen = self.perception(clouds.points)
         if self.options.coherent:
-            with clock("coherence"):
-                seen = _held_together(clouds, seen)
+            with clock("label smoothing"):
+                seen = smooth_perceived(clouds, seen)
         if not isinstance(seen, Votes):
             return seen
-        with clock("grouping"):
+        with clock("part grouping"):
             return grouped(seen)
 
-    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, _Seen]:
-        """The estimate whose boxes are the reference's, and what it goes by."""
-        options = self.options
-        points = as_cloud(points)
-        with clock("clean"):
-            good = clean(points)
-            warnings = cloud_warnings(points, good)
-            chosen = draw(len(good), options.num_points, np.random.default_rng(0))
-            cloud = torch.from_numpy(points[good[chosen]].astype(np.float32))[None].to(self.perception.device)
-            clouds = Clouds.of(cloud)
-        perceived = self.perceive(clouds, clock)
-        found = find(cloud, clouds, perceived, self.base, self.agent, options, clock).to("cpu")
-        with clock("report"):
-            index = cKDTree(found.observed.points[0].numpy()).query(points[good], workers=1)[1]
-            part = np.full(len(points), -1)
-            part[good] = found.observed.part[0].numpy()[index]
-            few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
-        if options.uncovered:
-            with clock("uncover"):
-                found = found.ending(pose_occluded_parts(found.shapes, found.refined.theta, points[few], part[few]))
-        if options.squared:
-            with clock("square"):
-                found = found.ending(align_normals(found.shapes, found.refined.theta, points[few], part[few]))
-        with clock("report"):
-            log_odds = np.full((len(points), self.perception.num_rows), np.nan)
-            log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]
-            trees, metres = found.shapes.trees, (perceived.log_diagonal.exp() * clouds.radius).cpu()
-            seen = _Seen(
-                log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres, few,
-                roughness(torch.from_numpy(points[few].astype(np.float32))),
-                _numpy(trees.lower * reach(trees, found.refined.theta.log_scale))[: int(trees.valid[0].sum())],
-            )  # fmt: skip
-            return replace(self._report(points, part, found, clock), warnings=warnings), seen
-
-    def _report(self, points: Array, part: NDArray[np.int64], found: Found, clock: Clock) -> Estimate:
-        """Everything about one fitted reference and labelled points, as arrays."""
-        shapes, observed, theta = found.shapes, found.observed, found.refined.theta
-        trees, reference = shapes.trees, found.reference
-        K = int(trees.valid[0].sum())
-        posed = pose_parts(trees, theta, shapes.box_center)
-        axis, origin = joint_axes(trees, posed)
-        poses = [_transforms(shapes, step)[:K] for step in found.path]
-        shows = visibility(shapes, observed, posed)[:K]
-        limits = torch.stack([trees.lower, trees.upper], dim=-1)
-        limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
-        rotation, center = _numpy(posed.rotation)[:K], _numpy(posed.center)[:K]
-        translation, size = widen(rotation, center, _numpy(shapes.box_size * posed.scale)[:K], points, part)
-        return Estimate(
-            rotation=rotation,
-            translation=translation,
-            size=size,
-            T_camera_part=poses[-1],
-            state=_numpy(joint_states(trees, theta))[:K],
-            joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),
-            joint_parent=np.where(np.arange(K) == 0, -1, trees.parent[0, :K].numpy()),
-            joint_axis=_numpy(axis)[:K],
-            joint_origin=_numpy(origin)[:K],
-            part=part,
-            reference=f"{self.base.categories[reference]}:{self.base.object_ids[reference]}",
-            residual=found.residual,
-            disagreement=found.disagreement,
-            visibility=shows,
-            confidence=self.calibration(found.residual, found.disagreement, shows.min()),
-            trajectory=np.stack(poses),
-            milliseconds=clock.milliseconds,
-            part_names=part_names(self.base, reference, shapes),
-            joint_limits=_numpy(limits)[:K],
+    def _reported(self, estimate: Estimate, fit: Fit) -> Estimate:
+        """The estimate with what the fit and the base say of it."""
+        return replace(
+            estimate,
+            reference=f"{self.base.categories[fit.row]}:{self.base.object_ids[fit.row]}",
+            residual=fit.residual,
+            disagreement=fit.disagreement,
+            confidence=self.calibration(fit.residual, fit.disagreement, estimate.visibility.min()),
+            part_names=part_names(self.base, fit.row, fit.shapes),
         )
 
-
-def _held_together(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes:
-    """What is perceived of one cloud, its labels, or votes, :func:`artperl.perception.label_smoothing.coherent`."""
-    points, diagonal = _numpy(clouds.points.cpu()), float(seen.log_diagonal.exp()[0])
-
-    def together(values: Tensor) -> Tensor:
-        return torch.from_numpy(coherent(points, _numpy(values.cpu()), diagonal))[None]
-
-    if not isinstance(seen, Votes):
-        logits = together(seen.part_logits.softmax(-1)).clamp(min=1e-6).log()
-        return replace(seen, part_logits=logits.to(seen.part_logits))
-    level = seen.level_logits.softmax(-1)
-    moves = 1.0 - level[..., :1]
-    said = torch.cat([seen.box, seen.joint], dim=-1)
-    every = together(torch.cat([level, moves * said, level[..., :1] * said], dim=-1)).to(said)
-    level, moving, still = every.split([level.shape[2], said.shape[2], said.shape[2]], dim=2)
-    # What moves and what does not are no mean of each other, where a walk goes from one to the other.
-    root = level.argmax(-1, keepdim=True) == 0
-    said = torch.where(root, still / level[..., :1], moving / level[..., 1:].sum(-1, keepdim=True))
-    return replace(seen, level_logits=level.clamp(min=1e-6).log(), box=said[..., :6], joint=said[..., 6:])
+    def _with_boxes(self, estimate: Estimate, known: _Known, clock: Clock) -> Estimate:
+        """The estimate with faces of boxes where the network says that they are, and points labelled by these boxes."""
+        if self.boxes is None:
+            return estimate
+        T, part = estimate.T_camera_part, estimate.part
+        with clock("boxes"):
+            for _ in range(_LOOKS):
+                evidence, unit = known.evidence(replace(estimate, part=part), self.boxes.num_rows)
+                boxes = self.boxes(evidence.to(self.perception.device))
+                center, size, farther = (
+                    (values.cpu() * unit)[0].double().numpy()[: len(estimate.size)] for values in boxes
+                )
+                part = labels_by_boxes(known.points, T, center, size, known.log_odds, _OUTSIDE * unit)
+        posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
+        farther = np.maximum(farther, np.minimum(known.lower - estimate.state, 0.0))
+        return slid(replace(estimate, translation=posed, size=size, part=part), farther)
 
 
-def _evidence(points: ArrayLike, estimate: Estimate, seen: _Seen, rows: int) -> tuple[Evidence, float]:
-    """Evidence of one estimate, padded to that many parts, and its unit in metres."""
-    T, K = estimate.T_camera_part, len(estimate.size)
-    slides = np.array(estimate.joint_type)[:, None] == "prismatic"
-    arrays = (
-        np.asarray(points)[seen.chosen], T, np.where(slides, estimate.joint_axis, 0.0),
-        brought_to_rest(estimate.translation, T), estimate.size,
-    )  # fmt: skip
-    cloud, poses, axis, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
-    part = torch.from_numpy(estimate.part[seen.chosen])
-    evidence, unit = Evidence.of(
-        cloud, part, poses, axis, center, size, seen.box_center[:K], seen.box_size[:K], seen.roughness
-    )  # fmt: skip
-    return evidence.padded(rows), float(unit)
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What is kept of perception once a cloud is fitted.
+
+    Attributes
+    ----------
+    points : (N, 3) float
+        Camera frame, metres.
+    log_odds : (N, P) float
+        Of each point to be of each part; NaN for outliers.
+    box_center, box_size : (P, 3) float
+        As perceived, in the rest frame, metres.
+    chosen : (M,) int64
+        Points by which faces of boxes are looked for.
+    roughness : () float
+        Of these, metres.
+    lower : (K,) float
+        Least states of the joints, radians or metres.
+    """
+
+    points: Array
+    log_odds: Array
+    box_center: Tensor
+    box_size: Tensor
+    chosen: NDArray[np.int64]
+    roughness: Tensor
+    lower: Array
+
+    @staticmethod
+    def of(cloud: Cloud, log_odds: Array, perceived: Perceived, clouds: Clouds, fit: Fit) -> _Known:
+        """All of one cloud."""
+        trees, metres = fit.shapes.trees, (perceived.log_diagonal.exp() * clouds.radius).cpu()
+        lower = (trees.lower * reach(trees, fit.theta.log_scale))[0].double().numpy()[: int(trees.valid[0].sum())]
+        return _Known(
+            cloud.points, log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres,
+            cloud.few, roughness(torch.from_numpy(cloud.points[cloud.few].astype(np.float32))), lower,
+        )  # fmt: skip
+
+    def evidence(self, estimate: Estimate, rows: int) -> tuple[Evidence, float]:
+        """Evidence for boxes, padded to that many rows, and its unit in metres."""
+        few = self.points[self.chosen], estimate.part[self.chosen]
+        return evidence_of_estimate(estimate, *few, self.box_center, self.box_size, self.roughness, rows)
 
 
-def _transforms(shapes: Shapes, theta: Theta) -> Array:
-    posed = pose_parts(shapes.trees, theta, shapes.box_center)
-    transforms = np.tile(np.eye(4), (posed.rotation.shape[1], 1, 1))
-    transforms[:, :3, :3], transforms[:, :3, 3] = _numpy(posed.rotation), _numpy(posed.translation)
-    return transforms
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Torch works on one thread.
 
-
-def _numpy(values: Tensor) -> Array:
-    """The first row, in double precision."""
-    return values[0].double().numpy()
+    An estimate is thousands of small operations. A second thread hardly helps with them, and where another process has
+    its core, all wait for it: four times as long.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)

@@ -8,12 +8,18 @@ surface easily and steps hardly ever, end somewhere near it; the point is of the
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
+from torch import Tensor
 
+from artperl.core.clouds import Clouds
 from artperl.core.neighbours import planes
+from artperl.perception.network import Perceived, Votes
 
 Array = NDArray[np.float64]
 
@@ -27,7 +33,7 @@ _STAY = 0.03
 _STEPS = 100
 
 
-def coherent(points: Array, values: Array, diagonal: float) -> Array:
+def smooth_labels(points: Array, values: Array, diagonal: float) -> Array:
     """(N, P) probabilities of parts, or what else is said of each point: the mean over where walks from it end.
 
     Parameters
@@ -53,3 +59,29 @@ def coherent(points: Array, values: Array, diagonal: float) -> Array:
     for _ in range(_STEPS):
         values = stay + onward @ values
     return values
+
+
+def smooth_perceived(clouds: Clouds, seen: Perceived | Votes) -> Perceived | Votes:
+    """What is perceived of one cloud, its labels, or votes, smoothed by :func:`smooth_labels`."""
+    points, diagonal = _double(clouds.points), float(seen.log_diagonal.exp()[0])
+
+    def together(values: Tensor) -> Tensor:
+        return torch.from_numpy(smooth_labels(points, _double(values), diagonal))[None]
+
+    if not isinstance(seen, Votes):
+        logits = together(seen.part_logits.softmax(-1)).clamp(min=1e-6).log()
+        return replace(seen, part_logits=logits.to(seen.part_logits))
+    level = seen.level_logits.softmax(-1)
+    moves = 1.0 - level[..., :1]
+    said = torch.cat([seen.box, seen.joint], dim=-1)
+    every = together(torch.cat([level, moves * said, level[..., :1] * said], dim=-1)).to(said)
+    level, moving, still = every.split([level.shape[2], said.shape[2], said.shape[2]], dim=2)
+    # What moves and what does not are no mean of each other, where a walk goes from one to the other.
+    root = level.argmax(-1, keepdim=True) == 0
+    said = torch.where(root, still / level[..., :1], moving / level[..., 1:].sum(-1, keepdim=True))
+    return replace(seen, level_logits=level.clamp(min=1e-6).log(), box=said[..., :6], joint=said[..., 6:])
+
+
+def _double(values: Tensor) -> Array:
+    """The first row, in double precision."""
+    return values[0].double().cpu().numpy()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import log_softmax
 from torch import Tensor
 
+from artperl.core.labels import label_log_odds
 from artperl.core.part_order import visible_order
 from artperl.perception.network import Perceived, Perception, Votes
 
@@ -94,7 +95,7 @@ def _grouped(place: Array, box: Array, joint: Array, level_log_odds: Array) -> d
     number, K = np.argsort(order), len(order)
     log_odds = np.full((len(box), rows), -np.inf)
     for n, k in enumerate(order):
-        fit = level_log_odds[:, depth[k]] - (differences(box, boxes[k]) ** 2 if k else 0.0)
+        fit = label_log_odds(level_log_odds[:, depth[k]], differences(box, boxes[k]) if k else 0.0)
         log_odds[:, n] = np.logaddexp(fit, np.log(_DOUBT / K))
 
     def padded(values: NDArray[Any]) -> NDArray[Any]:

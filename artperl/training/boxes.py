@@ -122,7 +122,7 @@ def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, pr
 
 def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
     """The record of one sample, in half precision as it is kept; none if the estimate does not fit."""
-    estimate, evidence, unit = estimator.examined(sample.points)
+    estimate, evidence, unit = estimator.evidence(sample.points)
     K = len(sample.box_size)
     if estimate.residual > _FITS or len(estimate.size) != K:
         return []

@@ -51,7 +51,7 @@ from artperl.evaluation.scoring import (
     summary,
     table,
 )
-from artperl.fitting.search import EstimatorOptions
+from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes

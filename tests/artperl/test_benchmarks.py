@@ -21,7 +21,7 @@ from artperl.evaluation.artimage import SPLIT, as_known, real_objects, reduced, 
 from artperl.evaluation.basin import ANGLES, _apart, basin_problem, run_basin, turned
 from artperl.evaluation.benchmark_rows import PUBLISHED, against_published, run_rows
 from artperl.evaluation.scoring import TEST_SEEDS, frozen_samples, metrics, true_poses
-from artperl.fitting.search import EstimatorOptions
+from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artsim.errors import AssetError, ConfigError

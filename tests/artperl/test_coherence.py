@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artperl.evaluation.artimage import real_objects
-from artperl.perception.label_smoothing import coherent
+from artperl.perception.label_smoothing import smooth_labels
 from artsim.model.kinematics import Array
 from tests.artperl.worlds import made, view
 
@@ -34,7 +34,7 @@ def test_a_wrong_border_moves_towards_a_step() -> None:
     points[points[:, 0] > 0.1, 2] = 0.03
     part = (points[:, 0] > 0.1).astype(int)
     guess = 0.5 + 0.4 * np.clip((points[:, 0] - 0.16) / 0.1, -1, 1)  # the border at .16
-    label = coherent(points, np.stack([1 - guess, guess], 1), 1.0).argmax(1)
+    label = smooth_labels(points, np.stack([1 - guess, guess], 1), 1.0).argmax(1)
     before = ((guess > 0.5) != part).mean()
     assert (label != part).mean() < 0.8 * before
 
@@ -42,7 +42,7 @@ def test_a_wrong_border_moves_towards_a_step() -> None:
 def test_without_a_step_a_border_stays_where_it_was() -> None:
     points = plane(3000, 0.0, 1)
     guess = (points[:, 0] > 0.16).astype(float)
-    label = coherent(points, np.stack([1 - guess, guess], 1), 1.0).argmax(1)
+    label = smooth_labels(points, np.stack([1 - guess, guess], 1), 1.0).argmax(1)
     assert (label != guess).mean() < 0.02
 
 
@@ -50,7 +50,7 @@ def test_without_a_step_a_border_stays_where_it_was() -> None:
 def test_labels_drawn_at_random_give_way_to_those_around(category: str, seed: int) -> None:
     sample = made(category, seed)
     guess = guessed(sample.part, len(sample.joint_type), 0.3, seed)
-    label = coherent(sample.points.astype(float), guess, sample.diagonal).argmax(1)
+    label = smooth_labels(sample.points.astype(float), guess, sample.diagonal).argmax(1)
     assert (label != sample.part).mean() < 0.2 * (guess.argmax(1) != sample.part).mean()
 
 
@@ -58,7 +58,7 @@ def test_so_they_do_on_real_objects(partnet_dir: Path) -> None:
     for obj in real_objects("laptop", "train", partnet_dir)[:2]:
         sample = view(obj, 0)
         guess = guessed(sample.part, 2, 0.3, 0)
-        label = coherent(sample.points.astype(float), guess, sample.diagonal).argmax(1)
+        label = smooth_labels(sample.points.astype(float), guess, sample.diagonal).argmax(1)
         assert (label != sample.part).mean() < 0.2 * (guess.argmax(1) != sample.part).mean()
 
 
@@ -67,20 +67,20 @@ def test_they_are_probabilities_whatever_the_pose_size_and_order(scale: float, s
     rng = np.random.default_rng(seed)
     sample = made("laptop", seed)
     points, guess = sample.points.astype(float), guessed(sample.part, 2, 0.3, seed)
-    out = coherent(points, guess, sample.diagonal)
+    out = smooth_labels(points, guess, sample.diagonal)
     assert (out >= 0).all()
     np.testing.assert_allclose(out.sum(1), 1.0, atol=1e-9)
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     order = rng.permutation(len(points))
     moved = scale * points[order] @ turn.T + rng.standard_normal(3)
-    again = coherent(moved, guess[order], scale * sample.diagonal)
+    again = smooth_labels(moved, guess[order], scale * sample.diagonal)
     assert (again.argmax(1) == out[order].argmax(1)).mean() > 0.999  # neighbours at equal distance may change places
     same = np.tile([0.3, 0.7], (len(points), 1))
-    np.testing.assert_allclose(coherent(points, same, sample.diagonal), same, atol=1e-9)
+    np.testing.assert_allclose(smooth_labels(points, same, sample.diagonal), same, atol=1e-9)
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_a_few_points_are_enough(count: int) -> None:
     points = np.random.default_rng(0).standard_normal((count, 3))
-    out = coherent(points, np.full((count, 2), 0.5), 1.0)
+    out = smooth_labels(points, np.full((count, 2), 0.5), 1.0)
     np.testing.assert_allclose(out, 0.5)

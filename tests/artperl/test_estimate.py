@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from artperl.core.estimate import Estimate, brought_to_rest, labels_by_boxes, slid, widen
+from artperl.core.estimate import Estimate, brought_to_rest, slid, widen
+from artperl.core.labels import labels_by_boxes
 from artperl.evaluation.scoring import frozen_samples, true_poses
 
 

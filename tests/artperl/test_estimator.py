@@ -22,10 +22,13 @@ from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
 from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.scoring import TEST_SEEDS, frozen_samples, metrics, score, true_poses
-from artperl.fitting.search import EstimatorOptions, astray, evened, turned_round
+from artperl.fitting.hypotheses import Context, References, chain_states, half_turn_about_vertical, part_weights
+from artperl.fitting.options import EstimatorOptions
+from artperl.fitting.search import outside
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception, Votes
 from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.references import references
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.model.camera import look_at_transform
@@ -105,10 +108,10 @@ def test_what_does_not_fit_is_looked_for_again(base: ShapeBase, sample: Sample) 
     options = EstimatorOptions(references=2, agent_steps=3, retry_residual=0.0)
     oracle = Oracle(sample, 2)
     once = Estimator(oracle, base, Agent(16), replace(options, retry_residual=np.inf))(sample.points)
-    assert "agent" not in once.milliseconds
+    assert "views around" not in once.milliseconds
     assert once.trajectory.shape == (2, 2, 4, 4)
     again = Estimator(oracle, base, Agent(16), options)(sample.points)
-    assert again.milliseconds["agent"] > 0.0
+    assert again.milliseconds["views around"] > 0.0
     # An agent that knows nothing does no harm: where it leads competes with the other starts.
     assert again.residual <= once.residual
     rotation, _ = true_poses(sample)
@@ -116,19 +119,22 @@ def test_what_does_not_fit_is_looked_for_again(base: ShapeBase, sample: Sample) 
 
 
 def test_only_chains_of_joints_are_searched_for_down_the_tree(estimator: Estimator, sample: Sample) -> None:
-    assert "beam" not in estimator(sample.points).milliseconds
     (seen,) = frozen_samples(["robot_arm"], 1, 1, parts="any", max_parts=10)
     arm = ShapeBase.of(objects_of(["robot_arm"], 1, TEST_SEEDS, "any", 10), 64)
-    knows = Oracle(seen, len(seen.joint_type))
-    with_beam = Estimator(knows, by_boxes(arm))
-    without = Estimator(knows, with_beam.base, options=EstimatorOptions(beam=0))
-    assert with_beam(seen.points).milliseconds["beam"] > 0.0
-    assert "beam" not in without(seen.points).milliseconds
+    for shown, base in ((sample, estimator.base), (seen, by_boxes(arm))):
+        oracle, cloud = Oracle(shown, len(shown.joint_type)), torch.from_numpy(shown.points)[None]
+        clouds = Clouds.of(cloud)
+        perceived = oracle(clouds.points)
+        row, shapes = references(base, perceived, 1)
+        context = Context(cloud, clouds, perceived, References(shapes, row), {}, None, EstimatorOptions())
+        proposed = chain_states(context, None)
+        assert (proposed is not None) == (shown is seen)
+        assert chain_states(replace(context, options=EstimatorOptions(beam=0)), None) is None
 
 
 def test_parts_count_by_the_root_of_their_points_but_no_point_for_more_than_eight() -> None:
     part = torch.tensor([[0] * 1600 + [1] * 400 + [2], [0] * 500 + [2] * 1501])
-    weight = evened(part)
+    weight = part_weights(part)
     assert [weight[0, part[0] == k].sum().item() for k in range(3)] == [1600.0, 800.0, 8.0]
     total = [weight[1, part[1] == k].sum().item() for k in (0, 2)]
     assert total[0] / total[1] == pytest.approx((500 / 1501) ** 0.5)
@@ -189,9 +195,9 @@ def test_what_is_seen_from_elsewhere_is_told(azimuth: float, elevation: float, m
     arc = max(abs((azimuth - middle + 180.0) % 360.0 - 180.0) - half, 0.0) * np.cos(up)
     assume(abs(arc - 15.0) > 1e-6 and abs(elevation + 25.0) > 1e-6)
     below = elevation < -25.0
-    assert bool(astray(theta, (middle - half, middle + half))) == (arc > 15.0 or below)
-    assert not astray(theta, None)
-    round_there = astray(turned_round(theta), (azimuth - 10.0, azimuth + 10.0))
+    assert bool(outside(theta, (middle - half, middle + half))) == (arc > 15.0 or below)
+    assert not outside(theta, None)
+    round_there = outside(half_turn_about_vertical(theta), (azimuth - 10.0, azimuth + 10.0))
     assert bool(round_there) == (170.0 * np.cos(up) > 15.0 or below)
 
 

@@ -13,10 +13,10 @@ import torch
 import artsim
 from artperl.core.shapes import Shapes
 from artperl.data.categories import objects_of
-from artperl.fitting.search import references
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import Grouped
 from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.references import references
 from artperl.retrieval.shape_base import ShapeBase, moves, widened
 from artsim.errors import ConfigError, DatasetError
 from tests.artperl.worlds import small_base

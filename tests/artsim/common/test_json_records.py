@@ -9,7 +9,7 @@ from artsim.common.json_records import from_json_values
 
 
 def test_a_value_of_another_type_is_named() -> None:
-    from artperl.fitting.search import EstimatorOptions
+    from artperl.fitting.options import EstimatorOptions
 
     assert from_json_values(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
     assert from_json_values(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf

@@ -1,0 +1,243 @@
+"""Hypotheses of where an object is: each generator proposes some, all are scored and fitted alike.
+
+A generator takes what is known of one cloud (:class:`Context`) and the best fit so far, if there is one. It returns
+hypotheses, or None where it has nothing to add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from artperl.agent.actions import expected_action
+from artperl.agent.decision_process import Fitting, FittingOptions
+from artperl.agent.policy import Agent
+from artperl.core.batch import Batch, concatenate
+from artperl.core.clouds import Clouds
+from artperl.core.pose import AxisPrior, Theta
+from artperl.core.shapes import Observed, Shapes
+from artperl.fitting import beam_search, initial_pose
+from artperl.fitting.options import EstimatorOptions
+from artperl.perception.network import Perceived
+
+_CHAIN = 3
+"""Joints one after another from which parts below have to tell how those above have turned."""
+_BEAM_HYPOTHESES = 8
+"""Ends of the beam search that are refined."""
+_HINGE_STATES = 8
+"""States of a joint by which a root that hardly shows is placed."""
+_MOST_WEIGHT = 8.0
+"""Weight of a point of a hardly visible part against one of the part with most points."""
+
+
+@dataclass(frozen=True, eq=False)
+class References(Batch):
+    """Objects of the base that may explain a cloud.
+
+    Attributes
+    ----------
+    shapes : Shapes
+        R rows.
+    row : (R,) int64
+        Of the base.
+    """
+
+    shapes: Shapes
+    row: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What is known of one cloud.
+
+    Attributes
+    ----------
+    cloud : (1, N, 3) float
+        Camera frame, metres, in random order.
+    clouds : Clouds
+        The same at a common place and size.
+    perceived : Perceived
+    references : References
+        As the base has them, the nearest first.
+    axis_priors : dict
+        By row of the base, how the axes of such objects lean; None where they do not.
+    agent : Agent, optional
+    options : EstimatorOptions
+    """
+
+    cloud: Tensor
+    clouds: Clouds
+    perceived: Perceived
+    references: References
+    axis_priors: dict[int, AxisPrior | None]
+    agent: Agent | None
+    options: EstimatorOptions
+
+    @cached_property
+    def adapted(self) -> tuple[Shapes, Theta]:
+        """The references with the perceived boxes, and the states that bring them nearest to the points."""
+        shapes = self.references.shapes
+        return initial_pose.start(self.clouds, self.perceived, shapes, len(shapes))
+
+    @cached_property
+    def observed(self) -> Observed:
+        """The points that references are fitted to, labelled by perception."""
+        part = self.perceived.part[:, : self.options.fit_points]
+        return Observed.of(self.cloud[:, : self.options.fit_points], part, part_weights(part))
+
+
+@dataclass(frozen=True, eq=False)
+class Hypotheses:
+    """H references, each in a state.
+
+    Attributes
+    ----------
+    shapes : Shapes
+        H rows.
+    theta : Theta
+        H rows.
+    row : list of int, length H
+        Of the base.
+    path : list of list of Theta, length H
+        States that led to each, one row each, from the first on.
+    """
+
+    shapes: Shapes
+    theta: Theta
+    row: list[int]
+    path: list[list[Theta]]
+
+    @staticmethod
+    def of(shapes: Shapes, theta: Theta, row: list[int]) -> Hypotheses:
+        """Hypotheses that no other state led to."""
+        return Hypotheses(shapes, theta, row, [[theta[i : i + 1]] for i in range(len(theta))])
+
+    @staticmethod
+    def joined(several: Sequence[Hypotheses]) -> Hypotheses:
+        """All of several sets, in their order."""
+        return Hypotheses(
+            concatenate([h.shapes for h in several]), concatenate([h.theta for h in several]),
+            [row for h in several for row in h.row], [path for h in several for path in h.path],
+        )  # fmt: skip
+
+
+class Best(Protocol):
+    """The best fit so far, of one row: :class:`artperl.fitting.search.Fit`."""
+
+    @property
+    def shapes(self) -> Shapes: ...
+
+    @property
+    def theta(self) -> Theta: ...
+
+    @property
+    def path(self) -> list[Theta]: ...
+
+    @property
+    def row(self) -> int: ...
+
+
+class Generator(Protocol):
+    """Proposes hypotheses for a cloud, given the best fit so far."""
+
+    __name__: str
+
+    def __call__(self, context: Context, best: Best | None) -> Hypotheses | None: ...
+
+
+def perceived_pose(context: Context, best: Best | None) -> Hypotheses | None:
+    """References where perception places the points in the rest frame."""
+    if not context.options.perceived_start:
+        return None
+    shapes, theta = context.adapted
+    return Hypotheses.of(shapes, theta, context.references.row.tolist())
+
+
+def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
+    """The first reference, its hardly visible root where the part with most points lets it be."""
+    shapes, theta = context.adapted[0][:1], context.adapted[1][:1]
+    if not context.options.perceived_start:
+        return None
+    states = initial_pose.by_another_part(context.clouds, context.perceived, shapes, theta, _HINGE_STATES)
+    return None if states is None else _of_first(context, shapes, states)
+
+
+def chain_states(context: Context, best: Best | None) -> Hypotheses | None:
+    """The first reference in the states that a beam search finds, where joints form a chain."""
+    options = context.options
+    shapes, theta = context.adapted[0][:1], context.adapted[1][:1]
+    if not (options.perceived_start and options.beam and int(shapes.trees.depth[0].max()) >= _CHAIN):
+        return None
+    probability = context.perceived.part_probability[..., : shapes.trees.num_rows]
+    states = beam_search.beam(
+        shapes, context.cloud, probability, theta, _BEAM_HYPOTHESES, options.beam, options.refine
+    )  # fmt: skip
+    return _of_first(context, shapes, states)
+
+
+def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
+    """The best fit with a shoulder or a wrist bent the other way."""
+    if best is None or not context.options.beam:
+        return None
+    states = beam_search.half_turned(best.shapes, best.theta)
+    return None if states is None else Hypotheses.of(best.shapes.repeat(len(states)), states, [best.row] * len(states))
+
+
+def views_around(context: Context, best: Best | None) -> Hypotheses | None:
+    """The reference as seen from several sides, as it was found but turned round, and where the agent leads it."""
+    options = context.options
+    if best is None:
+        first, row = context.adapted[0][:1], int(context.references.row[0])
+    else:
+        first, row = best.shapes, best.row
+    shapes = first.repeat(len(options.azimuths))
+    middle = np.mean(options.seen_from or (0.0, 0.0))
+    theta = initial_pose.facing(
+        shapes, context.clouds.center, middle + np.array(options.azimuths), options.elevation
+    )  # fmt: skip
+    if best is not None:
+        shapes = concatenate([shapes, first.repeat(2)])
+        theta = concatenate([theta, best.path[0], half_turn_about_vertical(best.theta)])
+    starts = Hypotheses.of(shapes, theta, [row] * len(shapes))
+    if context.agent is None or not options.agent_steps:
+        return starts
+    few = context.observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
+    steps = [theta, *agent_steps(context.agent, shapes, few, theta, options.agent_steps)]
+    paths = [[step[i : i + 1] for step in steps] for i in range(len(shapes))]
+    return Hypotheses.joined([starts, Hypotheses(shapes, steps[-1], starts.row, paths)])
+
+
+def _of_first(context: Context, shapes: Shapes, states: Theta) -> Hypotheses:
+    """The first reference in several states."""
+    return Hypotheses.of(shapes.repeat(len(states)), states, [int(context.references.row[0])] * len(states))
+
+
+def half_turn_about_vertical(theta: Theta) -> Theta:
+    """Objects that stand where they stood, by half a turn about their verticals."""
+    return replace(theta, rotation=theta.rotation * theta.rotation.new_tensor([-1.0, -1.0, 1.0]))
+
+
+def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
+    """States after each of the agent's actions."""
+    fitting = Fitting(shapes, observed, theta, FittingOptions(steps=steps))
+    path = []
+    while not fitting.done:
+        fitting.step(expected_action(agent(fitting.view())[0]))
+        path.append(fitting.theta)
+    return path
+
+
+def part_weights(part: Tensor) -> Tensor:
+    """(B, N) weights of points of such parts (B, N): a part counts by the root of how many points it has.
+
+    If all points counted alike, a temple that is seen from its end would have no say against the frame.
+    """
+    count = torch.nn.functional.one_hot(part).sum(1)
+    weight = (count.amax(1, keepdim=True) / count.clamp(min=1)).sqrt().clamp(max=_MOST_WEIGHT)
+    return weight.gather(1, part)
