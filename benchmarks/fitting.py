@@ -25,6 +25,7 @@ from artperl.agent.ppo import PPOOptions, collect, update
 from artperl.data.batches import batches
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
+from artperl.data.sources import DataOptions
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
@@ -71,7 +72,7 @@ def main(options: Options) -> None:
     """Measure and print."""
     torch.set_num_threads(options.threads)
     base = by_boxes(ShapeBase.of(objects_of([options.category], 16, BASE_SEEDS), options.points))
-    problems = Problems([options.category], base, options.environments, options.points)
+    problems = Problems(DataOptions([options.category]), base, options.environments, options.points)
     steps = env_steps(problems[0], options)
     print(f"environment: {steps:.0f} steps/s, {options.points} observed x {options.points} reference points")
     perception, perception_shares = learning_to_perceive(base.shapes.trees.num_rows, options)
@@ -112,7 +113,7 @@ def learning_to_perceive(rows: int, options: Options, batch_size: int = 32) -> t
     torch.manual_seed(0)
     network, shares = Perception(rows), Shares()
     optimizer = torch.optim.AdamW(network.parameters())
-    data = batches([options.category], rows, batch_size=batch_size)
+    data = batches(DataOptions([options.category]), rows, batch_size=batch_size)
     next(data)
     done, begun = 0, time.perf_counter()
     while time.perf_counter() - begun < options.seconds:

@@ -38,10 +38,8 @@ class AgentStage:
         if first >= total:
             return
         problems = Problems(
-            options.categories, context.objects.base, options.episodes, options.num_points, options.seed + 1,
-            options.start, options.sample, perception=perception if options.labels == "perceived" else None,
-            parts=options.parts, given=context.objects.given, views_per_object=_VIEWS, references=options.references,
-            dataset=options.dataset,
+            context.objects.data, context.objects.base, options.episodes, options.num_points, options.seed + 1,
+            options.start, perception if options.labels == "perceived" else None, _VIEWS, options.references,
         )  # fmt: skip
         bar = track("agent", total=total, initial=first, smoothing=0.1, shown=context.progress)
         for n in range(first, total):

@@ -8,7 +8,7 @@ from functools import partial
 
 from artperl.boxes.network import Boxes
 from artperl.data.batches import SENSOR
-from artperl.data.sources import Source, samples_from
+from artperl.data.sources import Source
 from artperl.estimator import save_estimator
 from artperl.evaluation.scoring import NUM_POINTS, VALIDATION_SEEDS, evaluate, mean_iou, summary
 from artperl.methods.full import Estimator
@@ -17,9 +17,10 @@ from artperl.training.context import Context
 from artperl.training.report import scalars
 from artperl.training.validation import given_samples, unseen_samples
 from artsim.common.progress import say
-from artsim.datasets.plan import SampleOptions
 from artsim.observing.sample import Sample
 
+_VIEWS = 2
+"""Views in a row of the same object."""
 _NOISY_EVERY = 4
 """Views of which one is seen by a sensor: boxes go by outermost points, which suffer most."""
 
@@ -66,19 +67,13 @@ def _sees_noise(context: Context) -> bool:
 
 def _samples(context: Context) -> Callable[[int], Sample]:
     """Fresh views by number."""
-    options = context.options
-    sample = replace(options.sample, num_points=options.num_points if options.dataset else NUM_POINTS)
-
-    def source(sample: SampleOptions) -> Source:
-        return samples_from(
-            options.dataset, options.categories, sample, options.seed + 2, 2,
-            context.objects.base.shapes.trees.num_rows, options.parts, context.objects.given,
-        )  # fmt: skip
-
-    clean = source(sample)
+    options, objects = context.options, context.objects
+    num_points = options.num_points if options.dataset else NUM_POINTS
+    clean = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS)
     if not _sees_noise(context):
         return clean.__getitem__
-    return partial(_mostly_clean, clean, source(replace(sample, noise=SENSOR)))
+    noisy = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS, SENSOR)
+    return partial(_mostly_clean, clean, noisy)
 
 
 def _mostly_clean(clean: Source, noisy: Source, number: int) -> Sample:

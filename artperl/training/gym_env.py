@@ -22,6 +22,7 @@ from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.core.pose import KINDS
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
+from artperl.data.sources import DataOptions
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
 
@@ -78,7 +79,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
         """Draw a new problem; the same seed draws the same one."""
         super().reset(seed=seed)
         drawn = int(self.np_random.integers(1 << 31))
-        problems = Problems([self.category], self.base, 1, self.options.observed_points, drawn)
+        problems = Problems(DataOptions([self.category]), self.base, 1, self.options.observed_points, drawn)
         self._problem = problem = problems[0]
         self._fitting = Fitting(problem.shapes, problem.observed, problem.start, self.options)
         return self._observation(), self._info()

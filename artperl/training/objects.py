@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from artperl.data.categories import arranged, objects_of
-from artperl.data.sources import Recorded
+from artperl.data.sources import DataOptions
 from artperl.evaluation.artimage import real_train_objects
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
@@ -31,11 +31,14 @@ class TrainingObjects:
         Objects of files, or real ones; training clouds show the same.
     base : ShapeBase
         Of all of them.
+    data : DataOptions
+        What training clouds show.
     """
 
     procedural: list[ArticulatedObject]
     given: list[ArticulatedObject]
     base: ShapeBase
+    data: DataOptions
 
     @classmethod
     def of(cls, options: TrainOptions) -> TrainingObjects:
@@ -51,12 +54,18 @@ class TrainingObjects:
         procedural = objects_of(options.categories, options.base_objects, BASE_SEEDS, options.parts, options.max_parts)
         given = _given_objects(options)
         base = _base_of([*procedural, *given], options)
+        data = DataOptions(
+            options.categories, options.parts, given, options.dataset, options.sample, options.stretched, options.noisy
+        )
         if options.dataset is not None:  # a dataset that does not fit is an error before anything is learnt
             points = options.num_points * (options.denser if options.dense_steps else 1)
-            Recorded(
-                options.dataset, options.categories, options.seed, base.shapes.trees.num_rows, points, options.parts
-            )
-        return cls(procedural, given, base)
+            data.source(base.shapes.trees.num_rows, points, options.seed, 1)
+        return cls(procedural, given, base, data)
+
+    @property
+    def num_rows(self) -> int:
+        """Rows for parts."""
+        return self.base.shapes.trees.num_rows
 
     @property
     def mixed(self) -> bool:

@@ -48,9 +48,8 @@ class PerceptionStage:
         if first >= self.steps:
             return
         data = batches(
-            options.categories, context.objects.base.shapes.trees.num_rows, self.num_points, self.batch_size, first,
-            self.seed, context.workers, options.sample, options.parts, context.objects.given, options.dataset,
-            options.stretched, options.noisy,
+            context.objects.data, context.objects.num_rows, self.num_points, self.batch_size, first, self.seed,
+            context.workers,
         )  # fmt: skip
         bar = track(self.name, total=self.steps, initial=first, smoothing=0.02, shown=context.progress)
         for step in range(first, self.steps):

@@ -65,7 +65,7 @@ class Training:
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         device = _device(options.device)
         torch.manual_seed(options.seed)
-        networks = programme.networks(options, objects.base.shapes.trees.num_rows)
+        networks = programme.networks(options, objects.num_rows)
         parent = None if options.start_from is None else load_estimator(options.start_from, device)
         if parent is not None:
             _start_from(parent, networks, str(options.start_from))

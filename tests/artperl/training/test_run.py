@@ -20,7 +20,7 @@ from artperl.agent.ppo import PPOOptions
 from artperl.boxes.network import Boxes
 from artperl.core.part_order import visible_order
 from artperl.data.batches import batches
-from artperl.data.sources import Given, Recorded
+from artperl.data.sources import DataOptions, Given, Recorded
 from artperl.estimator import load_estimator, read_settings, save_estimator
 from artperl.evaluation.scoring import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.training.context import Report
@@ -231,7 +231,7 @@ def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
     assert sorted(first) == sorted(second) == [sample.index for sample in train]
     assert first != second
     assert len(samples.object(0)) == 2
-    rows, _ = next(batches(["laptop"], 2, 96, 4, workers=0, seed=3, dataset=recorded))
+    rows, _ = next(batches(DataOptions(["laptop"], dataset=recorded), 2, 96, 4, workers=0, seed=3))
     assert rows.points.shape == (4, 96, 3)
     with pytest.raises(DatasetError, match="no scissors"):
         Recorded(recorded, ["scissors"], 0, 2, 96)
