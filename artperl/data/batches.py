@@ -63,7 +63,7 @@ class _Rows(IterableDataset[dict[str, Array]]):
         return (self.noisy if noisy else self.samples)[i]
 
 
-def carry_on(worker: int) -> None:
+def ignore_interrupt(worker: int) -> None:
     """A worker ends with the process that it works for, which hears Ctrl-C, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -97,7 +97,7 @@ def batches(
         sensed = data.source(num_rows, made_points, seed, fresh, SENSOR)
     rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data.stretched, data.noisy)
     loader = DataLoader(
-        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=carry_on
+        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=ignore_interrupt
     )
     window: deque[dict[str, Tensor]] = deque(maxlen=_WINDOW)
     for n, made in enumerate(loader, begin):

@@ -104,7 +104,7 @@ class Problems:
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
         if self.references == "deformed":
             objects = [self.samples.object(i) for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
-            shapes = deformed(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
+            shapes = deform(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
         else:
             query = box_embedding(valid, box_center, box_size)
             nearest, _ = self.base.nearest(query, min(_CHOICES, len(self.base)))
@@ -117,7 +117,7 @@ class Problems:
         part = torch.from_numpy(np.stack([s.part for s in samples]).astype(np.int64))
         observed = Observed.of(points, part if self.perception is None else self._labels(points))
         radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
-        return Problem(shapes, observed, perturbed(shapes, goal, radius, self.start, generator), goal)
+        return Problem(shapes, observed, draw_starts(shapes, goal, radius, self.start, generator), goal)
 
     @torch.inference_mode()
     def _labels(self, points: Tensor) -> Tensor:
@@ -146,7 +146,7 @@ def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
     return torch.arange(rows) < K, rotation, pad(center), pad(sample.box_size), *boxes
 
 
-def deformed(shapes: Shapes, generator: torch.Generator) -> Shapes:
+def deform(shapes: Shapes, generator: torch.Generator) -> Shapes:
     """Other objects with the same trees: stretched as a whole and part by part, their joints somewhere else."""
     B, P = shapes.trees.valid.shape
 
@@ -161,7 +161,9 @@ def deformed(shapes: Shapes, generator: torch.Generator) -> Shapes:
     )
 
 
-def perturbed(shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator) -> Theta:
+def draw_starts(
+    shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator
+) -> Theta:
     """Starts around goals, with the reference's own shape, and joint states anywhere in their limits."""
     B, P = shapes.trees.valid.shape
     plain = Theta(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from artperl.core.part_order import reordered_sample, visible_order
-from artperl.data.categories import Parts, arranged, has_parts
+from artperl.data.categories import Parts, has_parts, order_parts
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.draw import SensorName
 from artsim.datasets.plan import SampleOptions, draw_sample
@@ -73,7 +73,7 @@ class Samples:
     def _find_object(self, n: int) -> ArticulatedObject:
         if self._is_given(n):
             return self.given[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.given)))]
-        return arranged(self.stream.object(self._right(n)), self.parts)
+        return order_parts(self.stream.object(self._right(n)), self.parts)
 
     def _find_right(self, n: int) -> int:
         """Number of the object that stands for object ``n``."""
@@ -164,7 +164,7 @@ class Recorded:
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
-        return arranged(self.dataset.object_of(self[i]), self.parts)
+        return order_parts(self.dataset.object_of(self[i]), self.parts)
 
     def _is_right(self, sample: Sample) -> bool:
         few_enough = len(sample.joint_type) <= self.num_rows

@@ -20,7 +20,7 @@ from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import Batch, concatenate
 from artperl.core.estimate import brought_to_rest
 from artperl.core.tensor_files import read_tensors, write_tensors
-from artperl.data.batches import carry_on
+from artperl.data.batches import ignore_interrupt
 from artperl.evaluation.scoring import true_poses
 from artperl.methods.full import Estimator
 from artperl.training.context import Report
@@ -84,7 +84,7 @@ def record(
     bar = track("boxes", total=views, initial=first, unit="view", smoothing=0.02, shown=progress)
     loader = DataLoader(
         _Examined(estimator, samples), batch_size=None, sampler=range(first, views),
-        num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=carry_on,
+        num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=ignore_interrupt,
     )  # fmt: skip
     for n, made in enumerate(loader, first):
         records += [each.map(torch.clone) for each in made]  # out of the workers' shared memory

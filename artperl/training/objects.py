@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from artperl.data.categories import arranged, objects_of
+from artperl.data.categories import objects_of, order_parts
 from artperl.data.sources import DataOptions
 from artperl.evaluation.artimage import real_train_objects
 from artperl.retrieval.box_embedding import by_boxes
@@ -86,7 +86,7 @@ def _given_objects(options: TrainOptions) -> list[ArticulatedObject]:
     if options.real:
         return real_train_objects(options.categories)
     roots = {name: Path(folder) for name, folder in options.package_roots}
-    objects = [arranged(source.load(), options.parts) for source in find_sources(options.files, roots)]
+    objects = [order_parts(source.load(), options.parts) for source in find_sources(options.files, roots)]
     for obj in objects:
         if options.max_parts is not None and len(obj) > options.max_parts:
             raise ConfigError(

@@ -62,6 +62,8 @@ class Training:
         recipe: Recipe | None = None,
     ):  # fmt: skip
         self.out, self._report = out, report
+        if options.method not in PROGRAMMES:
+            raise ConfigError(f"{options.method} cannot be trained", "method", f"use {', '.join(PROGRAMMES)}")
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         device = _device(options.device)
         torch.manual_seed(options.seed)
