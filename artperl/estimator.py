@@ -70,7 +70,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         "calibration": asdict(estimator.calibration),
         "about": dict(about),
     }
-    write_atomic(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
+    write_atomic(folder / _SETTINGS, (json.dumps(settings) + "\n").encode())
 
 
 def _changes(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:

@@ -243,7 +243,7 @@ def full_disk(monkeypatch: pytest.MonkeyPatch, after: int) -> Iterator[None]:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
-        patched.setattr("artsim.common.files.os.fsync", fsync)
+        patched.setattr(os, "fsync", fsync)
         yield
 
 
