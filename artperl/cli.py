@@ -144,10 +144,7 @@ class Train:
             agent_rollouts=preset.agent_rollouts if rollouts is None else rollouts,
             box_views=preset.box_views if self.box_views is None else self.box_views,
             box_width=preset.box_width if self.box_width is None else self.box_width,
-            ppo=replace(
-                preset.ppo, behaviour_cloning=self.learning != "reinforcement",
-                reinforcement=self.learning != "cloning",
-            ),
+            learning=self.learning,
         )  # fmt: skip
         name = "-".join(category) or self.files[0].stem
         out = self.out or Path("out/train") / f"{name}-{self.preset}"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from artperl.agent.decision_process import FittingOptions
-from artperl.agent.ppo import PPOOptions
+from artperl.agent.ppo import CLONING, JOINT, REINFORCEMENT, Phase, PPOOptions
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, References, StartOptions
 from artsim.datasets.plan import SampleOptions
@@ -62,6 +63,8 @@ class TrainOptions:
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
+    learning: Literal["both", "cloning", "reinforcement"] = "both"
+    """How the agent learns: behaviour cloning, then that and PPO; or one of them alone."""
     references: References = "retrieved"
     """What the agent learns to fit."""
     labels: Labels = "perceived"
@@ -91,6 +94,13 @@ class TrainOptions:
     ppo: PPOOptions = field(default_factory=PPOOptions)
     fitting: FittingOptions = field(default_factory=FittingOptions)
     start: StartOptions = field(default_factory=StartOptions)
+
+    def phase(self, rollout: int) -> Phase:
+        """The phase of Algorithm 1 that a rollout is in."""
+        if self.learning == "reinforcement":
+            return REINFORCEMENT
+        early = rollout < self.cloning_share * self.agent_rollouts
+        return CLONING if early or self.learning == "cloning" else JOINT
 
     @property
     def votes(self) -> bool:

@@ -28,8 +28,9 @@ with needs("training"):
 
 from artperl.agent.decision_process import Fitting
 from artperl.agent.policy import Agent
-from artperl.agent.ppo import collect, update
+from artperl.agent.ppo import algorithm_1
 from artperl.boxes.network import Boxes
+from artperl.core.pose import Theta
 from artperl.data.batches import SENSOR, batches
 from artperl.data.categories import arranged, objects_of
 from artperl.data.fitting_problems import Problems
@@ -254,19 +255,19 @@ class Training:
             dataset=options.dataset,
         )  # fmt: skip
         bar = track("agent", total=total, initial=first, smoothing=0.1, shown=self.progress)
-        for n in range(first, total):
-            generator = torch.Generator(self.device).manual_seed((options.seed << 32) + n)
+
+        def episodes(n: int) -> tuple[Fitting, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             problem = problems[n].to(self.device)
-            fitting = Fitting(problem.shapes, problem.observed, problem.start, options.fitting)
-            updates: list[dict[str, float]] = []
-            cloning = options.ppo.behaviour_cloning and n < options.cloning_share * total
-            ppo = replace(options.ppo, reinforcement=False) if cloning else options.ppo
+            return Fitting(problem.shapes, problem.observed, problem.start, options.fitting), problem.goal
+
+        rounds = algorithm_1(
+            self.agent, optimizer, episodes, options.phase, options.ppo, options.seed, first, total
+        )  # fmt: skip
+        for n in range(first, total):
             with autocast(self.device, options.mixed_precision):
-                rollout = collect(self.agent, fitting, problem.goal, ppo, generator)
-                update(self.agent, optimizer, rollout, ppo, generator, updates.append)
+                figures = next(rounds)
             self.done["agent"] = n + 1
-            figures = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]} | rollout.figures
             write_scalars(board, "agent", figures, n)
             bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
             bar.update()
