@@ -50,6 +50,8 @@ class Train:
     parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
     objects of the families. By default the preset's."""
+    method: Literal["full", "artperl"] = "full"
+    """full: the method that comes with trained weights; artperl: that of the paper, section 4 as printed."""
     preset: Literal["quick", "full", "gpu", "joint"] = "quick"
     """quick: under five minutes on two cores, to see it learn; full: within the hour; gpu: longer, on a
     GPU; joint: one estimator for many categories, with any parts."""
@@ -100,13 +102,22 @@ class Train:
     def run(self) -> None:
         import torch
 
-        from artperl.training.options import PRESETS
+        from artperl.training.options import PAPER_PRESETS, PRESETS
+        from artperl.training.paper_run import train
         from artperl.training.run import Training
         from artsim.families import FAMILIES
 
         if self.threads is not None:
             torch.set_num_threads(self.threads)
-        preset = PRESETS[self.preset]
+        presets = PRESETS if self.method == "full" else PAPER_PRESETS
+        if self.preset not in presets:
+            raise ConfigError(f"the method {self.method} has no such preset", "preset", f"use {' or '.join(presets)}")
+        if self.method == "artperl" and (self.files or self.real or self.start_from):
+            raise ConfigError(
+                "the method artperl learns from procedural objects or a dataset", "files, real, start_from",
+                "leave them out",
+            )  # fmt: skip
+        preset = presets[self.preset]
         if self.denser is not None and self.denser < 1:
             raise ConfigError(f"{self.denser} times the points are none", "denser", "use 1 or more")
         if self.box_width is not None and self.box_width < 1:
@@ -147,10 +158,13 @@ class Train:
             learning=self.learning,
         )  # fmt: skip
         name = "-".join(category) or self.files[0].stem
-        out = self.out or Path("out/train") / f"{name}-{self.preset}"
-        training = Training(options, out, self.workers)
+        run = self.preset if self.method == "full" else f"{self.method}-{self.preset}"
+        out = self.out or Path("out/train") / f"{name}-{run}"
         try:
-            training.run()
+            if self.method == "artperl":
+                train(options, out, self.workers)
+            else:
+                Training(options, out, self.workers).run()
         except KeyboardInterrupt:
             print(f"stopped; the same command goes on from {out}", file=sys.stderr)
             sys.exit(130)
@@ -169,6 +183,8 @@ class Evaluate:
     estimator: tyro.conf.Positional[Path | None] = None
     """Folder of the estimator, or the name of one that comes with the package. For a benchmark, folder of the
     estimators by category; by default those that come with the package."""
+    method: Literal["full", "artperl"] = "full"
+    """Method of the estimator."""
     benchmark: Literal["artimage"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
     ablation: bool = False
@@ -242,11 +258,13 @@ class Evaluate:
         from artperl.estimator import folder_of, load_estimator, read_settings
         from artperl.evaluation.artimage import as_known
         from artperl.evaluation.scoring import evaluate, frozen_samples, samples_of, summary, table
+        from artperl.methods.full import Estimator
         from artsim.loading.sources import find_sources
 
         if self.estimator is None:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
-        estimator = load_estimator(self.estimator, seen_from=self.seen_from)
+        told = {} if self.seen_from is None else {"seen_from": self.seen_from}
+        estimator = load_estimator(self.estimator, method=self.method, **told)
         learnt = read_settings(folder_of(self.estimator))["about"]["options"]
         options = SampleOptions(
             self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
@@ -263,6 +281,8 @@ class Evaluate:
         else:
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
         if self.ablation:
+            if not isinstance(estimator, Estimator):
+                raise ConfigError("the ablation leaves out stages of the method full", "ablation", "leave it out")
             from artperl.evaluation.ablation import run_ablation, variants
             from artperl.evaluation.basin import basin_problem, run_basin
 

@@ -29,7 +29,7 @@ class FittingOptions:
     """The decision process."""
 
     steps: int = 20
-    """Steps of an episode."""
+    """Steps of an episode: how often each part acts."""
     eta: float = 0.5
     """Reward of a step that brings the clouds closer (equation 3)."""
     tolerance: float = 1e-4
@@ -124,6 +124,7 @@ class Fitting:
         self._scratch = self._local.new_empty(max(_CACHED, pairs))
         self.steps_taken = 0
         self._mask = action_mask(shapes.trees)
+        self._levels = 1 if self.options.order == "at once" else int(shapes.trees.depth.max()) + 1
         self._look()
 
     @property
@@ -210,7 +211,7 @@ class Fitting:
     @property
     def done(self) -> bool:
         """Whether the episodes have come to their last step."""
-        return self.steps_taken >= self.options.steps
+        return self.steps_taken >= self.options.steps * self._levels
 
 
 def nearest(asked: Tensor, offered: Tensor, groups: int, scratch: Tensor) -> tuple[Tensor, Tensor]:

@@ -57,7 +57,7 @@ class ArtPERLOptions:
     start: MeanView = field(default_factory=MeanView)
     """View that the reference is turned to before the agent's first step."""
     fitting: FittingOptions = field(
-        default_factory=lambda: FittingOptions(steps=20, distance="both", facing=True, order="root first")
+        default_factory=lambda: FittingOptions(steps=12, distance="both", facing=True, order="root first")
     )
     """The decision process of the agent."""
 
@@ -81,6 +81,15 @@ class Sizes:
             raise ValueError(f"widths are not within 1 to {_MAX_WIDTH}")
 
 
+def networks_of(sizes: Sizes) -> dict[str, nn.Module]:
+    """New networks of these sizes, by name."""
+    return {
+        "segmentation": Segmentation(sizes.num_rows, sizes.segmentation),
+        "siamese": Siamese(sizes.num_rows, sizes.siamese),
+        "policy": StatePolicy(sizes.policy),
+    }
+
+
 class ArtPERL:
     """The paper's method.
 
@@ -100,7 +109,9 @@ class ArtPERL:
         self, segmentation: Segmentation, siamese: Siamese, policy: StatePolicy, base: ShapeBase,
         options: ArtPERLOptions | None = None,
     ):  # fmt: skip
-        self.segmentation, self.siamese, self.policy, self.base = segmentation, siamese, policy, base
+        self.segmentation, self.siamese, self.policy = segmentation, siamese, policy
+        self.device = next(policy.parameters()).device
+        self.base = base.to(self.device)
         self.options = options or ArtPERLOptions()
         for network in self.networks().values():
             network.eval()
@@ -128,7 +139,7 @@ class ArtPERL:
         good = clean(cloud)
         warnings = cloud_warnings(cloud, good)
         chosen = draw(len(good), self.options.num_points, np.random.default_rng(0))
-        sampled = torch.from_numpy(cloud[good[chosen]].astype(np.float32))[None]
+        sampled = torch.from_numpy(cloud[good[chosen]].astype(np.float32))[None].to(self.device)
         with clock("segmentation"):
             part = self.segment(sampled)
         with clock("retrieval"):
@@ -143,8 +154,11 @@ class ArtPERL:
                 reference, few, path[-1], self.options.refine_iterations, self.options.refine_rate
             )
         labels = np.full(len(cloud), -1)
-        labels[good] = part[0].numpy()[cKDTree(sampled[0].numpy()).query(cloud[good], workers=1)[1]]
-        return self._report(row, reference, observed, [*path, refined.theta], labels, warnings, clock.milliseconds)
+        observed, reference = observed.to("cpu"), reference.to("cpu")
+        nearest = cKDTree(observed.points[0].numpy()).query(cloud[good], workers=1)[1]
+        labels[good] = observed.part[0].numpy()[nearest]
+        steps = [theta.to("cpu") for theta in (*path, refined.theta)]
+        return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
 
     @torch.no_grad()
     def segment(self, points: Tensor) -> Tensor:
@@ -181,15 +195,8 @@ class ArtPERL:
         """The method with these settings, its networks untrained."""
         sizes = from_plain(Sizes, settings.get("sizes"))
         options = from_plain(ArtPERLOptions, settings.get("options"))
-        return cls.untrained(sizes, base, options)
-
-    @classmethod
-    def untrained(cls, sizes: Sizes, base: ShapeBase, options: ArtPERLOptions | None = None) -> ArtPERL:
-        """The method with networks of these sizes that have learnt nothing."""
-        return cls(
-            Segmentation(sizes.num_rows, sizes.segmentation), Siamese(sizes.num_rows, sizes.siamese),
-            StatePolicy(sizes.policy), base, options,
-        )  # fmt: skip
+        own: dict[str, Any] = networks_of(sizes)
+        return cls(**own, base=base, options=options)
 
     def _report(
         self, row: int, reference: Shapes, observed: Observed, path: list[Theta], labels: NDArray[np.int64],

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from artperl.core.clouds import Clouds
 from artperl.core.pointnet2 import PointNet2
 from artperl.core.shapes import Shapes
+from artperl.retrieval.shape_base import ShapeBase
 
 POINTS = 1024
 """Points of a cloud that are embedded (section 4.2)."""
@@ -76,6 +77,13 @@ def canonical_clouds(shapes: Shapes, generator: torch.Generator, count: int = PO
     index = torch.multinomial(area.repeat_interleave(M, dim=1), count, replacement=True, generator=generator)
     points = shapes.points.flatten(1, 2).gather(1, index[..., None].expand(-1, -1, 3))
     return Clouds.of(points).points, index // M
+
+
+@torch.no_grad()
+def by_siamese(base: ShapeBase, siamese: Siamese) -> ShapeBase:
+    """The base, to be searched by the vectors of its objects."""
+    points, part = canonical_clouds(base.shapes, torch.Generator().manual_seed(0))
+    return base.with_embeddings(siamese(points, part))
 
 
 @torch.no_grad()

@@ -16,6 +16,8 @@ from artsim.datasets.plan import SampleOptions
 class TrainOptions:
     """What a run depends on."""
 
+    method: Literal["full", "artperl"] = "full"
+    """full: the estimator that is shipped; artperl: the method of the paper as printed."""
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
@@ -53,6 +55,8 @@ class TrainOptions:
     """Share of these clouds whose objects are stretched between the edges of their parts."""
     noisy: float = 0.0
     """Share of the others that are as a depth sensor, a D435, sees them."""
+    retrieval_steps: int = 0
+    """Batches that the Siamese network of the method artperl learns from."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""
@@ -127,3 +131,12 @@ PRESETS = {
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one
 category, on a GPU; joint: one estimator for many categories, with any parts."""
+
+PAPER_PRESETS = {
+    "quick": TrainOptions(
+        method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=250, batch_size=16,
+        num_points=768, retrieval_steps=100, agent_rollouts=60, episodes=48, test_objects=20, test_views=2,
+    ),
+    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=1500, episodes=64),
+}  # fmt: skip
+"""Presets of the method artperl."""
