@@ -28,8 +28,8 @@ from artperl.data.fitting_problems import Problem, Problems
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.objects import BASE_SEEDS
 from artperl.training.perception_losses import perception_losses
-from artperl.training.run import BASE_SEEDS
 from artperl.training.steps import autocast
 
 

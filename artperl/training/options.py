@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from artperl.agent.decision_process import FittingOptions
 from artperl.agent.ppo import PPOOptions
@@ -10,11 +11,15 @@ from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, References, StartOptions
 from artsim.datasets.plan import SampleOptions
 
+Method = Literal["full", "artperl"]
+
 
 @dataclass(frozen=True)
 class TrainOptions:
     """What a run depends on."""
 
+    method: Method = "full"
+    """full: the estimator that is shipped; artperl: the method of the paper as printed."""
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
