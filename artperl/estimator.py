@@ -5,6 +5,7 @@ Weights are kept in half precision. Nothing in the folder is executed when it is
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -33,7 +34,7 @@ from artsim.model.objects import MAX_PARTS
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 1
+_FORMAT = 2
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
@@ -56,7 +57,7 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
     if estimator.boxes is not None:
         networks["boxes"] = estimator.boxes
     tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
-    save_tensors(tensors, folder / _TENSORS)
+    write_tensors(tensors, folder / _TENSORS)
     estimator.base.save(folder / _BASE)
     settings = {
         "format": _FORMAT,
@@ -65,11 +66,20 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         "boxes": None
         if estimator.boxes is None
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
-        "options": asdict(estimator.options),
+        "options": _changes(asdict(estimator.options), asdict(EstimatorOptions())),
         "calibration": asdict(estimator.calibration),
         "about": dict(about),
     }
-    write_atomic(folder / _SETTINGS, (json.dumps(settings) + "\n").encode())
+    write_atomic(folder / _SETTINGS, (json.dumps(settings, indent=1) + "\n").encode())
+
+
+def _changes(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that differ from their defaults, at every depth: an option that goes leaves no trace in files."""
+    return {
+        name: _changes(value, defaults[name]) if isinstance(value, dict) else value
+        for name, value in values.items()
+        if value != defaults[name]
+    }
 
 
 def load_estimator(name: str | Path, device: torch.device | str = "cpu", **changes: Any) -> Estimator:
@@ -262,9 +272,15 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
         raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
-def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
-    """Write tensors so that a stop halfway leaves the old file."""
-    write_tensors(tensors, path)
+def weights_sha256(folder: Path) -> str:
+    """Digest of the weights of the estimator in a folder, by which its children name it.
+
+    Raises
+    ------
+    DatasetError
+        When there are none.
+    """
+    return hashlib.sha256(read_bounded(folder / _TENSORS, _MAX_TENSOR_BYTES, "weights", DatasetError)).hexdigest()
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

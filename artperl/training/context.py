@@ -45,6 +45,8 @@ class Context:
         Processes that make training clouds and estimates; the result does not depend on it.
     progress : bool
         Show bars.
+    provenance : dict
+        See :func:`artperl.training.recipes.provenance`.
     report : Report
         Hears the figures of every step.
     stop : Stop
@@ -60,6 +62,7 @@ class Context:
     device: torch.device
     workers: int
     progress: bool
+    provenance: dict[str, Any]
     report: Report
     stop: Stop = field(default_factory=Stop)
 
@@ -82,7 +85,7 @@ class Context:
 
     def about(self, figures: dict[str, Any]) -> dict[str, Any]:
         """What an estimator's file says about its training."""
-        return {"options": asdict(self.options), "done": dict(self.state.done), **rounded(figures)}
+        return {**self.provenance, "options": asdict(self.options), "done": dict(self.state.done), **rounded(figures)}
 
     def save(self) -> None:
         """Write where the run stands."""

@@ -1,22 +1,45 @@
-"""What a training run depends on, and presets."""
+"""What a training run depends on, and presets.
+
+Everything that a run may be told stands here once, with its default and its check. The command, the recipes and the
+presets name fields of :class:`TrainOptions` and give them values by :func:`changed`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
+from typing import Any, Literal, TypeVar
 
 from artperl.agent.decision_process import FittingOptions
 from artperl.agent.ppo import PPOOptions
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, References, StartOptions
+from artsim.common.plain import from_plain
 from artsim.datasets.plan import SampleOptions
+from artsim.errors import ConfigError
 
+T = TypeVar("T")
 Method = Literal["full", "artperl"]
+_MOST = 1_000_000_000
+_SHARES = ("stretched", "noisy", "cloning_share")
+_AT_LEAST_ONE = (
+    "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "episodes", "box_width",
+    "validate_every", "validate_rollouts", "test_objects", "validation_views", "test_views",
+)  # fmt: skip
+_AT_LEAST_ZERO = (
+    "perception_steps", "dense_steps", "agent_rollouts", "box_views", "box_steps", "foreign_categories", "seed",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """What a run depends on."""
+    """What a run depends on.
+
+    Raises
+    ------
+    ConfigError
+        When a value is impossible, or two values contradict each other.
+    """
 
     method: Method = "full"
     """full: the estimator that is shipped; artperl: the method of the paper as printed."""
@@ -97,10 +120,54 @@ class TrainOptions:
     fitting: FittingOptions = field(default_factory=FittingOptions)
     start: StartOptions = field(default_factory=StartOptions)
 
+    def __post_init__(self) -> None:
+        for names, least in ((_AT_LEAST_ONE, 1), (_AT_LEAST_ZERO, 0)):
+            for name in names:
+                if not least <= getattr(self, name) <= _MOST:
+                    raise ConfigError(f"{getattr(self, name)} is not possible", name, f"use {least} or more")
+        for name in _SHARES:
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ConfigError(f"{getattr(self, name)} is no share", name, "use 0 to 1")
+        for name in ("perception_rate", "agent_rate"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ConfigError(f"{getattr(self, name)} is no learning rate", name, "use 1e-4 to 1e-2")
+        if self.noisy and (self.dataset is not None or self.sample.noise != "none"):
+            raise ConfigError("clouds that have their noise get no other", "noisy", "use one of noise, dataset, noisy")
+        if self.dataset is not None and (self.real or self.files):
+            raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
+        if not self.categories and not self.files:
+            raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
+
     @property
     def votes(self) -> bool:
         """Whether perception finds parts by votes: of families' objects with any parts, nobody knows how many."""
         return self.parts == "any" and not self.files
+
+
+def changed(options: T, changes: Mapping[str, Any]) -> T:
+    """Options with other values for some fields, at every depth.
+
+    Parameters
+    ----------
+    options : T
+        A dataclass.
+    changes : mapping
+        Names of fields and plain values, as a JSON file has them; a mapping for a field that is a dataclass.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such field, or a value is not of its type or impossible.
+    """
+    try:
+        given = from_plain(type(options), changes)
+    except ValueError as error:
+        raise ConfigError(str(error), "options", "see artperl.training.options.TrainOptions") from error
+    values = {
+        name: changed(getattr(options, name), value) if is_dataclass(getattr(options, name)) else getattr(given, name)
+        for name, value in changes.items()
+    }
+    return replace(options, **values)  # type: ignore[type-var]
 
 
 PRESETS = {
@@ -120,5 +187,5 @@ PRESETS = {
         box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
 }  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one
-category, on a GPU; joint: one estimator for many categories, with any parts."""
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: the
+same on a GPU, never measured; joint: one estimator for many categories, with any parts."""

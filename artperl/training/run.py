@@ -21,6 +21,7 @@ from artperl.perception.network import Perception
 from artperl.training.context import Context, Report
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
+from artperl.training.recipes import Recipe, provenance
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
 from artperl.training.stages import PROGRAMMES, stages_of
@@ -47,6 +48,8 @@ class Training:
         Show a bar, and tables as they come.
     report : Report, optional
         Hears the figures of every step, as the curves do.
+    recipe : Recipe, optional
+        The recipe that the options are of.
 
     Raises
     ------
@@ -55,8 +58,9 @@ class Training:
     """
 
     def __init__(
-        self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True, report: Report | None = None
-    ):
+        self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True, report: Report | None = None,
+        recipe: Recipe | None = None,
+    ):  # fmt: skip
         self.out, self._report = out, report
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         device = _device(options.device)
@@ -74,7 +78,7 @@ class Training:
         }
         self.context = Context(
             options, RunFolder(out), objects, RunState(networks, optimizers), parent, programme.estimator, device,
-            workers, progress, _no_report,
+            workers, progress, provenance(options, recipe), _no_report,
         )  # fmt: skip
         if self.context.folder.begun:
             with self.context.folder.held():

@@ -86,9 +86,9 @@ def test(context: Context) -> dict[str, Any]:
     samples = unseen_samples(context, context.options.test_views, TEST_SEEDS)
     scored = evaluate(best, samples, context.progress)
     figures = summary(scored)
-    about = read_settings(context.folder.best)["about"]
-    told = {name: about[name] for name in ("options", "done")}  # validation figures chose this one: no measurement
-    save_estimator(best, context.folder.best, {**told, "test": rounded(figures)})
+    about = dict(read_settings(context.folder.best)["about"])
+    about.pop("validation", None)  # these figures chose this estimator, and are no measurement of it
+    save_estimator(best, context.folder.best, {**about, "test": rounded(figures)})
     write_atomic(out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
     write_atomic(out / "table.txt", (table(figures) + "\n").encode())
     try:
