@@ -5,6 +5,7 @@ Weights are kept in half precision. Nothing in the folder is executed when it is
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -35,7 +36,7 @@ from artsim.model.objects import MAX_PARTS
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 1
+_FORMAT = 2
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
@@ -66,10 +67,19 @@ def save_estimator(estimator: Estimator | ArtPERL, folder: Path, about: Mapping[
         "boxes": None
         if estimator.boxes is None
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
-        "options": asdict(estimator.options),
+        "options": _changes(asdict(estimator.options), asdict(EstimatorOptions())),
         "calibration": asdict(estimator.calibration),
     }
     _write(folder, networks, estimator.base, settings, about)
+
+
+def _changes(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that differ from their defaults, at every depth: an option that goes leaves no trace in files."""
+    return {
+        name: _changes(value, defaults[name]) if isinstance(value, dict) else value
+        for name, value in values.items()
+        if value != defaults[name]
+    }
 
 
 def _write(
@@ -77,10 +87,10 @@ def _write(
     about: Mapping[str, Any],
 ) -> None:  # fmt: skip
     tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
-    save_tensors(tensors, folder / _TENSORS)
+    write_tensors(tensors, folder / _TENSORS)
     base.save(folder / _BASE)
     told = {"format": _FORMAT, **settings, "about": dict(about)}
-    write_atomic(folder / _SETTINGS, (json.dumps(told) + "\n").encode())
+    write_atomic(folder / _SETTINGS, (json.dumps(told, indent=1) + "\n").encode())
 
 
 @overload
@@ -341,9 +351,15 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
         raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
-def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
-    """Write tensors so that a stop halfway leaves the old file."""
-    write_tensors(tensors, path)
+def weights_sha256(folder: Path) -> str:
+    """Digest of the weights of the estimator in a folder, by which its children name it.
+
+    Raises
+    ------
+    DatasetError
+        When there are none.
+    """
+    return hashlib.sha256(read_bounded(folder / _TENSORS, _MAX_TENSOR_BYTES, "weights", DatasetError)).hexdigest()
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -76,7 +76,7 @@ def overlays(estimator: Method, samples: Sequence[Sample], columns: int = 4) -> 
 
     Parameters
     ----------
-    estimator : Estimator
+    estimator : Method
     samples : sequence of Sample
     columns : int
     """

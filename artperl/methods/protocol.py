@@ -1,4 +1,4 @@
-"""What a method is: it makes an estimate of a cloud, and can be written down."""
+"""What a method is: it makes an estimate of a cloud."""
 
 from __future__ import annotations
 
@@ -13,18 +13,10 @@ from artperl.retrieval.shape_base import ShapeBase
 
 
 class Method(Protocol):
-    """A method of estimating 9D poses, trained.
-
-    Attributes
-    ----------
-    name : str
-        As the registry :data:`artperl.methods.METHODS` has it.
-    base : ShapeBase
-        References, with the embeddings that they are found by.
-    """
+    """A method of estimating 9D poses, trained. What scores, draws or applies a method knows it by this alone."""
 
     name: ClassVar[str]
-    base: ShapeBase
+    """As the registry :data:`artperl.methods.METHODS` has it."""
 
     @property
     def categories(self) -> tuple[str, ...]:
@@ -35,12 +27,19 @@ class Method(Protocol):
         """Estimate the pose of every part of the object that a cloud (N, 3) shows, camera frame, metres."""
         ...
 
+
+class Stored(Method, Protocol):
+    """A method that can be written down: networks are what is learnt, settings what is chosen."""
+
+    base: ShapeBase
+    """References, with the embeddings that they are found by."""
+
     def networks(self) -> dict[str, nn.Module]:
-        """Its networks by name: what is learnt."""
+        """Its networks by name."""
         ...
 
     def settings(self) -> dict[str, Any]:
-        """Sizes of its networks and options, in JSON's terms: what is chosen."""
+        """Sizes of its networks and options, in JSON's terms."""
         ...
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The paper's segmentation: PointNet++ and a three-layer MLP that names the part of each point (ArtPERL, section 4.2)."""
+"""The paper's segmentation: PointNet++, and a three-layer MLP that names the part of each point (section 4.2)."""
 
 from __future__ import annotations
 

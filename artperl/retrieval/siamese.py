@@ -72,7 +72,7 @@ def canonical_clouds(shapes: Shapes, generator: torch.Generator, count: int = PO
 
     Parts have points by their area.
     """
-    B, P, M, _ = shapes.points.shape
+    M = shapes.points.shape[2]
     area = torch.where(shapes.has_surface, shapes.spacing, 0.0).square()
     index = torch.multinomial(area.repeat_interleave(M, dim=1), count, replacement=True, generator=generator)
     points = shapes.points.flatten(1, 2).gather(1, index[..., None].expand(-1, -1, 3))

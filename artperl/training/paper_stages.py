@@ -6,14 +6,14 @@ Each goes on where it stopped: its batches, rates and actions are functions of t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from artperl.agent.decision_process import Fitting
-from artperl.agent.ppo import CLONING, JOINT, Phase, algorithm_1
+from artperl.agent.ppo import algorithm_1
 from artperl.agent.start import mean_start
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
@@ -21,15 +21,14 @@ from artperl.core.shapes import Observed, Shapes
 from artperl.data.batches import batches
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source, samples_from
+from artperl.estimator import save_estimator
 from artperl.methods.artperl import ArtPERL, Sizes, networks_of
 from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss
+from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.steps import autocast, one_cycle, set_rate
 from artsim.common.progress import track
 from artsim.datasets.plan import SampleOptions
-
-if TYPE_CHECKING:
-    from artperl.training.paper_run import Context
 
 _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
@@ -39,12 +38,12 @@ _CHOICES = 4
 """Nearest references among which the agent's is drawn: at test time, too, it is seldom the best one."""
 
 
-def networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
+def paper_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     """New networks of the method, by name."""
     return networks_of(Sizes(num_rows, segmentation=options.width))
 
 
-def estimator(context: Context) -> ArtPERL:
+def paper_estimator(context: Context) -> ArtPERL:
     """The method as the networks of a run stand."""
     own: dict[str, Any] = context.state.networks
     base = by_siamese(context.objects.base, own["siamese"].eval())
@@ -100,7 +99,7 @@ class RetrievalStage:
         first = context.state.done[self.name]
         if first >= total:
             return
-        method, base = estimator(context), context.objects.base.shapes
+        method, base = paper_estimator(context), context.objects.base.shapes
         samples = _source(context, POINTS, options.seed + 1, 1)
         bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
         network.train()
@@ -135,17 +134,14 @@ class AgentStage:
         first = context.state.done[self.name]
         if first >= total:
             return
-        method = estimator(context)
+        method = paper_estimator(context)
         samples = _source(context, method.options.num_points, options.seed + 2, _VIEWS)
 
         def episodes(n: int) -> tuple[Fitting, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             return fitting_episodes(method, samples, options.episodes, options.seed, n)
 
-        def phase(n: int) -> Phase:
-            return CLONING if n < options.cloning_share * total else JOINT
-
-        rounds = algorithm_1(method.policy, optimizer, episodes, phase, options.ppo, options.seed, first, total)
+        rounds = algorithm_1(method.policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
         bar = track(self.name, total=total, initial=first, smoothing=0.1, shown=context.progress)
         policy.train()
         for n, figures in enumerate(rounds, first):
@@ -157,8 +153,21 @@ class AgentStage:
         policy.eval()
 
 
-PAPER_STAGES = (SegmentationStage(), RetrievalStage(), AgentStage())
-"""In their order."""
+@dataclass(frozen=True)
+class KeepStage:
+    """The estimator is kept as the last stage leaves it: no validation chooses one."""
+
+    name: str = "keep"
+
+    def run(self, context: Context) -> None:
+        """Write the estimator."""
+        context.save()
+        save_estimator(paper_estimator(context), context.folder.best, context.about({}))
+
+
+def paper_stages(options: TrainOptions) -> list[Any]:
+    """The stages, in their order."""
+    return [SegmentationStage(), RetrievalStage(), AgentStage(), KeepStage()]
 
 
 def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n: int) -> tuple[Fitting, Theta]:
