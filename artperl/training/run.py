@@ -67,9 +67,8 @@ class Training:
         device = _device(options.device)
         torch.manual_seed(options.seed)
         networks = programme.networks(options, objects.base.shapes.trees.num_rows)
-        parent = (
-            None if options.start_from is None else load_estimator(options.start_from, device, method=options.method)
-        )
+        start = options.start_from
+        parent = None if start is None else load_estimator(start, device, method=options.method)
         if parent is not None:
             _start_from(parent, networks, str(start))
         optimizers: dict[str, torch.optim.Optimizer] = {

@@ -139,15 +139,16 @@ def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path
         batch_size=4, num_points=96, agent_rollouts=2, episodes=2, test_objects=1, test_views=1,
     )  # fmt: skip
     heard: dict[str, list[dict[str, float]]] = {}
-    training = Training(
-        options, tmp_path, workers=0, progress=False, report=lambda group, figures, _: heard.setdefault(group, []).append(figures)
-    )  # fmt: skip
-    before = {
-        name: [p.detach().clone() for p in net.parameters()] for name, net in training.context.state.networks.items()
-    }
+
+    def report(group: str, figures: dict[str, float], step: int) -> None:
+        heard.setdefault(group, []).append(figures)
+
+    training = Training(options, tmp_path, workers=0, progress=False, report=report)
+    networks = training.context.state.networks
+    before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
     training.run()
     assert {name: len(figures) for name, figures in heard.items()} == {"segmentation": 3, "retrieval": 2, "agent": 2}
-    for name, network in training.context.state.networks.items():
+    for name, network in networks.items():
         assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
     method = load_estimator(tmp_path / "best", method="artperl")
     (scored,) = evaluate(method, [view(artsim.make("laptop", 9), 4)])
