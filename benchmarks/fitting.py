@@ -21,7 +21,7 @@ from torch import nn
 from artperl.agent.actions import NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Agent
-from artperl.agent.ppo import PPOOptions, collect, update
+from artperl.agent.ppo import JOINT, PPOOptions, rollout, update
 from artperl.data.batches import batches
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
@@ -156,8 +156,8 @@ def learning_to_fit(problems: Problems, options: Options) -> tuple[float, Shares
         fitting.shares = shares
         reward = shares.seconds["reward"]
         with shares("network"):
-            rollout = collect(agent, fitting, problem.goal, ppo, generator)
-            update(agent, optimizer, rollout, ppo, generator)
+            buffer = rollout(agent, fitting, problem.goal, JOINT, ppo, generator)
+            update(agent, optimizer, buffer, JOINT, ppo, generator)
         shares.seconds["network"] -= shares.seconds["reward"] - reward
         done += 1
     states = done * options.environments * fitting.steps_taken

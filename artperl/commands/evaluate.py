@@ -29,6 +29,8 @@ class Evaluate:
     estimator: tyro.conf.Positional[Path | None] = None
     """Folder of the estimator, or the name of one that comes with the package. For a benchmark, folder of the
     estimators by category; by default those that come with the package."""
+    method: Literal["full", "artperl"] = "full"
+    """Method of the estimator."""
     benchmark: Literal["artimage"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
     ablation: bool = False
@@ -102,11 +104,13 @@ class Evaluate:
         from artperl.estimator import folder_of, load_estimator, read_settings
         from artperl.evaluation.artimage import as_known
         from artperl.evaluation.scoring import evaluate, frozen_samples, samples_of, summary, table
+        from artperl.methods.full import Estimator
         from artsim.loading.sources import find_sources
 
         if self.estimator is None:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
-        estimator = load_estimator(self.estimator, seen_from=self.seen_from)
+        told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
+        estimator = load_estimator(self.estimator, method=self.method, **told)
         learnt = read_settings(folder_of(self.estimator))["about"]["options"]
         options = SampleOptions(
             self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
@@ -123,6 +127,8 @@ class Evaluate:
         else:
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
         if self.ablation:
+            if not isinstance(estimator, Estimator):
+                raise ConfigError("the ablation leaves out stages of the method full", "ablation", "leave it out")
             from artperl.evaluation.ablation import run_ablation, variants
             from artperl.evaluation.basin import basin_problem, run_basin
 

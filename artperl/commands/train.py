@@ -130,7 +130,7 @@ class Train:
 
     def _options(self, recipe: Recipe | None) -> TrainOptions:
         """Those of the preset or the recipe, with what is given."""
-        from artperl.training.options import PRESETS, TrainOptions, changed
+        from artperl.training.options import TrainOptions, changed, preset_of
         from artsim.families import FAMILIES
 
         known = {field.name for field in fields(TrainOptions)}
@@ -143,17 +143,13 @@ class Train:
                 "views": self.views and {"preset": self.views}}  # fmt: skip
         if any(seen.values()):
             changes["sample"] = {name: value for name, value in seen.items() if value is not None}
-        if self.learning is not None:
-            changes["ppo"] = {
-                "behaviour_cloning": self.learning != "reinforcement", "reinforcement": self.learning != "cloning",
-            }  # fmt: skip
         if recipe is not None:
             if changes.keys() - {"device"}:
                 raise ConfigError(
                     f"the recipe says that itself: {', '.join(changes)}", "recipe", "give no other options with it"
                 )
             return changed(recipe.train_options(self.preset), changes)
-        preset = PRESETS[self.preset or "quick"]
+        preset = preset_of(self.method or "full", self.preset or "quick")
         if self.files:
             if self.categories or self.real or self.parts == "artimage":
                 raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")

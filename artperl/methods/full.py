@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -105,6 +106,7 @@ class Estimator:
         Without one, boxes are the reference's, widened to hold the points.
     """
 
+    name: ClassVar[str] = "full"
     perception: Perception
     base: ShapeBase
     agent: Agent | None = None
@@ -117,6 +119,11 @@ class Estimator:
         self.base = self.base.to(self.perception.device)
         if self.boxes is not None:
             self.boxes.to(self.perception.device)
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Categories of the references."""
+        return tuple(dict.fromkeys(self.base.categories))
 
     @torch.inference_mode()
     @_one_thread()

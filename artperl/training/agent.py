@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
-import torch
+from dataclasses import dataclass
 
 from artperl.agent.decision_process import Fitting
 from artperl.agent.policy import Agent
-from artperl.agent.ppo import collect, update
+from artperl.agent.ppo import algorithm_1
+from artperl.core.pose import Theta
 from artperl.data.fitting_problems import Problems
 from artperl.perception.network import Perception
 from artperl.training.context import Context
@@ -41,19 +40,17 @@ class AgentStage:
             context.objects.data, context.objects.base, options.episodes, options.num_points, options.seed + 1,
             options.start, perception if options.labels == "perceived" else None, _VIEWS, options.references,
         )  # fmt: skip
-        bar = track("agent", total=total, initial=first, smoothing=0.1, shown=context.progress)
-        for n in range(first, total):
-            generator = torch.Generator(context.device).manual_seed((options.seed << 32) + n)
+
+        def episodes(n: int) -> tuple[Fitting, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             problem = problems[n].to(context.device)
-            fitting = Fitting(problem.shapes, problem.observed, problem.start, options.fitting)
-            updates: list[dict[str, float]] = []
-            cloning = options.ppo.behaviour_cloning and n < options.cloning_share * total
-            ppo = replace(options.ppo, reinforcement=False) if cloning else options.ppo
+            return Fitting(problem.shapes, problem.observed, problem.start, options.fitting), problem.goal
+
+        rounds = algorithm_1(agent, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
+        bar = track("agent", total=total, initial=first, smoothing=0.1, shown=context.progress)
+        for n in range(first, total):
             with autocast(context.device, options.mixed_precision):
-                rollout = collect(agent, fitting, problem.goal, ppo, generator)
-                update(agent, optimizer, rollout, ppo, generator, updates.append)
-            figures = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]} | rollout.figures
+                figures = next(rounds)
             context.report("agent", figures, n)
             bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
             bar.update()

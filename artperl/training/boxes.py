@@ -37,6 +37,7 @@ class BoxStage:
         if state.done[self.name] >= options.box_views:
             return
         best = context.best(context.device)
+        assert isinstance(best, Estimator)
         learner = best_without_own_references(best, context)
         records = record(
             learner, _samples(context), options.box_views, context.folder.path / "boxes.safetensors",

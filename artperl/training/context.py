@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import torch
 
 from artperl.estimator import load_estimator
+from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
@@ -36,7 +37,7 @@ class Context:
     objects : TrainingObjects
     state : RunState
         The stages change it in place.
-    parent : Estimator or None
+    parent : Estimator or ArtPERL or None
         The estimator that the run started from.
     assemble : callable
         Makes an estimator of the networks as they stand.
@@ -57,8 +58,8 @@ class Context:
     folder: RunFolder
     objects: TrainingObjects
     state: RunState
-    parent: Estimator | None
-    assemble: Callable[[Context], Estimator]
+    parent: Estimator | ArtPERL | None
+    assemble: Callable[[Context], Estimator | ArtPERL]
     device: torch.device
     workers: int
     progress: bool
@@ -66,11 +67,11 @@ class Context:
     report: Report
     stop: Stop = field(default_factory=Stop)
 
-    def estimator(self) -> Estimator:
+    def estimator(self) -> Estimator | ArtPERL:
         """The estimator as it stands."""
         return self.assemble(self)
 
-    def best(self, device: torch.device | str = "cpu") -> Estimator:
+    def best(self, device: torch.device | str = "cpu") -> Estimator | ArtPERL:
         """The best estimator so far.
 
         Raises
@@ -79,7 +80,7 @@ class Context:
             When its files are damaged or missing.
         """
         try:
-            return load_estimator(self.folder.best, device)
+            return load_estimator(self.folder.best, device, method=self.options.method)
         except DatasetError as error:
             raise DatasetError(f"the best estimator is lost ({error.what})", error.where, self.folder.fix) from error
 

@@ -63,6 +63,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
                 "offset": _anything(N, 3),
                 "reference": _anything(P, M, 3),
                 "back": _anything(P, M, 3),
+                "shown": spaces.MultiBinary((P, M)),
                 "joint": _anything(P, 6),
                 "kind": spaces.MultiDiscrete(np.full(P, len(KINDS)), dtype=np.int64),
                 "parent": spaces.MultiDiscrete(np.full(P, P), dtype=np.int64),
@@ -96,7 +97,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
         # Copies, since what is kept from one step to the next is the caller's.
         fields: dict[str, NDArray[Any]] = {name: tensor[0].numpy().copy() for name, tensor in vars(view).items()}
         fields = {k: np.clip(v, -_FAR, _FAR) if v.dtype == np.float32 else v for k, v in fields.items()}
-        return fields | {"valid": fields["valid"].astype(np.int8)}
+        return fields | {name: fields[name].astype(np.int8) for name in ("valid", "shown")}
 
     def _info(self) -> dict[str, Any]:
         fitting, problem = self._running(), self._problem

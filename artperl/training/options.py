@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, Literal, TypeVar
 
 from artperl.agent.decision_process import FittingOptions
-from artperl.agent.ppo import PPOOptions
+from artperl.agent.ppo import CLONING, JOINT, REINFORCEMENT, Phase, PPOOptions
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, References, StartOptions
 from artsim.common.plain import from_plain
@@ -27,7 +27,8 @@ _AT_LEAST_ONE = (
     "validate_every", "validate_rollouts", "test_objects", "validation_views", "test_views",
 )  # fmt: skip
 _AT_LEAST_ZERO = (
-    "perception_steps", "dense_steps", "agent_rollouts", "box_views", "box_steps", "foreign_categories", "seed",
+    "perception_steps", "dense_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
+    "foreign_categories", "seed",
 )  # fmt: skip
 
 
@@ -71,7 +72,7 @@ class TrainOptions:
     width: int = 48
     """Channels of perception's finest level."""
     perception_steps: int = 4000
-    """Batches of stage 1."""
+    """Batches that perception, or the segmentation of the method artperl, learns from."""
     dense_steps: int = 1000
     """Batches in its end, of fewer, denser clouds: of as many points as the estimator looks at."""
     denser: int = 2
@@ -80,6 +81,8 @@ class TrainOptions:
     """Share of these clouds whose objects are stretched between the edges of their parts."""
     noisy: float = 0.0
     """Share of the others that are as a depth sensor, a D435, sees them."""
+    retrieval_steps: int = 0
+    """Batches that the Siamese network of the method artperl learns from."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""
@@ -90,6 +93,8 @@ class TrainOptions:
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
+    learning: Literal["both", "cloning", "reinforcement"] = "both"
+    """How the agent learns: behaviour cloning, then that and PPO; or one of them alone."""
     references: References = "retrieved"
     """What the agent learns to fit."""
     labels: Labels = "perceived"
@@ -137,6 +142,13 @@ class TrainOptions:
             raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
         if not self.categories and not self.files:
             raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
+
+    def phase(self, rollout: int) -> Phase:
+        """The phase of Algorithm 1 that a rollout is in."""
+        if self.learning == "reinforcement":
+            return REINFORCEMENT
+        early = rollout < self.cloning_share * self.agent_rollouts
+        return CLONING if early or self.learning == "cloning" else JOINT
 
     @property
     def votes(self) -> bool:
@@ -189,3 +201,26 @@ PRESETS = {
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: the
 same on a GPU, never measured; joint: one estimator for many categories, with any parts."""
+
+PAPER_PRESETS = {
+    "quick": TrainOptions(
+        method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=120, batch_size=16,
+        num_points=768, retrieval_steps=60, agent_rollouts=60, episodes=48, test_objects=20, test_views=2,
+    ),
+    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=1500, episodes=64),
+}  # fmt: skip
+"""Presets of the method artperl."""
+
+
+def preset_of(method: Method, name: str) -> TrainOptions:
+    """A preset of a method.
+
+    Raises
+    ------
+    ConfigError
+        When the method has no such preset.
+    """
+    presets = PRESETS if method == "full" else PAPER_PRESETS
+    if name not in presets:
+        raise ConfigError(f"the method {method} has no preset {name!r}", "preset", f"use {' or '.join(presets)}")
+    return presets[name]

@@ -16,6 +16,7 @@ with needs("training"):
     from torch import nn
 
 from artperl.estimator import load_estimator
+from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.training.context import Context, Report
@@ -62,15 +63,14 @@ class Training:
         recipe: Recipe | None = None,
     ):  # fmt: skip
         self.out, self._report = out, report
-        if options.method not in PROGRAMMES:
-            raise ConfigError(f"{options.method} cannot be trained", "method", f"use {', '.join(PROGRAMMES)}")
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         device = _device(options.device)
         torch.manual_seed(options.seed)
         networks = programme.networks(options, objects.num_rows)
-        parent = None if options.start_from is None else load_estimator(options.start_from, device)
+        start = options.start_from
+        parent = None if start is None else load_estimator(start, device, method=options.method)
         if parent is not None:
-            _start_from(parent, networks, str(options.start_from))
+            _start_from(parent, networks, str(start))
         optimizers: dict[str, torch.optim.Optimizer] = {
             name: torch.optim.AdamW(
                 network.to(device).parameters(),
@@ -118,7 +118,7 @@ def _no_report(group: str, figures: dict[str, float], step: int) -> None:
     """Before a run begins nobody listens."""
 
 
-def _start_from(parent: Estimator, networks: dict[str, nn.Module], folder: str) -> None:
+def _start_from(parent: Estimator | ArtPERL, networks: dict[str, nn.Module], folder: str) -> None:
     """Begin with the weights of another estimator.
 
     Raises

@@ -10,12 +10,14 @@ from torch import nn
 
 from artperl.agent.policy import Agent
 from artperl.fitting.search import EstimatorOptions
+from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.training.agent import AgentStage
 from artperl.training.boxes import BoxStage
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
+from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
 from artperl.training.perception import PerceptionStage
 from artperl.training.validation import Calibration
 
@@ -45,7 +47,7 @@ class Programme:
 
     networks: Callable[[TrainOptions, int], dict[str, nn.Module]]
     stages: Callable[[TrainOptions], list[Stage]]
-    estimator: Callable[[Context], Estimator]
+    estimator: Callable[[Context], Estimator | ArtPERL]
 
 
 def stages_of(options: TrainOptions) -> list[Stage]:
@@ -75,6 +77,7 @@ def _full_stages(options: TrainOptions) -> list[Stage]:
 def _full_estimator(context: Context) -> Estimator:
     """Without an agent until it has learnt; with the parent's boxes, if parts are found as the parent finds them."""
     networks, parent, options = context.state.networks, context.parent, context.options
+    assert isinstance(parent, Estimator | None)
     perception, agent = networks["perception"], networks["agent"]
     assert isinstance(perception, Perception)
     assert isinstance(agent, Agent)
@@ -87,5 +90,8 @@ def _full_estimator(context: Context) -> Estimator:
     )  # fmt: skip
 
 
-PROGRAMMES = {"full": Programme(_full_networks, _full_stages, _full_estimator)}
+PROGRAMMES = {
+    "full": Programme(_full_networks, _full_stages, _full_estimator),
+    "artperl": Programme(paper_networks, paper_stages, paper_estimator),
+}
 """By the name of the method."""

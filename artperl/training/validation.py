@@ -21,6 +21,7 @@ from artperl.evaluation.scoring import (
     summary,
     table,
 )
+from artperl.methods.full import Estimator
 from artperl.training.context import Context
 from artperl.training.report import rounded, scalars, write_report
 from artsim.common.files import write_atomic
@@ -65,6 +66,7 @@ def validate(context: Context) -> None:
     """Score the estimator on unseen objects, keep it if it is the best so far, and write where the run stands."""
     state, options = context.state, context.options
     estimator = context.estimator()
+    assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves
     scored = evaluate(estimator, unseen_samples(context, options.validation_views, VALIDATION_SEEDS), context.progress)
     figures, score = summary(scored), headline(scored)
     state.history.append({"step": state.step, "score": score, "done": dict(state.done)})
