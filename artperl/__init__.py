@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 from artsim.common.extras import needs
 
 if TYPE_CHECKING:
+    from artperl.core.estimate import Estimate
     from artperl.methods.full import Estimator
 
-__all__ = ["load_estimator"]
+__all__ = ["Estimate", "load_estimator"]
 
 
 def load_estimator(name: str | Path, **changes: Any) -> Estimator:
@@ -34,3 +35,12 @@ def load_estimator(name: str | Path, **changes: Any) -> Estimator:
         from artperl.estimator import load_estimator as load  # torch takes seconds to import
 
     return load(name, **changes)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Estimate":
+        with needs("artperl"):
+            from artperl.core.estimate import Estimate  # torch takes seconds to import
+
+        return Estimate
+    raise AttributeError(f"module 'artperl' has no attribute {name!r}")

@@ -28,8 +28,8 @@ from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.files import read_bounded, read_json, write_atomic
+from artsim.common.json_records import from_json_values
 from artsim.common.names import printable
-from artsim.common.plain import from_plain
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import MAX_PARTS
 
@@ -143,12 +143,12 @@ def load_estimator(
     _check_method(settings, method, folder)
     try:
         sizes = _Sizes(
-            from_plain(_PerceptionSize, settings.get("perception")),
-            None if settings.get("agent") is None else from_plain(_AgentSize, settings["agent"]),
-            None if settings.get("boxes") is None else from_plain(_BoxesSize, settings["boxes"]),
+            from_json_values(_PerceptionSize, settings.get("perception")),
+            None if settings.get("agent") is None else from_json_values(_AgentSize, settings["agent"]),
+            None if settings.get("boxes") is None else from_json_values(_BoxesSize, settings["boxes"]),
         )
-        options = replace(from_plain(EstimatorOptions, settings.get("options")), **changes)
-        calibration = from_plain(Calibration, settings.get("calibration"))
+        options = replace(from_json_values(EstimatorOptions, settings.get("options")), **changes)
+        calibration = from_json_values(Calibration, settings.get("calibration"))
     except ValueError as error:
         raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
     tensors = read_tensors(folder / _TENSORS)

@@ -1,35 +1,70 @@
 """artsim: synthetic articulated-object data, from URDF folders to labelled partial point clouds.
 
-Stable names; everything else is private. Heavy backends are imported when first used.
+Stable names; docs/api.md lists them with those of the public packages. Everything else is private. Heavy backends are
+imported when first used.
+
+Rooms, from the ground up. Each imports only rooms that come before it (import-linter holds this, see pyproject.toml):
+
+- common, errors: what every module may use.
+- model: an articulated object, its kinematics, cameras and frames. No backend.
+- making, families: objects from a seed.
+- loading: objects from files.
+- appearance: materials and light.
+- renderers: one scene in, one frame out.
+- observing: frames to labelled samples; sensor noise.
+- datasets, then stream: samples to disk and back, or without end.
+- scenes: several objects. checks: gates for simulators.
+- export: objects as URDF, MJCF and USD.
+- physics: objects that move. drawing: pictures.
+- envs: reinforcement learning. doctor, cli: programs.
 """
 
 from __future__ import annotations
 
+import importlib
+from types import ModuleType
+
+from artsim import errors, stream
 from artsim.datasets.dataset import Dataset, open_dataset
 from artsim.datasets.generate import generate
+from artsim.datasets.plan import SampleOptions
+from artsim.datasets.verify import verify
 from artsim.errors import ArtsimError
-from artsim.families import make
+from artsim.families import CATEGORIES, make
+from artsim.loading.meshes import LoadLimits
+from artsim.loading.sources import family_sources, find_sources
 from artsim.loading.urdf import load
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.frame import Frame
 from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import ARTSIM_VERSION, Sample, observe
-from artsim.renderers import Frame, make_renderer, render, render_cameras
+from artsim.observing.capture import observe
+from artsim.observing.sample import ARTSIM_VERSION, Sample
+from artsim.observing.sensor import SENSORS, Sensor
+from artsim.renderers import make_renderer, render, render_cameras
 
 __version__ = ARTSIM_VERSION
 
 __all__ = [
+    "CATEGORIES",
+    "SENSORS",
     "ArticulatedObject",
     "ArtsimError",
     "Camera",
     "Dataset",
     "Frame",
     "KinematicTree",
+    "LoadLimits",
     "Sample",
+    "SampleOptions",
+    "Sensor",
     "StateOptions",
     "ViewOptions",
     "__version__",
+    "errors",
+    "family_sources",
+    "find_sources",
     "generate",
     "load",
     "make",
@@ -40,4 +75,13 @@ __all__ = [
     "render_cameras",
     "sample_state",
     "sample_view",
+    "stream",
+    "verify",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """The public packages that need more than the core: ``artsim.physics`` works after ``import artsim``."""
+    if name in ("checks", "drawing", "envs", "export", "physics", "scenes"):
+        return importlib.import_module(f"artsim.{name}")
+    raise AttributeError(f"module 'artsim' has no attribute {name!r}")

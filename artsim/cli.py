@@ -14,13 +14,13 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from artsim.common.extras import explained, of_ours
+from artsim.common.extras import import_failure, is_own_module
 from artsim.common.names import PrintableStream, printable
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
-from artsim.scenes.maker import SceneCameraOptions, SceneOptions
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
 
 _LISTED = 50
 """Lines of a list before the rest is only counted."""
@@ -182,10 +182,7 @@ class Record:
 
         episode = replace(self.episode, categories=_categories(self.episode.categories))
         folder = record(self.out, episode, self.motions, self.frames, self.seed)
-        print(
-            f"{folder}: {self.motions} motions of {self.frames} frames; "
-            "read them with artsim.physics.episode_file.open_motions"
-        )
+        print(f"{folder}: {self.motions} motions of {self.frames} frames; read them with artsim.physics.open_motions")
 
 
 @dataclass(frozen=True)
@@ -218,9 +215,9 @@ class Scene:
     """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
 
     def run(self) -> None:
-        from artsim.scenes.maker import make_scene, scene_camera
-        from artsim.scenes.sample import observe_scene
-        from artsim.scenes.view import write_overview
+        from artsim.drawing.scene_overview import write_overview
+        from artsim.scenes.ground_truth import observe_scene
+        from artsim.scenes.random_scene import make_scene, scene_camera
 
         if min(self.scenes, self.views) < 1:
             raise ConfigError("there is nothing to make", "scenes, views", "use 1 or more of each")
@@ -260,9 +257,11 @@ class View:
     """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
-        from artsim.drawing.view import view_path
+        from artsim.drawing.contact_sheet import write_contact_sheet
 
-        for written in view_path(self.path, self.out, self.samples, self.split, self.rerun, self.package_root):
+        for written in write_contact_sheet(
+            self.path, self.out, self.samples, self.split, self.rerun, self.package_root
+        ):
             print(f"wrote {written}")
 
 
@@ -283,11 +282,11 @@ class Gallery:
 
     def run(self) -> None:
         from artsim.common.files import write_atomic
-        from artsim.drawing.gallery import gallery
+        from artsim.drawing.gallery import draw_gallery
         from artsim.loading.sources import family_sources
 
         sources = family_sources(_categories(self.categories), self.objects, self.first_object)
-        write_atomic(self.out, gallery([source.load() for source in sources], self.states))
+        write_atomic(self.out, draw_gallery([source.load() for source in sources], self.states))
         print(f"wrote {self.out}")
 
 
@@ -386,9 +385,9 @@ class Doctor:
     """raycast, pybullet, pybullet-egl, sapien, maniskill, warp, ray, torch; by default all of them."""
 
     def run(self) -> None:
-        from artsim.doctor import BACKENDS, examine, table
+        from artsim.doctor import BACKENDS, examine, finding_table
 
-        print(table([examine(backend) for backend in self.backends or BACKENDS]))
+        print(finding_table([examine(backend) for backend in self.backends or BACKENDS]))
 
 
 def _categories(named: tuple[str, ...]) -> tuple[str, ...]:
@@ -441,9 +440,9 @@ def run_program(verb: Any, program: str, description: str | None = None) -> None
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()
     except ImportError as error:  # the net below every import of an optional dependency
-        if of_ours(error):
+        if is_own_module(error):
             raise
-        print(f"error: {printable(explained(error, program), 4000)}", file=sys.stderr)
+        print(f"error: {printable(import_failure(error, program), 4000)}", file=sys.stderr)
         sys.exit(2)
     except (ArtsimError, OSError) as error:
         print(f"error: {printable(error, 4000)}", file=sys.stderr)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
-from artsim.common.extras import explained, install_command
+from artsim.common.extras import import_failure, install_command
 from artsim.errors import ArtsimError, ConfigError, RenderError
 
 SIZE = 128
@@ -82,22 +82,22 @@ def examine(backend: str) -> Finding:
             [sys.executable, "-m", "artsim.doctor", backend], capture_output=True, text=True, timeout=_TIMEOUT
         )
     except subprocess.TimeoutExpired:
-        return _broken(backend, f"gave no answer within {_TIMEOUT:.0f} s")
+        return _failure(backend, f"gave no answer within {_TIMEOUT:.0f} s")
     # A process that has answered may still crash at its exit.
     for line in reversed(child.stdout.splitlines()):
         if line.startswith('{"backend":'):
             return Finding(**json.loads(line))
     if child.returncode < 0:
-        return _broken(backend, f"crashes its process ({signal.Signals(-child.returncode).name})")
+        return _failure(backend, f"crashes its process ({signal.Signals(-child.returncode).name})")
     last = (child.stderr.strip().splitlines() or [f"ended with {child.returncode}"])[-1]
-    return _broken(backend, last)
+    return _failure(backend, last)
 
 
-def _broken(backend: str, problem: str, fix: str = "") -> Finding:
+def _failure(backend: str, problem: str, fix: str = "") -> Finding:
     return Finding(backend, works=False, problem=problem, fix=fix or _FIXES[backend])
 
 
-def table(findings: list[Finding]) -> str:
+def finding_table(findings: list[Finding]) -> str:
     """Findings as text: a line for each backend, and one more for what to do about those that do not work."""
     width = max(len("device"), *(len(finding.device) for finding in findings))
     lines = [f"{'backend':<14}{'works':<7}{'device':<{width + 2}}frames/s at {SIZE}x{SIZE}"]
@@ -228,12 +228,12 @@ def _answer(backend: str) -> Finding:
     try:
         device, fps = BACKENDS[backend]()
     except ArtsimError as error:
-        return _broken(backend, error.what, error.fix or "")
+        return _failure(backend, error.what, error.fix or "")
     except ImportError as error:
-        told = explained(error, backend)
-        return _broken(backend, told.what, "" if isinstance(error, ModuleNotFoundError) else told.fix or "")
+        told = import_failure(error, backend)
+        return _failure(backend, told.what, "" if isinstance(error, ModuleNotFoundError) else told.fix or "")
     except Exception as error:  # backends fail in many ways
-        return _broken(backend, f"{type(error).__name__}: {error}")
+        return _failure(backend, f"{type(error).__name__}: {error}")
     return Finding(backend, works=True, device=device, fps=fps)
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from artsim.common.names import printable
 
+__all__ = ["ArtsimError", "AssetError", "ConfigError", "DatasetError", "KinematicsError", "RenderError"]
+
 _MAX_TEXT = 1200
 """Characters of each part of a message: names out of files may be of any length."""
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 from types import TracebackType
 
-from artsim.common.extras import explained, of_ours
+from artsim.common.extras import import_failure, is_own_module
 from artsim.errors import ArtsimError
 
 
 def _one_line(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Print an error that is the user's to mend as one line, and exit with 2, as the other programs do."""
-    if isinstance(error, ImportError) and not of_ours(error):
-        error = explained(error, "benchmarks")
+    if isinstance(error, ImportError) and not is_own_module(error):
+        error = import_failure(error, "benchmarks")
     if not isinstance(error, ArtsimError):
         sys.__excepthook__(kind, error, trace)
         return

@@ -51,12 +51,6 @@ class Variant:
     """Only what comes after the search differs."""
 
 
-def _free_at_once(shapes: Any, observed: Any, start: Any, options: Any = None, *args: Any, **kwargs: Any) -> Any:
-    if options is not None and options.rigid_iterations == 2:
-        options = replace(options, rigid_iterations=0)
-    return _refine(shapes, observed, start, options, *args, **kwargs)
-
-
 def _no_outline(shapes: Any, observed: Any, start: Any, options: Any = None, *args: Any, **kwargs: Any) -> Any:
     return _refine(shapes, observed, start, replace(options, outline_weight=0.0), *args, **kwargs)
 
@@ -81,7 +75,7 @@ VARIANTS: dict[str, Variant] = {
     "labels of perception alone": Variant(
         patches=((search, "relabel", lambda shapes, observed, theta, logits: observed.part),)
     ),
-    "shape free at once": Variant(patches=((search, "refine", _free_at_once),)),
+    "shape free at once": Variant(patches=((levenberg_marquardt, "_RIGID_ITERATIONS", 0),)),
     "no outline term": Variant(patches=((search, "refine", _no_outline),)),
     "no second try": Variant({"retry_residual": float("inf")}),
     "no agent": Variant(change=lambda e: replace(e, agent=None)),

@@ -26,8 +26,9 @@ from artsim.errors import RenderError
 from artsim.families import FAMILIES
 from artsim.loading.sources import Source, family_sources, find_sources
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers import BACKGROUND, Frame, Renderer
+from artsim.renderers import Renderer
 from benchmarks.differences import CLASSES, Scene, classify, near_edge
 
 LIMITS = {

@@ -11,7 +11,7 @@ import numpy as np
 from artsim.doctor import examine
 from artsim.errors import RenderError
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.views import draw_views
+from artsim.renderers.view_batch import draw_views
 from artsim.renderers.warp import WarpRenderer, import_warp
 
 SIZE = 128

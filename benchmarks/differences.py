@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers import BACKGROUND, Frame
 from artsim.renderers.raycast import pose, render_posed
 
 Scene = tuple[ArticulatedObject, Array, Camera]

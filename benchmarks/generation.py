@@ -30,7 +30,7 @@ from artsim.loading.sources import find_sources
 from artsim.model.kinematics import Array
 from artsim.model.object_file import ObjectCache, save_object
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import draw_visible
+from artsim.observing.capture import draw_visible
 from artsim.renderers.raycast import cast, pose
 from benchmarks.demo_objects import demo_paths
 

@@ -28,7 +28,7 @@ from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, invert_transform
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.simulators import LinkPoses, poses_in_file
-from artsim.renderers.bullet import import_pybullet, silent
+from artsim.renderers.bullet import import_pybullet, silence_output
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def pybullet_poses(file: Path) -> LinkPoses:
             axis.set("xyz", " ".join(map(repr, (direction / np.linalg.norm(direction)).tolist())))
     client = _client()
     bullet.resetSimulation(physicsClientId=client)
-    with tempfile.NamedTemporaryFile(suffix=".urdf") as bare, silent():
+    with tempfile.NamedTemporaryFile(suffix=".urdf") as bare, silence_output():
         bare.write(etree.tostring(root))
         bare.flush()
         body = bullet.loadURDF(bare.name, useFixedBase=True, physicsClientId=client)

@@ -29,10 +29,10 @@ from artsim.checks.realism import (
     Likeness,
     Realism,
     Split,
-    between,
     distances,
     draw_split,
     likeness,
+    pair_distances,
     read_split,
     real_objects,
 )
@@ -101,7 +101,7 @@ def compare(
     starts = range(0, objects, batch)
     tasks = [(category, range(s, min(s + batch, objects)), list(real.values())) for s in starts]
     rows = track(category, pool.map(_to_real, tasks), total=len(tasks), leave=False)
-    return list(real), Realism(np.concatenate(list(rows)), between(yardstick))
+    return list(real), Realism(np.concatenate(list(rows)), pair_distances(yardstick))
 
 
 def _to_real(task: tuple[str, Sequence[int], list[Likeness]]) -> Array:

@@ -26,7 +26,8 @@ from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers import Renderer, make_renderer
 
 T = TypeVar("T")
-ASSETS = Path(__file__).resolve().parent.parent / "urdf_assets"
+ROOT = Path(__file__).resolve().parent.parent
+ASSETS, CASES = ROOT / "urdf_assets", ROOT / "tests" / "cases"
 DEMO = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
 
 

@@ -24,9 +24,9 @@ def load(path: Path) -> str:
 
 
 def view(path: Path) -> str:
-    from artsim.drawing.view import view_path
+    from artsim.drawing.contact_sheet import write_contact_sheet
 
-    return " ".join(str(written.absolute()) for written in view_path(path, samples=1))
+    return " ".join(str(written.absolute()) for written in write_contact_sheet(path, samples=1))
 
 
 def base(path: Path) -> str:

@@ -11,20 +11,14 @@ import subprocess
 import sys
 import zipfile
 import zlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import artsim
 from artsim.cli import main
-from artsim.common.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
-from artsim.common.names import printable, safe_name
-from artsim.common.plain import from_plain
 from artsim.errors import ArtsimError, AssetError
-from tests.conftest import ASSETS
 
 CASES = Path(__file__).parent / "cases" / "hostile"
 ESTIMATOR = Path(__file__).parents[1] / "artperl" / "weights" / "laptop"
@@ -296,74 +290,6 @@ def test_an_error_is_one_printable_line_of_bounded_length(tmp_path: Path) -> Non
     assert len(str(AssetError("x" * 100_000, "y" * 100_000, "z" * 100_000))) < 5000
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["/etc/passwd", "../../x", "x/../../y", "a\\b", ".hidden", "..", "", "con", "NUL.txt", "a\0b", "\ud800", "x" * 1000,
-     "\u202ex", "a b", "trailing.", "C:\\x"],
-)  # fmt: skip
-def test_a_name_is_never_a_path(text: str) -> None:
-    name = safe_name(text)
-    assert Path(name).name == name
-    assert not name.startswith(".")
-    assert len(f"{name}.png".encode()) <= 255
-    assert name.isprintable()
-    assert name != text
-    assert safe_name(text) == name
-    assert safe_name(name) == name
-
-
-def test_names_that_differ_stay_apart() -> None:
-    texts = ["a/b", "a_b", "a\\b", "a b", "..a_b", "x" * 100, "x" * 101, "\u6905", "\u6905/"]
-    assert len({safe_name(text) for text in texts}) == len(texts)
-    assert safe_name("laptop-10211") == "laptop-10211"
-    assert safe_name("\u6905\u5b50") == "\u6905\u5b50"
-
-
-def test_printable_text_stays_as_it_is() -> None:
-    for text in ("drawer_1", "\u6905\u5b50 \u00e9\u00df", "73 deg, 12 cm", ""):
-        assert printable(text) == text
-
-
-@pytest.mark.parametrize(
-    "text",
-    [b"[" * 100_000, b"[" * 70 + b"]" * 70, b"{\"a\":" * 500, b"1" * 5000, b"[1" + b"0" * 25 + b"]", b"1e999", b"NaN",
-     b"[Infinity]", b'"\\ud800"', b"\xff", b"", b"[0," * 10, b"nul", b"\xef\xbb\xbf"],
-)  # fmt: skip
-def test_json_of_no_use_is_a_value_error(text: bytes) -> None:
-    with pytest.raises(ValueError, match=r"."):
-        parse_json(text)
-
-
-def test_json_is_read_with_a_byte_order_mark() -> None:
-    assert parse_json(b'\xef\xbb\xbf{"a": [1, 2.5, "\\ud83d\\ude00"]}') == {"a": [1, 2.5, "\U0001f600"]}
-
-
-@pytest.mark.parametrize("order", ["C", "F"])
-@pytest.mark.parametrize("shape", [(), (0, 3), (4, 3), (2, 3, 4)])
-@pytest.mark.parametrize("dtype", ["f8", "i1", "<u2", ">f4", "?", "U3"])
-def test_arrays_come_back(order: Any, shape: tuple[int, ...], dtype: str) -> None:
-    array = np.asarray(np.arange(np.prod(shape, dtype=int)).reshape(shape).astype(dtype), order=order)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, a=array, b=array)
-    one = io.BytesIO()
-    np.save(one, array)
-    for found in (*parse_npz(buffer.getvalue()).values(), parse_npy(one.getvalue())):
-        np.testing.assert_array_equal(found, array)
-        assert found.dtype == array.dtype
-        assert found.flags.writeable
-
-
-def test_a_file_is_read_up_to_its_limit_and_no_further(tmp_path: Path) -> None:
-    (tmp_path / "f").write_bytes(bytes(100))
-    assert len(read_bounded(tmp_path / "f", 100, "file")) == 100
-    with pytest.raises(AssetError, match="over the limit"):
-        read_bounded(tmp_path / "f", 99, "file")
-    with pytest.raises(AssetError, match="is a folder"):
-        read_bounded(tmp_path, 99, "file")
-    with pytest.raises(AssetError, match="cannot read file"):
-        read_json(tmp_path / "a\0b", "file")
-
-
 def test_a_recording_names_its_motions_and_no_other_files(tmp_path: Path) -> None:
     from artsim.physics.episode_file import open_motions
 
@@ -373,83 +299,6 @@ def test_a_recording_names_its_motions_and_no_other_files(tmp_path: Path) -> Non
         (tmp_path / "motions.json").write_text(json.dumps(content))
         with pytest.raises(ArtsimError, match="names a motion"):
             open_motions(tmp_path)
-
-
-def resaved(path: Path, **changes: Any) -> Path:
-    """An object file with other arrays, or, for what is no array, another header."""
-    from artsim.model.object_file import save_object
-
-    save_object(artsim.load(ASSETS / "laptop"), path)
-    with np.load(path) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    header = json.loads(arrays["header"].tobytes())
-    for name, change in changes.items():
-        if name in arrays:
-            arrays[name] = change(arrays[name])
-        else:
-            header[name] = change(header[name])
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    np.savez(path, **arrays)
-    return path
-
-
-def _joint(**changes: Any) -> Callable[[dict[str, Any]], dict[str, Any]]:
-    return lambda tree: {"joints": [tree["joints"][0], tree["joints"][1] | changes, *tree["joints"][2:]]}
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"tree": _joint(parent=1)}, "a parent must come before its children"),
-        ({"tree": _joint(parent=-5)}, "no number of a joint"),
-        ({"tree": _joint(parent=True)}, "no number of a joint"),
-        ({"tree": _joint(mimic=[1, 1.0, 0.0])}, "form a loop"),
-        ({"tree": _joint(mimic=[1, 1.0])}, "not three values"),
-        ({"tree": _joint(axis=[0.0, 0.0, 2.0])}, "not a unit vector"),
-        ({"tree": _joint(axis=[1e308, 1e308, 1e308])}, "no number in range"),
-        ({"tree": _joint(rest=None)}, "no number in range"),
-        ({"tree": _joint(lower="a")}, "no number in range"),
-        ({"tree": lambda tree: {"joints": tree["joints"] * 1000}}, "no list of joints"),
-        ({"tree": lambda tree: tree["joints"]}, "no list of joints"),
-        ({"names": lambda names: names * 2}, "not 2 texts"),
-        ({"names": lambda names: [None] * len(names)}, "not 2 texts"),
-        ({"scale": lambda scale: -1.0}, "scale is -1"),
-        ({"scale": lambda scale: "1"}, "not numbers of shape"),
-        ({"T_base_rest": lambda T: T[:3]}, "not numbers of shape"),
-        ({"object_id": lambda name: "\ud800"}, "surrogates not allowed"),
-        ({"repairs": lambda repairs: [["a"]]}, "not 2 texts"),
-        ({"source_joints": lambda joints: {"a": [9, 1.0]}}, "source joint a"),
-        ({"format": lambda form: 2}, "its format is 2"),
-        ({"vertices": lambda v: v * np.nan}, "not finite"),
-        ({"vertices": lambda v: v * 0}, "no extent"),
-        ({"vertices": lambda v: v[:-1]}, "add up to"),
-        ({"vertices": lambda v: v.astype("U8")}, "vertices are <U8"),
-        ({"faces": lambda f: f - 1}, "corner that does not exist"),
-        ({"faces": lambda f: f + 10_000}, "corner that does not exist"),
-        ({"faces": lambda f: f[:0]}, "no triangle"),
-        ({"faces": lambda f: f.astype(np.float64)}, "faces are float64"),
-        ({"face_counts": lambda c: c[::-1]}, "does not exist"),
-        ({"vertex_counts": lambda c: -c}, "do not fit"),
-        ({"vertex_counts": lambda c: np.array([2**62, 2**62], np.int64)}, "add up to"),
-    ],
-)  # fmt: skip
-def test_a_damaged_object_file_is_refused(changes: dict[str, Any], text: str, tmp_path: Path) -> None:
-    with pytest.raises(AssetError, match=text) as caught:
-        artsim.load(resaved(tmp_path / "o.npz", **changes))
-    assert "Fix: generate it again" in str(caught.value)
-
-
-def test_a_value_of_another_type_is_named() -> None:
-    from artperl.fitting.search import EstimatorOptions
-
-    assert from_plain(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
-    assert from_plain(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf
-    for name, value in (("beam", True), ("beam", 2.0), ("coherent", 1), ("azimuths", 3), ("seen_from", [1.0]),
-                        ("refine", []), ("refine", {"tolerance": "a"}), ("elevation", float("nan"))):  # fmt: skip
-        with pytest.raises(ValueError, match=r"is |not a set"):
-            from_plain(EstimatorOptions, {name: value})
-    with pytest.raises(ValueError, match="no field 'x'"):
-        from_plain(EstimatorOptions, {"x": 1})
 
 
 def test_a_urdf_file_that_leads_out_of_its_folder_is_refused(tmp_path: Path) -> None:

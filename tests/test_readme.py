@@ -21,9 +21,8 @@ import tyro
 
 import artperl.cli
 import artsim.cli
-from tests.conftest import ASSETS
+from tests.conftest import ASSETS, ROOT
 
-ROOT = ASSETS.parent
 README = ROOT / "README.md"
 TUTORIAL = ROOT / "docs" / "tutorial.md"
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]

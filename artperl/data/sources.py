@@ -13,13 +13,13 @@ import numpy as np
 from artperl.core.part_order import reordered_sample, visible_order
 from artperl.data.categories import Parts, has_parts, order_parts
 from artsim.datasets.dataset import open_dataset
-from artsim.datasets.draw import SensorName
 from artsim.datasets.plan import SampleOptions, draw_sample
-from artsim.datasets.stream import FamilyStream
+from artsim.datasets.sample_options import SensorName
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import shared_renderer
+from artsim.stream import FamilyStream
 
 _ATTEMPTS = 200
 

@@ -82,9 +82,9 @@ def run_basin(
 
     def refined(theta: Theta) -> Theta:
         iterations = min(options.early_iterations, options.refine.iterations)
-        early = replace(options.refine, iterations=iterations, rigid_iterations=iterations)
-        theta = refine(problem.shapes, few, theta, early).theta
-        return refine(problem.shapes, problem.observed, theta, replace(options.refine, rigid_iterations=2)).theta
+        early = replace(options.refine, iterations=iterations)
+        theta = refine(problem.shapes, few, theta, early, rigid=True).theta
+        return refine(problem.shapes, problem.observed, theta, options.refine).theta
 
     result = []
     for angle in ANGLES:

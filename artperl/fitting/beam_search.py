@@ -17,7 +17,8 @@ from artperl.core.pose import Posed, Theta, Trees, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.correspondence import Target, match
-from artperl.fitting.levenberg_marquardt import RefineOptions, refine, robust
+from artperl.fitting.levenberg_marquardt import refine, robust_mean
+from artperl.fitting.refine_options import RefineOptions
 
 _STATES = 24
 """States that each joint takes, besides that of the start."""
@@ -47,7 +48,7 @@ class _Part(Batch):
         """(B,) robust distance of its points from the part in B poses ``T_camera_part``."""
         one = self.map(lambda tensor: tensor.expand(len(rotation), *tensor.shape[1:]))
         placed = replace(Theta.at_rest(one.shape.trees), rotation=rotation, translation=translation)
-        return robust(match(one.shape, one.target, placed, options.outline_weight), options.robust_end)
+        return robust_mean(match(one.shape, one.target, placed, options.outline_weight), options.robust_end)
 
 
 def beam(
@@ -163,8 +164,8 @@ def _roots(root: _Part, start: Theta, options: RefineOptions) -> Theta:
     many, theta = root.map(lambda tensor: tensor.expand(len(turn), *tensor.shape[1:])), start.repeat(len(turn))
     rotation, translation = turn @ theta.rotation, theta.translation + pivot - rotate(turn, pivot.expand(len(turn), 3))
     placed = replace(Theta.at_rest(many.shape.trees), rotation=rotation, translation=translation)
-    alone = replace(options, outline_weight=0.0, iterations=_ROOT_ITERATIONS, rigid_iterations=_ROOT_ITERATIONS)
-    refined = refine(many.shape, many.target.observed, placed, alone)
+    alone = replace(options, outline_weight=0.0, iterations=_ROOT_ITERATIONS)
+    refined = refine(many.shape, many.target.observed, placed, alone, rigid=True)
     best = refined.energy.argsort()[:_ROOTS]
     found = refined.theta[best]
     return replace(theta[best], rotation=found.rotation, translation=found.translation)

@@ -2,14 +2,13 @@
 
 The reference's points stand for small discs of its surface. An observed point is at distance
 
-    e^2 = n^2 + (glide * max(t - zone, 0))^2
+    e^2 = n^2 + (w * max(t - r, 0))^2
 
-from a disc with offset ``n`` along the disc's normal and ``t`` across it, where ``zone`` is the radius of the disc: the
-distance from the surface that the discs sample, rather than from the samples themselves.
+from a disc of radius ``r`` with offset ``n`` along the disc's normal and ``t`` along its tangent plane: the distance
+from the surface that the discs sample, rather than from the samples themselves. ``w`` is :data:`TANGENT_WEIGHT`.
 
-What is seen of an object lies on its surface, but an object that is too large fits that as well. So the other way
-round, every point of the reference, hidden or not, must lie within the outline of what is seen: points that would
-appear next to it are at a distance, too.
+An object that is too large fits what is seen of a surface as well. So the outline of the cloud counts, too: every point
+of the reference, hidden or not, is to appear within it, and is at a distance where it appears beside it.
 """
 
 from __future__ import annotations
@@ -25,18 +24,18 @@ from artperl.core.neighbours import nearest
 from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 
-GLIDE = 0.4
-"""Weight of offsets across a surface against those from it: with none, flat parts would slide along themselves."""
-_ZONE = 0.7
-"""Radius of the disc that a point stands for, over the spacing of points."""
-_GAP = 2.0
+TANGENT_WEIGHT = 0.4
+"""Of offsets along a surface against those from it: with none, flat parts would slide along themselves."""
+_DISC_RADIUS = 0.7
+"""Of the disc that a point stands for, over the spacing of points."""
+_OUTLINE_GAP = 2.0
 """Gap within an outline over the mean distance of neighbouring rays: for random rays, few points have a wider one."""
 _OUTLINE_POINTS = 32
 """Points of each part that must lie within the outline; the first ones are spread as evenly as all."""
 _BLOCK = 64
 """Points that are matched together."""
-_HIDDEN = 10.0
-"""Squared distance, in diagonals, added for a disc that faces away from the camera: it could not be seen."""
+_BACK_FACE = 10.0
+"""Squared distance, in diagonals, added for a disc that faces away from the camera: it cannot be seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,9 @@ class Target(Batch):
         middle = (share[..., None] * observed.points).sum(1, keepdim=True)
         rays = observed.points[..., :2] / observed.points[..., 2:].clamp(min=1e-6)
         rays = torch.where(observed.weight[..., None] > 0, rays, 1e3)
-        gap = _GAP * (share * nearest(rays, rays, 2)[0].amax(-1).sqrt()).sum(1)  # each ray is the nearest to itself
+        gap = _OUTLINE_GAP * (share * nearest(rays, rays, 2)[0].amax(-1).sqrt()).sum(
+            1
+        )  # each ray is the nearest to itself
         x = ((observed.points - middle) / unit[:, None, None]).float()  # small numbers, for single precision
         monomials = torch.cat([x * x, x * x.roll(1, -1), x, torch.ones_like(x[..., :1])], dim=-1)
         slot, source, block_part = _blocks(observed.part)
@@ -128,10 +129,10 @@ class Matches(Batch):
         Part of the reference that it depends on.
     local : (B, R, 3) float
         The reference's own point, in its rest frame.
-    normal, across : (B, R, 3) float
+    normal, tangent : (B, R, 3) float
         Unit directions in which the point is off.
-    offset, excess : (B, R) float
-        By how much, in diagonals; the second counts :data:`GLIDE` times.
+    normal_residual, tangent_residual : (B, R) float
+        By how much, in diagonals; the second counts :data:`TANGENT_WEIGHT` times.
     weight : (B, R) float
     """
 
@@ -141,15 +142,15 @@ class Matches(Batch):
     part: Tensor
     local: Tensor
     normal: Tensor
-    across: Tensor
-    offset: Tensor
-    excess: Tensor
+    tangent: Tensor
+    normal_residual: Tensor
+    tangent_residual: Tensor
     weight: Tensor
 
     @cached_property
     def square(self) -> Tensor:
         """(B, R) squared distances e^2, in diagonals."""
-        return self.offset**2 + (GLIDE * self.excess) ** 2
+        return self.normal_residual**2 + (TANGENT_WEIGHT * self.tangent_residual) ** 2
 
 
 def match(shapes: Shapes, target: Target, theta: Theta, outline_weight: float) -> Matches:
@@ -159,13 +160,13 @@ def match(shapes: Shapes, target: Target, theta: Theta, outline_weight: float) -
     """
     posed = pose_parts(shapes.trees, theta, shapes.box_center)
     points = posed.points(shapes.points, shapes.box_center)
-    rows = [_surface(shapes, target, posed, points)]
+    rows = [_surface_residuals(shapes, target, posed, points)]
     if outline_weight > 0:
-        rows.append(_outline(shapes, target, points[:, :, :_OUTLINE_POINTS], outline_weight))
+        rows.append(_outline_residuals(shapes, target, points[:, :, :_OUTLINE_POINTS], outline_weight))
     return Matches(theta, posed, *(torch.cat(column, dim=1) for column in zip(*rows, strict=True)))
 
 
-def _surface(shapes: Shapes, target: Target, posed: Posed, points: Tensor) -> tuple[Tensor, ...]:
+def _surface_residuals(shapes: Shapes, target: Target, posed: Posed, points: Tensor) -> tuple[Tensor, ...]:
     """Rows of :class:`Matches` for the observed points."""
     observed = target.observed
     normals = posed.normals(shapes.normals)
@@ -179,17 +180,17 @@ def _surface(shapes: Shapes, target: Target, posed: Posed, points: Tensor) -> tu
     normal, unit = at(normals), target.unit[:, None]
     apart = observed.points - at(points)
     offset = (apart * normal).sum(-1)
-    sideways = apart - offset[..., None] * normal
-    length = torch.linalg.vector_norm(sideways, dim=-1)
-    radius = (_ZONE * posed.scale.mean(-1) * shapes.spacing).gather(1, observed.part)
+    tangent = apart - offset[..., None] * normal
+    length = torch.linalg.vector_norm(tangent, dim=-1)
+    radius = (_DISC_RADIUS * posed.scale.mean(-1) * shapes.spacing).gather(1, observed.part)
     excess = (length - radius).clamp(min=0.0) / unit
-    across = sideways / length.clamp(min=1e-12)[..., None]
-    # Points labelled as a part that has no surface say nothing.
+    tangent = tangent / length.clamp(min=1e-12)[..., None]
+    # A part without a surface is at no distance from the points that are labelled as it.
     weight = target.share * torch.isfinite(radius)
-    return observed.points, observed.part, at(shapes.points), normal, across, offset / unit, excess, weight
+    return observed.points, observed.part, at(shapes.points), normal, tangent, offset / unit, excess, weight
 
 
-def _outline(shapes: Shapes, target: Target, points: Tensor, outline_weight: float) -> tuple[Tensor, ...]:
+def _outline_residuals(shapes: Shapes, target: Target, points: Tensor, outline_weight: float) -> tuple[Tensor, ...]:
     """Rows of :class:`Matches` for points of the reference (B, P, M, 3), which must appear within the outline."""
     B, P, M, _ = points.shape
     point = points.flatten(1, 2)
@@ -200,15 +201,16 @@ def _outline(shapes: Shapes, target: Target, points: Tensor, outline_weight: flo
     outwards = rays - ray
     length = torch.linalg.vector_norm(outwards, dim=-1)
     outwards = outwards / length.clamp(min=1e-12)[..., None]
-    # depth * length grows by outwards . (dx - rays * dz) when the point moves: pushed against that, it comes back.
-    push = -torch.cat([outwards, -(outwards * rays).sum(-1, keepdim=True)], dim=-1)
+    # depth * length grows by outwards . (dx - rays * dz) when the point moves; residuals fall along their normal.
+    normal = -torch.cat([outwards, -(outwards * rays).sum(-1, keepdim=True)], dim=-1)
     offset = depth[..., 0] * (length - target.gap[:, None]).clamp(min=0.0) / target.unit[:, None]
     solid = shapes.has_surface.to(point.dtype)
     weight = outline_weight * solid / (M * solid.sum(1, keepdim=True).clamp(min=1.0))
     part = torch.arange(P, device=point.device).repeat_interleave(M).expand(B, -1)
     own = shapes.points[:, :, :M].flatten(1, 2)
     zero = torch.zeros_like(point)
-    return point, part, own, push * (offset > 0)[..., None], zero, offset, zero[..., 0], weight.repeat_interleave(M, 1)
+    normal = normal * (offset > 0)[..., None]
+    return point, part, own, normal, zero, offset, zero[..., 0], weight.repeat_interleave(M, 1)
 
 
 def _nearest_disc(target: Target, points: Tensor, normals: Tensor) -> Tensor:
@@ -220,9 +222,9 @@ def _nearest_disc(target: Target, points: Tensor, normals: Tensor) -> Tensor:
     y = ((points - target.middle[:, None]) / target.unit[:, None, None, None]).float()
     n = normals.float()
     facing = (points * normals).sum(-1) < 0.0  # the camera is at the origin
-    weight = GLIDE**2
+    weight = TANGENT_WEIGHT**2
     height = (n * y).sum(-1, keepdim=True)
-    constant = height**2 + weight * (y * y).sum(-1, keepdim=True) + _HIDDEN * (~facing)[..., None]
+    constant = height**2 + weight * (y * y).sum(-1, keepdim=True) + _BACK_FACE * (~facing)[..., None]
     linear = -2.0 * (height * n + weight * y)
     # Products of different coordinates (zx, xy, yz) count twice.
     discs = torch.cat([n * n, 2.0 * n * n.roll(1, -1), linear, constant], dim=-1)

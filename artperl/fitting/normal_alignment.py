@@ -49,7 +49,7 @@ def normals_of(points: Array) -> tuple[NDArray[np.int64], Array]:
     return flat, normal[flat]
 
 
-def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]) -> Theta:
+def align_normals(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]) -> Theta:
     """Theta of one object whose root is turned, and whose hinges are, until surfaces face along axes.
 
     The root, and what slides along it, turns about the middle of its points; then each hinge down the tree turns by
@@ -75,7 +75,7 @@ def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]
     turning = (trees.turn[0] != 0).numpy()
     still = ~trees.carries[0].numpy()[turning].any(axis=0)
     R = theta.rotation[0].double().numpy()
-    turn = _turn(normal[still[own]] @ R, np.eye(3), int(still[looked_at].sum()))
+    turn = _alignment(normal[still[own]] @ R, np.eye(3), int(still[looked_at].sum()))
     if turn is not None:
         middle = points[still[part]].mean(axis=0)
         turned = R @ rotation_from_vector(torch.from_numpy(turn)).numpy()
@@ -88,7 +88,7 @@ def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]
         axis = trees.axis[0, k].double().numpy()
         if np.abs(axis).max() > np.cos(np.radians(_LEAN)):
             R = pose_parts(trees, theta, shapes.box_center).rotation[0, k].double().numpy()
-            turn = _turn(normal[own == k] @ R, axis[None], int((looked_at == k).sum()))
+            turn = _alignment(normal[own == k] @ R, axis[None], int((looked_at == k).sum()))
             if turn is not None:
                 state = theta.state.clone()
                 state[0, k] += float(turn @ axis) / float(trees.turn[0, k])
@@ -96,7 +96,7 @@ def squared(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]
     return theta
 
 
-def _turn(normal: Array, about: Array, points: int) -> Array | None:
+def _alignment(normal: Array, about: Array, points: int) -> Array | None:
     """(3,) rotation vector, a mix of directions (D, 3), by which a part is to turn in its own frame; None if unclear.
 
     Parameters

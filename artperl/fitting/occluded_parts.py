@@ -62,7 +62,7 @@ class _View:
         return (distance > _GAP * self.apart) | (points[..., 2] < self.depth[nearest] - margin)
 
 
-def uncovered(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]) -> Theta:
+def pose_occluded_parts(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]) -> Theta:
     """Theta of one object whose hinges with hardly visible parts are where these would not show more than they do.
 
     A state is the less likely the more points of the part a camera would have seen beyond those that it has, and the

@@ -26,7 +26,8 @@ from artperl.core.rotations import rotate
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.beam_search import beam, half_turned
 from artperl.fitting.initial_pose import by_another_part, facing, start
-from artperl.fitting.levenberg_marquardt import Refined, RefineOptions, refine
+from artperl.fitting.levenberg_marquardt import Refined, refine
+from artperl.fitting.refine_options import RefineOptions
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import Grouped
 from artperl.retrieval.box_embedding import box_embedding
@@ -296,15 +297,14 @@ def _settle(
         all_shapes, theta = concatenate([shapes] * len(ends)), concatenate(ends)
         few = observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(all_shapes))
         count = min(options.early_iterations, options.refine.iterations)
-        early = refine(all_shapes, few, theta, replace(options.refine, iterations=count, rigid_iterations=count))
+        early = refine(all_shapes, few, theta, replace(options.refine, iterations=count), rigid=True)
         best = int((early.energy + _NEVER * astray(early.theta, options.seen_from)).argmin())
         own, theta = all_shapes[best : best + 1], early.theta[best : best + 1]
     with clock("relabel"):
         observed = replace(observed, part=relabel(own, observed, theta, perceived.part_logits))
     with clock("last"):
         row = best % len(shapes)
-        last = replace(options.refine, rigid_iterations=2)
-        refined = refine(own, observed, theta, last, axis_prior=base.axis_prior(rows[row]))
+        refined = refine(own, observed, theta, options.refine, axis_prior=base.axis_prior(rows[row]))
         own = replace(own, trees=replace(own.trees, axis=refined.axis))
     steps = path[:1] if best < len(shapes) else path
     way = [*(step[row : row + 1] for step in steps), refined.theta]

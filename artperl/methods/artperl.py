@@ -34,7 +34,7 @@ from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import POINTS, Siamese
-from artsim.common.plain import from_plain
+from artsim.common.json_records import from_json_values
 from artsim.model.objects import MAX_PARTS
 
 Array = NDArray[np.float64]
@@ -193,8 +193,8 @@ class ArtPERL:
     @classmethod
     def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> ArtPERL:
         """The method with these settings, its networks untrained."""
-        sizes = from_plain(Sizes, settings.get("sizes"))
-        options = from_plain(ArtPERLOptions, settings.get("options"))
+        sizes = from_json_values(Sizes, settings.get("sizes"))
+        options = from_json_values(ArtPERLOptions, settings.get("options"))
         own: dict[str, Any] = networks_of(sizes)
         return cls(**own, base=base, options=options)
 

@@ -26,8 +26,8 @@ from artperl.core.clouds import Clouds
 from artperl.core.estimate import Calibration, Estimate, brought_to_rest, labels_by_boxes, slid, visibility, widen
 from artperl.core.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Shapes
-from artperl.fitting.normal_alignment import squared
-from artperl.fitting.occluded_parts import uncovered
+from artperl.fitting.normal_alignment import align_normals
+from artperl.fitting.occluded_parts import pose_occluded_parts
 from artperl.fitting.search import Clock, EstimatorOptions, Found, find
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.label_smoothing import coherent
@@ -194,10 +194,10 @@ class Estimator:
             few = good[draw(len(good), min(_BOX_POINTS, len(good)), np.random.default_rng(0))]
         if options.uncovered:
             with clock("uncover"):
-                found = found.ending(uncovered(found.shapes, found.refined.theta, points[few], part[few]))
+                found = found.ending(pose_occluded_parts(found.shapes, found.refined.theta, points[few], part[few]))
         if options.squared:
             with clock("square"):
-                found = found.ending(squared(found.shapes, found.refined.theta, points[few], part[few]))
+                found = found.ending(align_normals(found.shapes, found.refined.theta, points[few], part[few]))
         with clock("report"):
             log_odds = np.full((len(points), self.perception.num_rows), np.nan)
             log_odds[good] = _numpy(perceived.part_logits.log_softmax(-1).cpu())[index]

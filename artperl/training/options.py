@@ -14,7 +14,7 @@ from artperl.agent.decision_process import FittingOptions
 from artperl.agent.ppo import CLONING, JOINT, REINFORCEMENT, Phase, PPOOptions
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, References, StartOptions
-from artsim.common.plain import from_plain
+from artsim.common.json_records import from_json_values
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 
@@ -172,7 +172,7 @@ def changed(options: T, changes: Mapping[str, Any]) -> T:
         When there is no such field, or a value is not of its type or impossible.
     """
     try:
-        given = from_plain(type(options), changes)
+        given = from_json_values(type(options), changes)
     except ValueError as error:
         raise ConfigError(str(error), "options", "see artperl.training.options.TrainOptions") from error
     values = {

@@ -20,7 +20,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artsim.common.files import parse_json, read_bounded, write_atomic, write_error
-from artsim.datasets.team import locked
+from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import DatasetError
 
 _FORMAT = 2
@@ -62,7 +62,7 @@ class RunFolder:
         DatasetError
             When another run is writing here.
         """
-        with locked(self.path):
+        with folder_lock(self.path):
             for folder in (self.path, self.best):
                 for part in (*folder.glob(".*.part"), *folder.glob(".*.safetensors"), *folder.glob(".*.npz")):
                     part.unlink(missing_ok=True)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from artsim.appearance.textures import Image
 from artsim.model.kinematics import Array
 from artsim.model.objects import Part
-from artsim.renderers.base import two_sided_faces
 
 Colour = tuple[float, float, float]
 
@@ -144,7 +143,7 @@ def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
     scale : float
         Of the object: textures keep their size in metres.
     """
-    faces = two_sided_faces(part)
+    faces = part.two_sided_faces()
     twice = len(faces) // max(len(part.faces), 1)
     corners = part.vertices[faces].astype(np.float64)
     normals = corner_normals(part.vertices, faces)
@@ -154,7 +153,7 @@ def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
         own = material_of_face == number
         if not own.any():
             continue
-        uv = _wrapped(corners[own] * scale, across[own], material.tile)
+        uv = _texture_places(corners[own] * scale, across[own], material.tile)
         if coat.uv is not None:
             # The second copy of a face has its corners in the opposite order.
             laid = np.concatenate([coat.uv, coat.uv[:, ::-1]][:twice])[own]
@@ -187,7 +186,7 @@ def corner_normals(vertices: Array, faces: NDArray[np.int32]) -> NDArray[np.floa
     return normals
 
 
-def _wrapped(corners: Array, normals: Array, tile: float) -> Array:
+def _texture_places(corners: Array, normals: Array, tile: float) -> Array:
     """(F, 3, 2) places on a texture laid onto each face from the side that it faces most; grain along the longer.
 
     Parameters

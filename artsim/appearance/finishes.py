@@ -20,7 +20,7 @@ _ON_SURFACE = 1e-7  # metres
 _DETAIL = 0.12  # of the largest piece's volume: smaller pieces are handles, keys, feet, knobs
 
 
-def textured(texture: str, tile: float, roughness: float, metallic: float = 0.0, specular: float = 0.5) -> Finish:
+def texture_finish(texture: str, tile: float, roughness: float, metallic: float = 0.0, specular: float = 0.5) -> Finish:
     """A finish with a procedural texture."""
 
     def finish(rng: np.random.Generator, tone: Colour) -> Material:
@@ -29,27 +29,27 @@ def textured(texture: str, tile: float, roughness: float, metallic: float = 0.0,
     return finish
 
 
-def plain(roughness: float, metallic: float = 0.0, specular: float = 0.5) -> Finish:
+def plain_finish(roughness: float, metallic: float = 0.0, specular: float = 0.5) -> Finish:
     """A finish of one colour."""
     return lambda rng, tone: Material(tone, roughness * rng.uniform(0.85, 1.15), metallic, specular)
 
 
 FINISHES: dict[str, Finish] = {
-    "wood": textured("wood", 0.45, 0.5),
-    "parquet": textured("parquet", 1.1, 0.4),
-    "stone": textured("stone", 0.8, 0.3),
-    "tiles": textured("tiles", 1.2, 0.25),
-    "plaster": textured("plaster", 1.5, 0.9, specular=0.2),
-    "fabric": textured("fabric", 0.25, 0.95, specular=0.1),
-    "card": textured("card", 0.3, 0.9, specular=0.2),
-    "steel": textured("brushed", 0.2, 0.38, metallic=0.75),
-    "plastic": plain(0.45),
-    "gloss": plain(0.2, specular=0.7),
-    "shell": plain(0.4),
-    "smoke": plain(0.12, specular=0.8),
-    "rubber": plain(0.85, specular=0.2),
-    "enamel": plain(0.28, specular=0.6),
-    "chrome": plain(0.22, metallic=0.85),
+    "wood": texture_finish("wood", 0.45, 0.5),
+    "parquet": texture_finish("parquet", 1.1, 0.4),
+    "stone": texture_finish("stone", 0.8, 0.3),
+    "tiles": texture_finish("tiles", 1.2, 0.25),
+    "plaster": texture_finish("plaster", 1.5, 0.9, specular=0.2),
+    "fabric": texture_finish("fabric", 0.25, 0.95, specular=0.1),
+    "card": texture_finish("card", 0.3, 0.9, specular=0.2),
+    "steel": texture_finish("brushed", 0.2, 0.38, metallic=0.75),
+    "plastic": plain_finish(0.45),
+    "gloss": plain_finish(0.2, specular=0.7),
+    "shell": plain_finish(0.4),
+    "smoke": plain_finish(0.12, specular=0.8),
+    "rubber": plain_finish(0.85, specular=0.2),
+    "enamel": plain_finish(0.28, specular=0.6),
+    "chrome": plain_finish(0.22, metallic=0.85),
 }
 """Every finish by name."""
 
@@ -218,7 +218,7 @@ def _with_screen(lid: Part, coat: Coat, rng: np.random.Generator) -> Coat:
     return Coat((*coat.materials, display), np.where(shown, 2, coat.material_of_face), uv)
 
 
-def repainted(coats: Sequence[Coat], rng: np.random.Generator) -> tuple[Coat, ...]:
+def repaint_coats(coats: Sequence[Coat], rng: np.random.Generator) -> tuple[Coat, ...]:
     """The same coats, each of their materials replaced by one of a random finish."""
     names = sorted(FINISHES)
     new: dict[Material, Material] = {}

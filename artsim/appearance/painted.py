@@ -63,7 +63,7 @@ def painted_coats(obj: ArticulatedObject) -> tuple[Coat, ...] | None:
             return None
         if sum(len(mesh.material_of_face) for mesh in painted) != len(part.faces):
             return None
-        coats.append(_joined(painted))
+        coats.append(_combine_coats(painted))
     return tuple(coats) if any(len(coat.materials) for coat in coats) and any(map(_tells, coats)) else None
 
 
@@ -107,7 +107,7 @@ def _read(path: Path, pictures: dict[Path, Image | None]) -> Coat:
     used, number = np.unique(painted.material_of_face, return_inverse=True)
     looks = tuple(_material(described.get(painted.materials[k], {}), path.parent, pictures) for k in used)
     plain = np.array([look.texture is None for look in looks], dtype=bool)[number]
-    return _joined([Coat(looks, number, np.where(plain[:, None, None], np.nan, painted.uv))])
+    return _combine_coats([Coat(looks, number, np.where(plain[:, None, None], np.nan, painted.uv))])
 
 
 class _Inside:
@@ -158,7 +158,7 @@ def _texture(picture: Any) -> Image | None:
         return None
 
 
-def _joined(coats: Sequence[Coat]) -> Coat:
+def _combine_coats(coats: Sequence[Coat]) -> Coat:
     """One coat of several meshes that follow each other; materials that look the same become one."""
     materials: dict[tuple[Colour, int], Material] = {}
     numbers: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]

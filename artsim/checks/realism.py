@@ -35,7 +35,7 @@ from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import observe
+from artsim.observing.capture import observe
 
 MEASURES = ("surface", "parts", "boxes", "joints", "ranges")
 
@@ -296,8 +296,8 @@ def _joint_distances(a: Likeness, i: int, b: Likeness, j: int) -> tuple[float, f
     difference = float(np.abs(a.limits[i] - limits).sum())
     if not a.turns[i]:
         return placement, difference
-    between = 0.5 * (_axis_distance(a, i, b, j) + _axis_distance(b, j, a, i))
-    return placement + between, _LEVER * difference
+    gap = 0.5 * (_axis_distance(a, i, b, j) + _axis_distance(b, j, a, i))
+    return placement + gap, _LEVER * difference
 
 
 def _axis_distance(a: Likeness, i: int, b: Likeness, j: int) -> float:
@@ -362,7 +362,7 @@ class Realism:
         return np.asarray((self.to_real <= self.yardstick).all(axis=2).any(axis=0))
 
 
-def between(likenesses: Sequence[Likeness]) -> Array:
+def pair_distances(likenesses: Sequence[Likeness]) -> Array:
     """(P, 5) distances of all pairs."""
     found = [distances(a, b) for n, a in enumerate(likenesses) for b in likenesses[:n]]
     return np.array(found).reshape(-1, len(MEASURES))

@@ -87,10 +87,10 @@ def _geometry(obj: ArticulatedObject) -> dict[str, Callable[[], list[str]]]:
 
 
 def _run(gates: dict[str, Callable[[], list[str]]]) -> list[Gate]:
-    return [Gate(name, tuple(_closed(gate))) for name, gate in gates.items()]
+    return [Gate(name, tuple(_run_gate(gate))) for name, gate in gates.items()]
 
 
-def _closed(gate: Callable[[], list[str]]) -> list[str]:
+def _run_gate(gate: Callable[[], list[str]]) -> list[str]:
     """The problems a gate finds; an error is one."""
     try:
         return gate()

@@ -70,7 +70,7 @@ def _series(coefficients: tuple[float, ...], x: Number) -> Number:
     return total
 
 
-def _applied(of_number: Callable[..., float], of_array: Callable[..., Array], *arguments: Number) -> Number:
+def _apply(of_number: Callable[..., float], of_array: Callable[..., Array], *arguments: Number) -> Number:
     """A function of numbers, or of arrays of one shape: few numbers one by one, many of them block by block."""
     first = arguments[0]
     if isinstance(first, float):
@@ -170,7 +170,7 @@ def sin(x: float) -> float: ...
 def sin(x: Reals) -> Array: ...
 def sin(x: Number) -> Number:
     """Sine of angles in radians."""
-    return _applied(_sin_number, _sin_array, _near(x))
+    return _apply(_sin_number, _sin_array, _near(x))
 
 
 @overload
@@ -179,7 +179,7 @@ def cos(x: float) -> float: ...
 def cos(x: Reals) -> Array: ...
 def cos(x: Number) -> Number:
     """Cosine of angles in radians."""
-    return _applied(_cos_number, _cos_array, _near(x))
+    return _apply(_cos_number, _cos_array, _near(x))
 
 
 @overload
@@ -252,7 +252,7 @@ def arctan2(y: Number, x: Number) -> Number:
     if _is_number(y) and _is_number(x):
         return _arctan2_number(float(y), float(x))
     first, second = np.broadcast_arrays(np.asarray(y, dtype=np.float64), np.asarray(x, dtype=np.float64))
-    return _applied(_arctan2_number, _arctan2_array, first, second)
+    return _apply(_arctan2_number, _arctan2_array, first, second)
 
 
 @overload
@@ -332,7 +332,7 @@ def log(x: float) -> float: ...
 def log(x: Reals) -> Array: ...
 def log(x: Number) -> Number:
     """Natural logarithm: -inf of 0, NaN below."""
-    return _applied(_log_number, _log_array, float(x) if _is_number(x) else np.asarray(x, dtype=np.float64))
+    return _apply(_log_number, _log_array, float(x) if _is_number(x) else np.asarray(x, dtype=np.float64))
 
 
 def _exp_of(x: Number, twos: Number) -> Number:
@@ -364,7 +364,7 @@ def exp(x: float) -> float: ...
 def exp(x: Reals) -> Array: ...
 def exp(x: Number) -> Number:
     """Exponential: infinite from 709.78 on."""
-    return _applied(_exp_number, _exp_array, float(x) if _is_number(x) else np.asarray(x, dtype=np.float64))
+    return _apply(_exp_number, _exp_array, float(x) if _is_number(x) else np.asarray(x, dtype=np.float64))
 
 
 @overload

@@ -1,7 +1,7 @@
 """Optional dependencies: which extra brings each of them, and one sentence for whoever lacks one.
 
 Every import of an optional dependency stands in :func:`needs`, or is reached through a program whose last net is
-:func:`explained`: nobody has to read a traceback to learn what to install.
+:func:`import_failure`: nobody has to read a traceback to learn what to install.
 """
 
 from __future__ import annotations
@@ -65,17 +65,17 @@ def needs(where: str, kind: type[ArtsimError] = ConfigError, extra: str = "") ->
     try:
         yield
     except ImportError as error:
-        if of_ours(error):
+        if is_own_module(error):
             raise
-        raise explained(error, where, kind, extra) from error
+        raise import_failure(error, where, kind, extra) from error
 
 
-def of_ours(error: ImportError) -> bool:
+def is_own_module(error: ImportError) -> bool:
     """Whether a module of this project is what cannot be imported: a fault whose traceback is wanted."""
     return (error.name or "").partition(".")[0] in _OURS
 
 
-def explained(
+def import_failure(
     error: ImportError, where: str | None, kind: type[ArtsimError] = ConfigError, extra: str = ""
 ) -> ArtsimError:
     """The readable form of a failed import; parameters as of :func:`needs`."""

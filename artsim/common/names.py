@@ -31,10 +31,10 @@ def printable(text: object, most: int = 120) -> str:
     if len(text) > most:
         half = (most - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
-    return _escaped(text)
+    return _escape(text)
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
@@ -54,7 +54,7 @@ class PrintableStream(io.TextIOBase):
 
     def write(self, text: str) -> int:
         """Write a text, escaped."""
-        self._stream.write("\n".join(map(_escaped, text.split("\n"))))
+        self._stream.write("\n".join(map(_escape, text.split("\n"))))
         return len(text)
 
     def flush(self) -> None:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.datasets.description import read_description
-from artsim.datasets.draw import draw_sample
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.problems import repair_command
+from artsim.datasets.sample_options import draw_sample
 from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary

@@ -15,7 +15,7 @@ from typing import Any
 
 from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
 from artsim.common.names import printable
-from artsim.datasets import checked
+from artsim.datasets import json_values
 from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
@@ -110,14 +110,14 @@ def read_description(folder: Path) -> tuple[Plan, list[ShardRecord], dict[str, A
     document = _document(folder, DESCRIPTION)
     plan = _plan(document, path)
     try:
-        shards = checked.sequence(document["shards"], "shards", MAX_SHARDS)
+        shards = json_values.sequence(document["shards"], "shards", MAX_SHARDS)
         if len(shards) != plan.num_shards:  # compared before the plan's own are listed: a forged plan has any number
             raise ValueError(f"it lists {len(shards)} shards instead of {plan.num_shards}")
         records = [ShardRecord.from_dict(shard) for shard in shards]
         if [record.shard for record in records] != plan.shards():
             raise ValueError("its shards are not those of its plan")
     except (ValueError, KeyError) as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     return plan, records, document
 
 
@@ -126,7 +126,7 @@ def _document(folder: Path, name: str) -> dict[str, Any]:
     path = folder / name
     data = read_bounded(path, MAX_JSON_BYTES, name, DatasetError, fix=repair_command(folder))
     try:
-        document = dict(checked.mapping(parse_json(data), "it"))
+        document = dict(json_values.mapping(parse_json(data), "it"))
         if document["format"] not in (1, FORMAT):
             raise DatasetError(
                 f"format {document['format']!r:.20} is not {FORMAT}", path, "read it with the artsim that wrote it"
@@ -139,7 +139,7 @@ def _document(folder: Path, name: str) -> dict[str, Any]:
             if seal != _seal(document):
                 raise ValueError("it is not as it was written: its own sha256 is another")
     except (ValueError, KeyError) as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     return document
 
 
@@ -147,21 +147,21 @@ def _plan(document: Mapping[str, Any], path: Path) -> Plan:
     try:
         plan: Plan = (Plan if document["format"] == FORMAT else PlanFormat1).from_dict(document)
         for entries in (document["left_out"], document["repeated"]):
-            for entry in checked.sequence(entries, "sources", 10_000_000):
+            for entry in json_values.sequence(entries, "sources", 10_000_000):
                 for name in ("source", "source_sha256"):
-                    checked.text(checked.mapping(entry, "source")[name], name)
+                    json_values.text(json_values.mapping(entry, "source")[name], name)
     except (ValueError, KeyError, ConfigError) as error:
-        raise _damaged(path, error) from error
+        raise _damage_error(path, error) from error
     return plan
 
 
-def _damaged(path: Path, error: Exception) -> DatasetError:
+def _damage_error(path: Path, error: Exception) -> DatasetError:
     reason = f"{error.args[0]!r:.60} is missing" if isinstance(error, KeyError) else str(error)
     return DatasetError(f"{path.name} is damaged ({reason})", path.parent, repair_command(path.parent))
 
 
 @dataclass(frozen=True)
-class Begun:
+class StartedDataset:
     """What the descriptions in a folder say.
 
     Attributes
@@ -184,7 +184,7 @@ class Begun:
     problems: tuple[Problem, ...]
 
 
-def read_begun(folder: Path) -> Begun | None:
+def read_started(folder: Path) -> StartedDataset | None:
     """What is known of the dataset in a folder; None when nothing is.
 
     Raises
@@ -217,17 +217,17 @@ def read_begun(folder: Path) -> Begun | None:
             found.append(Problem(PLAN, "is missing", fix))
         elif begun is not None and begun != wanted:
             found.append(Problem(PLAN, f"is not the plan of {DESCRIPTION}", fix))
-        return Begun(wanted, plan, tuple(records), True, tuple(found))
+        return StartedDataset(wanted, plan, tuple(records), True, tuple(found))
     if begun is not None:
-        records = _claimed(folder)
+        records = _shards_of_journal(folder)
         found = [Problem(name, error.what.removeprefix(f"{name} "), fix) for name, error in problems]
-        return Begun(begun, _plan(begun, folder / PLAN), tuple(records), False, tuple(found))
+        return StartedDataset(begun, _plan(begun, folder / PLAN), tuple(records), False, tuple(found))
     if problems:
         raise problems[0][1]
     return None
 
 
-def _claimed(folder: Path) -> list[ShardRecord]:
+def _shards_of_journal(folder: Path) -> list[ShardRecord]:
     """Shards that a damaged ``dataset.json`` and the journal of a stopped run speak of."""
     entries: list[Any] = []
     try:

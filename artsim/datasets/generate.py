@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from artsim.common.files import write_atomic
-from artsim.datasets.description import DESCRIPTION, JOURNAL, Begun, read_begun
-from artsim.datasets.draw import SampleOptions
+from artsim.datasets.description import DESCRIPTION, JOURNAL, StartedDataset, read_started
+from artsim.datasets.new_plan import new_plan
 from artsim.datasets.origins import Origins, write_origins
 from artsim.datasets.plan import FORMAT, MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
-from artsim.datasets.planning import new_plan
 from artsim.datasets.restore import journal_line, remove_leftovers, restore
+from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares
 from artsim.datasets.state import State, examine, leftover_problems
-from artsim.datasets.team import Team, locked
+from artsim.datasets.worker_pool import WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
@@ -128,24 +128,24 @@ def generate(
     asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), (), strict, version("artsim"))
     _check_options(asked, workers, load_limit, sources)
     if (folder / DESCRIPTION).exists():  # else it is not complete, and perhaps another run is at it
-        begun = _begun(folder, asked, sources)
+        begun = _start(folder, asked, sources)
         if begun is not None and _is_sound(folder, begun, num_samples, workers, progress):
             return _result(folder, begun, 0, start)
-    with locked(folder):
+    with folder_lock(folder):
         remove_leftovers(folder)
         try:
-            begun = _begun(folder, asked, sources)
+            begun = _start(folder, asked, sources)
             grown_from = None
-            with Team(folder, workers) as team:
+            with WorkerPool(folder, workers) as team:
                 if begun is None:
                     document = new_plan(folder, asked, sources, team, skip_broken, load_limit, progress)
-                    begun = Begun(document, Plan.from_dict(document), (), False, ())
+                    begun = StartedDataset(document, Plan.from_dict(document), (), False, ())
                 elif num_samples > begun.plan.num_samples:
                     grown_from = begun.plan.num_samples
-                    begun = _extended(folder, begun, num_samples)
+                    begun = _extend(folder, begun, num_samples)
                 write_origins(folder, sources)
                 state = examine(folder, begun, workers, progress)
-                damaged = _damaged(folder, begun, state) if grown_from is None else set()
+                damaged = _damaged_files(folder, begun, state) if grown_from is None else set()
                 restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
         finally:
             remove_leftovers(folder)
@@ -157,20 +157,20 @@ def generate(
     return replace(_result(folder, begun, restored.samples, start), restored=files, grown_from=grown_from)
 
 
-def _is_sound(folder: Path, begun: Begun, num_samples: int, workers: int, progress: bool) -> bool:
+def _is_sound(folder: Path, begun: StartedDataset, num_samples: int, workers: int, progress: bool) -> bool:
     """Whether the dataset asked for is there, complete and undamaged: then nothing is written, not even a lock."""
     if not begun.complete or begun.problems or num_samples != begun.plan.num_samples:
         return False
     return not leftover_problems(folder, begun) and not examine(folder, begun, workers, progress)
 
 
-def _result(folder: Path, begun: Begun, made: int, start: float) -> GenerateResult:
+def _result(folder: Path, begun: StartedDataset, made: int, start: float) -> GenerateResult:
     left_out = tuple(str(entry["why"]) for entry in begun.document["left_out"])
     seconds = time.perf_counter() - start
     return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
 
 
-def _damaged(folder: Path, begun: Begun, state: State) -> set[str]:
+def _damaged_files(folder: Path, begun: StartedDataset, state: State) -> set[str]:
     """Files that were there before, or were said to be, and have to be made again."""
     finished = {record.name for record in begun.records}
     shards = {shard.name for shard in state.shards if shard.name in finished}
@@ -200,7 +200,7 @@ def _check_options(asked: Plan, workers: int, load_limit: float, sources: Sequen
         view_sampler(asked.sample.views.custom)
 
 
-def _begun(folder: Path, asked: Plan, sources: Sequence[Source]) -> Begun | None:
+def _start(folder: Path, asked: Plan, sources: Sequence[Source]) -> StartedDataset | None:
     """What the folder says of its dataset, which is the one asked for, or a smaller one; None when there is none.
 
     Raises
@@ -212,7 +212,7 @@ def _begun(folder: Path, asked: Plan, sources: Sequence[Source]) -> Begun | None
         return None
     if not folder.is_dir():
         raise ConfigError("cannot write (it is a file)", folder, "choose another folder")
-    begun = read_begun(folder)
+    begun = read_started(folder)
     if begun is None:
         _refuse_strangers(folder)
         return None
@@ -226,7 +226,7 @@ def _begun(folder: Path, asked: Plan, sources: Sequence[Source]) -> Begun | None
     del wanted["objects"]
     if asked.num_samples > begun.plan.num_samples:
         del wanted["num_samples"]  # it is to grow
-    differing = _differing(wanted, begun.document)
+    differing = _differences(wanted, begun.document)
     document = begun.document
     have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
     if have != {(s.name, s.sha256) for s in sources}:
@@ -250,22 +250,22 @@ def _refuse_strangers(folder: Path) -> None:
         raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
 
 
-def _differing(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
+def _differences(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
     """Names of the entries of ``wanted`` that are stored otherwise, such as 'sample.views.fov'."""
     names: list[str] = []
     for name, value in wanted.items():
         there = stored.get(name)
         if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
-            names += _differing(value, there, f"{prefix}{name}.")
+            names += _differences(value, there, f"{prefix}{name}.")
         elif value != there:
             names.append(prefix + name)
     return names
 
 
-def _extended(folder: Path, begun: Begun, num_samples: int) -> Begun:
+def _extend(folder: Path, begun: StartedDataset, num_samples: int) -> StartedDataset:
     """The plan with more samples. What is finished of the smaller one is noted, before nothing else says so."""
     document = {**begun.document, "num_samples": num_samples}
     plan = replace(begun.plan, num_samples=num_samples)
     write_atomic(folder / JOURNAL, b"".join(map(journal_line, begun.records)))
     (folder / DESCRIPTION).unlink(missing_ok=True)
-    return Begun(document, plan, begun.records, False, ())
+    return StartedDataset(document, plan, begun.records, False, ())

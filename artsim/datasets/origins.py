@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from artsim.common.files import read_json
-from artsim.datasets import checked
+from artsim.datasets import json_values
 from artsim.datasets.description import write_if_other
 from artsim.datasets.plan import PlannedObject
 from artsim.errors import ArtsimError, AssetError, DatasetError
@@ -51,7 +51,7 @@ class Origins:
 
     def __init__(self, folder: Path, sources: Sequence[Source] = ()):
         self._files: dict[str, list[FileSource]] = defaultdict(list)
-        for source in [*sources, *_noted(folder)]:
+        for source in [*sources, *_read_origins(folder)]:
             if isinstance(source, FileSource):
                 self._files[source.sha256].append(source)
 
@@ -65,17 +65,17 @@ class Origins:
         return list(self._files[planned.source_sha256])
 
 
-def _noted(folder: Path) -> list[FileSource]:
+def _read_origins(folder: Path) -> list[FileSource]:
     """Files that are still where they were, and still as they were."""
     try:
         noted = read_json(folder / ORIGINS, ORIGINS, DatasetError)
-        entries = checked.sequence(checked.mapping(noted, "it")["files"], "files", _MAX_SOURCES)
+        entries = json_values.sequence(json_values.mapping(noted, "it")["files"], "files", _MAX_SOURCES)
         files = []
         for entry in entries:
-            own = checked.mapping(entry, "file")
-            roots = checked.mapping(own["package_roots"], "package_roots")
-            path, sha256 = Path(checked.text(own["path"], "path")), checked.text(own["sha256"], "sha256")
-            files.append((path, sha256, {name: Path(checked.text(root, name)) for name, root in roots.items()}))
+            own = json_values.mapping(entry, "file")
+            roots = json_values.mapping(own["package_roots"], "package_roots")
+            path, sha256 = Path(json_values.text(own["path"], "path")), json_values.text(own["sha256"], "sha256")
+            files.append((path, sha256, {name: Path(json_values.text(root, name)) for name, root in roots.items()}))
     except (ArtsimError, ValueError, KeyError):
         return []  # a note that helps, no more
     found = []

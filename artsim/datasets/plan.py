@@ -15,10 +15,10 @@ from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any
 
-from artsim.datasets import checked
-from artsim.datasets.draw import SampleOptions as SampleOptions
-from artsim.datasets.draw import draw_sample as draw_sample
+from artsim.datasets import json_values
 from artsim.datasets.layout import at_place
+from artsim.datasets.sample_options import SampleOptions as SampleOptions
+from artsim.datasets.sample_options import draw_sample as draw_sample
 from artsim.datasets.splits import SPLITS, check_shares
 from artsim.model.objects import MAX_PARTS
 
@@ -80,25 +80,27 @@ class PlannedObject:
     @staticmethod
     def from_dict(data: object) -> PlannedObject:
         """Inverse of ``dataclasses.asdict`` after a trip through JSON; ValueError where it is none."""
-        own = checked.mapping(data, "object")
+        own = json_values.mapping(data, "object")
         known = {f.name for f in fields(PlannedObject)}
         if not own.keys() <= known:
             raise ValueError(f"an object has no {min(own.keys() - known)!r:.40}")
-        repairs = checked.sequence(own.get("repairs", []), "repairs", 10_000)
-        pairs = [checked.sequence(repair, "repair", 2) for repair in repairs]
+        repairs = json_values.sequence(own.get("repairs", []), "repairs", 10_000)
+        pairs = [json_values.sequence(repair, "repair", 2) for repair in repairs]
         digest = own.get("file_sha256", "")
         return PlannedObject(
-            key=checked.text(own["key"], "key", _KEY),
-            category=checked.text(own["category"], "category"),
-            object_id=checked.text(own["object_id"], "object_id"),
-            sha256=checked.text(own["sha256"], "sha256"),
-            num_parts=checked.whole(own["num_parts"], "num_parts", 1, MAX_PARTS),
-            source=checked.text(own["source"], "source"),
-            source_sha256=checked.text(own["source_sha256"], "source_sha256"),
-            split=checked.one_of(own["split"], "split", SPLITS),
-            file_sha256=digest if digest == "" else checked.text(digest, "file_sha256", checked.SHA256),
-            rigid=checked.boolean(own.get("rigid", False), "rigid"),
-            repairs=tuple((checked.text(where, "repair"), checked.text(what, "repair")) for where, what in pairs),
+            key=json_values.text(own["key"], "key", _KEY),
+            category=json_values.text(own["category"], "category"),
+            object_id=json_values.text(own["object_id"], "object_id"),
+            sha256=json_values.text(own["sha256"], "sha256"),
+            num_parts=json_values.whole(own["num_parts"], "num_parts", 1, MAX_PARTS),
+            source=json_values.text(own["source"], "source"),
+            source_sha256=json_values.text(own["source_sha256"], "source_sha256"),
+            split=json_values.one_of(own["split"], "split", SPLITS),
+            file_sha256=digest if digest == "" else json_values.text(digest, "file_sha256", json_values.SHA256),
+            rigid=json_values.boolean(own.get("rigid", False), "rigid"),
+            repairs=tuple(
+                (json_values.text(where, "repair"), json_values.text(what, "repair")) for where, what in pairs
+            ),
         )
 
 
@@ -225,24 +227,26 @@ class Plan:
         ValueError, KeyError, ConfigError
             When a value is missing, of another type, or makes no sense.
         """
-        fractions = tuple(checked.number(v, "fractions") for v in checked.sequence(data["fractions"], "fractions", 3))
+        fractions = tuple(
+            json_values.number(v, "fractions") for v in json_values.sequence(data["fractions"], "fractions", 3)
+        )
         if len(fractions) != 3:
             raise ValueError("fractions are not three numbers")
         check_shares(fractions)
-        objects = tuple(map(PlannedObject.from_dict, checked.sequence(data["objects"], "objects", _MAX_OBJECTS)))
+        objects = tuple(map(PlannedObject.from_dict, json_values.sequence(data["objects"], "objects", _MAX_OBJECTS)))
         if not objects:
             raise ValueError("it has no objects")
         if len({planned.key.lower() for planned in objects}) < len(objects):
             raise ValueError("two objects have the same key")
         plan = cls(
-            seed=checked.whole(data["seed"], "seed", 0, 2**63),
-            num_samples=checked.whole(data["num_samples"], "num_samples", 1, MAX_SAMPLES),
-            shard_size=checked.whole(data["shard_size"], "shard_size", 1, MAX_SAMPLES),
+            seed=json_values.whole(data["seed"], "seed", 0, 2**63),
+            num_samples=json_values.whole(data["num_samples"], "num_samples", 1, MAX_SAMPLES),
+            shard_size=json_values.whole(data["shard_size"], "shard_size", 1, MAX_SAMPLES),
             fractions=fractions,
             sample=SampleOptions.from_dict(data["sample"]),
             objects=objects,
-            strict=checked.boolean(data.get("strict", False), "strict"),
-            artsim_version=checked.text(data["artsim_version"], "artsim_version", most=64),
+            strict=json_values.boolean(data.get("strict", False), "strict"),
+            artsim_version=json_values.text(data["artsim_version"], "artsim_version", most=64),
         )
         if plan.num_shards > MAX_SHARDS:
             raise ValueError(f"it has {plan.num_shards} shards, over {MAX_SHARDS}")
@@ -279,20 +283,20 @@ class ShardRecord(Shard):
     @staticmethod
     def from_dict(data: object) -> ShardRecord:
         """Inverse of ``dataclasses.asdict`` after a trip through JSON; ValueError where it is none."""
-        own = checked.mapping(data, "shard")
+        own = json_values.mapping(data, "shard")
         known = {f.name for f in fields(ShardRecord)}
         if not known - {"recipe"} <= own.keys() <= known:
             raise ValueError(f"a shard has {', '.join(sorted(map(str, own)))!s:.80}")
-        split, recipe = checked.one_of(own["split"], "split", SPLITS), own.get("recipe", "")
-        first, end = (checked.whole(own[name], name, 0, MAX_SAMPLES) for name in ("first", "end"))
+        split, recipe = json_values.one_of(own["split"], "split", SPLITS), own.get("recipe", "")
+        first, end = (json_values.whole(own[name], name, 0, MAX_SAMPLES) for name in ("first", "end"))
         if first >= end:
             raise ValueError(f"a shard goes from {first} to {end}")
         return ShardRecord(
-            name=checked.text(own["name"], "name", re.compile(rf"{split}-[0-9]{{6,9}}\.tar")),
+            name=json_values.text(own["name"], "name", re.compile(rf"{split}-[0-9]{{6,9}}\.tar")),
             split=split,
             first=first,
             end=end,
-            bytes=checked.whole(own["bytes"], "bytes", 0, 2**63),
-            sha256=checked.text(own["sha256"], "sha256", checked.SHA256),
-            recipe=recipe if recipe == "" else checked.text(recipe, "recipe", checked.SHA256),
+            bytes=json_values.whole(own["bytes"], "bytes", 0, 2**63),
+            sha256=json_values.text(own["sha256"], "sha256", json_values.SHA256),
+            recipe=recipe if recipe == "" else json_values.text(recipe, "recipe", json_values.SHA256),
         )

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from artsim.datasets.description import read_begun
+from artsim.datasets.description import read_started
 from artsim.datasets.origins import Origins
 from artsim.datasets.plan import FORMAT
 from artsim.datasets.problems import Problem
 from artsim.datasets.restore import remove_leftovers, restore
 from artsim.datasets.state import examine, leftover_problems, strangers
-from artsim.datasets.team import Team, locked
+from artsim.datasets.worker_pool import WorkerPool, folder_lock
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 
@@ -67,7 +67,7 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
         On Ctrl-C, after the workers have stopped; the same call goes on.
     """
     folder = Path(folder)
-    begun = read_begun(folder)
+    begun = read_started(folder)
     if begun is None:
         raise DatasetError("no dataset here", folder, "name a folder that generate.py wrote")
     if begun.plan.format != FORMAT:
@@ -80,9 +80,9 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
         return RepairResult(folder, (), tuple(foreign))
     if state.shards:
         _check_makeable(folder, begun.plan.artsim_version, begun.plan.sample.views.custom, begun.complete)
-    with locked(folder):
+    with folder_lock(folder):
         try:
-            with Team(folder, workers) as team:
+            with WorkerPool(folder, workers) as team:
                 restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
         finally:
             remove_leftovers(folder)

@@ -13,7 +13,7 @@ from artsim.datasets.description import (
     DESCRIPTION,
     JOURNAL,
     PLAN,
-    Begun,
+    StartedDataset,
     document_bytes,
     full_description,
     write_if_other,
@@ -22,8 +22,8 @@ from artsim.datasets.origins import Origins
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem
 from artsim.datasets.state import STAGED, State, leftovers
-from artsim.datasets.team import Lost, Team
-from artsim.datasets.worker import CompiledSource, Refused, compile_source, make_shard
+from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source, make_shard
+from artsim.datasets.worker_pool import WorkerLost, WorkerPool
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 
@@ -31,7 +31,7 @@ _OTHER_MAKER = "another processor, or another version of artsim or of a library,
 
 
 @dataclass
-class Restored:
+class RestoreResult:
     """What was made, and what could not be.
 
     Attributes
@@ -48,7 +48,9 @@ class Restored:
     failed: list[Problem] = field(default_factory=list)
 
 
-def restore(folder: Path, begun: Begun, state: State, origins: Origins, team: Team, progress: bool) -> Restored:
+def restore(
+    folder: Path, begun: StartedDataset, state: State, origins: Origins, team: WorkerPool, progress: bool
+) -> RestoreResult:
     """Make all that is missing or damaged, and complete the dataset if nothing is left to do.
 
     A file whose checksum is known is put in place only with that very content.
@@ -57,17 +59,17 @@ def restore(folder: Path, begun: Begun, state: State, origins: Origins, team: Te
     ----------
     folder : Path
         Locked by this process.
-    begun : Begun
+    begun : StartedDataset
         What the dataset has to be.
     state : State
         What it is.
     origins : Origins
         Where its objects come from.
-    team : Team
+    team : WorkerPool
     progress : bool
         Show progress bars.
     """
-    restored = Restored()
+    restored = RestoreResult()
     remove_leftovers(folder)
     if write_if_other(folder / PLAN, document_bytes(begun.document)):
         restored.files.append(PLAN)
@@ -87,7 +89,13 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def _make_objects(
-    folder: Path, begun: Begun, state: State, origins: Origins, team: Team, progress: bool, restored: Restored
+    folder: Path,
+    begun: StartedDataset,
+    state: State,
+    origins: Origins,
+    team: WorkerPool,
+    progress: bool,
+    restored: RestoreResult,
 ) -> set[PlannedObject]:
     """Load damaged and missing objects again; those that could not be."""
     attempts: dict[str, tuple[PlannedObject, Source, int]] = {}
@@ -105,7 +113,7 @@ def _make_objects(
     with track("objects", total=len(attempts), unit="object", shown=progress and bool(attempts)) as bar:
         for staged, answer in team.run(compile_source, tasks):
             planned = attempts[staged][0]
-            problem = _not_as_planned(planned, answer)
+            problem = _plan_difference(planned, answer)
             if problem is None:
                 _put(folder / "objects" / staged, folder / planned.file)
                 done.add(planned)
@@ -121,9 +129,9 @@ def _make_objects(
     return {planned for planned in state.objects if planned not in done}
 
 
-def _not_as_planned(planned: PlannedObject, answer: CompiledSource | Refused | Lost) -> str | None:
+def _plan_difference(planned: PlannedObject, answer: CompiledSource | RefusedSource | WorkerLost) -> str | None:
     """Why what was loaded is not the object that was planned."""
-    if isinstance(answer, Refused | Lost):
+    if isinstance(answer, RefusedSource | WorkerLost):
         return answer.why
     if answer.file_sha256 == planned.file_sha256:
         return None
@@ -155,12 +163,12 @@ def _clear(path: Path) -> None:
 
 def _make_shards(
     folder: Path,
-    begun: Begun,
+    begun: StartedDataset,
     state: State,
     lost: set[PlannedObject],
-    team: Team,
+    team: WorkerPool,
     progress: bool,
-    restored: Restored,
+    restored: RestoreResult,
 ) -> dict[str, ShardRecord]:
     """Make damaged and missing shards, writing down each as it is done."""
     wanted = {record.name: record.sha256 for record in begun.records} if begun.complete else {}
@@ -188,7 +196,7 @@ def _make_shards(
     tasks = ((shard, (shard, wanted.get(shard.name))) for shard in missing)
     with track("samples", total=total, initial=done, unit="sample", shown=progress) as bar:
         for shard, answer in team.run(make_shard, tasks, progress=bar.update):
-            if isinstance(answer, Lost):
+            if isinstance(answer, WorkerLost):
                 raise DatasetError(
                     f"{answer.why} while {shard.name} was made", folder, "use fewer --workers; the same command resumes"
                 )
@@ -217,7 +225,7 @@ def _append(path: Path, data: bytes) -> None:
         raise write_error(error, path) from error
 
 
-def _complete(folder: Path, begun: Begun, records: Mapping[str, ShardRecord]) -> bool:
+def _complete(folder: Path, begun: StartedDataset, records: Mapping[str, ShardRecord]) -> bool:
     """Write ``dataset.json`` unless it is there, and remove the journal; whether it was written."""
     shards: Iterable[Shard] = begun.plan.shards()
     description = full_description(begun.document, begun.plan, [records[shard.name] for shard in shards])

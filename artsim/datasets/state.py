@@ -11,7 +11,7 @@ from pathlib import Path
 
 from artsim.common.files import file_sha256
 from artsim.common.progress import track
-from artsim.datasets.description import JOURNAL, Begun
+from artsim.datasets.description import JOURNAL, StartedDataset
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 
@@ -51,13 +51,13 @@ class State:
         ]
 
 
-def examine(folder: Path, begun: Begun, workers: int = 2, progress: bool = True) -> State:
+def examine(folder: Path, begun: StartedDataset, workers: int = 2, progress: bool = True) -> State:
     """Compare the checksums of all files with those in the descriptions.
 
     Parameters
     ----------
     folder : Path
-    begun : Begun
+    begun : StartedDataset
     workers : int
         Threads that read.
     progress : bool
@@ -128,7 +128,7 @@ def _file_problem(path: Path, digests: Sequence[str]) -> tuple[str | None, str]:
     return None, digest
 
 
-def strangers(folder: Path, begun: Begun) -> list[Problem]:
+def strangers(folder: Path, begun: StartedDataset) -> list[Problem]:
     """Shards and objects that are no part of the dataset."""
     shards = {shard.name for shard in begun.plan.shards()}
     objects = {planned.file for planned in begun.plan.objects}
@@ -146,7 +146,7 @@ def leftovers(folder: Path) -> list[Path]:
     return [path for path in found if path.is_symlink() or not path.is_dir()]
 
 
-def leftover_problems(folder: Path, begun: Begun) -> list[Problem]:
+def leftover_problems(folder: Path, begun: StartedDataset) -> list[Problem]:
     """Files of killed runs that a complete dataset does not need."""
     found = leftovers(folder) + ([folder / JOURNAL] if begun.complete and (folder / JOURNAL).exists() else [])
     fix = repair_command(folder)

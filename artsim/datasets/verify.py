@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from artsim.common.progress import track
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.description import DESCRIPTION, read_begun, read_description
+from artsim.datasets.description import DESCRIPTION, read_description, read_started
 from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
@@ -53,7 +53,7 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
         When the folder holds no dataset, or one that is not complete yet.
     """
     folder = Path(folder)
-    begun = read_begun(folder)
+    begun = read_started(folder)
     if begun is None or not (begun.complete or (folder / DESCRIPTION).exists()):
         read_description(folder)  # raises
     assert begun is not None
@@ -150,7 +150,7 @@ def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) ->
         try:
             sample = reader.read(key)
             obj = dataset.objects[planned.key].scaled(sample.scale)
-            yield from (Problem(where, what, _FIX) for what in _unplanned(sample, plan, index))
+            yield from (Problem(where, what, _FIX) for what in _plan_problems(sample, plan, index))
             yield from (Problem(where, what, _FIX) for what in sample_problems(sample, obj))
         except ArtsimError as error:
             yield Problem(where, error.what, _FIX)
@@ -159,7 +159,7 @@ def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) ->
     reader.close()
 
 
-def _unplanned(sample: Sample, plan: Plan, index: int) -> Iterator[str]:
+def _plan_problems(sample: Sample, plan: Plan, index: int) -> Iterator[str]:
     options = plan.sample
     if (sample.seed, sample.index) != (plan.seed, index):
         yield f"calls itself sample {sample.index} of seed {sample.seed}"
@@ -197,7 +197,7 @@ def sample_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
     if sample.object_sha256 != obj.sha256 or len(sample.joint_type) != len(obj):
         yield "shows another object than the plan says"
         return
-    malformed = list(_malformed(sample, len(obj)))
+    malformed = list(_form_problems(sample, len(obj)))
     yield from malformed
     if malformed:
         return
@@ -213,7 +213,7 @@ def sample_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
     yield from _image_problems(sample, obj, true_points)
 
 
-def _malformed(sample: Sample, num_parts: int) -> Iterator[str]:
+def _form_problems(sample: Sample, num_parts: int) -> Iterator[str]:
     """Arrays of another shape or type than they should have, and numbers that are none."""
     points, K, image = sample.part.size, num_parts, (sample.height, sample.width)
     shapes: dict[str, tuple[type, tuple[int, ...]]] = {

@@ -14,11 +14,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from artsim.common.extras import explained
+from artsim.common.extras import import_failure
 from artsim.common.files import file_sha256
 from artsim.datasets.description import read_plan
-from artsim.datasets.draw import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
 from artsim.datasets.plan import Plan, Shard, ShardRecord
+from artsim.datasets.sample_options import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
 from artsim.datasets.shards import OtherBytesError, write_shard
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import FamilySource, Source
@@ -81,7 +81,7 @@ def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, 
     except ArtsimError as error:
         return "failed", error
     except ImportError as error:
-        return "failed", explained(error, None)
+        return "failed", import_failure(error, None)
     except Exception as error:  # whatever it is, the parent has to know; it may not survive a trip between processes
         return "failed", DatasetError(f"a worker process failed ({type(error).__name__}: {error})")
 
@@ -170,7 +170,7 @@ class CompiledSource:
 
 
 @dataclass(frozen=True)
-class Refused:
+class RefusedSource:
     """Why a source is of no use."""
 
     why: str
@@ -178,7 +178,7 @@ class Refused:
 
 def compile_source(
     source: Source, staged: str, seed: int, options: SampleOptions | None, strict: bool = False
-) -> CompiledSource | Refused:
+) -> CompiledSource | RefusedSource:
     """Load a source and keep it compiled in the dataset's folder, under a provisional name.
 
     Parameters
@@ -198,14 +198,16 @@ def compile_source(
         obj = source.load()
         repairs = tuple((r.where, r.what) for r in obj.repairs if not r.note)
         if strict and repairs:
-            return Refused(f"{source.name}: repaired while loading: " + "; ".join(f"{a}: {b}" for a, b in repairs))
+            return RefusedSource(
+                f"{source.name}: repaired while loading: " + "; ".join(f"{a}: {b}" for a, b in repairs)
+            )
         identity = source.sha256 if isinstance(source, FamilySource) else obj.sha256
         if options is not None:
             check_visible(obj, options, seed, identity)
     except ArtsimError as error:
-        return Refused(str(error) if source.name in str(error) else f"{source.name}: {error}")
+        return RefusedSource(str(error) if source.name in str(error) else f"{source.name}: {error}")
     except (Exception, SystemExit) as error:  # parsers raise whatever they stumble on; memory and stack run out, too
-        return Refused(f"{source.name}: cannot be loaded ({type(error).__name__}: {error})")
+        return RefusedSource(f"{source.name}: cannot be loaded ({type(error).__name__}: {error})")
     path = _worker.folder / "objects" / staged
     save_object(obj, path)
     return CompiledSource(

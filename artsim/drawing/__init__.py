@@ -1,1 +1,10 @@
-"""Pictures and listings for people."""
+"""Pictures of objects, datasets and scenes.
+
+Stable names; the modules of this package are private. Matplotlib and rerun are imported when first used.
+"""
+
+from artsim.drawing.contact_sheet import write_contact_sheet
+from artsim.drawing.gallery import draw_gallery
+from artsim.drawing.scene_overview import write_overview
+
+__all__ = ["draw_gallery", "write_contact_sheet", "write_overview"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.common.names import printable
-from artsim.drawing.view import shaded
+from artsim.drawing.annotation import shade_parts
 from artsim.model.draws import ViewOptions, joint_intervals, sample_view
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -20,7 +20,7 @@ _TILE = 260  # pixels
 _HEADER = 22
 
 
-def gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_row: int = 3) -> bytes:
+def draw_gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_row: int = 3) -> bytes:
     """PNG with every object at rest and opened further and further.
 
     Parameters
@@ -40,14 +40,14 @@ def gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_r
         x, y = column * states * _TILE, row * (_TILE + _HEADER)
         title = printable(f"{obj.category} {obj.object_id}: {len(obj)} parts")
         draw.text((x + 6, y + 2), title, "black", font)
-        for i, q in enumerate(opened_states(obj, states)):
+        for i, q in enumerate(opening_states(obj, states)):
             sheet.paste(Image.fromarray(portrait(obj, q)), (x + i * _TILE, y + _HEADER))
     buffer = io.BytesIO()
     sheet.quantize(256).save(buffer, "PNG", optimize=True)  # a third of the size
     return buffer.getvalue()
 
 
-def opened_states(obj: ArticulatedObject, count: int) -> list[Array]:
+def opening_states(obj: ArticulatedObject, count: int) -> list[Array]:
     """At rest, then every joint on its way to its farther limit, the last time by 0.4 to 0.9 of the way."""
     rng = np.random.default_rng(0)
     rest = obj.tree.rest
@@ -64,5 +64,5 @@ def portrait(obj: ArticulatedObject, q: Array, size: int = _TILE) -> NDArray[np.
         azimuth=(35.0, 35.0), elevation=(25.0, 25.0), fill=(0.95, 0.95), width=2 * size, height=2 * size
     )
     camera = sample_view(obj, q, options, np.random.default_rng(0))
-    image = Image.fromarray(shaded(render(obj, q, camera), camera))
+    image = Image.fromarray(shade_parts(render(obj, q, camera), camera))
     return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))

@@ -10,9 +10,9 @@ import numpy as np
 from artsim.common.extras import needs
 from artsim.common.files import write_error
 from artsim.common.names import printable
-from artsim.drawing.view import PALETTE, Shown, axis_segment
+from artsim.drawing.annotation import PALETTE, Shown, axis_segment
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
-from artsim.renderers import BACKGROUND
 
 
 def write_recording(shown: Sequence[Shown], path: Path) -> None:

@@ -13,6 +13,8 @@ with needs("artsim.envs"):
     import gymnasium
     from gymnasium.envs.registration import WrapperSpec
 
+    from artsim.envs.articulated import EnvOptions
+
 gymnasium.register(id="artsim/Articulated-v0", entry_point="artsim.envs.articulated:ArticulatedEnv")
 # As ManiSkill's register_env does, which would have to import it: its own time limit knows batches.
 _TIME_LIMIT = WrapperSpec(
@@ -25,3 +27,5 @@ gymnasium.register(
     disable_env_checker=True,
     additional_wrappers=(_TIME_LIMIT,),
 )
+
+__all__ = ["EnvOptions"]

@@ -22,7 +22,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.datasets.dataset import pad_sample
-from artsim.drawing.view import shaded
+from artsim.drawing.annotation import shade_parts
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array
 from artsim.observing.sample import Sample
@@ -206,7 +206,7 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
         if self.render_mode is None:
             return None
         episode, camera = self.episode, self.episode.camera
-        return shaded(render(episode.obj, episode.simulation.state, camera), camera)
+        return shade_parts(render(episode.obj, episode.simulation.state, camera), camera)
 
     def close(self) -> None:
         """Free the physics world."""

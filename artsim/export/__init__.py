@@ -113,3 +113,6 @@ def _write_meshes(robot: Robot, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for mesh in robot.meshes:
         (folder / f"{mesh.name}.obj").write_text(obj_text(mesh))
+
+
+__all__ = ["FORMATS", "export"]

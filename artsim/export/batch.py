@@ -19,7 +19,7 @@ from typing import Any
 
 from artsim.common.files import read_json, write_atomic, write_error
 from artsim.common.progress import track
-from artsim.datasets.team import Lost, Team, locked
+from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make
@@ -83,17 +83,17 @@ def generate_objects(
     check_formats(formats)
     folder = Path(out)
     wanted = [(category, number) for category in dict.fromkeys(categories) for number in range(seed, seed + count)]
-    with locked(folder):
+    with folder_lock(folder):
         _remove_leftovers(folder)
         found = {key: meta for key in wanted if (meta := _whole(_folder(folder, *key), formats)) is not None}
         missing = [key for key in wanted if key not in found]
         with (
             track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
-            Team(folder, workers) as team,
+            WorkerPool(folder, workers) as team,
         ):
             tasks = ((key, (folder, *key, tuple(formats))) for key in missing)
             for key, answer in team.run(write_object, tasks):
-                if isinstance(answer, Lost):
+                if isinstance(answer, WorkerLost):
                     raise AssetError(answer.why, f"{key[0]} {key[1]}", "use fewer --workers; the same command resumes")
                 found[key] = answer
                 bar.update()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from artsim.common.names import safe_name
 from artsim.errors import AssetError
-from artsim.model.inertia import Inertia, joined_inertia, part_inertia
+from artsim.model.inertia import Inertia, combine_inertias, part_inertia
 from artsim.model.kinematics import Array, Joint
 from artsim.model.objects import ArticulatedObject, Mesh
 
@@ -161,7 +161,7 @@ def as_robot(obj: ArticulatedObject) -> Robot:
         raise AssetError("is not at rest at q = 0", where, "only procedural objects (artsim.make) can be exported")
     own = [part_inertia(obj, k) for k in range(len(obj))]
     carried = [
-        joined_inertia(own[j] for j in range(k, len(obj)) if _carries(tree.parents, k, j)) for k in range(len(obj))
+        combine_inertias(own[j] for j in range(k, len(obj)) if _carries(tree.parents, k, j)) for k in range(len(obj))
     ]
     used = {part.name for part in obj.parts} | {joint.name for joint in tree.joints}
     links: list[Link] = []
@@ -173,10 +173,10 @@ def as_robot(obj: ArticulatedObject) -> Robot:
         if k > 0:
             parent = index[joint.parent]
             if joint.type == "screw":
-                slide = _unused(f"{obj.parts[k].name}_slide", used)
+                slide = _unused_name(f"{obj.parts[k].name}_slide", used)
                 joints.append(_slide(slide, joint, parent, len(links), carried[k]))
                 parent = len(links)
-                helper = _unused(f"{obj.parts[k].name}_thread", used)
+                helper = _unused_name(f"{obj.parts[k].name}_thread", used)
                 links.append(Link(helper, -1, origin, inertia.share(HELPER_SHARE)))
                 inertia = inertia.share(1.0 - HELPER_SHARE)
             joints.append(_joint(obj, joint, parent, len(links), carried[k]))
@@ -192,7 +192,7 @@ def _carries(parents: Sequence[int] | NDArray[np.int64], k: int, j: int) -> bool
     return j == k
 
 
-def _unused(name: str, used: set[str]) -> str:
+def _unused_name(name: str, used: set[str]) -> str:
     while name in used:
         name += "_"
     used.add(name)
@@ -228,7 +228,7 @@ def _joint(obj: ArticulatedObject, joint: Joint, parent: int, child: int, carrie
     if joint.mimic is not None:
         mimic = (obj.tree.joints[joint.mimic.source].name, joint.mimic.multiplier, joint.mimic.offset)
     kind = "continuous" if joint.type == "screw" else joint.type
-    return _driven(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
+    return _link_joint(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
 
 
 def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:
@@ -236,10 +236,10 @@ def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -
     lower, upper = sorted((joint.lower * joint.pitch, joint.upper * joint.pitch))
     if not (np.isfinite(lower) and np.isfinite(upper)):
         raise AssetError("a screw without limits cannot be written", f"joint {joint.name!r}", "limit it")
-    return _driven(name, "prismatic", parent, child, joint, lower, upper, carried, (joint.name, joint.pitch, 0.0))
+    return _link_joint(name, "prismatic", parent, child, joint, lower, upper, carried, (joint.name, joint.pitch, 0.0))
 
 
-def _driven(
+def _link_joint(
     name: str,
     kind: str,
     parent: int,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from artsim.common.products import apply, dot, matmul, unit
 from artsim.errors import AssetError
-from artsim.loading.robot import Robot, RobotJoint
+from artsim.loading.urdf_document import UrdfJoint, UrdfRobot
 from artsim.model.kinematics import Array
 from artsim.model.objects import Part, Repair
 
@@ -22,13 +22,13 @@ class RigidBody:
     """Links that never move against each other, in the base link's frame at the file's zero state."""
 
     links: list[str]
-    joint: RobotJoint | None  # the moving joint that carries the body; None for the root
+    joint: UrdfJoint | None  # the moving joint that carries the body; None for the root
     parent: RigidBody | None
     T_base_joint: Array
     T_base_link: dict[str, Array]
     vertices: Array
     faces: NDArray[np.int32]
-    slide: RobotJoint | None = None  # screws: the prismatic joint merged into this one
+    slide: UrdfJoint | None = None  # screws: the prismatic joint merged into this one
     slide_rate: float = 0.0  # screws: value of the slide joint for each radian
     pitch: float = 0.0  # screws: metres along the turning axis for each radian
 
@@ -38,15 +38,15 @@ class RigidBody:
         return Part(solid, label or solid, self.vertices, self.faces)
 
 
-def merge_fixed_links(robot: Robot, file: Path, repairs: list[Repair]) -> list[RigidBody]:
+def merge_fixed_links(robot: UrdfRobot, file: Path, repairs: list[Repair]) -> list[RigidBody]:
     """Bodies of the tree, root first, parents before children, siblings in the file's order."""
-    children: dict[str, list[RobotJoint]] = defaultdict(list)
+    children: dict[str, list[UrdfJoint]] = defaultdict(list)
     for joint in robot.joints:
         children[joint.parent].append(joint)
     root = _root_link(robot, children, file, repairs)
     solid = {link.name for link in robot.links if link.shapes or link.unusable}
 
-    def new_body(link: str, joint: RobotJoint | None, parent: RigidBody | None, T: Array) -> RigidBody:
+    def new_body(link: str, joint: UrdfJoint | None, parent: RigidBody | None, T: Array) -> RigidBody:
         return RigidBody([link], joint, parent, T, {link: T}, np.zeros((0, 3)), np.zeros((0, 3), np.int32))
 
     bodies = [new_body(root, None, None, np.eye(4))]
@@ -81,7 +81,7 @@ def merge_fixed_links(robot: Robot, file: Path, repairs: list[Repair]) -> list[R
     return bodies
 
 
-def _root_link(robot: Robot, children: Mapping[str, list[RobotJoint]], file: Path, repairs: list[Repair]) -> str:
+def _root_link(robot: UrdfRobot, children: Mapping[str, list[UrdfJoint]], file: Path, repairs: list[Repair]) -> str:
     carried_by: dict[str, str] = {}
     for joint in robot.joints:
         if joint.child in carried_by:
@@ -105,10 +105,10 @@ def _root_link(robot: Robot, children: Mapping[str, list[RobotJoint]], file: Pat
 
 
 def _places_root(
-    joint: RobotJoint,
+    joint: UrdfJoint,
     link: str,
     root: str,
-    children: Mapping[str, list[RobotJoint]],
+    children: Mapping[str, list[UrdfJoint]],
     solid: Collection[str],
     repairs: list[Repair],
 ) -> bool:

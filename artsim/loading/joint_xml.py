@@ -23,7 +23,7 @@ import numpy as np
 from lxml import etree
 
 from artsim.common.products import norm, unit
-from artsim.loading.robot import MimicRelation, RobotJoint
+from artsim.loading.urdf_document import MimicRelation, UrdfJoint
 from artsim.loading.xml_values import Element
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
@@ -49,7 +49,7 @@ _OTHER_TYPES = {
 }  # fmt: skip
 
 
-def read_joint(joint: etree._Element, links: Collection[str], file: Path, repairs: list[Repair]) -> RobotJoint:
+def read_joint(joint: etree._Element, links: Collection[str], file: Path, repairs: list[Repair]) -> UrdfJoint:
     """A joint.
 
     Parameters
@@ -87,13 +87,13 @@ def read_joint(joint: etree._Element, links: Collection[str], file: Path, repair
     origin = element.origin(joint)
     name = str(joint.get("name"))
     if kind not in MOVING_TYPES:  # whatever else it says has no meaning
-        return RobotJoint(name, kind, parent, child, origin, np.array([1.0, 0.0, 0.0]), 0.0, 0.0)
+        return UrdfJoint(name, kind, parent, child, origin, np.array([1.0, 0.0, 0.0]), 0.0, 0.0)
     mimic = _read_mimic(joint, element)
     axis = _read_axis(joint, kind, element)
     if axis is None:
-        return RobotJoint(name, "fixed", parent, child, origin, np.array([1.0, 0.0, 0.0]), 0.0, 0.0)
+        return UrdfJoint(name, "fixed", parent, child, origin, np.array([1.0, 0.0, 0.0]), 0.0, 0.0)
     kind, lower, upper = _read_limits(joint, kind, element)
-    return RobotJoint(name, kind, parent, child, origin, axis, lower, upper, mimic)
+    return UrdfJoint(name, kind, parent, child, origin, axis, lower, upper, mimic)
 
 
 def _end(joint: etree._Element, end: str, links: Collection[str], element: Element) -> str:

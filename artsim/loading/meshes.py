@@ -20,11 +20,11 @@ from artsim.errors import AssetError
 from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
-from artsim.loading.robot import Geometry, MeshFile
+from artsim.loading.urdf_document import Geometry, MeshFile
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import Repair
 
-__all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merged", "triangles"]
+__all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merge_shapes", "triangles"]
 
 _TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
 """Of each primitive: round ones have 64 sides, a sphere is an icosahedron whose faces are divided four times."""
@@ -227,7 +227,7 @@ def triangles(
     return surface.vertices, surface.faces, surface.notes
 
 
-def merged(shapes: list[tuple[Array, NDArray[np.int32], Array]]) -> tuple[Array, NDArray[np.int32]]:
+def merge_shapes(shapes: list[tuple[Array, NDArray[np.int32], Array]]) -> tuple[Array, NDArray[np.int32]]:
     """One mesh out of several, each with its (4, 4) transform into the common frame."""
     if not shapes:
         return np.zeros((0, 3)), np.zeros((0, 3), np.int32)

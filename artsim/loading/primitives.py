@@ -43,7 +43,7 @@ def cylinder(radius: float, length: float) -> Mesh:
 
 @cache
 def _unit_cylinder() -> Mesh:
-    return _turned([-0.5, 0.5], [1.0, 1.0], (-0.5, 0.5))
+    return _turn([-0.5, 0.5], [1.0, 1.0], (-0.5, 0.5))
 
 
 def capsule(radius: float, length: float) -> Mesh:
@@ -57,7 +57,7 @@ def _unit_capsule() -> tuple[Array, Array, NDArray[np.int32]]:
     """Points of the unit ball (V, 3), which way (V, 3) each goes as the capsule grows longer, and the triangles."""
     angles = np.arange(_SECTIONS // 4) * (0.5 * np.pi / (_SECTIONS // 4))
     heights, radii = sin(angles), cos(angles)
-    ball, faces = _turned([*-heights[::-1], *heights], [*radii[::-1], *radii], (-1.0, 1.0))
+    ball, faces = _turn([*-heights[::-1], *heights], [*radii[::-1], *radii], (-1.0, 1.0))
     upper = np.zeros((len(ball), 3))
     upper[:, 2] = -1.0
     upper[len(heights) * _SECTIONS : 2 * len(heights) * _SECTIONS, 2] = 1.0
@@ -65,7 +65,7 @@ def _unit_capsule() -> tuple[Array, Array, NDArray[np.int32]]:
     return ball, upper, faces
 
 
-def _turned(heights: list[float], radii: list[float], ends: tuple[float, float]) -> Mesh:
+def _turn(heights: list[float], radii: list[float], ends: tuple[float, float]) -> Mesh:
     """Closed surface of rings about z, from the lowest to the highest, and of the two points that close it."""
     angles = np.arange(_SECTIONS) * (2.0 * np.pi / _SECTIONS)
     circle = np.stack([cos(angles), sin(angles)], axis=1)

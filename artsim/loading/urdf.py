@@ -24,13 +24,13 @@ from artsim.loading.bodies import (
     merge_fixed_links,
     without_empty_leaves,
 )
-from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_shapes, merged
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_shapes, merge_shapes
 from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_state import canonical_category, rest_state
-from artsim.loading.robot import Link, Robot, RobotJoint
+from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.urdf_xml import parse_robot
-from artsim.loading.xml_repair import unexpanded
+from artsim.loading.xml_repair import xacro_error
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
@@ -173,7 +173,7 @@ def find_urdf(path: Path) -> Path:
     if not found:
         macros = sorted(path.glob("*.xacro"))
         if macros:
-            raise unexpanded("the folder holds no URDF file, but macros", macros[0])
+            raise xacro_error("the folder holds no URDF file, but macros", macros[0])
         raise AssetError("the folder holds no URDF file", path, "pass a folder with a mobility.urdf or one *.urdf")
     raise AssetError(f"the folder holds {len(found)} URDF files", path, f"pass one of them, such as {found[0].name}")
 
@@ -200,7 +200,7 @@ def _encodable(name: str) -> str:
 
 
 def _read_geometry(
-    bodies: list[RigidBody], robot: Robot, reader: MeshReader, file: Path, repairs: list[Repair]
+    bodies: list[RigidBody], robot: UrdfRobot, reader: MeshReader, file: Path, repairs: list[Repair]
 ) -> None:
     """Fill in every body's surface from the shapes of its links."""
     links = {link.name: link for link in robot.links}
@@ -216,7 +216,7 @@ def _read_geometry(
             raise AssetError(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
-        body.vertices, body.faces = merged(surfaces)
+        body.vertices, body.faces = merge_shapes(surfaces)
         _check_range(body.vertices, f"{file}: link {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
@@ -224,7 +224,7 @@ def _read_geometry(
 
 
 def _surfaces(
-    link: Link, T_base_link: Array, reader: MeshReader, file: Path
+    link: UrdfLink, T_base_link: Array, reader: MeshReader, file: Path
 ) -> tuple[list[tuple[Array, NDArray[np.int32], Array]], list[str]]:
     """Vertices, triangles and transform into the base frame of each shape of a link, and why others are left out.
 
@@ -326,7 +326,7 @@ def _triple(vector: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _mimic(joint: RobotJoint, index: Mapping[str, int], file: Path) -> Mimic | None:
+def _mimic(joint: UrdfJoint, index: Mapping[str, int], file: Path) -> Mimic | None:
     if joint.mimic is None:
         return None
     source = index.get(joint.mimic.joint)

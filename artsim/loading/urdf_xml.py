@@ -1,4 +1,4 @@
-"""From the bytes of a URDF file to a checked :class:`~artsim.loading.robot.Robot`.
+"""From the bytes of a URDF file to a checked :class:`~artsim.loading.urdf_document.UrdfRobot`.
 
 The file is untrusted: no document type, no entities, bounded size, every number finite. What can be mended is mended
 and recorded; what cannot raises an error that names the element.
@@ -15,7 +15,7 @@ from lxml import etree
 
 from artsim.errors import AssetError
 from artsim.loading.joint_xml import read_joint
-from artsim.loading.robot import Box, Capsule, Cylinder, Geometry, Link, MeshFile, Robot, Shape, Sphere
+from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, MeshFile, Shape, Sphere, UrdfLink, UrdfRobot
 from artsim.loading.xml_repair import readable_xml, use_plain_names
 from artsim.loading.xml_values import Element
 from artsim.model.objects import Repair
@@ -47,7 +47,7 @@ def safe_xml(data: bytes, where: Path) -> etree._Element:
 
 def parse_robot(
     data: bytes, where: Path, max_links: int, shapeless: Collection[str] = ()
-) -> tuple[Robot, list[Repair]]:
+) -> tuple[UrdfRobot, list[Repair]]:
     """Read, check and mend a URDF document.
 
     Parameters
@@ -63,7 +63,7 @@ def parse_robot(
 
     Returns
     -------
-    robot : Robot
+    robot : UrdfRobot
     repairs : list of Repair
 
     Raises
@@ -88,7 +88,7 @@ def parse_robot(
         repairs.append(Repair("file", "has no <visual>: its collision geometry is shown"))
     read = tuple(_read_link(link, shown, where, repairs) for link in links)
     names = {link.name for link in read}
-    robot = Robot(read, tuple(read_joint(joint, names, where, repairs) for joint in joints))
+    robot = UrdfRobot(read, tuple(read_joint(joint, names, where, repairs) for joint in joints))
     _summarise_missing(links, shapeless, repairs)
     return robot, repairs
 
@@ -102,7 +102,7 @@ def _check_names(elements: Sequence[etree._Element], tag: str, where: Path) -> N
             raise AssetError(f"{count} {tag}s are called {name!r}", where, "give each its own name")
 
 
-def _read_link(link: etree._Element, shown: str, file: Path, repairs: list[Repair]) -> Link:
+def _read_link(link: etree._Element, shown: str, file: Path, repairs: list[Repair]) -> UrdfLink:
     """A link with the shapes that it shows, its ``<visual>`` or ``<collision>`` elements; inertia is not read."""
     element = Element(f"link {link.get('name')!r}", file, repairs)
     if link.find("origin") is not None or link.find("pose") is not None:
@@ -119,7 +119,7 @@ def _read_link(link: etree._Element, shown: str, file: Path, repairs: list[Repai
             continue
         if shape is not None:
             shapes.append(shape)
-    return Link(str(link.get("name")), tuple(shapes), tuple(unusable), tuple(empty))
+    return UrdfLink(str(link.get("name")), tuple(shapes), tuple(unusable), tuple(empty))
 
 
 class UnusableShapeError(Exception):

@@ -63,7 +63,7 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
             f"cd {shlex.quote(str(where.parent))} && git lfs pull",
         )
     repairs: list[Repair] = []
-    text = _decoded(data, repairs)
+    text = _decode(data, repairs)
     start, stray = _prolog(text)
     if text[start : start + 14].lower() == "<!doctype html":
         raise AssetError("is a web page, not URDF", where, "download the raw file")
@@ -74,7 +74,7 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
     return ("\n" * text.count("\n", 0, start) + _with_prefixes(body, repairs)).encode(), repairs
 
 
-def _decoded(data: bytes, repairs: list[Repair]) -> str:
+def _decode(data: bytes, repairs: list[Repair]) -> str:
     """Text by its byte order mark, else as declared, else as UTF-8, which most files are whatever they declare."""
     for mark, encoding in _BOMS:
         if data.startswith(mark):
@@ -177,7 +177,7 @@ def use_plain_names(root: etree._Element, where: Path) -> list[Repair]:
         name = etree.QName(element)
         if name.namespace not in (None, own):
             if "xacro" in str(name.namespace):
-                raise unexpanded(_NOT_EXPANDED + f"<{element.prefix}:{name.localname}>", where)
+                raise xacro_error(_NOT_EXPANDED + f"<{element.prefix}:{name.localname}>", where)
             continue
         plain = name.localname
         if plain not in _ELEMENTS and plain.lower() in _ELEMENTS:
@@ -210,15 +210,15 @@ def _refuse_unexpanded(root: etree._Element, where: Path) -> None:
     """Macros of xacro that have not been replaced; what they stand for would be missing."""
     for element in root:
         if element.tag in ("include", "macro"):
-            raise unexpanded(_NOT_EXPANDED + f"<{element.tag}>", where)
+            raise xacro_error(_NOT_EXPANDED + f"<{element.tag}>", where)
         if element.tag in ("link", "joint"):
             for inner in element.iter(etree.Element):
                 for value in inner.attrib.values():
                     if "${" in value or "$(" in value:
-                        raise unexpanded(_NOT_EXPANDED + f"{value[:60]!r} in <{inner.tag}>", where)
+                        raise xacro_error(_NOT_EXPANDED + f"{value[:60]!r} in <{inner.tag}>", where)
 
 
-def unexpanded(what: str, where: Path) -> AssetError:
+def xacro_error(what: str, where: Path) -> AssetError:
     """The error about a file of xacro, with the command that expands it."""
     name = where.name.removesuffix(".xacro").removesuffix(".urdf")
     target = where.with_name(f"{name}.urdf" if where.suffix == ".xacro" else f"{name}_expanded.urdf")

@@ -17,7 +17,7 @@ _FLAT = 1e-3
 """A hull that fills less of its box has no volume worth the name."""
 
 
-def embodied(obj: ArticulatedObject) -> ArticulatedObject:
+def add_bodies(obj: ArticulatedObject) -> ArticulatedObject:
     """The object with a body for every part, names that any file takes, and joints that are 0 at rest.
 
     Parts with a body keep it. A part of a loaded object, whose surface need not be closed, becomes its convex hull; one
@@ -31,11 +31,11 @@ def embodied(obj: ArticulatedObject) -> ArticulatedObject:
             mimic = replace(mimic, offset=mimic.offset + mimic.multiplier * source_rest - rest)
         lower, upper = joint.lower - rest, joint.upper - rest
         joints.append(replace(joint, name=f"joint{k}", lower=lower, upper=upper, rest=0.0, mimic=mimic))
-    parts = [_embodied_part(obj, k) for k in range(len(obj))]
+    parts = [_add_body(obj, k) for k in range(len(obj))]
     return replace(obj, parts=tuple(parts), native_tree=KinematicTree(joints))
 
 
-def _embodied_part(obj: ArticulatedObject, k: int) -> Part:
+def _add_body(obj: ArticulatedObject, k: int) -> Part:
     part = replace(obj.parts[k], name=f"part{k}", label=f"part{k}")
     if part.body is not None:
         return part

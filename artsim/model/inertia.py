@@ -77,7 +77,7 @@ def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     return inertia
 
 
-def joined_inertia(inertias: Iterable[Inertia]) -> Inertia:
+def combine_inertias(inertias: Iterable[Inertia]) -> Inertia:
     """Several bodies as one (parallel axis theorem)."""
     bodies = list(inertias)
     mass = sum(body.mass for body in bodies)

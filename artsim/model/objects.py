@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.names import printable
 from artsim.common.products import norm
+from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
-from artsim.model.describe import brief, object_line, object_text
 from artsim.model.kinematics import LARGEST, Array, KinematicTree
 
 if TYPE_CHECKING:
@@ -108,6 +108,17 @@ class Part:
         # Which of 0.0 and -0.0 is the smaller depends on the processor: adding 0.0 leaves one of them.
         return np.stack([used.min(axis=0), used.max(axis=0)]) + 0.0
 
+    def two_sided_faces(self) -> NDArray[np.int32]:
+        """(F, 3) triangles; unless the surface is a closed solid, each facing both ways.
+
+        Rasterisers leave out triangles that face away, and real meshes are wound any way.
+        """
+        import trimesh
+
+        mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
+        mesh.merge_vertices()
+        return self.faces if mesh.is_volume else np.concatenate([self.faces, self.faces[:, ::-1]])
+
     def moved(self, offset: Array) -> Part:
         """The part translated by (3,) metres."""
         body = self.body
@@ -171,10 +182,34 @@ class ArticulatedObject:
         return len(self.parts)
 
     def __str__(self) -> str:
-        return object_text(self)
+        tree = self.tree
+        rows: list[tuple[str, ...]] = [("part", "name", "joint", "from", "to", "size, cm", "triangles")]
+        for k, (part, joint) in enumerate(zip(self.parts, tree.joints, strict=True)):
+            ends = [joint_value(end, joint.type) if k else "" for end in (joint.lower, joint.upper)]
+            kind = joint.type if joint.mimic is None else f"{joint.type} (follows {joint.mimic.source})"
+            rows.append(
+                (str(k), label_of(part.label), kind, *ends, centimetres(self.box_size[k]), f"{len(part.faces):,}")
+            )
+        inside = (
+            f"{plural(len(self), 'part')}, {plural(len(tree.free_joints), 'free joint')}, {self.num_faces:,} triangles"
+        )
+        size = "no geometry"
+        if self.has_surface.any():
+            size = f"{centimetres(self.bounds[1] - self.bounds[0])} cm, diagonal {three_digits(100 * self.diagonal)} cm"
+        who = f"{label_of(self.category)} {label_of(self.object_id)}"
+        return "\n".join(
+            [
+                cut(f"{who}   from {printable(self.source or 'memory', 60)}"),
+                f"{inside}, {plural(len(self.repairs), 'repair')}",
+                f"{size}, scale {self.scale:.4g}",
+                "",
+                *table(rows, left=3),
+            ]
+        )
 
     def __repr__(self) -> str:
-        return object_line(self)
+        who = f"{type(self).__name__} {label_of(self.category)} {label_of(self.object_id)}"
+        return f"<{who}: {plural(len(self), 'part')}, {plural(len(self.tree.free_joints), 'free joint')}>"
 
     @cached_property
     def tree(self) -> KinematicTree:

@@ -28,7 +28,7 @@ _SAME_SURFACE = 0.02  # share of the depth by which neighbours on one surface di
 _MAX_INCIDENCE = np.deg2rad(85.0)  # the formulae diverge at grazing incidence; no device was measured beyond
 
 
-class View:
+class PixelView:
     """Some pixels of a noise-free scene, and what chance decides at each of them.
 
     Parameters
@@ -127,12 +127,12 @@ def _scramble(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
 class Step(Protocol):
     """One thing that a sensor does to a depth image."""
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         """Depth reported after this step.
 
         Parameters
         ----------
-        view : View
+        view : PixelView
         depth : (N,) float
             Reported so far; 0 = no return.
         focal : float
@@ -165,7 +165,7 @@ class LateralJitter:
     sigma_px: float
     grazing_px: float = 0.0
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         sigma = self._sigma_px(view.incidence) if self.grazing_px else np.full(len(depth), self.sigma_px)
         sigma = sigma * (view.camera.K[0, 0] / focal)  # in the camera's own pixels
         row = view.row + sigma * view.normal(stream)
@@ -208,7 +208,7 @@ class DisparityQuantisation:
     step_px: float
     baseline: float
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         unit = focal * self.baseline / self.step_px  # disparity in steps, times depth
         steps = np.rint(unit / np.where(depth > 0, depth, np.inf))
         return np.where(steps > 0, unit / np.maximum(steps, 1.0), 0.0)
@@ -241,7 +241,7 @@ class AxialNoise:
     grazing: float = 0.0
     measured_with: DisparityQuantisation | None = None
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         incidence = view.incidence if self.grazing else np.zeros(len(depth))
         seen = np.flatnonzero(depth > 0)
         noisy = depth[seen] + self.sigma(depth[seen], incidence[seen], focal) * view.normal(stream, seen)
@@ -278,7 +278,7 @@ class _AtEdges:
     jump: float
     chance: float
 
-    def happens(self, view: View, stream: int) -> tuple[NDArray[np.bool_], Array, Array]:
+    def happens(self, view: PixelView, stream: int) -> tuple[NDArray[np.bool_], Array, Array]:
         """Where it does, and the nearest and farthest depth around each pixel."""
         near, far = _range(view.patch)
         return (far - near > self.jump) & (view.uniform(stream) < self.chance), near, far
@@ -292,7 +292,7 @@ class _AtEdges:
 class EdgeDropout(_AtEdges):
     """Pixels lose their return beside a jump in depth; an empty background counts as one."""
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         lost, _, _ = self.happens(view, stream)
         return np.where(lost, 0.0, depth)
 
@@ -309,7 +309,7 @@ class FlyingPixels(_AtEdges):
 
     reach: float
 
-    def read(self, view: View, depth: Array, focal: float, stream: int) -> Array:
+    def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         flies, near, far = self.happens(view, stream)
         flies = flies & (depth > 0)
         near = np.where(flies, near, 0.0)

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from artsim.common.elementary import log
-from artsim.common.products import apply, norm
-from artsim.errors import ConfigError, RenderError
-from artsim.model.camera import Camera
-from artsim.model.describe import sample_line, sample_text
+from artsim.common.products import norm
+from artsim.common.tables import centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.model.kinematics import Array
-from artsim.model.objects import ArticulatedObject
-from artsim.observing.noise import Look, View
-from artsim.observing.sensor import Sensor, find_sensor
-from artsim.renderers import BACKGROUND, Frame, Renderer, shared_renderer
-from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visibility
+
+ARTSIM_VERSION = version("artsim")
+"""Of this installation; each sample names the one that made it."""
 
 IMAGES = ("depth", "part_mask", "rgb")
 """Images that a sample can carry besides its cloud."""
@@ -110,10 +105,34 @@ class Sample:
     rgb: NDArray[np.uint8] | None = None
 
     def __str__(self) -> str:
-        return sample_text(self)
+        rows: list[tuple[str, ...]] = [
+            ("part", "name", "joint", "points", "visible", "state", "from", "to", "size, cm")
+        ]
+        counts = np.bincount(self.part, minlength=len(self.joint_type))
+        for k, kind in enumerate(self.joint_type):
+            values = (self.joint_state[k], *self.joint_limits[k]) if k else ()
+            state, low, high = (joint_value(float(value), kind) for value in values) if k else ("", "", "")
+            visible = f"{100 * self.visible_fraction[k]:.0f} %"
+            shown = (str(k), label_of(self.part_names[k]), kind, f"{counts[k]:,}", visible, state, low, high)
+            rows.append((*shown, centimetres(self.box_size[k])))
+        origin = f"sample {self.index} of seed {self.seed}" if self.index >= 0 else "a view that was asked for"
+        images = [image for image in ("depth", "part_mask", "rgb") if getattr(self, image) is not None]
+        distance = norm(self.T_camera_part[0, :3, 3])  # of the middle of the object at rest
+        inside = f"{len(self.points):,} points, {plural(len(self.joint_type), 'part')}"
+        made = f"renderer {label_of(self.renderer)}, noise {label_of(self.noise)}, images {', '.join(images) or 'none'}"
+        return "\n".join(
+            [
+                cut(f"{label_of(self.category)} {label_of(self.object_id)}   {origin}"),
+                f"{inside}, diagonal {three_digits(100 * self.diagonal)} cm, {distance:.2f} m from the camera",
+                cut(f"camera {self.width} x {self.height}, {made}"),
+                "",
+                *table(rows, left=3),
+            ]
+        )
 
     def __repr__(self) -> str:
-        return sample_line(self)
+        who = f"{type(self).__name__} {label_of(self.category)} {label_of(self.object_id)}"
+        return f"<{who}: {len(self.points):,} points, {plural(len(self.joint_type), 'part')}>"
 
     @property
     def rest_points(self) -> Array:
@@ -121,283 +140,3 @@ class Sample:
         diagonal = norm(self.box_size)
         rest: Array = (self.npcs - 0.5) * diagonal[self.part, None] + self.box_center[self.part]
         return rest
-
-
-def observe(
-    obj: ArticulatedObject,
-    q: ArrayLike,
-    camera: Camera,
-    T_world_object: ArrayLike | None = None,
-    num_points: int = 2048,
-    renderer: str | Renderer = "raycast",
-    images: tuple[str, ...] = (),
-    noise: str | Sensor = "none",
-    rng: np.random.Generator | None = None,
-    seed: int = -1,
-    index: int = -1,
-) -> Sample:
-    """Look at a posed object and write down the cloud with its ground truth.
-
-    The cloud is ``num_points`` pixels drawn uniformly without replacement from those that show the object (with
-    replacement once there are fewer). Without images, ``raycast`` casts only as many of them as the cloud needs:
-    the same pixels are looked at in both cases, so that the same ``rng`` gives the same cloud. With noise, those are
-    pixels at which the sensor reports something; all else that the sample says stays free of noise.
-
-    Parameters
-    ----------
-    obj : ArticulatedObject
-    q : (K,) float
-        Joint states in radians or metres; the root's entry is ignored.
-    camera : Camera
-    T_world_object : (4, 4) float, optional
-        Pose of the rest frame in the world; identity by default.
-    num_points : int
-    renderer : str or Renderer
-        One of ``artsim.renderers.RENDERERS``, or one of your own.
-    images : tuple of str
-        Which of ``IMAGES`` to keep.
-    noise : str or Sensor
-        Depth sensor: one of ``artsim.observing.sensor.SENSORS``, or one of your own.
-    rng : numpy Generator, optional
-        Seeded with 0 by default.
-    seed, index : int
-        Stored in the record.
-
-    Returns
-    -------
-    Sample
-
-    Raises
-    ------
-    RenderError
-        When the camera does not see the object at all.
-    ConfigError
-        When an option makes no sense.
-    """
-    if num_points < 1:
-        raise ConfigError(f"a cloud of {num_points} points is empty", "num_points", "ask for at least 1")
-    unknown = set(images) - set(IMAGES)
-    if unknown:
-        raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")
-    rng = rng or np.random.default_rng(0)
-    name, sensor = renderer if isinstance(renderer, str) else renderer.name, find_sensor(noise)
-    key = int(rng.integers(2**63)) if sensor.steps else 0
-    posed = pose(obj, q, camera, T_world_object)
-    frame = None
-    if images or name != "raycast":
-        drawer = shared_renderer(renderer) if isinstance(renderer, str) else renderer
-        frame = drawer.render(obj, q, camera, T_world_object)
-        look = _lookup(frame)
-        pixels, depth, part = draw_visible(posed, _sensed(look, look, camera, sensor, key), num_points, rng)
-        visible_fraction = _exact_visible_fraction(posed, frame)
-    else:
-        rays, look = _Rays(posed), _in_any_order(posed)
-        pixels, depth, part = draw_visible(posed, _sensed(rays, look, camera, sensor, key), num_points, rng)
-        visible_fraction = rays.visible_fraction()
-    if len(pixels) == 0:
-        raise RenderError("the camera does not see the object", obj.object_id, "move the camera or the object")
-    points = true_points = camera.unproject(pixels, depth)
-    if sensor.steps:
-        true_points = camera.unproject(pixels, look(*np.divmod(pixels, camera.width))[0])
-        if "depth" in images:
-            assert frame is not None
-            frame = replace(frame, depth=sensor.read_image(frame.depth, camera, key))
-    wanted = {image: None if frame is None else getattr(frame, field) for image, field in _FRAME_FIELDS.items()}
-    if "rgb" in images and wanted["rgb"] is None:
-        raise ConfigError(
-            f"renderer {name!r} makes no rgb", "images", "use a renderer that does, such as sapien or pybullet"
-        )
-    tree = obj.tree
-    axis_camera, origin_camera = tree.posed_joints(posed.T_camera_part)
-    return Sample(
-        points=points.astype(np.float32),
-        part=part,
-        npcs=_npcs(true_points, part, posed).astype(np.float32, order="C"),
-        T_camera_part=posed.T_camera_part,
-        box_center=obj.box_center,
-        box_size=obj.box_size,
-        visible_fraction=visible_fraction,
-        joint_type=tree.types,
-        joint_parent=tree.parents,
-        joint_axis=tree.axes,
-        joint_origin=tree.origins,
-        joint_axis_camera=axis_camera,
-        joint_origin_camera=origin_camera,
-        joint_state=tree.complete_state(q),
-        joint_rest=tree.rest,
-        joint_limits=tree.limits,
-        K=camera.K,
-        T_world_camera=camera.T_world_camera,
-        width=camera.width,
-        height=camera.height,
-        part_names=tuple(p.label for p in obj.parts),
-        category=obj.category,
-        object_id=obj.object_id,
-        object_sha256=obj.sha256,
-        scale=obj.scale,
-        diagonal=obj.diagonal,
-        seed=seed,
-        index=index,
-        renderer=name,
-        artsim_version=ARTSIM_VERSION,
-        noise=sensor.name,
-        **{image: value if image in images else None for image, value in wanted.items()},
-    )
-
-
-ARTSIM_VERSION = version("artsim")
-_FRAME_FIELDS = {"depth": "depth", "part_mask": "part_ids", "rgb": "rgb"}
-
-
-def _lookup(frame: Frame) -> Look:
-    return lambda row, column: (frame.depth[row, column], frame.part_ids[row, column])
-
-
-def _in_any_order(posed: PosedObject) -> Look:
-    """Casts one ray through each pixel asked for, however often it is asked for."""
-    width = posed.camera.width
-
-    def look(row: NDArray[np.int64], column: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        pixels, back = np.unique(row * width + column, return_inverse=True)
-        depth, part, _ = cast(posed, *np.divmod(pixels, width))
-        return depth[back], part[back]
-
-    return look
-
-
-def _sensed(look: Look, around: Look, camera: Camera, sensor: Sensor, key: int) -> Look:
-    """What a sensor reports: pixels without a return show nothing.
-
-    Parameters
-    ----------
-    look : Look
-        The noise-free scene at the pixels asked for.
-    around : Look
-        The noise-free scene anywhere else.
-    camera : Camera
-    sensor : Sensor
-    key : int
-        Of all chance.
-    """
-    if not sensor.steps:
-        return look
-
-    def sensed(row: NDArray[np.int64], column: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        depth, part = look(row, column)
-        hit = (part != BACKGROUND).nonzero()[0]
-        reading, shown = np.zeros_like(depth), np.full_like(part, BACKGROUND)
-        reading[hit] = sensor.read(View(around, camera, row[hit], column[hit], depth[hit], key))
-        shown[reading > 0] = part[reading > 0]
-        return reading, shown
-
-    return sensed
-
-
-def draw_visible(
-    posed: PosedObject, look: Look, num_points: int, rng: np.random.Generator
-) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]:
-    """Look at random pixels that the object can cover until ``num_points`` of them show it.
-
-    Returns
-    -------
-    pixels : (num_points,) int
-        Flat indices, all different, unless fewer pixels show the object: then some are drawn again with replacement.
-        Empty when none does.
-    depth : (num_points,) float32
-    part : (num_points,) uint8
-    """
-    first, end = posed.candidates()
-    up_to = np.cumsum(end - first)  # candidates in the rows so far
-    shift = end - up_to  # from a candidate's number to its column
-    total = int(up_to[-1])
-    fresh = np.ones(total, dtype=bool)
-    hits: list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]] = []
-    found = visited = 0
-    while found < num_points and visited < total:
-        # As many as it should take, judging by the share of hits so far (at first, by experience), and a few more.
-        share = found / visited if found else 0.82 / (1 + visited)
-        missing = num_points - found
-        wanted = min(int((missing + 2.5 * np.sqrt(missing * (1.03 - share))) / share) + 16, total)
-        left = total - visited
-        if wanted > left // 2:
-            rest = fresh.nonzero()[0]
-            local = rest if wanted > 0.7 * left else np.sort(rng.permutation(rest)[:wanted])
-        else:
-            # Numbers drawn with replacement repeat each other and earlier rounds: so many leave ``wanted`` new ones.
-            drawn = np.zeros(total, dtype=bool)
-            drawn[rng.integers(0, total, size=int(-total * log(1.0 - wanted / left)))] = True
-            local = (drawn & fresh).nonzero()[0]  # in order: neighbouring rays share memory
-        fresh[local] = False
-        row = np.searchsorted(up_to, local, side="right")
-        column = local + shift[row]
-        depth, part = look(row, column)
-        hit = (part != BACKGROUND).nonzero()[0]
-        hits.append((row[hit] * posed.camera.width + column[hit], depth[hit], part[hit]))
-        visited, found = visited + len(local), found + len(hit)
-    if found == 0:
-        return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.uint8)
-    # Every visible pixel has had the same chance so far, so that any choice among those found is uniform.
-    chosen = rng.permutation(found)[:num_points]
-    if found < num_points:
-        chosen = np.concatenate([chosen, rng.integers(0, found, size=num_points - found)])
-    pixels, depth, part = (np.concatenate(column)[chosen] for column in zip(*hits, strict=True))
-    return pixels, depth, part
-
-
-class _Rays:
-    """A :data:`Look` that casts rays and counts, for each part, how many met it and how many saw it."""
-
-    enough = 100
-    """Amodal hits from which a part's visible fraction is estimated; parts with fewer are looked at more closely."""
-
-    def __init__(self, posed: PosedObject):
-        self.posed = posed
-        self.met = np.zeros(len(posed.obj), dtype=np.int64)
-        self.saw = np.zeros(len(posed.obj), dtype=np.int64)
-
-    def __call__(
-        self, row: NDArray[np.int64], column: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        depth, part, met = cast(self.posed, row, column)
-        self.met += met
-        self.saw += np.bincount(part, minlength=BACKGROUND + 1)[: len(self.met)]
-        return depth, part
-
-    def visible_fraction(self) -> Array:
-        """(K,) estimate with a standard error of at most about 0.05."""
-        counts = np.stack([self.met, self.saw], axis=1)
-        few = np.flatnonzero(self.met < self.enough).tolist()
-        if few:
-            counts[few] += visibility(self.posed, few, max_rays=256)
-        met, saw = counts.T
-        fraction: Array = saw / np.maximum(met, 1)
-        return fraction
-
-
-def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
-    """(K,) visible pixels of the frame over amodal pixels, which are cast where the renderer does not count them."""
-    amodal = frame.amodal_pixels
-    if amodal is None:
-        amodal = render_posed(posed).amodal_pixels
-    assert amodal is not None
-    visible = np.bincount(frame.part_ids.ravel(), minlength=BACKGROUND + 1)[: len(amodal)]
-    # A rasteriser may cover a pixel more than the rays do at a silhouette.
-    fraction: Array = np.minimum(visible / np.maximum(amodal, 1), 1.0)
-    return fraction
-
-
-def _npcs(points: Array, part: NDArray[np.uint8], posed: PosedObject) -> Array:
-    """(N, 3) normalised part coordinates of camera-frame points: one uniform scale per part."""
-    rotation, translation = posed.T_camera_part[:, :3, :3], posed.T_camera_part[:, :3, 3]
-    size = norm(posed.obj.box_size)
-    size[size == 0] = 1.0  # parts without geometry have no points
-    # R^T (p - t) is the inverse transform; the part's centre and scale are folded into it.
-    linear = rotation / size[:, None, None]
-    shift = 0.5 - (apply(np.swapaxes(rotation, 1, 2), translation) + posed.obj.box_center) / size[:, None]
-    # One column for each point, so that each step runs over memory in order.
-    table = np.concatenate([linear, shift[:, None]], axis=1).reshape(-1, 12).T.take(part, axis=1).reshape(4, 3, -1)
-    npcs = table[0] * points[:, 0]
-    npcs += table[1] * points[:, 1]
-    npcs += table[2] * points[:, 2]
-    npcs += table[3]
-    return npcs.T

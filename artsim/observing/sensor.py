@@ -20,8 +20,8 @@ from artsim.observing.noise import (
     EdgeDropout,
     FlyingPixels,
     LateralJitter,
+    PixelView,
     Step,
-    View,
 )
 
 
@@ -43,12 +43,12 @@ class Sensor:
     steps: tuple[Step, ...] = ()
     focal: float = 600.0
 
-    def read(self, view: View) -> NDArray[np.float32]:
+    def read(self, view: PixelView) -> NDArray[np.float32]:
         """Depth reported at the pixels of a view.
 
         Parameters
         ----------
-        view : View
+        view : PixelView
 
         Returns
         -------
@@ -82,7 +82,7 @@ class Sensor:
             return depth[row, column], nothing[: len(row)]
 
         row, column = np.divmod(np.arange(depth.size), camera.width)
-        return self.read(View(look, camera, row, column, depth.ravel(), key)).reshape(depth.shape)
+        return self.read(PixelView(look, camera, row, column, depth.ravel(), key)).reshape(depth.shape)
 
     def sigma(self, depth: ArrayLike, incidence: ArrayLike = 0.0) -> Array:
         """Standard deviation of a reading on a flat surface, by the closed forms of the steps.

@@ -11,7 +11,6 @@ import numpy as np
 import tyro
 from numpy.typing import ArrayLike
 
-from artsim.datasets.stream import STREAM_SEEDS
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import FamilySource, Source, family_sources, find_sources
@@ -28,9 +27,11 @@ from artsim.model.draws import (
 )
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.sample import Sample, observe
+from artsim.observing.capture import observe
+from artsim.observing.sample import Sample
 from artsim.observing.sensor import find_sensor
 from artsim.physics.world import Control, PhysicsOptions, Simulation
+from artsim.stream import STREAM_SEEDS
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ class Episode:
             self._simulation = Simulation(obj, self.options.physics)
         self._simulation.reset(sample_state(obj, self.options.states, rng))
         self.steps = 0
-        self._camera = sample_view(obj, widest_state(obj), self.options.views, rng)
+        self._camera = sample_view(obj, most_open_state(obj), self.options.views, rng)
 
     def step(self, action: ArrayLike, control: Control) -> None:
         """One control step; see :meth:`Simulation.step`."""
@@ -158,7 +159,7 @@ class Episode:
         obj = self.obj
         if self.options.camera == "fixed":
             return self._camera
-        center, _ = bounding_sphere(obj, widest_state(obj))
+        center, _ = bounding_sphere(obj, most_open_state(obj))
         angle = np.deg2rad(self.options.orbit_speed) * self.time
         T_world_turned = np.eye(4)
         T_world_turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
@@ -193,7 +194,7 @@ def openness(obj: ArticulatedObject, q: Array) -> float:
     return float(np.mean(np.abs(q - rest)[free] / np.maximum(longest[free], 1e-9))) if len(free) else 0.0
 
 
-def widest_state(obj: ArticulatedObject) -> Array:
+def most_open_state(obj: ArticulatedObject) -> Array:
     """(K,) of the rest state and the two ends of all joints, the one that takes the most room."""
     ends = joint_intervals(obj)
     states = [obj.tree.complete_state(q) for q in (obj.tree.rest, ends[:, 0], ends[:, 1])]

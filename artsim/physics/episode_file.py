@@ -67,7 +67,7 @@ class Motion:
         return (self[i] for i in range(len(self)))
 
 
-def carried(points: NDArray[Any], part: NDArray[np.uint8], before: Sample, after: Sample) -> Array:
+def follow_points(points: NDArray[Any], part: NDArray[np.uint8], before: Sample, after: Sample) -> Array:
     """Where the same places of the object are in another frame of its motion.
 
     Parameters

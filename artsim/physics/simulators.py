@@ -32,7 +32,7 @@ from artsim.loading.urdf import find_urdf, load
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.bullet import import_pybullet, silent
+from artsim.renderers.bullet import import_pybullet, silence_output
 
 AGREEMENT = 1e-6
 """Metres by which places of parts may differ; for objects larger than 1 m, share of their diagonal."""
@@ -42,7 +42,7 @@ LinkPoses = Callable[[dict[str, float]], dict[str, Array]]
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedFile:
     """A file in a simulator: number of links, of joints that move, its kinematics, and what must live as long."""
 
     links: int
@@ -73,7 +73,7 @@ class Agreement:
     problem: str
 
 
-def in_pybullet(file: Path) -> Loaded:
+def in_pybullet(file: Path) -> LoadedFile:
     """Load a URDF file in PyBullet; its poses are valid until the next file is loaded."""
     bullet = import_pybullet()
     client = _bullet_client()
@@ -94,7 +94,7 @@ def in_pybullet(file: Path) -> Loaded:
             found[name] = _pose(np.reshape(bullet.getMatrixFromQuaternion(state[5]), (3, 3)), state[4])
         return found
 
-    return Loaded(len(infos) + 1, len(moving), poses)
+    return LoadedFile(len(infos) + 1, len(moving), poses)
 
 
 @cache
@@ -104,7 +104,7 @@ def _bullet_client() -> int:
     return int(bullet.connect(bullet.DIRECT))
 
 
-def in_mujoco(file: Path) -> Loaded:
+def in_mujoco(file: Path) -> LoadedFile:
     """Load a URDF or MJCF file in MuJoCo."""
     with needs("mujoco"):
         import mujoco
@@ -123,10 +123,10 @@ def in_mujoco(file: Path) -> Loaded:
         mujoco.mj_kinematics(model, data)
         return {b.name: _pose(data.xmat[b.id].reshape(3, 3), data.xpos[b.id]) for b in bodies}
 
-    return Loaded(model.nbody - 1, model.njnt, poses)
+    return LoadedFile(model.nbody - 1, model.njnt, poses)
 
 
-def in_sapien(file: Path) -> Loaded:
+def in_sapien(file: Path) -> LoadedFile:
     """Load a URDF file in SAPIEN, whose own kinematics works in single precision."""
     sapien = _sapien()
     scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
@@ -143,7 +143,7 @@ def in_sapien(file: Path) -> Loaded:
         robot.set_qpos(np.array([values[name] for name in joints], dtype=np.float32))
         return {link.name: link.entity_pose.to_transformation_matrix().astype(np.float64) for link in robot.links}
 
-    return Loaded(len(robot.links), len(joints), poses, scene)
+    return LoadedFile(len(robot.links), len(joints), poses, scene)
 
 
 @cache
@@ -161,7 +161,11 @@ def _pose(rotation: Any, position: Any) -> Array:
     return pose
 
 
-SIMULATORS: dict[str, Callable[[Path], Loaded]] = {"pybullet": in_pybullet, "mujoco": in_mujoco, "sapien": in_sapien}
+SIMULATORS: dict[str, Callable[[Path], LoadedFile]] = {
+    "pybullet": in_pybullet,
+    "mujoco": in_mujoco,
+    "sapien": in_sapien,
+}
 """Name of each simulator -> its loader."""
 
 
@@ -211,7 +215,7 @@ def _compare(
     joints: int,
 ) -> Agreement:
     try:
-        with silent():
+        with silence_output():
             loaded = SIMULATORS[name](file)
     except ArtsimError:
         raise

@@ -30,10 +30,10 @@ from scipy.spatial.transform import Rotation
 
 from artsim.errors import ConfigError
 from artsim.export.robot import GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
-from artsim.model.convex_bodies import embodied
+from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.bullet import import_pybullet, silent
+from artsim.renderers.bullet import import_pybullet, silence_output
 
 Control = Literal["effort", "velocity"]
 _ANY_SPEED = 1e4
@@ -106,7 +106,7 @@ class Simulation:
     def __init__(self, obj: ArticulatedObject, options: PhysicsOptions | None = None):
         self.obj, self.options = obj, options or PhysicsOptions()
         self._bullet = import_pybullet()
-        self._robot = as_robot(embodied(obj))
+        self._robot = as_robot(add_bodies(obj))
         self.mass_unit = _mass_unit(self._robot.links)
         names = {joint.name: j for j, joint in enumerate(self._robot.joints)}
         part_joint = [names[joint.name] for joint in self._robot.obj.tree.joints[1:]]
@@ -114,7 +114,7 @@ class Simulation:
         driven = [self._robot.joints[j] for j in self._driven]
         self.effort_limit = np.array([joint.effort for joint in driven])
         self.velocity_limit = np.array([joint.velocity for joint in driven])
-        with silent():
+        with silence_output():
             self.client: int = self._bullet.connect(self._bullet.DIRECT)
         self.close = weakref.finalize(self, _disconnect, self._bullet, self.client)
         """Free the world; happens by itself when the simulation is no longer used."""
@@ -151,7 +151,7 @@ class Simulation:
         self._damping = self._follow.T @ (damping[:, None] * self._follow)
         self._always = len(joints) > len(self._driven) or bool(self._damping.any())
         self._measured = [self._numbers[j] for j in part_joint]
-        with silent():  # the first mass matrix comes with remarks on the rounding of axes
+        with silence_output():  # the first mass matrix comes with remarks on the rounding of axes
             self._momentum(np.zeros(len(joints)), np.zeros(len(joints)))
 
     def reset(self, q: ArrayLike | None = None, velocity: ArrayLike | None = None) -> None:
@@ -332,7 +332,7 @@ def _collision_shape(bullet: ModuleType, client: int, link: Link) -> int:
         lines += [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in (mesh.vertices - link.origin).tolist()]
         lines += [f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + first).tolist()]
         first += len(mesh.vertices)
-    with tempfile.TemporaryDirectory(prefix="artsim-physics-") as folder, silent():
+    with tempfile.TemporaryDirectory(prefix="artsim-physics-") as folder, silence_output():
         path = Path(folder) / "pieces.obj"
         path.write_text("".join(lines))
         return int(bullet.createCollisionShape(bullet.GEOM_MESH, fileName=str(path), physicsClientId=client))
@@ -346,5 +346,5 @@ def _box_mesh(shape: BoxShape) -> MeshShape:
 
 
 def _disconnect(bullet: ModuleType, client: int) -> None:
-    with silent():
+    with silence_output():
         bullet.disconnect(client)

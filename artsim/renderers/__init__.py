@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from artsim.errors import ConfigError
 from artsim.model.camera import Camera
+from artsim.model.frame import Frame
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.base import BACKGROUND, CameraBatch, Frame, Renderer
+from artsim.renderers.base import CameraBatch, Renderer
 
 RENDERERS = ("raycast", "pybullet", "pybullet-egl", "sapien", "warp")
 
@@ -118,10 +119,8 @@ def render_cameras(
 
 
 __all__ = [
-    "BACKGROUND",
     "RENDERERS",
     "CameraBatch",
-    "Frame",
     "Renderer",
     "make_renderer",
     "render",

@@ -3,43 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from artsim.model.camera import Camera
-from artsim.model.describe import brief
+from artsim.model.frame import Frame
 from artsim.model.kinematics import Array
-from artsim.model.objects import ArticulatedObject, Part
-
-BACKGROUND = 255
-"""Part id of pixels that show no part."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """What a camera sees of one object.
-
-    Attributes
-    ----------
-    depth : (H, W) float32
-        z-depth in metres, 0 = no return.
-    part_ids : (H, W) uint8
-        Index of the part seen at each pixel; ``BACKGROUND`` where none is.
-    amodal_pixels : (K,) int64 or None
-        Pixels that each part would cover if nothing hid it, where the renderer knows.
-    rgb : (H, W, 3) uint8 or None
-        Colour, where the renderer makes it.
-    """
-
-    depth: NDArray[np.float32]
-    part_ids: NDArray[np.uint8]
-    amodal_pixels: NDArray[np.int64] | None = None
-    rgb: NDArray[np.uint8] | None = None
-
-    __repr__ = brief
+from artsim.model.objects import ArticulatedObject
 
 
 class Renderer(Protocol):
@@ -88,18 +60,6 @@ class CameraBatch(Protocol):
         Users call :func:`artsim.renderers.render_cameras`, which any renderer will do for.
         """
         ...
-
-
-def two_sided_faces(part: Part) -> NDArray[np.int32]:
-    """(F, 3) triangles of a part; unless it is a closed solid, each facing both ways.
-
-    Rasterisers leave out triangles that face away, and real meshes are wound any way.
-    """
-    import trimesh
-
-    mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
-    mesh.merge_vertices()
-    return part.faces if mesh.is_volume else np.concatenate([part.faces, part.faces[:, ::-1]])
 
 
 def depth_range(obj: ArticulatedObject, T_camera_part: Array) -> tuple[float, float]:

@@ -23,10 +23,11 @@ from artsim.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.common.extras import needs
 from artsim.errors import RenderError
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.base import BACKGROUND, Frame, depth_range, two_sided_faces
-from artsim.renderers.kept import Kept
+from artsim.renderers.base import depth_range
+from artsim.renderers.geometry_cache import GeometryCache
 from artsim.renderers.raycast import pose
 from artsim.renderers.scene import Scene, SceneFrame, split_ids
 
@@ -56,7 +57,7 @@ class BulletRenderer:
     def __init__(self, egl: bool = False):
         self.name = "pybullet-egl" if egl else "pybullet"
         self._egl = egl
-        self._worlds: Kept[_World] = Kept(_MAX_WORLDS[self.name])
+        self._worlds: GeometryCache[_World] = GeometryCache(_MAX_WORLDS[self.name])
         _World((), egl).close()  # says now, rather than at the first frame, that the backend is missing
 
     def render(
@@ -146,7 +147,7 @@ class _World:
         spec = importlib.util.find_spec("eglRenderer")
         if spec is None or spec.origin is None:
             raise RenderError("this PyBullet has no EGL plugin", "pybullet-egl", _EGL_FIX)
-        with silent():
+        with silence_output():
             plugin = self._bullet.loadPlugin(spec.origin, "_eglRendererPlugin", physicsClientId=self._client)
         if plugin < 0:
             raise RenderError("EGL does not start", "pybullet-egl", _EGL_FIX)
@@ -156,7 +157,7 @@ class _World:
         if len(solid.part.faces) == 0:
             return
         if solid.coat is None:
-            yield self._body(_obj_text(solid.part.vertices, two_sided_faces(solid.part)), solid.part.name, folder)
+            yield self._body(_obj_text(solid.part.vertices, solid.part.two_sided_faces()), solid.part.name, folder)
             return
         for patch in patches(solid.part, solid.coat, solid.scale):
             body = self._body(_patch_text(patch, solid.scale), solid.part.name, folder)
@@ -217,7 +218,7 @@ class _World:
         """Colour, depth buffer and bodies."""
         projection = _projection(camera, near, far, (float(shift[0]), float(shift[1])))
         light = {} if lights is None else _light_options(lights, camera)
-        with silent():
+        with silence_output():
             _, _, rgb, buffer, bodies = self._bullet.getCameraImage(
                 camera.width,
                 camera.height,
@@ -252,7 +253,7 @@ def _light_options(lights: Lights, camera: Camera) -> dict[str, object]:
 
 def _disconnect(bullet: ModuleType, client: int) -> None:
     """Close a physics server, and with it its plugins."""
-    with silent():
+    with silence_output():
         bullet.disconnect(client)
 
 
@@ -297,13 +298,13 @@ def import_pybullet() -> ModuleType:
     RenderError
         When it is not installed.
     """
-    with needs("pybullet", RenderError), silent():
+    with needs("pybullet", RenderError), silence_output():
         import pybullet
     return pybullet
 
 
 @contextlib.contextmanager
-def silent() -> Iterator[None]:
+def silence_output() -> Iterator[None]:
     """Keep PyBullet's own chatter, which it prints from C, out of the program's output."""
     sys.stdout.flush()
     sys.stderr.flush()

@@ -21,15 +21,15 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.elementary import cos, tan
 from artsim.common.products import apply, matmul, unit
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.base import BACKGROUND, Frame
 
 _MISS = np.float32(1e30)
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class RaySurface:
     """What rays need of a part, made at first use and kept as long as the part.
 
     Attributes
@@ -44,17 +44,17 @@ class Surface:
     corners: Array
 
 
-_surfaces: weakref.WeakKeyDictionary[Part, Surface] = weakref.WeakKeyDictionary()
+_surfaces: weakref.WeakKeyDictionary[Part, RaySurface] = weakref.WeakKeyDictionary()
 
 
-def surface(part: Part) -> Surface:
+def ray_surface(part: Part) -> RaySurface:
     """The surface of a part that has one."""
     made = _surfaces.get(part)
     if made is None:
         # Embree's `robust` mode costs a third more and changed no pixel in ten million on real objects.
         scene = EmbreeScene()
         TriangleMesh(scene, part.vertices.astype(np.float32), part.faces)
-        made = _surfaces[part] = Surface(scene, bounding_corners(part.vertices[np.unique(part.faces)]))
+        made = _surfaces[part] = RaySurface(scene, bounding_corners(part.vertices[np.unique(part.faces)]))
     return made
 
 
@@ -206,7 +206,7 @@ def _corners(obj: ArticulatedObject) -> Array:
     root, others = obj.parts[0], obj.parts[1:]
     known = _corners_of.get(root)
     if known is None or known[0] != others:  # other objects may have the same root
-        own = [surface(p).corners if len(p.faces) else np.zeros((1, 3)) for p in obj.parts]
+        own = [ray_surface(p).corners if len(p.faces) else np.zeros((1, 3)) for p in obj.parts]
         most = max(map(len, own))
         padded = np.stack([np.pad(c, ((0, most - len(c)), (0, 0)), "edge").T for c in own])
         known = _corners_of[root] = (others, padded)
@@ -284,7 +284,7 @@ def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArra
     # All rays start at the camera: one origin, seen N times through a stride of 0.
     shape = (plane.shape[1], 3)
     origins: NDArray[np.float32] = np.ndarray(shape, np.float32, posed.origins[k].copy(), strides=(0, 4))
-    distance: NDArray[np.float32] = surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="DISTANCE")
+    distance: NDArray[np.float32] = ray_surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="DISTANCE")
     return distance
 
 

@@ -16,9 +16,10 @@ from artsim.appearance.painted import painted_coats
 from artsim.common.extras import install_command
 from artsim.errors import RenderError
 from artsim.model.camera import Camera
+from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.base import BACKGROUND, Frame, depth_range
-from artsim.renderers.kept import Kept
+from artsim.renderers.base import depth_range
+from artsim.renderers.geometry_cache import GeometryCache
 from artsim.renderers.raycast import pose
 from artsim.renderers.sapien_stage import Shadows, Stage
 from artsim.renderers.scene import Scene, SceneFrame, split_ids
@@ -61,7 +62,7 @@ class SapienRenderer:
 
     def __init__(self) -> None:
         self._sapien = import_sapien()
-        self._stages: Kept[Stage] = Kept(_MAX_STAGES)
+        self._stages: GeometryCache[Stage] = GeometryCache(_MAX_STAGES)
 
     def render(
         self, obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from artsim.appearance import Coat, Lights
 from artsim.common.products import matmul
 from artsim.errors import ConfigError
+from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import Array, Joint, KinematicTree, transform_points
 from artsim.model.objects import ArticulatedObject, Mesh, Part, content_sha256
-from artsim.renderers.base import BACKGROUND
 
 MAX_THINGS = 254
 """Instance ids are stored in a byte; 255 marks places where nothing stands."""
@@ -153,7 +153,7 @@ def used_vertices(part: Part) -> Array:
     return found
 
 
-def rigid(name: str, mesh: Mesh) -> ArticulatedObject:
+def rigid_object(name: str, mesh: Mesh) -> ArticulatedObject:
     """An object of one part that no joint moves.
 
     Parameters

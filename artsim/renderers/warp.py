@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.extras import needs
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
+from artsim.model.frame import Frame
 from artsim.model.kinematics import ROTATING, Array
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.base import Frame
-from artsim.renderers.bullet import silent
-from artsim.renderers.views import Clouds, Images, Views
+from artsim.renderers.bullet import silence_output
+from artsim.renderers.view_batch import Clouds, Images, Views
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +279,7 @@ def import_warp() -> ModuleType:
         import warp
     warp.config.log_level = warp.LOG_WARNING
     try:
-        with silent():  # on a machine without a GPU it says so, in C, in every process
+        with silence_output():  # on a machine without a GPU it says so, in C, in every process
             warp.init()
     except OSError as error:
         fix = "set WARP_CACHE_PATH to a folder that can be written"

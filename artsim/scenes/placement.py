@@ -107,7 +107,7 @@ class Arrangement:
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = rotation, (*place, self.area.height - low[2])
             thing = Thing(obj, q, T, coats)
-            if any(not apart(thing, other) for other in self.things):
+            if any(not are_apart(thing, other) for other in self.things):
                 continue
             found += 1
             off = (place - 0.5 * (np.add(self.area.low, self.area.high))) / np.subtract(self.area.high, self.area.low)
@@ -161,7 +161,7 @@ def resting_rotation(obj: ArticulatedObject) -> Array:
     for n in (0, *np.lexsort((height, leaning))):
         touching = corners[dot(corners, normals[n]) > reach[n] - max(level, _YIELD * height[n])]
         if _steadiness(touching, normals[n], middle, float(height[n])) > _STEADY:
-            return np.eye(3) if n == 0 else _turned_down(normals[n])
+            return np.eye(3) if n == 0 else _turn_down(normals[n])
     return np.eye(3)
 
 
@@ -169,7 +169,7 @@ def _steadiness(touching: Array, down: Array, middle: Array, height: float) -> f
     """Angle in radians by which a body that touches the ground at some points must be tipped until it falls over."""
     from scipy.spatial import ConvexHull, QhullError
 
-    plane = _turned_down(down)[:2]
+    plane = _turn_down(down)[:2]
     try:
         base = ConvexHull(matmul(touching - middle, plane.T))
     except (QhullError, ValueError):  # an edge or a corner
@@ -177,7 +177,7 @@ def _steadiness(touching: Array, down: Array, middle: Array, height: float) -> f
     return arctan2(float((-base.equations[:, 2]).min()), height)
 
 
-def _turned_down(normal: Array) -> Array:
+def _turn_down(normal: Array) -> Array:
     """(3, 3) rotation by the least angle that makes a unit vector point down."""
     down = np.array([0.0, 0.0, -1.0])
     axis, cosine = np.cross(normal, down), float(np.clip(dot(normal, down), -1.0, 1.0))
@@ -213,7 +213,7 @@ def _hull_volume(part: Part) -> tuple[float, Array]:
     return float(volumes.sum()), inside + (volumes[:, None] * tetrahedra.sum(axis=1) / 4.0).sum(axis=0) / volumes.sum()
 
 
-def apart(one: Thing, other: Thing, gap: float = GAP) -> bool:
+def are_apart(one: Thing, other: Thing, gap: float = GAP) -> bool:
     """Whether the surfaces of two things that stand on one plane keep a distance, metres.
 
     Neither is then inside the other: the lowest point of a thing inside a solid would lie on that solid's underside.

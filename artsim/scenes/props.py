@@ -13,7 +13,7 @@ from artsim.common.products import matmul
 from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.scene import Thing, rigid
+from artsim.renderers.scene import Thing, rigid_object
 
 _THICKNESS = 0.06  # of floors and walls
 _ROOM_HEIGHT = 2.6
@@ -24,7 +24,9 @@ TABLE_HEIGHT = 0.74
 """Metres from the floor to the top of a table."""
 
 
-def placed(name: str, solid: Solid, materials: Material | Sequence[Material], T_world: Array | None = None) -> Thing:
+def place_solid(
+    name: str, solid: Solid, materials: Material | Sequence[Material], T_world: Array | None = None
+) -> Thing:
     """A rigid thing that stands where its solid was built, or at a pose from there.
 
     Parameters
@@ -46,7 +48,7 @@ def _rigid(
     """Object in its rest frame, where its origin was before, and its coat."""
     vertices, faces = solid.union()
     center = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    obj = rigid(name, (vertices - center, faces))
+    obj = rigid_object(name, (vertices - center, faces))
     if isinstance(materials, Material):
         return obj, center, (plain_coat(obj.parts[0], materials),)
     number = piece_of_face(vertices, faces, solid.piece_meshes())
@@ -68,12 +70,12 @@ def table(size: Vector, rng: np.random.Generator) -> list[Thing]:
     material = draw_material(str(rng.choice(_TABLE_FINISHES)), rng)
     legs = material if rng.random() < 0.5 else draw_material("steel", rng)
     top = rounded_box((-x, -y, -thick), (x, y, 0.0), 0.02, axis=2)
-    things = [placed("table", top, material)]
+    things = [place_solid("table", top, material)]
     for sx in (-1, 1):
         for sy in (-1, 1):
             foot = np.array([sx * (x - inset - leg / 2), sy * (y - inset - leg / 2)])
             solid = box((*(foot - leg / 2), -TABLE_HEIGHT), (*(foot + leg / 2), -thick - 1e-4))
-            things.append(placed("table", solid, legs))
+            things.append(place_solid("table", solid, legs))
     return things
 
 
@@ -100,10 +102,10 @@ def room(low: Vector, high: Vector, floor: float, rng: np.random.Generator) -> l
         y1 += _FURTHER
         side = (y0 - _THICKNESS, y0)
     return [
-        placed("floor", box((x0, y0, floor - _THICKNESS), (x1, y1, floor)), ground),
-        placed("wall", box((x1, y0, floor), (x1 + _THICKNESS, y1, top)), wall),
-        placed("wall", box((x0, side[0], floor), (x1, side[1], top)), wall),
-        placed("skirting", box((x1 - 0.012, y0, floor), (x1, y1, floor + 0.07)), skirting),
+        place_solid("floor", box((x0, y0, floor - _THICKNESS), (x1, y1, floor)), ground),
+        place_solid("wall", box((x1, y0, floor), (x1 + _THICKNESS, y1, top)), wall),
+        place_solid("wall", box((x0, side[0], floor), (x1, side[1], top)), wall),
+        place_solid("skirting", box((x1 - 0.012, y0, floor), (x1, y1, floor + 0.07)), skirting),
     ]
 
 

@@ -8,12 +8,8 @@ from pathlib import Path
 import artsim
 from artperl.training.options import PRESETS
 from artperl.training.run import Training
-from artsim.datasets.plan import SampleOptions
-from artsim.datasets.verify import verify
-from artsim.drawing.gallery import gallery
-from artsim.drawing.view import view_path
-from artsim.families import FAMILIES
-from artsim.loading.sources import family_sources, find_sources
+from artsim import CATEGORIES, SampleOptions, family_sources, find_sources, verify
+from artsim.drawing import draw_gallery, write_contact_sheet
 
 ASSETS = Path(__file__).resolve().parents[2] / "urdf_assets"
 
@@ -21,7 +17,7 @@ ASSETS = Path(__file__).resolve().parents[2] / "urdf_assets"
 def main(out: Path) -> None:
     # 1. Objects: procedural ones, a few URDF folders, PyBullet's Franka Panda, and real ones where there are any.
     out.mkdir(parents=True, exist_ok=True)
-    (out / "gallery.png").write_bytes(gallery([artsim.make(category) for category in sorted(FAMILIES)]))
+    (out / "gallery.png").write_bytes(draw_gallery([artsim.make(category) for category in sorted(CATEGORIES)]))
     objects = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
     data = importlib.util.find_spec("pybullet_data")
     if data is not None and data.submodule_search_locations:
@@ -30,7 +26,7 @@ def main(out: Path) -> None:
         objects.append(Path(os.environ["ARTSIM_PARTNET_DIR"]))
 
     # 2. Samples: random joint states and views, 2,048 points each, with full ground truth.
-    sources = [*find_sources(objects), *family_sources(sorted(FAMILIES), 2)]
+    sources = [*find_sources(objects), *family_sources(sorted(CATEGORIES), 2)]
     made = artsim.generate(
         sources, out / "dataset", num_samples=500, sample=SampleOptions(num_points=2048), splits=(1, 0, 0)
     )
@@ -48,7 +44,7 @@ def main(out: Path) -> None:
         print(f"  {name}: {(sample.part == k).sum()} points, {100 * sample.visible_fraction[k]:.0f} % visible")
 
     # 5. Pictures.
-    sheet, recording = view_path(made.folder, rerun=made.folder / "recording.rrd")
+    sheet, recording = write_contact_sheet(made.folder, rerun=made.folder / "recording.rrd")
 
     # 6. ArtPERL: learn the poses of a laptop's parts from fresh objects, and test on unseen ones.
     training = Training(PRESETS["quick"], out / "training")

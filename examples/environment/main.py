@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 import artsim.envs  # noqa: F401  # registers artsim/Articulated-v0
-from artsim.model.draws import ViewOptions
+from artsim import ViewOptions
 
 
 def main(out: Path) -> None:

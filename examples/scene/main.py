@@ -5,9 +5,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from artsim.scenes.maker import SceneCameraOptions, SceneOptions, make_scene, scene_camera
-from artsim.scenes.sample import observe_scene
-from artsim.scenes.view import write_overview
+from artsim.drawing import write_overview
+from artsim.scenes import SceneCameraOptions, SceneOptions, make_scene, observe_scene, scene_camera
 
 SEED = 17
 

@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 
 import artsim
-from artsim.observing.sensor import SENSORS, Sensor
+from artsim import SENSORS, Sensor
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

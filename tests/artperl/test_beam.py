@@ -17,12 +17,13 @@ from artperl.core.pose import Theta, Trees, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.beam_search import _from_the_root_down, _grid, beam, half_turned
-from artperl.fitting.levenberg_marquardt import RefineOptions, refine
+from artperl.fitting.levenberg_marquardt import refine
+from artperl.fitting.refine_options import RefineOptions
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.model.kinematics import Joint, KinematicTree, Mimic
 from artsim.renderers import shared_renderer
 
-_RIGID = RefineOptions(sigma_scale=0.0, sigma_aspect=0.0, sigma_stretch=0.0, sigma_shift=0.0)
+_RIGID = RefineOptions(sigma_scale=1e-3, sigma_aspect=1e-3, sigma_stretch=1e-3, sigma_shift=1e-3)
 
 
 @cache

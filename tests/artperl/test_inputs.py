@@ -18,8 +18,8 @@ from artperl.perception.network import Perception
 from artperl.viewer import page
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError
+from artsim.model.frame import BACKGROUND
 from artsim.observing.sample import Sample
-from artsim.renderers import BACKGROUND
 from tests.artperl.worlds import small_base
 
 

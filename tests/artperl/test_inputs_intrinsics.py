@@ -14,8 +14,8 @@ from artperl.inputs import InputOptions, points_of_depth, read_cloud, read_intri
 from artperl.inputs.intrinsics import read_camera
 from artperl.inputs.intrinsics_formats import Hints
 from artsim.errors import ConfigError
-from artsim.scenes.maker import SceneCameraOptions, SceneOptions, make_scene, scene_camera
-from artsim.scenes.sample import observe_scene, write_view
+from artsim.scenes.ground_truth import observe_scene, write_view
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera
 
 CASES = Path(__file__).parents[1] / "cases"
 K = np.array([[376.617315730203, 0.0, 167.25], [0.0, 289.7056274847714, 116.5], [0.0, 0.0, 1.0]])

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from artsim.appearance import Coat
 from artsim.envs.maniskill.places import T_world_object
 from artsim.export.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
-from artsim.model.convex_bodies import embodied
+from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers.sapien_stage import render_body
@@ -75,7 +75,7 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], 
     AssetError
         When a part encloses no solid.
     """
-    robot = as_robot(embodied(obj))
+    robot = as_robot(add_bodies(obj))
     builder = scene.create_articulation_builder()
     T = T_world_object(obj)
     builder.initial_pose = sapien_pose(T[:3, 3], T[:3, :3])
@@ -103,7 +103,7 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], 
         made_joint.set_friction(joints[name].friction / weights[name])
     part_links = [link for link in robot.links if link.part >= 0]
     place = [0, *(names.index(joint.name) for joint in robot.obj.tree.joints[1:])]
-    follow, offset = _following(robot, names)
+    follow, offset = _mimic_gears(robot, names)
     return Built(
         articulation,
         [by_name[link.name] for link in part_links],
@@ -202,7 +202,7 @@ def _weights(robot: Robot) -> dict[str, float]:
     return {joint.name: mass[joint.child] * GRAVITY for joint in robot.joints}
 
 
-def _following(robot: Robot, names: list[str]) -> tuple[Array, Array]:
+def _mimic_gears(robot: Robot, names: list[str]) -> tuple[Array, Array]:
     """(D, F) and (D,): degrees of freedom as a linear function of the free joints."""
     unit = np.eye(len(robot.obj))
     states = [robot.states(q) for q in (np.zeros(len(robot.obj)), *unit[robot.obj.tree.free_joints])]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor
-
-if TYPE_CHECKING:
-    from artsim.envs.maniskill.truth import Truth
 
 Goal = Literal["open", "close", "random"]
 REACH = 5.0
@@ -19,18 +16,6 @@ LEAST_OPEN, MOST_OPEN = 0.5, 0.9
 """Of the way from rest, how far joints are to be opened, or closed from."""
 APART = 0.3
 """Least share of their range that random goals are from where joints begin."""
-
-
-def start_and_goal(goal: Goal, truth: Truth, draw: Tensor) -> tuple[Tensor, Tensor]:
-    """(B, P) joint states at which episodes begin, and which are to be reached, from (2, B, P) uniform draws."""
-    rest, span = truth.fixed["joint_rest"], truth.high - truth.low
-    if goal == "random":
-        share = torch.remainder(draw[0] + APART + (1.0 - 2.0 * APART) * draw[1], 1.0)
-        start, end = truth.low + draw[0] * span, truth.low + share * span
-    else:
-        opened = rest + (LEAST_OPEN + (MOST_OPEN - LEAST_OPEN) * draw[0]) * (truth.far - rest)
-        start, end = (rest, opened) if goal == "open" else (opened, rest)
-    return truth.complete_state(start), truth.complete_state(end)
 
 
 def dense_reward(error: Tensor, free: Tensor, tolerance: float, distance: Tensor) -> Tensor:

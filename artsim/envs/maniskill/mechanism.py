@@ -54,16 +54,16 @@ class Mechanism:
         def tensor(arrays: Sequence[Array], dtype: torch.dtype = torch.float32) -> Tensor:
             return torch.from_numpy(np.stack(arrays)).to(device, dtype)
 
-        self._place = tensor([_padded(each.place, (rows,)) for each in built], torch.int64)
-        self._offset = tensor([_padded(each.offset, (most,)) for each in built])
-        self._origins = tensor([_padded(each.origins, (rows, 3)) for each in built])
+        self._place = tensor([_pad(each.place, (rows,)) for each in built], torch.int64)
+        self._offset = tensor([_pad(each.offset, (most,)) for each in built])
+        self._origins = tensor([_pad(each.origins, (rows, 3)) for each in built])
         self._follow = torch.zeros(len(built), most, rows, device=device)
         for i, each in enumerate(built):
             free = truth.free[i].nonzero()[:, 0]
             self._follow[i, : len(each.follow), free] = torch.from_numpy(each.follow).float().to(device)
         self._project = None
         if any(len(each.follow) > each.follow.shape[1] for each in built):
-            self._project = tensor([_padded(_projection(each), (most, most)) for each in built])
+            self._project = tensor([_pad(_projection(each), (most, most)) for each in built])
 
     def T_world_part(self) -> Tensor:
         """(B, P, 4, 4): the rest frame, as carried by each part, to the sub-scene's world; padding repeats it."""
@@ -120,7 +120,7 @@ def _projection(built: Built) -> Array:
     return projection
 
 
-def _padded(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def _pad(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     padded: NDArray[Any] = np.zeros(shape, dtype=array.dtype)
     padded[tuple(slice(n) for n in array.shape)] = array
     return padded

@@ -9,7 +9,7 @@ from artsim.model.camera import look_at_transform
 from artsim.model.draws import bounding_sphere, joint_intervals
 from artsim.model.kinematics import ROTATING, Array
 from artsim.model.objects import ArticulatedObject
-from artsim.physics.episode import widest_state
+from artsim.physics.episode import most_open_state
 
 _READY = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4, 0.04, 0.04)
 ROBOTS = {
@@ -35,7 +35,7 @@ def T_world_object(obj: ArticulatedObject) -> Array:
     """(4, 4) pose of an object that stands on the ground, or, where a joint goes below its foot, just above it."""
     T = np.eye(4)
     bottoms = []
-    for q in (obj.tree.rest, widest_state(obj)):
+    for q in (obj.tree.rest, most_open_state(obj)):
         posed = obj.tree.forward_kinematics(q)
         reach = 0.5 * (np.abs(posed[:, 2, :3]) * obj.box_size).sum(axis=1)
         height = (posed[:, 2, :3] * obj.box_center).sum(axis=1) + posed[:, 2, 3]
@@ -87,7 +87,7 @@ def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, 
     free = [int(k) for k in obj.tree.free_joints]
     handles = np.mean([handle(obj, k) for k in free], axis=0) + up
     closed = float(obj.bounds[0, 0])
-    opened = min(closed, _front(obj, widest_state(obj)))
+    opened = min(closed, _front(obj, most_open_state(obj)))
     if robot != "floating_panda_gripper":
         x = np.clip(opened - _CLEARANCE - _READY_REACH, handles[0] - _FAR, handles[0] - _NEAR)
         return np.array([min(x, closed - _CLEARANCE - _READY_REACH), handles[1], 0.0]), np.array(ROBOTS[robot])
@@ -118,7 +118,7 @@ def _push(obj: ArticulatedObject, k: int) -> tuple[Array, Array]:
 
 def onlooker(obj: ArticulatedObject, stand: Array) -> Array:
     """(4, 4) ``T_world_camera`` from which object and robot are seen, from the front and the object's right side."""
-    center, radius = bounding_sphere(obj, widest_state(obj))
+    center, radius = bounding_sphere(obj, most_open_state(obj))
     center = center + T_world_object(obj)[:3, 3]
     low, high = (
         np.minimum(center - radius, stand - [*_ARM[:2], 0.0]),

@@ -20,12 +20,12 @@ from artsim.appearance.finishes import draw_coats
 from artsim.appearance.painted import painted_coats
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
 from artsim.envs.maniskill.build import OBJECT_BIT, build
-from artsim.envs.maniskill.eyes import camera_record, look, poses
-from artsim.envs.maniskill.goal import BEST, dense_reward, start_and_goal
+from artsim.envs.maniskill.cameras import camera_record, look, poses
+from artsim.envs.maniskill.goal import BEST, dense_reward
 from artsim.envs.maniskill.mechanism import Mechanism
 from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
 from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_start
-from artsim.envs.maniskill.truth import Record, Truth, truth_of
+from artsim.envs.maniskill.truth import Record, Truth, start_and_goal, truth_of
 from artsim.errors import ConfigError
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.episode import Episode, EpisodeOptions

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from artsim.envs.maniskill.goal import APART, LEAST_OPEN, MOST_OPEN, Goal
 from artsim.envs.maniskill.places import T_world_object, handle
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import JOINT_TYPES, ROTATING, Array
@@ -114,7 +115,7 @@ def truth_of(objects: Sequence[ArticulatedObject], max_joints: int, device: Any)
     rows = max_joints + 1
 
     def stack(of: Callable[[ArticulatedObject], Any], dtype: torch.dtype = torch.float32) -> Tensor:
-        return torch.from_numpy(np.stack([_padded(np.asarray(of(obj)), rows) for obj in objects])).to(device, dtype)
+        return torch.from_numpy(np.stack([_pad(np.asarray(of(obj)), rows) for obj in objects])).to(device, dtype)
 
     def each(of: Callable[[ArticulatedObject], Any]) -> Tensor:
         return torch.tensor(np.array([of(obj) for obj in objects]), dtype=torch.float32, device=device)
@@ -149,7 +150,19 @@ def truth_of(objects: Sequence[ArticulatedObject], max_joints: int, device: Any)
     )
 
 
-def _padded(array: Array, rows: int) -> Array:
+def start_and_goal(goal: Goal, truth: Truth, draw: Tensor) -> tuple[Tensor, Tensor]:
+    """(B, P) joint states at which episodes begin, and which are to be reached, from (2, B, P) uniform draws."""
+    rest, span = truth.fixed["joint_rest"], truth.high - truth.low
+    if goal == "random":
+        share = torch.remainder(draw[0] + APART + (1.0 - 2.0 * APART) * draw[1], 1.0)
+        start, end = truth.low + draw[0] * span, truth.low + share * span
+    else:
+        opened = rest + (LEAST_OPEN + (MOST_OPEN - LEAST_OPEN) * draw[0]) * (truth.far - rest)
+        start, end = (rest, opened) if goal == "open" else (opened, rest)
+    return truth.complete_state(start), truth.complete_state(end)
+
+
+def _pad(array: Array, rows: int) -> Array:
     padded = np.zeros((rows, *array.shape[1:]), dtype=array.dtype)
     padded[: len(array)] = array
     return padded
@@ -167,4 +180,4 @@ def _mimic(obj: ArticulatedObject, rows: int) -> tuple[Tensor, Tensor]:
     columns = obj.tree.complete_state(np.eye(len(obj))) - offset  # row j: what joint j moves
     matrix = np.zeros((rows, rows))
     matrix[: len(obj), : len(obj)] = columns.T
-    return torch.from_numpy(matrix).float(), torch.from_numpy(_padded(offset, rows)).float()
+    return torch.from_numpy(matrix).float(), torch.from_numpy(_pad(offset, rows)).float()

@@ -22,10 +22,10 @@ from artsim.loading.mesh_files.surface import (
     Draft,
     Surface,
     UnusableMeshError,
+    compose_affine,
     mirrors,
-    moved,
-    named,
-    product,
+    quote_name,
+    transform_affine,
 )
 
 _MAX_DEPTH = 150
@@ -70,7 +70,7 @@ def _unit(document: Document, draft: Draft) -> float:
     except ValueError:
         meter = math.nan
     if not 0.0 < meter < math.inf:
-        raise UnusableMeshError(f"its <unit meter={named(text)}> is no length")
+        raise UnusableMeshError(f"its <unit meter={quote_name(text)}> is no length")
     if any(u.get("meter") not in (None, text) for u in document.root.iter("unit") if u is not unit):
         draft.note(f"has parts in other units: all are taken as units of {meter:g} m")
     return meter
@@ -79,7 +79,7 @@ def _unit(document: Document, draft: Draft) -> float:
 def _tell_up_axis(document: Document, draft: Draft) -> None:
     axis = document.root.findtext("asset/up_axis")
     if axis is not None and axis.strip() != "Z_UP":
-        draft.note(f"up_axis {named(axis.strip())} is not applied, as in RViz, PyBullet and SAPIEN")
+        draft.note(f"up_axis {quote_name(axis.strip())} is not applied, as in RViz, PyBullet and SAPIEN")
 
 
 @dataclass
@@ -117,7 +117,7 @@ class _Scene:
             scene = self._document.target(shown)
             if scene is not None:
                 return [scene]
-            self._draft.note(f"scene {named(shown.get('url'))} is missing")
+            self._draft.note(f"scene {quote_name(shown.get('url'))} is missing")
         elif scenes:
             self._draft.note("does not say which scene it shows")
         if scenes:
@@ -136,7 +136,7 @@ class _Scene:
         if node in self._extents:
             known = self._extents[node]
             if known is None:
-                raise UnusableMeshError(f"node {named(node.get('id'))} contains itself")
+                raise UnusableMeshError(f"node {quote_name(node.get('id'))} contains itself")
             return known
         if depth == 0:
             raise UnusableMeshError(f"its nodes are nested over {_MAX_DEPTH} deep")
@@ -159,11 +159,11 @@ class _Scene:
             for element in node:
                 make = _TRANSFORMS.get(element.tag)
                 if make is not None:
-                    T = product(T, make(element, node))
+                    T = compose_affine(T, make(element, node))
         for geometry in self._shown_by(node):
             faces = geometry.faces[:, ::-1] if mirrors(T) else geometry.faces
             self._draft.accounted += len(faces)
-            self._draft.add(moved(T, geometry.vertices), faces)
+            self._draft.add(transform_affine(T, geometry.vertices), faces)
         for child in self._children(node):
             self.show(child, T)
 
@@ -176,7 +176,7 @@ class _Scene:
                 if target is not None:
                     yield target
                 else:
-                    self._once(element, f"node {named(element.get('url'))} is missing: left out")
+                    self._once(element, f"node {quote_name(element.get('url'))} is missing: left out")
 
     def _shown_by(self, node: etree._Element) -> Iterator[Geometry]:
         if node.tag == "geometry":
@@ -201,11 +201,12 @@ class _Scene:
                 kind = "skin" if change.tag == "skin" else "morph targets"
                 self._once(
                     instance,
-                    f"{kind} of {named(target.get('id'))} left out: its geometry is shown as it stands in its node",
+                    f"{kind} of {quote_name(target.get('id'))} left out: "
+                    "its geometry is shown as it stands in its node",
                 )
             target = None if change is None else self._document.find(change.get("source"))
         if target is None or target.tag != "geometry":
-            self._once(instance, f"{named(instance.get('url'))} is missing or no geometry: left out")
+            self._once(instance, f"{quote_name(instance.get('url'))} is missing or no geometry: left out")
             return None
         return self._geometry(target)
 
@@ -225,10 +226,10 @@ class _Scene:
         root = self._document.root
         for element in root.iter("instance_geometry", "instance_controller"):
             if element not in self._seen:
-                self._draft.note(f"{named(element.get('url'))} in a node outside the scene: left out")
+                self._draft.note(f"{quote_name(element.get('url'))} in a node outside the scene: left out")
         for geometry in root.iter("geometry"):
             if geometry not in self._geometries:
-                self._draft.note(f"geometry {named(attribute(geometry))} is not in the scene: left out")
+                self._draft.note(f"geometry {quote_name(attribute(geometry))} is not in the scene: left out")
 
 
 def _matrix(element: etree._Element, node: etree._Element) -> Array:
@@ -269,7 +270,7 @@ def _look_at(element: etree._Element, node: etree._Element) -> Array:
     right = np.cross(up, back)
     lengths = [math.sqrt(float((v * v).sum())) for v in (back, right)]
     if min(lengths) == 0.0:
-        raise UnusableMeshError(f"<lookat> of node {named(attribute(node))} has no direction")
+        raise UnusableMeshError(f"<lookat> of node {quote_name(attribute(node))} has no direction")
     T = np.eye(4)
     T[:3, 0], T[:3, 2], T[:3, 3] = right / lengths[1], back / lengths[0], eye
     T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
@@ -277,7 +278,7 @@ def _look_at(element: etree._Element, node: etree._Element) -> Array:
 
 
 def _skew(element: etree._Element, node: etree._Element) -> Array:
-    raise UnusableMeshError(f"node {named(attribute(node))} has a <skew>, which is not read")
+    raise UnusableMeshError(f"node {quote_name(attribute(node))} has a <skew>, which is not read")
 
 
 _TRANSFORMS: dict[str, Callable[[etree._Element, etree._Element], Array]] = {

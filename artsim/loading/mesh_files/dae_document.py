@@ -6,7 +6,7 @@ import numpy as np
 from lxml import etree
 
 from artsim.errors import AssetError
-from artsim.loading.mesh_files.surface import Array, Bounds, UnusableMeshError, named
+from artsim.loading.mesh_files.surface import Array, Bounds, UnusableMeshError, quote_name
 from artsim.loading.mesh_files.text import numbers
 
 _MAX_TAGS = 600_000
@@ -38,7 +38,7 @@ class Document:
     """
 
     def __init__(self, data: bytes, bounds: Bounds):
-        self.root = _parsed(data, bounds)
+        self.root = _parse(data, bounds)
         self.num_primitives = 0
         self.points: dict[etree._Element, Array] = {}
         self._ids: dict[str, etree._Element] = {}
@@ -48,7 +48,7 @@ class Document:
             if name is not None:
                 self._ids.setdefault(name, element)
         if self.root.tag != "COLLADA":
-            raise UnusableMeshError(f"its top element is {named(self.root.tag)}, not 'COLLADA'")
+            raise UnusableMeshError(f"its top element is {quote_name(self.root.tag)}, not 'COLLADA'")
 
     def find(self, url: str | None) -> etree._Element | None:
         """The element that ``#id`` names; None for one that is missing or in another file."""
@@ -59,7 +59,7 @@ class Document:
         return self.find(instance.get("url"))
 
 
-def _parsed(data: bytes, bounds: Bounds) -> etree._Element:
+def _parse(data: bytes, bounds: Bounds) -> etree._Element:
     if data.count(b"<") > _MAX_TAGS:
         raise AssetError(
             f"the mesh has over {_MAX_TAGS} XML tags", bounds.where, "export it again with one list of numbers a mesh"
@@ -115,5 +115,5 @@ def values(element: etree._Element, count: int, node: etree._Element) -> Array:
     """
     found = array(element)
     if len(found) != count or not np.isfinite(found).all():
-        raise UnusableMeshError(f"<{element.tag}> of node {named(attribute(node))} is not {count} finite numbers")
+        raise UnusableMeshError(f"<{element.tag}> of node {quote_name(attribute(node))} is not {count} finite numbers")
     return found

@@ -9,7 +9,7 @@ from lxml import etree
 
 from artsim.loading.mesh_files.dae_document import Document, array, attribute, integers
 from artsim.loading.mesh_files.polygons import divide_with_holes, fans, strips, triangulate
-from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, UnusableMeshError, joined, named
+from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, UnusableMeshError, join_pieces, quote_name
 
 _NOT_READ = ("lines", "linestrips", "points")
 _PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
@@ -45,11 +45,11 @@ class _Corners:
 
 def read_geometry(element: etree._Element, document: Document, bounds: Bounds, draft: Draft) -> Geometry | None:
     """All triangles of a geometry, or None where it has none; says what is left out."""
-    name = f"geometry {named(attribute(element))}"
+    name = f"geometry {quote_name(attribute(element))}"
     mesh = element.find("mesh")
     if mesh is None:
         kind = element[0].tag if len(element) else "nothing"
-        draft.note(f"{name} is of a kind that is not read ({named(kind)}): left out")
+        draft.note(f"{name} is of a kind that is not read ({quote_name(kind)}): left out")
         return None
     said = Draft()
     pieces: list[tuple[Array, Indices]] = []
@@ -72,7 +72,7 @@ def read_geometry(element: etree._Element, document: Document, bounds: Bounds, d
         draft.note(f"{name} has no faces")
         return None
     # Copies of a geometry must not multiply vertices that nothing shows.
-    return Geometry(*joined(pieces))
+    return Geometry(*join_pieces(pieces))
 
 
 def _corners(primitive: etree._Element, document: Document) -> _Corners:
@@ -97,7 +97,7 @@ def _natural(element: etree._Element, name: str, default: int) -> int:
     if text is None:
         return default
     if not text.strip().isdecimal() or len(text) > 12:
-        raise UnusableMeshError(f"{name} {named(text)} of its <{element.tag}> is no number")
+        raise UnusableMeshError(f"{name} {quote_name(text)} of its <{element.tag}> is no number")
     return int(text)
 
 

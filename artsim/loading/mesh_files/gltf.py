@@ -22,11 +22,11 @@ from artsim.loading.mesh_files.surface import (
     Indices,
     Surface,
     UnusableMeshError,
-    joined,
+    compose_affine,
+    join_pieces,
     mirrors,
-    moved,
-    named,
-    product,
+    quote_name,
+    transform_affine,
 )
 
 _READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
@@ -98,11 +98,13 @@ def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
 def _check_version(document: Items) -> None:
     version = str(document.object("asset").value.get("version"))
     if version.split(".")[0] != "2":
-        raise UnusableMeshError(f"is glTF {named(version)}, not 2")
+        raise UnusableMeshError(f"is glTF {quote_name(version)}, not 2")
     required = document.value.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else [required]:
         if name not in _READ and not str(name).startswith(_HARMLESS):
-            raise UnusableMeshError(f"needs the glTF extension {named(name)}, which is not read: export it without")
+            raise UnusableMeshError(
+                f"needs the glTF extension {quote_name(name)}, which is not read: export it without"
+            )
 
 
 class _Scene:
@@ -129,7 +131,7 @@ class _Scene:
         for (vertices, faces), places in zip(meshes, copies, strict=True):
             self._draft.accounted += len(faces) * len(places)
             for T in places:
-                self._draft.add(moved(T, vertices), faces[:, ::-1] if mirrors(T) else faces)
+                self._draft.add(transform_affine(T, vertices), faces[:, ::-1] if mirrors(T) else faces)
         self._tell_unseen([node for node, _ in shown])
 
     def _shown(self) -> list[tuple[Items, Array]]:
@@ -143,7 +145,7 @@ class _Scene:
                 raise UnusableMeshError(f"node {number} has two parents, or is nested too deeply")
             visited.add(number)
             node = self._nodes[number]
-            T = product(T, _transform(node))
+            T = compose_affine(T, _transform(node))
             if "mesh" in node.value:
                 shown.append((node, T))
                 self._bounds.check_pieces(len(shown))
@@ -180,7 +182,7 @@ class _Scene:
         moves = columns.get("TRANSLATION", np.zeros((count, 3)))
         turns = columns.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
         scales = columns.get("SCALE", np.ones((count, 3)))
-        return [product(T, _composed(*parts)) for parts in zip(moves, turns, scales, strict=True)]
+        return [compose_affine(T, _compose(*parts)) for parts in zip(moves, turns, scales, strict=True)]
 
     def _declared(self, node: Items) -> int:
         """Triangles that a node's mesh declares, by the sizes of its accessors alone."""
@@ -206,13 +208,13 @@ class _Scene:
         """Vertices and triangles of a node's mesh, with the node's weights of its morph targets."""
         number = integer(node.value["mesh"], len(self._document.list("meshes")))
         mesh = self._document.list("meshes")[number]
-        label = f"mesh {named(mesh.value.get('name', number))}"
+        label = f"mesh {quote_name(mesh.value.get('name', number))}"
         if "skin" in node.value:
             self._draft.note(f"{label}: skin left out: it is shown as it stands in its node")
         weights = tuple(_numbers(node.array("weights") or mesh.array("weights"), None, f"weights of {label}"))
         if (number, weights) not in self._meshes:
             pieces = [self._primitive(p, weights, label) for p in mesh.list("primitives")]
-            self._meshes[number, weights] = joined([piece for piece in pieces if piece is not None])
+            self._meshes[number, weights] = join_pieces([piece for piece in pieces if piece is not None])
         return self._meshes[number, weights]
 
     def _primitive(self, primitive: Items, weights: tuple[float, ...], label: str) -> tuple[Array, Indices] | None:
@@ -257,7 +259,7 @@ class _Scene:
         seen = {node.value["mesh"] for node in shown}
         for number, mesh in enumerate(self._document.list("meshes")):
             if number not in seen:
-                self._draft.note(f"mesh {named(mesh.value.get('name', number))} is not in the scene: left out")
+                self._draft.note(f"mesh {quote_name(mesh.value.get('name', number))} is not in the scene: left out")
 
 
 def _numbers(found: list[Any], count: int | None, what: str) -> list[float]:
@@ -270,16 +272,16 @@ def _numbers(found: list[Any], count: int | None, what: str) -> list[float]:
 
 def _transform(node: Items) -> Array:
     """(4, 4) transform of a node to its parent."""
-    what = f"numbers of node {named(node.value.get('name', 'without a name'))}"
+    what = f"numbers of node {quote_name(node.value.get('name', 'without a name'))}"
     if "matrix" in node.value:
         return np.array(_numbers(node.array("matrix"), 16, what)).reshape(4, 4).T
     move = _numbers(node.array("translation") or [0, 0, 0], 3, what)
     turn = _numbers(node.array("rotation") or [0, 0, 0, 1], 4, what)
     scale = _numbers(node.array("scale") or [1, 1, 1], 3, what)
-    return _composed(np.array(move), np.array(turn), np.array(scale))
+    return _compose(np.array(move), np.array(turn), np.array(scale))
 
 
-def _composed(move: Array, turn: Array, scale: Array) -> Array:
+def _compose(move: Array, turn: Array, scale: Array) -> Array:
     """(4, 4) transform that scales, turns by a quaternion (x, y, z, w), then moves."""
     x, y, z, w = turn.tolist()
     length = math.sqrt(x * x + y * y + z * z + w * w)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.loading.mesh_files.surface import Array, Bounds, Draft, UnusableMeshError, named
+from artsim.loading.mesh_files.surface import Array, Bounds, Draft, UnusableMeshError, quote_name
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -55,7 +55,7 @@ def integer(value: Any, below: int) -> int:
         When it is none, or too large.
     """
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < below:
-        raise UnusableMeshError(f"holds {named(value)} where a number from 0 to {below - 1} belongs")
+        raise UnusableMeshError(f"holds {quote_name(value)} where a number from 0 to {below - 1} belongs")
     return value
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
-from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, named
+from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, quote_name
 from artsim.loading.mesh_files.text import Rows, first_numbers, numbers, numbers_per_row, plain_text, substitute
 
 _HARMLESS = ("vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", "mg", "lod", "bevel", "c_interp",
@@ -77,12 +77,12 @@ def statements(data: bytes, bounds: Bounds) -> Statements:
     vertex_rows, face_rows = rows.which(b"v"), rows.which(b"f")
     bounds.check(int(vertex_rows.sum()), "vertices")
     bounds.check(int(face_rows.sum()), "triangles")
-    points = first_numbers(_uncommented(rows.rest(vertex_rows, b"v")), 3)  # a row may go on with a weight or a colour
-    references = _uncommented(rows.rest(face_rows, b"f"))
+    points = first_numbers(_strip_comment(rows.rest(vertex_rows, b"v")), 3)  # a row may go on with a weight or a colour
+    references = _strip_comment(rows.rest(face_rows, b"f"))
     return Statements(rows, points, vertex_rows, face_rows, numbers_per_row(references), references)
 
 
-def _uncommented(text: bytes) -> bytes:
+def _strip_comment(text: bytes) -> bytes:
     return substitute(rb"#[^\n]*", b"", text) if b"#" in text else text
 
 
@@ -94,7 +94,7 @@ def read_obj(data: bytes, bounds: Bounds) -> Surface:
     UnusableMeshError
     AssetError
     """
-    return _surface(statements(data, bounds), _declared(data), bounds)
+    return _surface(statements(data, bounds), _declaration(data), bounds)
 
 
 def _surface(found: Statements, declared: int, bounds: Bounds) -> Surface:
@@ -146,14 +146,14 @@ def read_painted(data: bytes, bounds: Bounds) -> Painted:
     AssetError
     """
     found = statements(data, bounds)
-    surface = _surface(found, _declared(data), bounds)
+    surface = _surface(found, _declaration(data), bounds)
     assert surface.corners is not None
     libraries, used = found.rows.which(b"mtllib"), found.rows.which(b"usemtl")
     names = ["", *_names(found.rows.rest(used, b"usemtl"))]
     number = {name: k for k, name in enumerate(dict.fromkeys(names))}
     of_statement = np.array([number[name] for name in names])
     of_corner = np.repeat(of_statement[np.cumsum(used)[found.face_rows]], found.counts)
-    places = first_numbers(_uncommented(found.rows.rest(found.rows.which(b"vt"), b"vt")), 2)
+    places = first_numbers(_strip_comment(found.rows.rest(found.rows.which(b"vt"), b"vt")), 2)
     uv = np.append(places, [[np.nan, np.nan]], axis=0)
     index = found.indices(_textures(found.references), found.rows.which(b"vt"))[surface.corners]
     index[(index < 0) | (index >= len(places))] = len(places)
@@ -182,10 +182,10 @@ def _tell_others(found: Statements, draft: Draft) -> None:
         if statement in ("l", "p"):
             draft.left_out(count, "lines" if statement == "l" else "points")
         elif statement not in _HARMLESS_WORDS:
-            draft.left_out(count, f"rows that begin with {named(statement)}")
+            draft.left_out(count, f"rows that begin with {quote_name(statement)}")
 
 
-def _declared(data: bytes) -> int:
+def _declaration(data: bytes) -> int:
     """How many faces a Wavefront file declares."""
     if b"\r" not in data and b"\t" not in data and b"\n " not in data and not data.startswith((b" ", b"\xef")):
         return data.count(b"\nf ") + data.startswith(b"f ") + data.count(b"\nf\n")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.loading.mesh_files.polygons import strips, triangulate
-from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, named
+from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, quote_name
 from artsim.loading.mesh_files.text import numbers
 
 _TYPES = {
@@ -77,7 +77,7 @@ def read_ply(data: bytes, bounds: Bounds) -> Surface:
     for element in elements:
         if element.count and (element.least == 0 or element.count > body.room(element)):
             raise UnusableMeshError(
-                f"declares {element.count} rows of {named(element.name)}, more than its bytes can hold"
+                f"declares {element.count} rows of {quote_name(element.name)}, more than its bytes can hold"
             )
         if element.name in ("vertex", "face", "tristrips"):
             bounds.check(element.count, "vertices" if element.name == "vertex" else "triangles")
@@ -118,7 +118,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int]:
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case _:
-                raise UnusableMeshError(f"its header says {named(' '.join(words))}, which is not understood")
+                raise UnusableMeshError(f"its header says {quote_name(' '.join(words))}, which is not understood")
     if order is None:
         raise UnusableMeshError("its header names no format that is read")
     names = [element.name for element in elements]
@@ -170,7 +170,7 @@ class _Text:
         for i, (p, is_list) in enumerate(zip(element.properties, lists, strict=True)):
             first, length = starts[:, i], counts[:, i]
             if is_list and (self._values[first - 1] != length).any():
-                raise UnusableMeshError(f"{named(element.name)} has lists whose lengths are no whole numbers")
+                raise UnusableMeshError(f"{quote_name(element.name)} has lists whose lengths are no whole numbers")
             columns[p.name] = (
                 _Lists(length, _whole(self._values[_places(first, length)])) if is_list else self._values[first]
             )
@@ -273,7 +273,7 @@ class _Bytes:
         ]
         kinds = {p.count_type for p in element.properties if p.count_type}
         if len(kinds) > 1:
-            raise UnusableMeshError(f"{named(element.name)} counts its lists in several types, which is not read")
+            raise UnusableMeshError(f"{quote_name(element.name)} counts its lists in several types, which is not read")
         kind = np.dtype(kinds.pop())
         end = len(self._data)
         starts, counts, self._at = _walk(self._reader(kind), self._at, widths, element.count, end)

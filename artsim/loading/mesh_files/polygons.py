@@ -120,7 +120,7 @@ def _fans(
     triangles = [(first[whole, None, None] + fan).reshape(-1, 3)]
     owners = [np.repeat(own[whole], n - 2)]
     for k, flat in zip(
-        folded, _flattened(points[corners[first[folded, None] + np.arange(n)]], normals[folded]), strict=True
+        folded, _flatten(points[corners[first[folded, None] + np.arange(n)]], normals[folded]), strict=True
     ):
         ears, crossing = clip_ears([flat])
         made.crossing += crossing
@@ -129,7 +129,7 @@ def _fans(
     return np.concatenate(triangles), np.concatenate(owners)
 
 
-def _flattened(polygons: Array, normals: Array) -> Array:
+def _flatten(polygons: Array, normals: Array) -> Array:
     """(P, N, 2) polygons of (P, N, 3), seen from where their normals point: they turn to the left.
 
     Leaving out the coordinate along which a polygon is thinnest keeps it whole and costs no precision.
@@ -156,7 +156,7 @@ def divide_with_holes(outlines: list[Array]) -> tuple[Indices, bool]:
     """
     spokes = outlines[0] - outlines[0][0]
     normal = _cross(spokes[:-1], spokes[1:]).sum(axis=0)
-    (flat,) = _flattened(np.concatenate(outlines)[None], normal[None])
+    (flat,) = _flatten(np.concatenate(outlines)[None], normal[None])
     ends = np.cumsum([len(outline) for outline in outlines])
     places = np.split(flat, ends[:-1])
     order = np.split(np.arange(len(flat)), ends[:-1])

@@ -57,7 +57,7 @@ def _read_bytes(data: bytes, count: int, bounds: Bounds) -> Surface:
 
 def _read_text(data: bytes, bounds: Bounds) -> Surface:
     text = plain_text(data).lower()
-    draft = Draft(declared=_declared(data))
+    draft = Draft(declared=_declaration(data))
     rows = Rows(text)
     if rows.which(b"vertex").sum() != text.count(b"vertex"):
         # Any word may be the name of a solid.
@@ -84,6 +84,6 @@ def _read_text(data: bytes, bounds: Bounds) -> Surface:
     return draft.surface()
 
 
-def _declared(data: bytes) -> int:
+def _declaration(data: bytes) -> int:
     """How many facets a text declares."""
     return len(re.findall(rb"(?i)\bfacet\s+normal\b", data)) or data.lower().count(b"endfacet")

@@ -146,7 +146,7 @@ class Draft:
             if self.accounted == 0:
                 raise UnusableMeshError(f"declares {_readable(self.declared)} faces, none of which could be read")
             self.note(f"declares {_readable(self.declared)} faces, but {self.accounted} were found")
-        vertices, faces = joined(self.pieces)
+        vertices, faces = join_pieces(self.pieces)
         near = np.all(np.abs(vertices) <= FAR, axis=1)  # false for what is not a number, too
         usable = (faces >= 0).all(axis=1)
         if not near.all():
@@ -154,12 +154,12 @@ class Draft:
         corners = self.corners
         if not usable.all():
             self.left_out(int((~usable).sum()), "triangles", NO_POINT)
-            vertices, faces = joined([(vertices, faces[usable])])
+            vertices, faces = join_pieces([(vertices, faces[usable])])
             corners = None if corners is None else corners[usable]
-        return Surface(vertices, faces.astype(np.int32), _shortened(self.notes), corners)
+        return Surface(vertices, faces.astype(np.int32), _shorten(self.notes), corners)
 
 
-def joined(pieces: list[tuple[Array, Indices]]) -> tuple[Array, Indices]:
+def join_pieces(pieces: list[tuple[Array, Indices]]) -> tuple[Array, Indices]:
     """One piece of several: without the vertices that no triangle names, and with those that pieces share once.
 
     Numbers that name no vertex become -1.
@@ -186,7 +186,7 @@ def joined(pieces: list[tuple[Array, Indices]]) -> tuple[Array, Indices]:
     return all_vertices[used[:-1]], number[all_faces]
 
 
-def _shortened(notes: list[str]) -> tuple[str, ...]:
+def _shorten(notes: list[str]) -> tuple[str, ...]:
     """Each note once, with how often it was made; the last ones in a word."""
     counted = [text if count == 1 else f"{text} ({count} times)" for text, count in Counter(notes).items()]
     if len(counted) <= _MAX_NOTES:
@@ -194,19 +194,19 @@ def _shortened(notes: list[str]) -> tuple[str, ...]:
     return (*counted[:_MAX_NOTES], f"and {len(counted) - _MAX_NOTES} other problems")
 
 
-def named(name: object) -> str:
+def quote_name(name: object) -> str:
     """A name out of a file, safe to print: quoted, without control characters, and short."""
     text = ascii(name) if isinstance(name, str) else ascii(str(name))
     return text if len(text) <= 60 else f"{text[:56]}...'"
 
 
-def moved(T: Array, points: Array) -> Array:
+def transform_affine(T: Array, points: Array) -> Array:
     """(N, 3) points carried by an affine (4, 4) transform, the same bits on every processor (no BLAS)."""
     x, y, z = points.T
     return np.stack([T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3] for i in range(3)], axis=1)
 
 
-def product(A: Array, B: Array) -> Array:
+def compose_affine(A: Array, B: Array) -> Array:
     """(4, 4) product of two transforms, without BLAS."""
     return np.add.reduce(A[:, :, None] * B[None, :, :], axis=1)
 

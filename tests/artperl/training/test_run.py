@@ -28,10 +28,10 @@ from artperl.training.run import Training
 from artperl.training.steps import one_cycle
 from artsim import generate
 from artsim.datasets.plan import SampleOptions
-from artsim.datasets.stream import STREAM_SEEDS
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import family_sources
 from artsim.loading.urdf import load
+from artsim.stream import STREAM_SEEDS
 
 TINY = TrainOptions(
     base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, stretched=0.5, batch_size=4,

@@ -1,0 +1,134 @@
+"""The plan of a new dataset: every source is loaded once, and what cannot be used is named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from artsim.common.files import write_error
+from artsim.common.progress import track
+from artsim.datasets.plan import Plan, PlannedObject
+from artsim.datasets.splits import assign_splits, showing_order, unique_keys
+from artsim.datasets.state import STAGED
+from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source
+from artsim.datasets.worker_pool import WorkerLost, WorkerPool
+from artsim.errors import AssetError
+from artsim.loading.sources import Source
+
+_VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
+_LISTED = 6
+"""Reasons that an error gives; the others are counted."""
+
+
+def new_plan(
+    folder: Path,
+    asked: Plan,
+    sources: Sequence[Source],
+    team: WorkerPool,
+    skip_broken: bool,
+    load_limit: float,
+    progress: bool,
+) -> dict[str, Any]:
+    """Load every source, keep it compiled in the folder, and describe the dataset that they make.
+
+    Parameters
+    ----------
+    folder : Path
+    asked : Plan
+        Without objects.
+    sources : sequence of Source
+    team : WorkerPool
+    skip_broken : bool
+        Leave out what is of no use, instead of stopping.
+    load_limit : float
+        Seconds that an object may take to load.
+    progress : bool
+
+    Returns
+    -------
+    dict
+        Content of ``plan.json``.
+
+    Raises
+    ------
+    AssetError
+        Naming the sources that cannot be used.
+    """
+    staging = folder / "objects"
+    try:
+        staging.mkdir(exist_ok=True)
+    except OSError as error:
+        raise write_error(error, staging) from error
+    answers: dict[int, CompiledSource | RefusedSource] = {}
+    tasks = (
+        (i, (source, f"{STAGED}{i}.npz", asked.seed, asked.sample, asked.strict)) for i, source in enumerate(sources)
+    )
+    with track("objects", total=len(sources), unit="object", shown=progress) as bar:
+        for i, answer in team.run(compile_source, tasks, load_limit):
+            answers[i] = RefusedSource(f"{sources[i].name}: {answer.why}") if isinstance(answer, WorkerLost) else answer
+            bar.update()
+    used, repeated, left_out = _sort_out(sources, [answers[i] for i in range(len(sources))])
+    if (left_out and not skip_broken) or not used:
+        raise _unusable(left_out, len(sources), asked.strict)
+    objects = list(planned_objects([source for source, _ in used], [compiled for _, compiled in used], asked))
+    for planned, (_, compiled) in zip(objects, used, strict=True):
+        (staging / compiled.staged).replace(folder / planned.file)
+    order = showing_order([(planned.category, planned.split) for planned in objects])
+    plan = replace(asked, objects=tuple(objects[n] for n in order)).to_dict()
+    return {
+        **plan,
+        "versions": {name: version(name) for name in _VERSIONS_OF},
+        "left_out": left_out,
+        "repeated": repeated,
+    }
+
+
+def _sort_out(
+    sources: Sequence[Source], answers: Sequence[CompiledSource | RefusedSource]
+) -> tuple[list[tuple[Source, CompiledSource]], list[dict[str, str]], list[dict[str, str]]]:
+    """Sources that are used, those that name an object again, and those that are of no use."""
+    used: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
+    repeated: list[dict[str, str]] = []
+    left_out: list[dict[str, str]] = []
+    for source, answer in zip(sources, answers, strict=True):
+        entry = {"source": source.name, "source_sha256": source.sha256}
+        if isinstance(answer, RefusedSource):
+            left_out.append({**entry, "why": answer.why})
+        elif used.setdefault((answer.category, answer.object_id, answer.identity), (source, answer))[0] is not source:
+            repeated.append(entry)  # the same object named twice counts once
+    return list(used.values()), repeated, left_out
+
+
+def planned_objects(
+    sources: Sequence[Source], compiled: Sequence[CompiledSource], asked: Plan
+) -> Iterator[PlannedObject]:
+    """The objects, each with its key and split."""
+    keys = unique_keys([(c.category, c.object_id, c.identity) for c in compiled])
+    splits = assign_splits([(c.category, c.identity) for c in compiled], asked.fractions, asked.seed)
+    for key, split, source, c in zip(keys, splits, sources, compiled, strict=True):
+        yield PlannedObject(
+            key=key,
+            category=c.category,
+            object_id=c.object_id,
+            sha256=c.sha256,
+            num_parts=c.num_parts,
+            source=source.name,
+            source_sha256=source.sha256,
+            split=split,
+            file_sha256=c.file_sha256,
+            rigid=c.rigid,
+            repairs=c.repairs,
+        )
+
+
+def _unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> AssetError:
+    """The error that names what cannot be used."""
+    reasons = [entry["why"] for entry in left_out[:_LISTED]]
+    if len(left_out) > _LISTED:
+        reasons.append(f"and {len(left_out) - _LISTED} more")
+    verb = "do not load, or were repaired (--strict)" if strict else "do not load"
+    what = f"{len(left_out)} of {total} objects {verb}: {'; '.join(reasons)}"
+    return AssetError(what, fix="mend them, or leave them out with --skip-broken")

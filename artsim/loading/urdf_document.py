@@ -1,0 +1,142 @@
+"""What a URDF document says, checked: links with their shapes, and joints between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from artsim.model.kinematics import Array
+
+
+@dataclass(frozen=True)
+class Box:
+    """Centred box of (3,) side lengths; one of them may be 0."""
+
+    size: Array
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Centred cylinder along z."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """Centred capsule along z: ``length`` is that of the cylinder between the two half spheres."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Centred sphere."""
+
+    radius: float
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh by the name that the document gives it, and its (3,) scale (negative: mirrored), if it has one."""
+
+    filename: str
+    scale: Array | None = None
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A shape of a link; one field is set."""
+
+    box: Box | None = None
+    cylinder: Cylinder | None = None
+    capsule: Capsule | None = None
+    sphere: Sphere | None = None
+    mesh: MeshFile | None = None
+
+    def __str__(self) -> str:
+        if self.mesh is not None:
+            return f"mesh {self.mesh.filename!r}"
+        return next(name for name, shape in vars(self).items() if shape is not None)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A geometry in its link.
+
+    Attributes
+    ----------
+    geometry : Geometry
+    origin : (4, 4) float
+        Maps the geometry's frame to the link's.
+    """
+
+    geometry: Geometry
+    origin: Array
+
+
+@dataclass(frozen=True)
+class UrdfLink:
+    """A link.
+
+    Attributes
+    ----------
+    name : str
+    shapes : tuple of Shape
+        What it shows.
+    unusable : tuple of str
+        Why other shapes of it cannot be shown.
+    empty : tuple of str
+        What shapes of it have no extent, so that there is nothing to show.
+    """
+
+    name: str
+    shapes: tuple[Shape, ...] = ()
+    unusable: tuple[str, ...] = ()
+    empty: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MimicRelation:
+    """The value of a joint is ``multiplier`` times that of ``joint``, plus ``offset``."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """A joint.
+
+    Attributes
+    ----------
+    name, type, parent, child : str
+        Type is revolute, continuous, prismatic, fixed or floating; parent and child are links.
+    origin : (4, 4) float
+        Maps the joint's frame at zero to the parent's.
+    axis : (3,) float
+        Unit vector in the joint's frame.
+    lower, upper : float
+        Radians or metres; infinite where it turns freely.
+    mimic : MimicRelation or None
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: Array
+    axis: Array
+    lower: float
+    upper: float
+    mimic: MimicRelation | None = None
+
+
+@dataclass(frozen=True)
+class UrdfRobot:
+    """Links and joints in the document's order."""
+
+    links: tuple[UrdfLink, ...]
+    joints: tuple[UrdfJoint, ...]

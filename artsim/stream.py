@@ -1,0 +1,97 @@
+"""On-line training data: fresh procedural objects for ever, nothing on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from artsim.datasets.plan import SampleOptions, draw_sample
+from artsim.errors import ConfigError
+from artsim.loading.sources import family_sources
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
+from artsim.renderers import Renderer, make_renderer
+
+__all__ = ["FamilyStream"]
+
+STREAM_SEEDS = (1 << 31, 1 << 32)
+"""Seeds of a stream's objects: none that a person would choose for a test set."""
+
+
+class FamilyStream:
+    """Endless source of samples of objects that have never been seen before.
+
+    Object ``n`` is drawn from (seed, n) and is of category ``n`` modulo the number of categories; sample ``i`` shows
+    object ``i // views_per_object`` and is always the same. Iterating yields all samples of the objects ``start``,
+    ``start + step``, ...: give each training process its own ``start`` and a common ``step``.
+
+    Parameters
+    ----------
+    categories : sequence of str
+        One that is named twice comes twice as often.
+    options : SampleOptions, optional
+    seed : int
+    views_per_object : int
+    start, step : int
+
+    Raises
+    ------
+    ConfigError
+        When a category is unknown, or a number makes no sense.
+    """
+
+    def __init__(
+        self,
+        categories: Sequence[str],
+        options: SampleOptions | None = None,
+        seed: int = 0,
+        views_per_object: int = 4,
+        start: int = 0,
+        step: int = 1,
+    ):
+        if not categories:
+            raise ConfigError("a stream needs categories", fix="name at least one")
+        if min(seed, start) < 0 or min(views_per_object, step) < 1:
+            raise ConfigError(
+                f"a stream has no seed {seed}, {views_per_object} views per object, start {start}, step {step}",
+                fix="count from 0 upwards; views and step from 1",
+            )
+        family_sources(categories, 1)  # raises where there is none
+        self.categories = list(categories)
+        self.options, self.seed = options or SampleOptions(), seed
+        self.views_per_object, self.start, self.step = views_per_object, start, step
+        self._renderer: Renderer | None = None
+        self._object = lru_cache(maxsize=8)(self._make)
+
+    def __getitem__(self, i: int) -> Sample:
+        if i < 0:
+            raise IndexError(f"sample {i} of an endless stream")
+        if self._renderer is None:
+            self._renderer = make_renderer(self.options.renderer)
+        return draw_sample(self.object(i // self.views_per_object), self.options, self.seed, i, self._renderer)
+
+    def object(self, n: int) -> ArticulatedObject:
+        """Object number ``n``, which samples ``n * views_per_object`` and on show."""
+        return self._object(n)
+
+    def __iter__(self) -> Iterator[Sample]:
+        n = self.start
+        while True:
+            for view in range(self.views_per_object):
+                yield self[n * self.views_per_object + view]
+            n += self.step
+
+    def _make(self, n: int) -> ArticulatedObject:
+        seed = int(np.random.default_rng([self.seed, n]).integers(*STREAM_SEEDS))
+        (source,) = family_sources([self.categories[n % len(self.categories)]], 1, seed)
+        return source.load()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**{k: v for k, v in self.__dict__.items() if k != "_object"}, "_renderer": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._object = lru_cache(maxsize=8)(self._make)

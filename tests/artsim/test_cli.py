@@ -1,0 +1,105 @@
+"""The programs as a user runs them."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.conftest import ROOT
+
+LAPTOP = "urdf_assets/laptop"
+ARTSIM = str(Path(sys.executable).with_name("artsim"))
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(arguments, capture_output=True, text=True, cwd=ROOT, timeout=120)
+
+
+def generate(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return run(sys.executable, "generate.py", *arguments)
+
+
+def test_help_teaches() -> None:
+    result = generate("--help")
+    assert result.returncode == 0
+    for word in (
+        "--objects",
+        "--out",
+        "--states.fraction-open",
+        "--views.preset",
+        "--renderer",
+        "To make objects:",
+        "To load objects:",
+    ):
+        assert word in result.stdout
+    result = run(ARTSIM, "--help")
+    for verb in ("generate", "view", "inspect", "verify"):
+        assert verb in result.stdout
+
+
+def test_a_mistyped_option_is_pointed_out() -> None:
+    result = generate("--objects", LAPTOP, "--out", "x", "--num-sample", "3")
+    assert result.returncode == 2
+    assert "num-samples" in result.stdout + result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_errors_are_one_line_and_exit_with_2(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot>")
+    for arguments in (
+        (ARTSIM, "inspect", str(broken)),
+        (ARTSIM, "inspect", str(tmp_path / "nowhere")),
+        (ARTSIM, "verify", str(tmp_path)),
+        (ARTSIM, "view", str(tmp_path)),
+        (sys.executable, "generate.py", "--objects", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")),
+        (sys.executable, "generate.py", "--objects", "urdf_assets/laptop", "--out", str(tmp_path), "--num-points", "0"),
+    ):
+        result = run(*arguments)
+        assert result.returncode == 2, arguments
+        assert "Traceback" not in result.stderr
+        assert "error" in result.stderr.lower() or "error" in result.stdout.lower()
+
+
+def test_inspect_prints_tree_limits_boxes_and_repairs() -> None:
+    result = run(ARTSIM, "inspect", "urdf_assets/quirks/chain")
+    assert result.returncode == 0
+    for text in (
+        "7 parts, 6 free joints",
+        "revolute 'j1'",
+        "-114.6 to 114.6 deg",
+        "turns freely",
+        "repairs: 3",
+        "axis of length 2",
+    ):
+        assert text in result.stdout
+    assert "m/rad" in run(ARTSIM, "inspect", "urdf_assets/quirks/screw_helper").stdout
+    assert "follows 1 x -1 + 0.1" in run(ARTSIM, "inspect", "urdf_assets/quirks/mimic_pair").stdout
+
+
+def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
+    out = tmp_path / "first"
+    options = "--num-samples 20 --scale 0.5 1.0 --states.joint-range screen -1.5 0 --images depth part_mask"
+    made = generate("--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), *options.split())
+    assert made.returncode == 0, made.stderr
+    assert "20 samples" in made.stdout
+    assert "sound" in run(ARTSIM, "verify", str(out)).stdout
+    (out / "plan.json").write_text("{")
+    shutil.copy(out / "train-000000.tar", out / "mine.tar")
+    found = run(ARTSIM, "verify", str(out))
+    assert found.returncode == 2
+    assert "plan.json: is damaged (" in found.stdout
+    assert f"Fix: artsim repair {out}" in found.stderr
+    refused = run(ARTSIM, "repair", str(out))
+    assert refused.returncode == 2
+    assert "restored: plan.json" in refused.stdout
+    assert "mine.tar: is no part of this dataset. Fix: move it out of the folder, or delete it" in refused.stdout
+    (out / "mine.tar").unlink()
+    assert f"{out}: nothing to repair" in run(ARTSIM, "repair", str(out)).stdout
+    assert "already complete, 20 samples" in generate(*made.args[2:]).stdout
+    view = run(ARTSIM, "view", str(out), "--samples", "2", "--rerun", str(tmp_path / "r.rrd"))
+    assert view.returncode == 0, view.stderr
+    assert (out / "contact_sheet.png").stat().st_size > 10_000
+    assert (tmp_path / "r.rrd").stat().st_size > 10_000
