@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
 
-.PHONY: demo test lint bench audit clean system assets
+.PHONY: demo test lint bench audit clean system assets weights
 
 demo: $(VENV)/.ready
 	$(PY) examples/demo/main.py out/demo
@@ -38,6 +38,14 @@ bench: $(VENV)/.ready-dev
 # Sim-readiness of 10,000 procedural objects, and of the real ones in ARTSIM_PARTNET_DIR.
 audit: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.audit
+
+# The estimators that come with the package, each from its recipe; stop it at any moment: the same command goes on.
+# To try one: make weights RECIPES=laptop PRESET=quick
+RECIPES ?= $(basename $(notdir $(wildcard artperl/recipes/*.json)))
+weights: $(VENV)/.ready-dev
+	for recipe in $(RECIPES); do \
+		$(VENV)/bin/artperl train --recipe $$recipe $(if $(PRESET),--preset $(PRESET)) --workers 2 --threads 1 || exit; \
+	done
 
 assets: $(VENV)/.ready-dev
 	$(PY) urdf_assets/build.py

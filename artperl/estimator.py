@@ -5,11 +5,12 @@ Weights are kept in half precision. Nothing in the folder is executed when it is
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, overload
 
 import torch
 from safetensors.torch import load as load_tensors
@@ -20,6 +21,8 @@ from artperl.boxes.network import Boxes
 from artperl.core.estimate import Calibration
 from artperl.core.tensor_files import write_tensors
 from artperl.fitting.options import EstimatorOptions
+from artperl.methods import method_of
+from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
@@ -33,12 +36,12 @@ from artsim.model.objects import MAX_PARTS
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 1
+_FORMAT = 2
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
 
-def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any]) -> None:
+def save_estimator(estimator: Estimator | ArtPERL, folder: Path, about: Mapping[str, Any]) -> None:
     """Write an estimator.
 
     Parameters
@@ -50,29 +53,67 @@ def save_estimator(estimator: Estimator, folder: Path, about: Mapping[str, Any])
         Anything else worth knowing, in JSON's terms: what it was trained on, and how well it does.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    if isinstance(estimator, ArtPERL):
+        _write(folder, estimator.networks(), estimator.base, {"method": estimator.name, **estimator.settings()}, about)
+        return
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
     if estimator.agent is not None:
         networks["agent"] = estimator.agent
     if estimator.boxes is not None:
         networks["boxes"] = estimator.boxes
-    tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
-    save_tensors(tensors, folder / _TENSORS)
-    estimator.base.save(folder / _BASE)
     settings = {
-        "format": _FORMAT,
         "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
         "agent": None if estimator.agent is None else {"width": estimator.agent.width},
         "boxes": None
         if estimator.boxes is None
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
-        "options": asdict(estimator.options),
+        "options": _changes(asdict(estimator.options), asdict(EstimatorOptions())),
         "calibration": asdict(estimator.calibration),
-        "about": dict(about),
     }
-    write_atomic(folder / _SETTINGS, (json.dumps(settings) + "\n").encode())
+    _write(folder, networks, estimator.base, settings, about)
 
 
-def load_estimator(name: str | Path, device: torch.device | str = "cpu", **changes: Any) -> Estimator:
+def _changes(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that differ from their defaults, at every depth: an option that goes leaves no trace in files."""
+    return {
+        name: _changes(value, defaults[name]) if isinstance(value, dict) else value
+        for name, value in values.items()
+        if value != defaults[name]
+    }
+
+
+def _write(
+    folder: Path, networks: Mapping[str, nn.Module], base: ShapeBase, settings: Mapping[str, Any],
+    about: Mapping[str, Any],
+) -> None:  # fmt: skip
+    tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
+    write_tensors(tensors, folder / _TENSORS)
+    base.save(folder / _BASE)
+    told = {"format": _FORMAT, **settings, "about": dict(about)}
+    write_atomic(folder / _SETTINGS, (json.dumps(told) + "\n").encode())
+
+
+@overload
+def load_estimator(
+    name: str | Path, device: torch.device | str = "cpu", method: Literal["full"] = "full", **changes: Any
+) -> Estimator: ...
+
+
+@overload
+def load_estimator(
+    name: str | Path, device: torch.device | str = "cpu", *, method: Literal["artperl"], **changes: Any
+) -> ArtPERL: ...
+
+
+@overload
+def load_estimator(
+    name: str | Path, device: torch.device | str = "cpu", *, method: str, **changes: Any
+) -> Estimator | ArtPERL: ...
+
+
+def load_estimator(
+    name: str | Path, device: torch.device | str = "cpu", method: str = "full", **changes: Any
+) -> Estimator | ArtPERL:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
 
     Parameters
@@ -80,6 +121,8 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
     name : str or Path
     device : torch.device or str
         Where it works, such as "cuda".
+    method : str
+        Name of the method, of :data:`artperl.methods.METHODS`.
     **changes
         Of its :class:`~artperl.fitting.options.EstimatorOptions`, such as ``seen_from=(-75.0, 75.0)``.
 
@@ -90,11 +133,14 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
     DatasetError
         When there is no such estimator, or its files are damaged.
     """
+    if method_of(method) is ArtPERL:
+        return _load_artperl(name, device, changes)
     unknown = ", ".join(changes.keys() - {field.name for field in fields(EstimatorOptions)})
     if unknown:
         raise ConfigError("an estimator has no such option", unknown, "see artperl.fitting.options.EstimatorOptions")
     folder = folder_of(name)
     settings = read_settings(folder)
+    _check_method(settings, method, folder)
     try:
         sizes = _Sizes(
             from_json_values(_PerceptionSize, settings.get("perception")),
@@ -122,6 +168,49 @@ def load_estimator(name: str | Path, device: torch.device | str = "cpu", **chang
     assert isinstance(agent, Agent | None)
     assert isinstance(boxes, Boxes | None)
     return Estimator(perception, base, agent, options, calibration, boxes)
+
+
+def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping[str, Any]) -> ArtPERL:
+    """The method of the paper, from a folder; none comes with the package."""
+    folder = folder_of(name)
+    if changes:
+        raise ConfigError("the method artperl has no such option", ", ".join(changes), "leave it out")
+    if folder.parent == WEIGHTS or not (folder / _SETTINGS).exists():
+        category = folder.name if folder.parent == WEIGHTS else "laptop"
+        raise DatasetError(
+            "there is no estimator of the method artperl", name,
+            f"train it: python train.py --category {category} --method artperl --preset full",
+        )  # fmt: skip
+    settings = read_settings(folder)
+    _check_method(settings, "artperl", folder)
+    base, tensors = ShapeBase.load(folder / _BASE), read_tensors(folder / _TENSORS)
+    try:
+        with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
+            networks = ArtPERL.of_settings(settings, base).networks()
+        _check_fit(networks, tensors, folder)
+        method = ArtPERL.of_settings(settings, base)
+    except ValueError as error:
+        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
+    for key, network in method.networks().items():
+        network.load_state_dict(_under(tensors, f"{key}."))
+        network.to(device)
+    if base.embeddings is None or base.embeddings.shape[1] != method.siamese.num_rows * method.siamese.width:
+        raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
+    return ArtPERL(method.segmentation, method.siamese, method.policy, base, method.options)
+
+
+def _check_method(settings: Mapping[str, Any], method: str, folder: Path) -> None:
+    """Refuse the estimator of another method.
+
+    Raises
+    ------
+    DatasetError
+    """
+    found = settings.get("method", "full")
+    if found != method:
+        raise DatasetError(
+            f"this is an estimator of the method {found!r:.20}, not {method}", folder, f"ask for --method {found!s:.20}"
+        )
 
 
 _MAX_ROWS, _MAX_WIDTH = MAX_PARTS, 2048
@@ -262,9 +351,15 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
         raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
-def save_tensors(tensors: Mapping[str, Tensor], path: Path) -> None:
-    """Write tensors so that a stop halfway leaves the old file."""
-    write_tensors(tensors, path)
+def weights_sha256(folder: Path) -> str:
+    """Digest of the weights of the estimator in a folder, by which its children name it.
+
+    Raises
+    ------
+    DatasetError
+        When there are none.
+    """
+    return hashlib.sha256(read_bounded(folder / _TENSORS, _MAX_TENSOR_BYTES, "weights", DatasetError)).hexdigest()
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

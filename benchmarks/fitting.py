@@ -21,15 +21,16 @@ from torch import nn
 from artperl.agent.actions import NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Agent
-from artperl.agent.ppo import PPOOptions, collect, update
+from artperl.agent.ppo import JOINT, PPOOptions, rollout, update
 from artperl.data.batches import batches
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
+from artperl.data.sources import DataOptions
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.objects import BASE_SEEDS
 from artperl.training.perception_losses import perception_losses
-from artperl.training.run import BASE_SEEDS
 from artperl.training.steps import autocast
 
 
@@ -71,7 +72,7 @@ def main(options: Options) -> None:
     """Measure and print."""
     torch.set_num_threads(options.threads)
     base = by_boxes(ShapeBase.of(objects_of([options.category], 16, BASE_SEEDS), options.points))
-    problems = Problems([options.category], base, options.environments, options.points)
+    problems = Problems(DataOptions([options.category]), base, options.environments, options.points)
     steps = env_steps(problems[0], options)
     print(f"environment: {steps:.0f} steps/s, {options.points} observed x {options.points} reference points")
     perception, perception_shares = learning_to_perceive(base.shapes.trees.num_rows, options)
@@ -112,7 +113,7 @@ def learning_to_perceive(rows: int, options: Options, batch_size: int = 32) -> t
     torch.manual_seed(0)
     network, shares = Perception(rows), Shares()
     optimizer = torch.optim.AdamW(network.parameters())
-    data = batches([options.category], rows, batch_size=batch_size)
+    data = batches(DataOptions([options.category]), rows, batch_size=batch_size)
     next(data)
     done, begun = 0, time.perf_counter()
     while time.perf_counter() - begun < options.seconds:
@@ -155,8 +156,8 @@ def learning_to_fit(problems: Problems, options: Options) -> tuple[float, Shares
         fitting.shares = shares
         reward = shares.seconds["reward"]
         with shares("network"):
-            rollout = collect(agent, fitting, problem.goal, ppo, generator)
-            update(agent, optimizer, rollout, ppo, generator)
+            buffer = rollout(agent, fitting, problem.goal, JOINT, ppo, generator)
+            update(agent, optimizer, buffer, JOINT, ppo, generator)
         shares.seconds["network"] -= shares.seconds["reward"] - reward
         done += 1
     states = done * options.environments * fitting.steps_taken

@@ -26,7 +26,7 @@ from artperl.evaluation.benchmark_rows import find_estimator
 from artperl.evaluation.scoring import TEST_SEEDS
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import box_embedding
-from artperl.retrieval.siamese import Siamese, contrastive_loss
+from artperl.retrieval.siamese import Siamese, canonical_clouds, contrastive_loss
 from artperl.training.steps import one_cycle, set_rate
 from artsim.common.progress import track
 from artsim.datasets.plan import SampleOptions
@@ -83,22 +83,13 @@ def learn(category: str, estimator: Estimator, steps: int) -> Siamese:
     for step in track(category, range(steps), leave=False):
         chosen = torch.randperm(OBJECTS, generator=generator)[:BATCH]
         view = chosen * VIEWS + torch.randint(VIEWS, (BATCH,), generator=generator)
-        vectors = network(*canonical(own[chosen], generator))
+        vectors = network(*canonical_clouds(own[chosen], generator, POINTS))
         set_rate(optimizer, RATE * one_cycle(step, steps))
         loss = contrastive_loss(network(observed[view], part[view]), vectors)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
     return network.eval()
-
-
-def canonical(shapes: Shapes, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-    """Clouds (B, POINTS, 3) of whole objects at rest, normalised, in random order, and the parts of their points."""
-    B, P, M, _ = shapes.points.shape
-    known = shapes.has_surface[..., None].expand(B, P, M).flatten(1).float()
-    index = torch.multinomial(known, POINTS, replacement=True, generator=generator)
-    points = shapes.points.flatten(1, 2).gather(1, index[..., None].expand(-1, -1, 3))
-    return Clouds.of(points).points, index // M
 
 
 @torch.inference_mode()
@@ -110,7 +101,7 @@ def quality(category: str, estimator: Estimator, network: Siamese, objects: int)
     samples = row_samples("procedural", category, objects=objects, views=2 * objects)
     true = Shapes.from_objects([obj.with_diagonal(1.0) for obj in tested], base.shapes.points.shape[2], P)
     generator = torch.Generator().manual_seed(1)
-    vectors = network(*canonical(base.shapes, generator))
+    vectors = network(*canonical_clouds(base.shapes, generator, POINTS))
     chamfer, boxes = differences(true, base.shapes)
     chosen: dict[str, list[int]] = {"boxes": [], "contrastive": []}
     for sample in samples:

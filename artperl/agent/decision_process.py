@@ -12,10 +12,10 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from artperl.agent.actions import apply, expert
+from artperl.agent.actions import NOTHING, action_mask, apply, expert
 from artperl.core.batch import Batch
 from artperl.core.pose import Posed, Theta, joint_axes, pose_parts
-from artperl.core.shapes import Observed, Shapes
+from artperl.core.shapes import Observed, Shapes, faces_camera
 
 FAR = 1e6
 """Coordinate of reference points that stand for nothing: parts without a surface."""
@@ -29,7 +29,7 @@ class FittingOptions:
     """The decision process."""
 
     steps: int = 20
-    """Steps of an episode."""
+    """Steps of an episode: how often each part acts."""
     eta: float = 0.5
     """Reward of a step that brings the clouds closer (equation 3)."""
     tolerance: float = 1e-4
@@ -41,6 +41,11 @@ class FittingOptions:
     distance: Literal["observed", "both"] = "observed"
     """Chamfer distance from the observed points to the reference only, or both ways: a partial cloud cannot be near to
     the parts of the reference that its camera did not see."""
+    facing: bool = False
+    """Only reference points whose surface faces the camera count, so that like is compared with like."""
+    order: Literal["at once", "root first"] = "at once"
+    """Each step moves all parts; or those of one level of the tree, from the root to the leaves and again, so that no
+    child makes up for its parent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,8 @@ class View(Batch):
     reference : (B, P, M, 3) float
     back : (B, P, M, 3) float
         From each reference point to the nearest observed point of its own part; 0 where none is seen.
+    shown : (B, P, M) bool
+        Reference points that count; the others are 0.
     joint : (B, P, 6) float
         Axis, and anchor of each part's joint.
     kind : (B, P) int64
@@ -72,6 +79,7 @@ class View(Batch):
     offset: Tensor
     reference: Tensor
     back: Tensor
+    shown: Tensor
     joint: Tensor
     kind: Tensor
     parent: Tensor
@@ -115,14 +123,28 @@ class Fitting:
         pairs = observed.points.shape[1] * rows * self.shapes.points.shape[2]
         self._scratch = self._local.new_empty(max(_CACHED, pairs))
         self.steps_taken = 0
+        self._mask = action_mask(shapes.trees)
+        self._levels = 1 if self.options.order == "at once" else int(shapes.trees.depth.max()) + 1
         self._look()
+
+    @property
+    def mask(self) -> Tensor:
+        """(B, P, 9) bool: the axes that the next step moves."""
+        if self.options.order == "at once":
+            return self._mask
+        depth = self.shapes.trees.depth
+        level = self.steps_taken % (depth.amax(1, keepdim=True) + 1)
+        return self._mask & (depth == level)[..., None]
 
     def _look(self) -> None:
         """Pose the reference, and find the nearest points both ways."""
         self.posed = pose_parts(self.shapes.trees, self.theta, self.shapes.box_center)
         points = self.posed.points(self.shapes.points, self.shapes.box_center)
         local = (points - self.center[:, None, None]) / self.radius[:, None, None, None]
-        self.reference = torch.where(self.shapes.has_surface[..., None, None], local, FAR)
+        self.shown = self.shapes.has_surface[..., None].expand(points.shape[:-1])
+        if self.options.facing:
+            self.shown = self.shown & faces_camera(points, self.posed.normals(self.shapes.normals))
+        self.reference = torch.where(self.shown[..., None], local, FAR)
         B, P, M, _ = local.shape
         squared = (self.reference**2).sum(-1, keepdim=True)
         placed = torch.cat([self.reference, squared], dim=-1).reshape(B, P * M, 4)
@@ -140,8 +162,7 @@ class Fitting:
         every = torch.cat([-2.0 * self._local, self._square[..., None]], dim=-1)
         least = nearest(asked, every, 1, self._scratch)[1].reshape(B, P, M) + squared[..., 0]
         apart = least.clamp(0.0, 4.0).sqrt()
-        seen = self.shapes.has_surface[..., None].to(apart.dtype)
-        return (apart * seen).sum((1, 2)) / (seen.sum((1, 2)) * M)
+        return (apart * self.shown).sum((1, 2)) / self.shown.sum((1, 2)).clamp(min=1)
 
     def view(self) -> View:
         """What the agent sees now."""
@@ -149,12 +170,13 @@ class Fitting:
         index = (self.observed.part * M + self._nearest)[..., None].expand(-1, -1, 3)
         offset = self.reference.reshape(B, P * M, 3).gather(1, index) - self._local
         seen = self._local.gather(1, self._back.reshape(B, P * M, 1).expand(-1, -1, 3)).reshape(B, P, M, 3)
-        known = ~self._unseen & self.shapes.has_surface
-        back = torch.where(known[..., None, None], seen - self.reference, 0.0)
-        reference = torch.where(self.shapes.has_surface[..., None, None], self.reference, 0.0)
+        known = ~self._unseen[..., None] & self.shown
+        back = torch.where(known[..., None], seen - self.reference, 0.0)
+        reference = torch.where(self.shown[..., None], self.reference, 0.0)
         return View(
-            self._local, self.observed.part, offset.clamp(-2.0, 2.0), reference, back, self._joints(self.posed),
-            self.shapes.trees.kind, self.shapes.trees.parent, self.shapes.trees.valid, self._ranges(),
+            self._local, self.observed.part, offset.clamp(-2.0, 2.0), reference, back, self.shown,
+            self._joints(self.posed), self.shapes.trees.kind, self.shapes.trees.parent, self.shapes.trees.valid,
+            self._ranges(),
         )  # fmt: skip
 
     def _joints(self, posed: Posed) -> Tensor:
@@ -176,8 +198,9 @@ class Fitting:
         return expert(self.shapes, self.theta, goal, self.radius)
 
     def step(self, action: Tensor) -> Tensor:
-        """Take an action (B, P, 9); returns the reward (B,) of equation 3."""
+        """Take an action (B, P, 9), of which :attr:`mask` counts; returns the reward (B,) of equation 3."""
         before = self.distance
+        action = torch.where(self.mask, action, NOTHING)
         self.theta = apply(self.shapes, self.theta, action, self.radius)
         self._look()
         self.steps_taken += 1
@@ -188,7 +211,7 @@ class Fitting:
     @property
     def done(self) -> bool:
         """Whether the episodes have come to their last step."""
-        return self.steps_taken >= self.options.steps
+        return self.steps_taken >= self.options.steps * self._levels
 
 
 def nearest(asked: Tensor, offered: Tensor, groups: int, scratch: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,9 +1,8 @@
 """The fitting agent: one policy for every tree (ArtPERL, section 4.3).
 
-A shared encoder describes each part by its observed points and by the reference's, with the offsets between them and
-their moments. The policy of a part reads these, what is known of its joint, the same of its parent, whose own error
-its joint is not to make up for, and the whole object. Its weights are shared by all parts, with one head for each type
-of joint, so that the number of parts is not built in.
+A policy describes each part by its observed points and by the reference's. The head of a part reads this, what is known
+of its joint, the same of its parent, whose own error its joint is not to make up for, and the whole object. Weights are
+shared by all parts, with one head for each type of joint, so that the number of parts is not built in.
 """
 
 from __future__ import annotations
@@ -19,55 +18,44 @@ from artperl.core.pose import KINDS
 
 _HEADS = {"free": 0, "revolute": 1, "continuous": 1, "prismatic": 2, "screw": 1, "fixed": 3}
 """Head of each kind of joint."""
+_OF_JOINT = 6 + 2 + 1
+"""Numbers that tell a joint: axis and anchor, place in its range and the range; and the part's share of the points."""
 
 
-class Agent(nn.Module):
-    """Policy and value.
+class Policy(nn.Module):
+    """Policy and value, from a description of each part.
 
     Parameters
     ----------
     width : int
-        Channels of the encoder's first layer.
+        Channels of the first layer of the encoders.
+    described : int
+        Numbers by which :meth:`describe` tells a part.
     """
 
     head_of: Tensor
 
-    def __init__(self, width: int = 64):
+    def __init__(self, width: int, described: int):
         super().__init__()
         self.width = width
-        features = 2 * width
-        self.observed = _encoder(6, width, features)
-        self.reference = _encoder(6, width, features)
         self.kind = nn.Embedding(len(KINDS), 16)
-        described = 4 * features + 16 + 6 + 2 + 1 + NUM_MOMENTS
-        self.part = nn.Sequential(nn.Linear(described, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU())
+        self.part = nn.Sequential(nn.Linear(described + 16 + _OF_JOINT, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU())
         self.whole = nn.Sequential(nn.Linear(128, 128), nn.ReLU())
         self.local = nn.Sequential(nn.Linear(384, 128), nn.ReLU())
         self.heads = nn.Linear(128, (max(_HEADS.values()) + 1) * NUM_AXES * NUM_BINS)
         self.value = nn.Sequential(nn.Linear(128, 64), nn.ReLU(), nn.Linear(64, 1))
         self.register_buffer("head_of", torch.tensor([_HEADS[kind] for kind in KINDS]), persistent=False)
 
+    def describe(self, view: View) -> tuple[list[Tensor], Tensor, list[Tensor]]:
+        """What comes before, of, and after a part's joint (B, P, ...) in its description; the share of its points."""
+        raise NotImplementedError
+
     def forward(self, view: View) -> tuple[Tensor, Tensor]:
         """Logits (B, P, 9, 11) of the bins, and value (B,)."""
-        seen = self.observed(torch.cat([view.observed, view.offset], dim=-1))
-        have = self.reference(torch.cat([view.reference, view.back], dim=-1))
         B, P = view.valid.shape
-        mean, top, share = _pool_parts(seen, view.part, P)
-        described = torch.cat(
-            [
-                mean,
-                top,
-                have.mean(2),
-                have.amax(2),
-                self.kind(view.kind),
-                view.joint.clamp(-4, 4),
-                view.state,
-                share,
-                moments(view),
-            ],
-            -1,
-        )
-        part = self.part(described)
+        seen, share, more = self.describe(view)
+        joint = [self.kind(view.kind), view.joint.clamp(-4, 4), view.state, share]
+        part = self.part(torch.cat([*seen, *joint, *more], -1))
         valid = view.valid[..., None]
         whole = self.whole(part.masked_fill(~valid, -torch.inf).amax(1))
         above = part.gather(1, view.parent[..., None].expand(-1, -1, part.shape[-1]))
@@ -75,6 +63,50 @@ class Agent(nn.Module):
         logits = self.heads(local).reshape(B, P, -1, NUM_AXES, NUM_BINS)
         head = self.head_of[view.kind][..., None, None, None].expand(-1, -1, 1, NUM_AXES, NUM_BINS)
         return logits.gather(2, head)[:, :, 0].float(), self.value(whole)[:, 0].float()
+
+
+class StatePolicy(Policy):
+    """The paper's policy: the state is the observed cloud's features beside the reference's, by one encoder.
+
+    Parameters
+    ----------
+    width : int
+    """
+
+    def __init__(self, width: int = 64):
+        features = 2 * width
+        super().__init__(width, 4 * features)
+        self.encoder = nn.Sequential(_encoder(3, width, features), nn.Linear(features, features), nn.ReLU())
+
+    def describe(self, view: View) -> tuple[list[Tensor], Tensor, list[Tensor]]:
+        seen = self.encoder(view.observed)
+        mean, top, share = _pool_parts(seen, view.part, view.valid.shape[1])
+        have, shown = self.encoder(view.reference), view.shown[..., None]
+        count = shown.sum(2).clamp(min=1)
+        # Features are not negative, so that 0 stands for points that do not count.
+        have = have * shown
+        return [mean, top, have.sum(2) / count, have.amax(2)], share, []
+
+
+class Agent(Policy):
+    """A policy whose points know the nearest ones of the other cloud, and what their offsets say at once.
+
+    Parameters
+    ----------
+    width : int
+    """
+
+    def __init__(self, width: int = 64):
+        features = 2 * width
+        super().__init__(width, 4 * features + NUM_MOMENTS)
+        self.observed = _encoder(6, width, features)
+        self.reference = _encoder(6, width, features)
+
+    def describe(self, view: View) -> tuple[list[Tensor], Tensor, list[Tensor]]:
+        seen = self.observed(torch.cat([view.observed, view.offset], dim=-1))
+        have = self.reference(torch.cat([view.reference, view.back], dim=-1))
+        mean, top, share = _pool_parts(seen, view.part, view.valid.shape[1])
+        return [mean, top, have.mean(2), have.amax(2)], share, [moments(view)]
 
 
 def _encoder(inputs: int, width: int, outputs: int) -> nn.Sequential:

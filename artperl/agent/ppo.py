@@ -1,22 +1,21 @@
-"""Behaviour cloning and PPO, together (ArtPERL, Algorithm 1).
+"""Composited reinforcement learning and behaviour cloning: Algorithm 1 of ArtPERL.
 
-The algorithm is one loop: fit a batch of objects for an episode with the current policy; ask the expert, at every state
-visited, what it would have done (equation 4); add generalised advantages of the rewards (equation 3); and update the
-agent on the whole buffer by both losses (equation 5).
+:func:`algorithm_1` is the loop; :func:`rollout` fills the replay buffer, :func:`update` learns from it. A
+:class:`Phase` says what the agent learns by, and how it acts meanwhile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 from torch.distributions import Categorical
 
-from artperl.agent.actions import MOVE, SCALE, TURN, action_mask
+from artperl.agent.actions import MOVE, SCALE, TURN
 from artperl.agent.decision_process import Fitting, View
-from artperl.agent.policy import Agent
+from artperl.agent.policy import Policy
 from artperl.core.batch import concatenate
 from artperl.core.pose import KINDS, Theta
 
@@ -25,12 +24,8 @@ _PRISMATIC = KINDS.index("prismatic")
 
 @dataclass(frozen=True)
 class PPOOptions:
-    """Algorithm 1."""
+    """Constants of equations 4 and 5."""
 
-    behaviour_cloning: bool = True
-    """Learn from the expert (equation 4)."""
-    reinforcement: bool = True
-    """Learn from rewards (equation 5)."""
     lambda_rotation: float = 0.3
     lambda_translation: float = 0.6
     lambda_scale: float = 0.1
@@ -46,18 +41,34 @@ class PPOOptions:
     minibatch: int = 64
     """States of an update: few, since the states of an episode are much alike, and updates are what learning needs."""
     max_gradient: float = 0.5
-    sharpness: float = 3.0
-    """While it learns from rewards, the policy that acts has that many times the logits of the one that is cloned.
-    Cloning leaves each axis as unsure as the expert's next step is; one axis of many would then take a long step astray
-    at every turn, to states of which the agent knows less and less. Cloning alone wants such states: the expert says
-    what to do there."""
-    guided: float = 0.3
-    """Share of the steps that the expert takes while the agent learns by cloning alone: left to itself, an agent that
-    knows nothing yet strays so far that what it learns there is of no use."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What the agent learns by, and how it acts meanwhile."""
+
+    cloning: bool
+    """Learn from the expert (equation 4)."""
+    reinforcement: bool
+    """Learn from rewards (equation 5)."""
+    guided: float
+    """Share of the steps that the expert takes."""
+    sharpness: float
+    """The policy that acts has that many times the logits of the one that is cloned."""
+
+
+CLONING = Phase(cloning=True, reinforcement=False, guided=0.3, sharpness=1.0)
+"""Behaviour cloning alone. Left to itself, an agent that knows nothing yet strays so far that what it learns there is
+of no use: the expert takes some steps."""
+JOINT = Phase(cloning=True, reinforcement=True, guided=0.0, sharpness=3.0)
+"""Both losses. Cloning leaves each axis as unsure as the expert's next step is, so that one axis of many would take a
+long step astray at every turn: what acts is sharper."""
+REINFORCEMENT = Phase(cloning=False, reinforcement=True, guided=0.0, sharpness=3.0)
+"""PPO alone, for the ablation."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rollout:
+class Buffer:
     """Replay buffer of one batch of episodes. T steps of B environments, flat: S = T * B rows."""
 
     view: View
@@ -70,38 +81,111 @@ class Rollout:
     figures: dict[str, float]
 
 
+def algorithm_1(
+    policy: Policy,
+    optimizer: torch.optim.Optimizer,
+    episodes: Callable[[int], tuple[Fitting, Theta]],
+    phases: Callable[[int], Phase],
+    options: PPOOptions,
+    seed: int,
+    first: int,
+    last: int,
+) -> Iterator[dict[str, float]]:
+    """Algorithm 1, one round after the other; it goes on when the next figures are asked for.
+
+    Parameters
+    ----------
+    policy : Policy
+    optimizer : torch.optim.Optimizer
+    episodes : function
+        Of the number of a round: environments at their start, and the goal that the expert steers to.
+    phases : function
+        Of the number of a round.
+    options : PPOOptions
+    seed : int
+        Of the actions; they depend on the number of the round beside it.
+    first, last : int
+        Rounds to run, the last left out.
+
+    Yields
+    ------
+    dict
+        Mean losses, reward, and chamfer distances at the start and at the end of the episodes.
+    """
+    device = next(policy.parameters()).device
+    for n in range(first, last):
+        generator = torch.Generator(device).manual_seed((seed << 32) + n)
+        phase = phases(n)
+        fitting, goal = episodes(n)
+        buffer = rollout(policy, fitting, goal, phase, options, generator)
+        losses = update(policy, optimizer, buffer, phase, options, generator)
+        yield {name: sum(one[name] for one in losses) / len(losses) for name in losses[0]} | buffer.figures
+
+
 @torch.no_grad()
-def collect(agent: Agent, fitting: Fitting, goal: Theta, options: PPOOptions, generator: torch.Generator) -> Rollout:
+def rollout(
+    policy: Policy, fitting: Fitting, goal: Theta, phase: Phase, options: PPOOptions, generator: torch.Generator
+) -> Buffer:
     """Run an episode of every environment with the stochastic policy, noting what the expert would have done."""
-    views, actions, experts, log_probs, values, rewards = [], [], [], [], [], []
-    mask = action_mask(fitting.shapes.trees)
+    views, masks, actions, experts, log_probs, values, rewards = [], [], [], [], [], [], []
     first = fitting.distance
     while not fitting.done:
-        view = fitting.view()
-        logits, value = agent(view)
-        flat = acting(logits, options).softmax(-1).flatten(0, 2)
-        action = torch.multinomial(flat, 1, generator=generator).view(mask.shape)
-        expert = fitting.expert(goal)
-        if not options.reinforcement:
-            guided = torch.rand(len(action), generator=generator, device=action.device) < options.guided
-            action = torch.where(guided[:, None, None], expert, action)
+        view, mask, expert = fitting.view(), fitting.mask, fitting.expert(goal)
+        logits, value = policy(view)
+        acting = phase.sharpness * logits
+        action = torch.multinomial(acting.softmax(-1).flatten(0, 2), 1, generator=generator).view(mask.shape)
+        guided = torch.rand(len(action), generator=generator, device=action.device) < phase.guided
+        action = torch.where(guided[:, None, None], expert, action)
         views.append(view)
+        masks.append(mask)
         actions.append(action)
         experts.append(expert)
-        log_probs.append(log_probability(acting(logits, options), action, mask))
+        log_probs.append(log_probability(acting, action, mask))
         values.append(value)
         rewards.append(fitting.step(action))
-    values.append(agent(fitting.view())[1])
+    values.append(policy(fitting.view())[1])
     advantage = advantages(torch.stack(rewards), torch.stack(values), options)
     figures = {
         "reward": torch.stack(rewards).mean().item(),
         "chamfer_start": first.mean().item(),
         "chamfer_end": fitting.distance.mean().item(),
     }
-    return Rollout(
-        concatenate(views), mask.repeat(len(views), 1, 1), torch.cat(actions), torch.cat(experts),
-        torch.cat(log_probs), advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(), figures,
+    return Buffer(
+        concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(experts), torch.cat(log_probs),
+        advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(), figures,
     )  # fmt: skip
+
+
+def update(
+    policy: Policy,
+    optimizer: torch.optim.Optimizer,
+    buffer: Buffer,
+    phase: Phase,
+    options: PPOOptions,
+    generator: torch.Generator,
+) -> list[dict[str, float]]:
+    """Several passes of minibatch updates over a buffer; figures of each update."""
+    figures, total = [], len(buffer.log_prob)
+    advantage = (buffer.advantage - buffer.advantage.mean()) / (buffer.advantage.std() + 1e-8)
+    for _ in range(options.epochs):
+        for rows in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
+            logits, value = policy(buffer.view[rows])
+            mask = buffer.mask[rows]
+            losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
+            cloning = cloning_loss(logits, buffer.expert[rows], mask, buffer.view.kind[rows], options)
+            loss = value.new_zeros(())
+            if phase.reinforcement:
+                loss = loss + losses["policy"] + options.lambda_value * losses["value"]
+                loss = loss - options.lambda_entropy * losses["entropy"]
+            if phase.cloning:
+                loss = loss + cloning
+            optimizer.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(policy.parameters(), options.max_gradient)
+            optimizer.step()
+            right = ((logits.argmax(-1) == buffer.expert[rows]) & mask).sum() / mask.sum()
+            figures.append({k: v.item() for k, v in {**losses, "cloning": cloning, "accuracy": right}.items()})
+    return figures
 
 
 def advantages(rewards: Tensor, values: Tensor, options: PPOOptions) -> Tensor:
@@ -114,59 +198,23 @@ def advantages(rewards: Tensor, values: Tensor, options: PPOOptions) -> Tensor:
     return result
 
 
-def acting(logits: Tensor, options: PPOOptions) -> Tensor:
-    """Logits of the policy that acts, from the agent's."""
-    return options.sharpness * logits if options.reinforcement else logits
-
-
 def log_probability(logits: Tensor, action: Tensor, mask: Tensor) -> Tensor:
     """(B,) logarithm of the probability of an action: the axes are independent given the state."""
     chosen = logits.log_softmax(-1).gather(-1, action[..., None])[..., 0]
     return (chosen * mask).sum((1, 2))
 
 
-def update(
-    agent: Agent,
-    optimizer: torch.optim.Optimizer,
-    rollout: Rollout,
-    options: PPOOptions,
-    generator: torch.Generator,
-    on_update: Callable[[dict[str, float]], None] = lambda figures: None,
-) -> None:
-    """Several passes of minibatch updates over a rollout."""
-    total = len(rollout.log_prob)
-    advantage = (rollout.advantage - rollout.advantage.mean()) / (rollout.advantage.std() + 1e-8)
-    for _ in range(options.epochs):
-        for rows in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
-            logits, value = agent(rollout.view[rows])
-            mask = rollout.mask[rows]
-            losses = ppo_losses(acting(logits, options), value, rollout, advantage, rows, options)
-            cloning = cloning_loss(logits, rollout.expert[rows], mask, rollout.view.kind[rows], options)
-            loss = value.new_zeros(())
-            if options.reinforcement:
-                loss = loss + losses["policy"] + options.lambda_value * losses["value"]
-                loss = loss - options.lambda_entropy * losses["entropy"]
-            if options.behaviour_cloning:
-                loss = loss + cloning
-            optimizer.zero_grad()
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(agent.parameters(), options.max_gradient)
-            optimizer.step()
-            right = ((logits.argmax(-1) == rollout.expert[rows]) & mask).sum() / mask.sum()
-            on_update({k: v.item() for k, v in {**losses, "cloning": cloning, "accuracy": right}.items()})
-
-
 def ppo_losses(
-    logits: Tensor, value: Tensor, rollout: Rollout, advantage: Tensor, rows: Tensor, options: PPOOptions
+    logits: Tensor, value: Tensor, buffer: Buffer, advantage: Tensor, rows: Tensor, options: PPOOptions
 ) -> dict[str, Tensor]:
-    """Clipped surrogate, squared value error, entropy, and the approximate divergence from the rollout's policy."""
-    mask = rollout.mask[rows]
-    log_ratio = log_probability(logits, rollout.action[rows], mask) - rollout.log_prob[rows]
+    """Clipped surrogate, squared value error, entropy, and the approximate divergence from the buffer's policy."""
+    mask = buffer.mask[rows]
+    log_ratio = log_probability(logits, buffer.action[rows], mask) - buffer.log_prob[rows]
     ratio, gain = log_ratio.exp(), advantage[rows]
     clipped = ratio.clamp(1.0 - options.clip, 1.0 + options.clip)
     return {
         "policy": -torch.minimum(ratio * gain, clipped * gain).mean(),
-        "value": torch.nn.functional.mse_loss(value, rollout.result[rows]),
+        "value": torch.nn.functional.mse_loss(value, buffer.result[rows]),
         "entropy": (Categorical(logits=logits).entropy() * mask).sum((1, 2)).mean(),
         "divergence": ((ratio - 1.0) - log_ratio).mean(),
     }

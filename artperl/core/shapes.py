@@ -123,6 +123,11 @@ class Observed(Batch):
         return Observed(points, part.long(), torch.ones_like(points[..., 0]) if weight is None else weight)
 
 
+def faces_camera(points: Tensor, normals: Tensor) -> Tensor:
+    """(...) bool: surface points (..., 3), camera frame, whose normals (..., 3) lean towards the camera."""
+    return (points * normals).sum(-1) < 0.0
+
+
 def spread_points(
     vertices: Array, faces: NDArray[np.int32], count: int, rng: np.random.Generator
 ) -> tuple[Array, Array, float]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -15,13 +13,10 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from artperl.core.clouds import Clouds
-from artperl.data.categories import Parts
-from artperl.data.sources import Source, samples_from
+from artperl.data.sources import DataOptions, Source
 from artperl.data.stretching import stretch
 from artperl.data.truth import Truth, to_batch, training_rows
-from artsim.datasets.plan import SampleOptions
 from artsim.model.kinematics import Array
-from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
 _USES = 4
@@ -68,26 +63,15 @@ class _Rows(IterableDataset[dict[str, Array]]):
         return (self.noisy if noisy else self.samples)[i]
 
 
-def carry_on(worker: int) -> None:
+def ignore_interrupt(worker: int) -> None:
     """A worker ends with the process that it works for, which hears Ctrl-C, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def batches(
-    categories: Sequence[str],
-    num_rows: int,
-    num_points: int = 1024,
-    batch_size: int = 32,
-    first_batch: int = 0,
-    seed: int = 0,
-    workers: int = 1,
-    sample: SampleOptions | None = None,
-    parts: Parts = "artimage",
-    given: Sequence[ArticulatedObject] = (),
-    dataset: str | Path | None = None,
-    stretched: float = 0.0,
-    noisy: float = 0.0,
-) -> Iterator[tuple[Clouds, Truth]]:
+    data: DataOptions, num_rows: int, num_points: int = 1024, batch_size: int = 32, first_batch: int = 0,
+    seed: int = 0, workers: int = 1,
+) -> Iterator[tuple[Clouds, Truth]]:  # fmt: skip
     """Endless batches of fresh procedural objects, or of a dataset.
 
     A quarter of each batch is views of one object that was never seen before; the others are drawn from the last
@@ -96,8 +80,7 @@ def batches(
 
     Parameters
     ----------
-    categories : sequence of str
-        Empty to learn from the given objects alone.
+    data : DataOptions
     num_rows : int
         Rows for parts.
     num_points, batch_size : int
@@ -106,28 +89,15 @@ def batches(
     seed : int
     workers : int
         Processes that make samples; 0 makes them in this one.
-    sample : SampleOptions, optional
-        View preset, noise and the like; ``num_points`` overrides its own.
-    parts : Parts
-    given : sequence of ArticulatedObject
-        See :func:`samples_from`.
-    dataset : str or Path, optional
-        See :class:`Recorded`.
-    stretched : float
-        Share of the views whose objects are stretched; see :func:`artperl.data.stretching.stretch`.
-    noisy : float
-        Share of the others that are as a :data:`SENSOR` sees them.
     """
-    cast = _SPARE * num_points if stretched and dataset is None else num_points  # a dataset has what it has
-    options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": cast})
+    made_points = _SPARE * num_points if data.stretched and data.dataset is None else num_points
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
-    samples = sensed = samples_from(dataset, categories, options, seed, fresh, num_rows, parts, given)
-    if noisy:
-        as_seen = replace(options, noise=SENSOR)
-        sensed = samples_from(dataset, categories, as_seen, seed, fresh, num_rows, parts, given)
-    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, stretched, noisy)
+    samples = sensed = data.source(num_rows, made_points, seed, fresh)
+    if data.noisy:
+        sensed = data.source(num_rows, made_points, seed, fresh, SENSOR)
+    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data.stretched, data.noisy)
     loader = DataLoader(
-        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=carry_on
+        rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=ignore_interrupt
     )
     window: deque[dict[str, Tensor]] = deque(maxlen=_WINDOW)
     for n, made in enumerate(loader, begin):

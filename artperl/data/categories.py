@@ -58,7 +58,7 @@ def opens_to_the_back(joint_types: Sequence[str], joint_axes: ArrayLike) -> bool
     return bool(np.asarray(joint_axes)[slides, 0].sum() > _BACKWARDS)
 
 
-def arranged(obj: ArticulatedObject, parts: Parts) -> ArticulatedObject:
+def order_parts(obj: ArticulatedObject, parts: Parts) -> ArticulatedObject:
     """The object with its parts in the order that an estimator for such objects knows them in."""
     return as_seen(obj) if parts == "any" else obj
 
@@ -96,6 +96,6 @@ def _objects(first: FamilySource, parts: Parts, max_parts: int) -> Iterator[Arti
             continue  # a rare fault of the family, which artsim's audit reports
         if len(obj) <= max_parts and has_parts(first.category, obj.tree.types, obj.tree.axes, parts):
             missed = 0
-            yield arranged(obj, parts)
+            yield order_parts(obj, parts)
         elif (missed := missed + 1) > _ATTEMPTS:
             raise ConfigError(f"no object of at most {max_parts} parts has those of {parts}", first.category)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -16,15 +14,12 @@ from artperl.core.batch import Batch
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.data.categories import Parts
-from artperl.data.sources import samples_from
+from artperl.data.sources import DataOptions
 from artperl.fitting.initial_pose import adapted, sized
 from artperl.perception.network import Perception
 from artperl.perception.part_grouping import perceive
 from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.shape_base import ShapeBase
-from artsim.datasets.plan import SampleOptions
-from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
 References = Literal["retrieved", "deformed"]
@@ -35,6 +30,8 @@ Labels = Literal["perceived", "true"]
 """Which part each point is said to be of: what perception says; or the truth, for an agent that is to learn more trees
 than its perception can tell apart yet."""
 
+_CHOICES = 4
+"""Nearest references among which one is drawn: in use, too, the nearest is seldom the best."""
 _STRETCH = (0.25, 0.1)
 """Half-widths of the logarithms by which deformed references are stretched: as a whole, and each part on its own."""
 _SHIFT = 0.03
@@ -76,50 +73,27 @@ class Problems:
 
     Parameters
     ----------
-    categories : sequence of str
+    data : DataOptions
     base : ShapeBase
         References are drawn from the few that are most like the object.
     batch_size, num_points : int
     seed : int
     start : StartOptions, optional
-    sample : SampleOptions, optional
-        View preset, noise and the like.
-    choices : int
-        Among how many of the nearest references to draw.
     perception : Perception, optional
         Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
         it.
-    parts : Parts
-    given : sequence of ArticulatedObject
-        See :func:`artperl.data.sources.samples_from`.
     views_per_object : int
         Problems in a row of the same object.
     references : References
-    dataset : str or Path, optional
-        See :class:`artperl.data.sources.Recorded`.
     """
 
     def __init__(
-        self,
-        categories: Sequence[str],
-        base: ShapeBase,
-        batch_size: int = 64,
-        num_points: int = 512,
-        seed: int = 0,
-        start: StartOptions | None = None,
-        sample: SampleOptions | None = None,
-        choices: int = 4,
-        perception: Perception | None = None,
-        parts: Parts = "artimage",
-        given: Sequence[ArticulatedObject] = (),
-        views_per_object: int = 2,
+        self, data: DataOptions, base: ShapeBase, batch_size: int = 64, num_points: int = 512, seed: int = 0,
+        start: StartOptions | None = None, perception: Perception | None = None, views_per_object: int = 2,
         references: References = "retrieved",
-        dataset: str | Path | None = None,
-    ):
-        options = SampleOptions(**{**vars(sample or SampleOptions()), "num_points": num_points})
-        rows = base.shapes.trees.num_rows
-        self.samples = samples_from(dataset, categories, options, seed, views_per_object, rows, parts, given)
-        self.base, self.batch_size, self.seed, self.choices = base, batch_size, seed, choices
+    ):  # fmt: skip
+        self.samples = data.source(base.shapes.trees.num_rows, num_points, seed, views_per_object)
+        self.base, self.batch_size, self.seed = base, batch_size, seed
         self.start, self.perception, self.references = start or StartOptions(), perception, references
 
     def __getitem__(self, n: int) -> Problem:
@@ -130,10 +104,10 @@ class Problems:
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
         if self.references == "deformed":
             objects = [self.samples.object(i) for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
-            shapes = deformed(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
+            shapes = deform(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
         else:
             query = box_embedding(valid, box_center, box_size)
-            nearest, _ = self.base.nearest(query, min(self.choices, len(self.base)))
+            nearest, _ = self.base.nearest(query, min(_CHOICES, len(self.base)))
             pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
             shapes = self.base.shapes[nearest.gather(1, pick)[:, 0]]
         shapes = sized(shapes, torch.tensor([sample.diagonal for sample in samples]))
@@ -143,7 +117,7 @@ class Problems:
         part = torch.from_numpy(np.stack([s.part for s in samples]).astype(np.int64))
         observed = Observed.of(points, part if self.perception is None else self._labels(points))
         radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
-        return Problem(shapes, observed, perturbed(shapes, goal, radius, self.start, generator), goal)
+        return Problem(shapes, observed, draw_starts(shapes, goal, radius, self.start, generator), goal)
 
     @torch.inference_mode()
     def _labels(self, points: Tensor) -> Tensor:
@@ -172,7 +146,7 @@ def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
     return torch.arange(rows) < K, rotation, pad(center), pad(sample.box_size), *boxes
 
 
-def deformed(shapes: Shapes, generator: torch.Generator) -> Shapes:
+def deform(shapes: Shapes, generator: torch.Generator) -> Shapes:
     """Other objects with the same trees: stretched as a whole and part by part, their joints somewhere else."""
     B, P = shapes.trees.valid.shape
 
@@ -187,7 +161,9 @@ def deformed(shapes: Shapes, generator: torch.Generator) -> Shapes:
     )
 
 
-def perturbed(shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator) -> Theta:
+def draw_starts(
+    shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator
+) -> Theta:
     """Starts around goals, with the reference's own shape, and joint states anywhere in their limits."""
     B, P = shapes.trees.valid.shape
     plain = Theta(

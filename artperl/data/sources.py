@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from artperl.core.part_order import reordered_sample, visible_order
-from artperl.data.categories import Parts, arranged, has_parts
+from artperl.data.categories import Parts, has_parts, order_parts
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions, draw_sample
+from artsim.datasets.sample_options import SensorName
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
@@ -71,7 +73,7 @@ class Samples:
     def _find_object(self, n: int) -> ArticulatedObject:
         if self._is_given(n):
             return self.given[int(np.random.default_rng([self.stream.seed, n]).integers(len(self.given)))]
-        return arranged(self.stream.object(self._right(n)), self.parts)
+        return order_parts(self.stream.object(self._right(n)), self.parts)
 
     def _find_right(self, n: int) -> int:
         """Number of the object that stands for object ``n``."""
@@ -162,7 +164,7 @@ class Recorded:
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
-        return arranged(self.dataset.object_of(self[i]), self.parts)
+        return order_parts(self.dataset.object_of(self[i]), self.parts)
 
     def _is_right(self, sample: Sample) -> bool:
         few_enough = len(sample.joint_type) <= self.num_rows
@@ -204,13 +206,60 @@ class Given:
 Source = Samples | Recorded | Given
 
 
-def samples_from(
-    dataset: str | Path | None, categories: Sequence[str], options: SampleOptions, seed: int, views_per_object: int,
-    num_rows: int, parts: Parts, given: Sequence[ArticulatedObject],
-) -> Source:  # fmt: skip
-    """What there is to learn from: a dataset; or fresh objects of some categories; or, without those, given ones."""
-    if dataset is not None:
-        return Recorded(dataset, categories, seed, num_rows, options.num_points, parts)
-    if not categories:
-        return Given(given, options, seed, views_per_object, num_rows)
-    return Samples(categories, options, seed, views_per_object, num_rows, parts, given)
+@dataclass(frozen=True, eq=False)
+class DataOptions:
+    """What there is to learn from, and how it is seen.
+
+    Attributes
+    ----------
+    categories : sequence of str
+        Procedural categories; empty to learn from the given objects alone.
+    parts : Parts
+    given : sequence of ArticulatedObject
+        Every other object is one of these, if there are any.
+    dataset : str or Path, optional
+        Folder of a dataset to learn from instead.
+    sample : SampleOptions
+        View preset, noise and the like.
+    stretched : float
+        Share of the training clouds whose objects are stretched; see :func:`artperl.data.stretching.stretch`.
+    noisy : float
+        Share of the other training clouds that are as a depth sensor sees them.
+    """
+
+    categories: Sequence[str] = ()
+    parts: Parts = "artimage"
+    given: Sequence[ArticulatedObject] = ()
+    dataset: str | Path | None = None
+    sample: SampleOptions = field(default_factory=SampleOptions)
+    stretched: float = 0.0
+    noisy: float = 0.0
+
+    def source(
+        self, num_rows: int, num_points: int, seed: int, views_per_object: int, noise: SensorName | None = None
+    ) -> Source:
+        """Samples by number.
+
+        Parameters
+        ----------
+        num_rows : int
+            The most parts that an object may have.
+        num_points : int
+            Points of a cloud; of a dataset, the least number.
+        seed : int
+        views_per_object : int
+            Samples in a row of the same object.
+        noise : str, optional
+            Depth sensor; by default that of :attr:`sample`.
+
+        Raises
+        ------
+        DatasetError
+            When no sample of the dataset fits.
+        """
+        if self.dataset is not None:
+            return Recorded(self.dataset, self.categories, seed, num_rows, num_points, self.parts)
+        sample = replace(self.sample, num_points=num_points, noise=self.sample.noise if noise is None else noise)
+        if not self.categories:
+            return Given(self.given, sample, seed, views_per_object, num_rows)
+        return Samples(self.categories, sample, seed, views_per_object, num_rows, self.parts, self.given)

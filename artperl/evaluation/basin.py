@@ -14,6 +14,7 @@ from artperl.agent.actions import MOVE, NUM_AXES, TURN, move
 from artperl.core.pose import Theta, clamp_state, pose_parts
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, Problem, Problems, References
+from artperl.data.sources import DataOptions
 from artperl.evaluation.metrics import rotation_error
 from artperl.fitting.hypotheses import agent_steps
 from artperl.fitting.levenberg_marquardt import refine
@@ -43,8 +44,8 @@ def basin_problem(
 ) -> Problem:
     """``count`` fresh objects, their points labelled by the estimator's perception or by the truth."""
     return Problems(
-        categories, estimator.base, count, estimator.options.num_points, _SEED,
-        perception=estimator.perception if labels == "perceived" else None, parts=parts, references=references,
+        DataOptions(categories, parts), estimator.base, count, estimator.options.num_points, _SEED,
+        perception=estimator.perception if labels == "perceived" else None, references=references,
     )[0]  # fmt: skip
 
 

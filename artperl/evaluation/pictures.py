@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from artperl.core.estimate import Estimate
 from artperl.evaluation.scoring import compare, true_poses
-from artperl.methods.full import Estimator
+from artperl.methods.protocol import Method
 from artsim.common.extras import needs
 from artsim.common.names import printable
 from artsim.drawing.annotation import PALETTE
@@ -33,6 +33,8 @@ _CURVES = (
     ("agent/chamfer_end", "chamfer distance at the end of an episode, radii"),
     ("agent/accuracy", "actions as the expert's"),
     ("perception/accuracy", "points with the right part"),
+    ("segmentation/accuracy", "points with the right part"),
+    ("retrieval/loss", "contrastive loss, equation 2"),
     ("perception/coordinates", "rest-frame coordinates off by, diagonals"),
     ("validation/score", "score on unseen objects"),
 )
@@ -69,12 +71,12 @@ def curves(events: Path) -> bytes:
     return _png(figure)
 
 
-def overlays(estimator: Estimator, samples: Sequence[Sample], columns: int = 4) -> bytes:
+def overlays(estimator: Method, samples: Sequence[Sample], columns: int = 4) -> bytes:
     """PNG of clouds with the boxes of their parts: true ones grey and dashed, estimated ones in the part's colour.
 
     Parameters
     ----------
-    estimator : Estimator
+    estimator : Method
     samples : sequence of Sample
     columns : int
     """

@@ -18,7 +18,7 @@ from scipy.optimize import linear_sum_assignment, minimize
 from artperl.core.estimate import Calibration, Estimate, brought_to_rest
 from artperl.data.categories import Parts, objects_of
 from artperl.evaluation import metrics
-from artperl.methods.full import Estimator
+from artperl.methods.protocol import Method
 from artsim.common.progress import track
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ArtsimError
@@ -127,19 +127,19 @@ def samples_of(
     ]
 
 
-def evaluate(estimator: Estimator, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
+def evaluate(estimator: Method, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
     """Score an estimator on samples, one at a time."""
     views = track("evaluating", samples, unit="view", leave=False, shown=progress)
     return [score(estimator, sample) for sample in views]
 
 
-def mistake(estimator: Estimator, samples: Iterable[Sample]) -> list[Scored]:
+def mistake(estimator: Method, samples: Iterable[Sample]) -> list[Scored]:
     """Scores of estimates for objects that are not of the estimator's categories: whatever it says is wrong."""
     estimates = ((sample, estimator(sample.points)) for sample in samples)
     return [_wrong(sample, estimate, sum(estimate.milliseconds.values())) for sample, estimate in estimates]
 
 
-def score(estimator: Estimator, sample: Sample) -> Scored:
+def score(estimator: Method, sample: Sample) -> Scored:
     """Errors of the estimate of one sample."""
     begun = time.perf_counter()
     try:

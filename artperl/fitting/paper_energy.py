@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from artperl.core.batch import Batch
 from artperl.core.pose import Posed, Theta, Trees, clamp_state, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
-from artperl.core.shapes import Observed, Shapes
-from artperl.fitting.levenberg_marquardt import Refined
+from artperl.core.shapes import Observed, Shapes, faces_camera
 
 
-def part_energy(shapes: Shapes, observed: Observed, posed: Posed, two_sided: bool = True) -> Tensor:
+@dataclass(frozen=True, eq=False)
+class Minimum(Batch):
+    """Where a minimisation of B objects ends.
+
+    Attributes
+    ----------
+    theta : Theta
+    energy, start_energy : (B,) float
+        Of equations 6 and 7, in the end and at the start.
+    """
+
+    theta: Theta
+    energy: Tensor
+    start_energy: Tensor
+
+
+def part_energy(shapes: Shapes, observed: Observed, posed: Posed, unit: Tensor) -> Tensor:
     """Equation 6: chamfer distance between each part's observed points and the posed reference's, summed over parts.
 
-    The paper prints "s R P' - t", where it must add t. Distances are squared and counted in diagonals of the reference.
+    The paper prints "s R P' - t", where it must add t. Of the reference only what faces the camera counts: a partial
+    cloud is not near to what its camera did not see. Distances are squared.
 
     Parameters
     ----------
     shapes : Shapes
     observed : Observed
     posed : Posed
-    two_sided : bool
-        False leaves out the way from the reference to the cloud, which a partial view draws to the parts of the
-        surface that happen to be seen.
+    unit : (B,) float
+        Metres that count as 1.
 
     Returns
     -------
@@ -35,17 +51,16 @@ def part_energy(shapes: Shapes, observed: Observed, posed: Posed, two_sided: boo
     B, P, M, _ = points.shape
     of_part = torch.nn.functional.one_hot(observed.part, P).transpose(1, 2) * observed.weight[:, None]  # (B, P, N)
     with torch.no_grad():  # gradients flow through the distances of the nearest pairs alone
+        shown = faces_camera(points, posed.normals(shapes.normals)) & shapes.has_surface[..., None]
         apart = torch.cdist(points.flatten(1, 2), observed.points).unflatten(1, (P, M))
-        to_reference = apart.argmin(2)
+        to_reference = apart.masked_fill(~shown[..., None], torch.inf).argmin(2)
         to_cloud = apart.masked_fill(of_part[:, :, None] <= 0, torch.inf).argmin(-1)
+        seen, facing = of_part.sum(-1), shown.sum(-1)
     near = points.gather(2, to_reference[..., None].expand(-1, -1, -1, 3))
-    seen = of_part.sum(-1)
-    total = (of_part * (observed.points[:, None] - near).square().sum(-1)).sum(-1) / seen.clamp(min=1e-12)
-    if two_sided:
-        cloud = observed.points.gather(1, to_cloud.flatten(1)[..., None].expand(-1, -1, 3)).reshape(B, P, M, 3)
-        total = total + (cloud - points).square().sum(-1).mean(-1)
-    counted = (seen > 0) & shapes.has_surface
-    return torch.where(counted, total, 0.0).sum(1) / shapes.diagonal**2
+    there = (of_part * (observed.points[:, None] - near).square().sum(-1)).sum(-1) / seen.clamp(min=1e-12)
+    cloud = observed.points.gather(1, to_cloud.flatten(1)[..., None].expand(-1, -1, 3)).reshape(B, P, M, 3)
+    back = (shown * (cloud - points).square().sum(-1)).sum(-1) / facing.clamp(min=1)
+    return torch.where((seen > 0) & (facing > 0), there + back, 0.0).sum(1) / unit**2
 
 
 def joint_energy(trees: Trees, rotation: Tensor) -> Tensor:
@@ -70,13 +85,8 @@ def joint_energy(trees: Trees, rotation: Tensor) -> Tensor:
 
 
 def refine_by_gradient(
-    shapes: Shapes,
-    observed: Observed,
-    start: Theta,
-    iterations: int = 100,
-    rate: float = 0.01,
-    two_sided: bool = True,
-) -> Refined:
+    shapes: Shapes, observed: Observed, start: Theta, iterations: int = 100, rate: float = 0.01
+) -> Minimum:
     """Minimise E_P + E_J over the pose and the joint states with Adam, the scale fixed (section 4.4).
 
     The best state met on the way is returned, so that the energy never rises; states stay within their limits.
@@ -89,38 +99,41 @@ def refine_by_gradient(
     iterations : int
     rate : float
         First step of Adam, in radians and diagonals; it falls to a tenth along half a cosine.
-    two_sided : bool
-        See :func:`part_energy`.
     """
     trees = shapes.trees
     B, P = trees.valid.shape
     start = replace(start, state=clamp_state(trees, start.state)).detach()
+    unit = shapes.diagonal * start.log_scale.mean(1).exp()
     change = torch.zeros(B, 6 + P, dtype=start.state.dtype, device=start.state.device, requires_grad=True)
     optimizer = torch.optim.Adam([change], lr=rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, iterations, 0.1 * rate)
-    pivot = (observed.points * observed.weight[..., None]).sum(1) / observed.weight.sum(1, keepdim=True).clamp(
-        min=1e-12
-    )
+    share = observed.weight / observed.weight.sum(1, keepdim=True).clamp(min=1e-12)
+    pivot = (observed.points * share[..., None]).sum(1)
     length = torch.where(trees.slide != 0, shapes.diagonal[:, None], 1.0)
 
     def moved() -> Theta:
         turn = rotation_from_vector(change[:, :3])
-        translation = rotate(turn, start.translation - pivot) + pivot + shapes.diagonal[:, None] * change[:, 3:6]
+        translation = rotate(turn, start.translation - pivot) + pivot + unit[:, None] * change[:, 3:6]
         state = clamp_state(trees, start.state + length * change[:, 6:])
         return replace(start, rotation=turn @ start.rotation, translation=translation, state=state)
 
-    first = best_energy = torch.full((B,), torch.inf, dtype=change.dtype, device=change.device)
-    best, steps = start, torch.zeros(B, dtype=torch.int64, device=change.device)
+    first = least = torch.full((B,), torch.inf, dtype=change.dtype, device=change.device)
+    best = start
     for i in range(iterations + 1):
         theta = moved()
-        posed = pose_parts(trees, theta, shapes.box_center)
-        energy = part_energy(shapes, observed, posed, two_sided) + joint_energy(trees, posed.rotation)
-        better = energy.detach() < best_energy
-        best, best_energy = theta.detach().where(better, best), torch.where(better, energy.detach(), best_energy)
-        first, steps = (best_energy, steps) if i == 0 else (first, steps + better)
+        energy = total_energy(shapes, observed, theta, unit)
+        better = energy.detach() < least
+        best, least = theta.detach().where(better, best), torch.where(better, energy.detach(), least)
+        first = least if i == 0 else first
         if i < iterations:
             optimizer.zero_grad()
             energy.sum().backward()
             optimizer.step()
             schedule.step()
-    return Refined(best, shapes.trees.axis, best_energy, first, steps)
+    return Minimum(best, least, first)
+
+
+def total_energy(shapes: Shapes, observed: Observed, theta: Theta, unit: Tensor) -> Tensor:
+    """(B,) E = E_P + E_J of the parts as Theta poses them."""
+    posed = pose_parts(shapes.trees, theta, shapes.box_center)
+    return part_energy(shapes, observed, posed, unit) + joint_energy(shapes.trees, posed.rotation)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -96,6 +97,7 @@ class Estimator:
         Without one, boxes are the reference's, enlarged to hold the points.
     """
 
+    name: ClassVar[str] = "full"
     perception: Perception
     base: ShapeBase
     agent: Agent | None = None
@@ -108,6 +110,11 @@ class Estimator:
         self.base = self.base.to(self.perception.device)
         if self.boxes is not None:
             self.boxes.to(self.perception.device)
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Categories of the references."""
+        return tuple(dict.fromkeys(self.base.categories))
 
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.

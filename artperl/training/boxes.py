@@ -1,165 +1,101 @@
-"""Learning to say where boxes end: estimates of fresh views, and the network that learns from how their boxes are off.
-
-The network sees what it will see in use: references as they were found and fitted, faults included.
-"""
+"""Stage: the network for boxes learns from the best estimator's own estimates."""
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
+from functools import partial
 
-import numpy as np
-import torch
-from torch import Tensor, nn
-from torch.utils.data import DataLoader, Dataset
-
-from artperl.boxes.evidence import Evidence
-from artperl.boxes.network import Boxes, box_losses
-from artperl.core.batch import Batch, concatenate
-from artperl.core.estimate import brought_to_rest
-from artperl.core.tensor_files import read_tensors, write_tensors
-from artperl.data.batches import carry_on
-from artperl.evaluation.scoring import true_poses
+from artperl.boxes.network import Boxes
+from artperl.data.batches import SENSOR
+from artperl.data.sources import Source
+from artperl.estimator import save_estimator
+from artperl.evaluation.scoring import NUM_POINTS, VALIDATION_SEEDS, evaluate, mean_iou, summary
 from artperl.methods.full import Estimator
-from artperl.training.steps import Stop, one_cycle, set_rate
-from artsim.common.progress import track
-from artsim.errors import DatasetError
+from artperl.training.box_records import learn, record
+from artperl.training.context import Context
+from artperl.training.report import scalars
+from artperl.training.validation import given_samples, unseen_samples
+from artsim.common.progress import say
 from artsim.observing.sample import Sample
 
-_SAVE_VIEWS = 200
-"""Views after which records are written down."""
-_FITS = 0.02
-"""Residual up to which an estimate is learnt from: of others there is no saying what their boxes show."""
-_BATCH = 32
-_RATE, _DECAY = 2e-3, 0.1
+_VIEWS = 2
+"""Views in a row of the same object."""
+_NOISY_EVERY = 4
+"""Views of which one is seen by a sensor: boxes go by outermost points, which suffer most."""
 
 
-@dataclass(frozen=True, eq=False)
-class Records(Batch):
-    """B estimates: what was seen, and the true boxes, in the estimated rest frame, in diagonals.
+@dataclass(frozen=True)
+class BoxStage:
+    """The best estimator gets other boxes if they are better on unseen objects, and on given ones."""
 
-    Attributes
-    ----------
-    evidence : Evidence
-    center, size : (B, P, 3) float
-        Where the boxes are seen, brought to rest by the estimated poses.
-    rest : (B, P, 3) float
-        Their centres at rest.
-    """
+    name: str = "boxes"
 
-    evidence: Evidence
-    center: Tensor
-    size: Tensor
-    rest: Tensor
-
-
-class _Examined(Dataset[list[Records]]):
-    """Records by number of the sample."""
-
-    def __init__(self, estimator: Estimator, samples: Callable[[int], Sample]):
-        self.estimator, self.samples = estimator, samples
-
-    def __getitem__(self, number: int) -> list[Records]:
-        return _examined(self.estimator, self.samples(number))
-
-
-def record(
-    estimator: Estimator, samples: Callable[[int], Sample], views: int, file: Path, stop: Stop, workers: int,
-    progress: bool,
-) -> Records | None:  # fmt: skip
-    """Records of the first so many samples, in single precision; those that the file holds are taken from it.
-
-    None when no estimate fits. Each of the workers, processes of one thread, estimates other samples; without any, or
-    on a GPU, this process does.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        When a stop is asked for, and what there is has been written down.
-    """
-    first, records = _load(file) if file.exists() else (0, [])
-    bar = track("boxes", total=views, initial=first, unit="view", smoothing=0.02, shown=progress)
-    loader = DataLoader(
-        _Examined(estimator, samples), batch_size=None, sampler=range(first, views),
-        num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=carry_on,
-    )  # fmt: skip
-    for n, made in enumerate(loader, first):
-        records += [each.map(torch.clone) for each in made]  # out of the workers' shared memory
-        bar.update()
-        if (n + 1) % _SAVE_VIEWS == 0 or n + 1 == views or stop.asked:
-            _save(records, n + 1, file)
-        if stop.asked:
-            raise KeyboardInterrupt
-    bar.close()
-    every: Records | None = concatenate(records).to(torch.float32) if records else None
-    return every
+    def run(self, context: Context) -> None:
+        """Record the estimates that are left, learn from them, and choose."""
+        options, state = context.options, context.state
+        if state.done[self.name] >= options.box_views:
+            return
+        best = context.best(context.device)
+        assert isinstance(best, Estimator)
+        learner = best_without_own_references(best, context)
+        records = record(
+            learner, _samples(context), options.box_views, context.folder.path / "boxes.safetensors",
+            context.report, context.stop, context.workers, context.progress,
+        )  # fmt: skip
+        learnt = None
+        if records is not None:
+            rows = best.perception.num_rows
+            learnt = learn(records, rows, options.box_width, options.box_steps, options.seed, context.progress)
+        context.stop_if_asked()
+        state.done[self.name] = options.box_views
+        if learnt is None:
+            say("boxes: no estimate fits its view; they stay as they are")
+        else:
+            _choose(context, best, learner, learnt.half().float())  # as precise as files are
+        context.save()
 
 
-def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, progress: bool) -> Boxes:
-    """A network that has learnt from records: always the same one for the same arguments."""
-    torch.manual_seed(seed)
-    boxes = Boxes(num_rows, width).to(records.center.device)
-    optimizer = torch.optim.AdamW(boxes.parameters(), weight_decay=_DECAY)
-    bar = track("moving faces", range(steps), smoothing=0.02, shown=progress)
-    for step in bar:
-        set_rate(optimizer, _RATE * one_cycle(step, steps))
-        batch = records[torch.randint(len(records), (_BATCH,))]
-        center, size, farther = boxes(batch.evidence)
-        axis, valid = batch.evidence.axis, batch.evidence.valid
-        slides = axis.any(-1)
-        losses = box_losses(center, size, batch.center, batch.size, valid)
-        losses += box_losses(center - farther[..., None] * axis, size, batch.rest, batch.size, slides)
-        loss = losses.sum() / (valid.sum() + slides.sum())
-        optimizer.zero_grad()
-        loss.backward()
-        nn.utils.clip_grad_norm_(boxes.parameters(), 1.0)
-        optimizer.step()
-        bar.set_postfix_str(f"loss {loss.item():.3f}")
-    return boxes
+def best_without_own_references(best: Estimator, context: Context) -> Estimator:
+    """The estimator as it is in use: no object that it sees is among its references."""
+    return replace(best, base=context.objects.base_without_given(context.options)) if context.objects.mixed else best
 
 
-def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
-    """The record of one sample, in half precision as it is kept; none if the estimate does not fit."""
-    estimate, evidence, unit = estimator.evidence(sample.points)
-    K = len(sample.box_size)
-    if estimate.residual > _FITS or len(estimate.size) != K:
-        return []
-    T, T_true = estimate.T_camera_part, sample.T_camera_part[0]
-    center = brought_to_rest(true_poses(sample)[1], T)
-    still = sample.box_center @ T_true[:3, :3].T + T_true[:3, 3]  # every part where it is at rest, in the camera frame
-    rest = brought_to_rest(still, np.broadcast_to(T[0], T.shape))
-    padded = np.zeros((3, 1, evidence.valid.shape[1], 3))
-    padded[:, 0, :K] = center / unit, sample.box_size / unit, rest / unit
-    return [Records(evidence, *torch.from_numpy(padded)).to(torch.float16)]
+def _sees_noise(context: Context) -> bool:
+    """Whether some views are by a sensor: those of a run with a sensor of its own are so anyway."""
+    return context.options.dataset is None and context.options.sample.noise == "none"
 
 
-def _save(records: list[Records], views: int, file: Path) -> None:
-    tensors = {"views": torch.tensor(views)}
-    if records:
-        every: Records = concatenate(records)
-        tensors |= {name: values for name, values in vars(every).items() if name != "evidence"}
-        tensors |= {f"evidence.{name}": values for name, values in vars(every.evidence).items()}
-    write_tensors(tensors, file)
+def _samples(context: Context) -> Callable[[int], Sample]:
+    """Fresh views by number."""
+    options, objects = context.options, context.objects
+    num_points = options.num_points if options.dataset else NUM_POINTS
+    clean = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS)
+    if not _sees_noise(context):
+        return clean.__getitem__
+    noisy = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS, SENSOR)
+    return partial(_mostly_clean, clean, noisy)
 
 
-def _load(file: Path) -> tuple[int, list[Records]]:
-    """How many views were looked at, and what they gave.
+def _mostly_clean(clean: Source, noisy: Source, number: int) -> Sample:
+    return (noisy if number % _NOISY_EVERY == _NOISY_EVERY - 1 else clean)[number]
 
-    Raises
-    ------
-    DatasetError
-        When the file is damaged.
-    """
-    fix = f"to look at these views again: rm {shlex.quote(str(file))}"
-    tensors, _ = read_tensors(file, "what boxes learn from", fix)
-    try:
-        views = int(tensors.pop("views"))
-        if not tensors:
-            return views, []
-        names = [name for name in tensors if name.startswith("evidence.")]
-        evidence = {name.removeprefix("evidence."): tensors.pop(name) for name in names}
-        return views, [Records(Evidence(**evidence), **tensors)]
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise DatasetError(f"what boxes learn from is damaged ({error})", file, fix) from error
+
+def _choose(context: Context, best: Estimator, learner: Estimator, boxes: Boxes) -> None:
+    """Give the best estimator these boxes if the learner is better with them."""
+    views = context.options.validation_views
+    validation = unseen_samples(context, views, VALIDATION_SEEDS)
+    if context.objects.mixed:
+        validation += given_samples(context, len(validation), VALIDATION_SEEDS)
+    noisy = []
+    if _sees_noise(context):
+        noisy = unseen_samples(context, -(-views // _NOISY_EVERY), VALIDATION_SEEDS, SENSOR)
+    before, after = (
+        evaluate(estimator, validation + noisy, context.progress)
+        for estimator in (learner, replace(learner, boxes=boxes))
+    )
+    figures = summary(after[: len(validation)])
+    if mean_iou(after) > mean_iou(before):
+        save_estimator(replace(best, boxes=boxes), context.folder.best, context.about({"validation": figures}))
+    context.report("validation", scalars(figures), context.state.step)
+    say(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")

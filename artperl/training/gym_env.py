@@ -22,6 +22,7 @@ from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.core.pose import KINDS
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
+from artperl.data.sources import DataOptions
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
 
@@ -62,6 +63,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
                 "offset": _anything(N, 3),
                 "reference": _anything(P, M, 3),
                 "back": _anything(P, M, 3),
+                "shown": spaces.MultiBinary((P, M)),
                 "joint": _anything(P, 6),
                 "kind": spaces.MultiDiscrete(np.full(P, len(KINDS)), dtype=np.int64),
                 "parent": spaces.MultiDiscrete(np.full(P, P), dtype=np.int64),
@@ -78,7 +80,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
         """Draw a new problem; the same seed draws the same one."""
         super().reset(seed=seed)
         drawn = int(self.np_random.integers(1 << 31))
-        problems = Problems([self.category], self.base, 1, self.options.observed_points, drawn)
+        problems = Problems(DataOptions([self.category]), self.base, 1, self.options.observed_points, drawn)
         self._problem = problem = problems[0]
         self._fitting = Fitting(problem.shapes, problem.observed, problem.start, self.options)
         return self._observation(), self._info()
@@ -95,7 +97,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
         # Copies, since what is kept from one step to the next is the caller's.
         fields: dict[str, NDArray[Any]] = {name: tensor[0].numpy().copy() for name, tensor in vars(view).items()}
         fields = {k: np.clip(v, -_FAR, _FAR) if v.dtype == np.float32 else v for k, v in fields.items()}
-        return fields | {"valid": fields["valid"].astype(np.int8)}
+        return fields | {name: fields[name].astype(np.int8) for name in ("valid", "shown")}
 
     def _info(self) -> dict[str, Any]:
         fitting, problem = self._running(), self._problem

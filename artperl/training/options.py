@@ -1,20 +1,49 @@
-"""What a training run depends on, and presets."""
+"""What a training run depends on, and presets.
+
+Everything that a run may be told stands here once, with its default and its check. The command, the recipes and the
+presets name fields of :class:`TrainOptions` and give them values by :func:`changed`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
+from typing import Any, Literal, TypeVar
 
 from artperl.agent.decision_process import FittingOptions
-from artperl.agent.ppo import PPOOptions
+from artperl.agent.ppo import CLONING, JOINT, REINFORCEMENT, Phase, PPOOptions
 from artperl.data.categories import Parts
 from artperl.data.fitting_problems import Labels, References, StartOptions
+from artsim.common.json_records import from_json_values
 from artsim.datasets.plan import SampleOptions
+from artsim.errors import ConfigError
+
+T = TypeVar("T")
+Method = Literal["full", "artperl"]
+_MOST = 1_000_000_000
+_SHARES = ("stretched", "noisy", "cloning_share")
+_AT_LEAST_ONE = (
+    "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "episodes", "box_width",
+    "validate_every", "validate_rollouts", "test_objects", "validation_views", "test_views",
+)  # fmt: skip
+_AT_LEAST_ZERO = (
+    "perception_steps", "dense_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
+    "foreign_categories", "seed",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """What a run depends on."""
+    """What a run depends on.
 
+    Raises
+    ------
+    ConfigError
+        When a value is impossible, or two values contradict each other.
+    """
+
+    method: Method = "full"
+    """full: the estimator that is shipped; artperl: the method of the paper as printed."""
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
@@ -43,7 +72,7 @@ class TrainOptions:
     width: int = 48
     """Channels of perception's finest level."""
     perception_steps: int = 4000
-    """Batches of stage 1."""
+    """Batches that perception, or the segmentation of the method artperl, learns from."""
     dense_steps: int = 1000
     """Batches in its end, of fewer, denser clouds: of as many points as the estimator looks at."""
     denser: int = 2
@@ -52,6 +81,8 @@ class TrainOptions:
     """Share of these clouds whose objects are stretched between the edges of their parts."""
     noisy: float = 0.0
     """Share of the others that are as a depth sensor, a D435, sees them."""
+    retrieval_steps: int = 0
+    """Batches that the Siamese network of the method artperl learns from."""
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""
@@ -62,6 +93,8 @@ class TrainOptions:
     """Batches of episodes of stage 2; 0 goes without an agent."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
+    learning: Literal["both", "cloning", "reinforcement"] = "both"
+    """How the agent learns: behaviour cloning, then that and PPO; or one of them alone."""
     references: References = "retrieved"
     """What the agent learns to fit."""
     labels: Labels = "perceived"
@@ -92,10 +125,61 @@ class TrainOptions:
     fitting: FittingOptions = field(default_factory=FittingOptions)
     start: StartOptions = field(default_factory=StartOptions)
 
+    def __post_init__(self) -> None:
+        for names, least in ((_AT_LEAST_ONE, 1), (_AT_LEAST_ZERO, 0)):
+            for name in names:
+                if not least <= getattr(self, name) <= _MOST:
+                    raise ConfigError(f"{getattr(self, name)} is not possible", name, f"use {least} or more")
+        for name in _SHARES:
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ConfigError(f"{getattr(self, name)} is no share", name, "use 0 to 1")
+        for name in ("perception_rate", "agent_rate"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ConfigError(f"{getattr(self, name)} is no learning rate", name, "use 1e-4 to 1e-2")
+        if self.noisy and (self.dataset is not None or self.sample.noise != "none"):
+            raise ConfigError("clouds that have their noise get no other", "noisy", "use one of noise, dataset, noisy")
+        if self.dataset is not None and (self.real or self.files):
+            raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
+        if not self.categories and not self.files:
+            raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
+
+    def phase(self, rollout: int) -> Phase:
+        """The phase of Algorithm 1 that a rollout is in."""
+        if self.learning == "reinforcement":
+            return REINFORCEMENT
+        early = rollout < self.cloning_share * self.agent_rollouts
+        return CLONING if early or self.learning == "cloning" else JOINT
+
     @property
     def votes(self) -> bool:
         """Whether perception finds parts by votes: of families' objects with any parts, nobody knows how many."""
         return self.parts == "any" and not self.files
+
+
+def changed(options: T, changes: Mapping[str, Any]) -> T:
+    """Options with other values for some fields, at every depth.
+
+    Parameters
+    ----------
+    options : T
+        A dataclass.
+    changes : mapping
+        Names of fields and plain values, as a JSON file has them; a mapping for a field that is a dataclass.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such field, or a value is not of its type or impossible.
+    """
+    try:
+        given = from_json_values(type(options), changes)
+    except ValueError as error:
+        raise ConfigError(str(error), "options", "see artperl.training.options.TrainOptions") from error
+    values = {
+        name: changed(getattr(options, name), value) if is_dataclass(getattr(options, name)) else getattr(given, name)
+        for name, value in changes.items()
+    }
+    return replace(options, **values)  # type: ignore[type-var]
 
 
 PRESETS = {
@@ -115,5 +199,28 @@ PRESETS = {
         box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
 }  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: one
-category, on a GPU; joint: one estimator for many categories, with any parts."""
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: the
+same on a GPU, never measured; joint: one estimator for many categories, with any parts."""
+
+PAPER_PRESETS = {
+    "quick": TrainOptions(
+        method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=120, batch_size=16,
+        num_points=768, retrieval_steps=60, agent_rollouts=60, episodes=48, test_objects=20, test_views=2,
+    ),
+    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=1500, episodes=64),
+}  # fmt: skip
+"""Presets of the method artperl."""
+
+
+def preset_of(method: Method, name: str) -> TrainOptions:
+    """A preset of a method.
+
+    Raises
+    ------
+    ConfigError
+        When the method has no such preset.
+    """
+    presets = PRESETS if method == "full" else PAPER_PRESETS
+    if name not in presets:
+        raise ConfigError(f"the method {method} has no preset {name!r}", "preset", f"use {' or '.join(presets)}")
+    return presets[name]

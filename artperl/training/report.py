@@ -13,22 +13,20 @@ from torch.utils.tensorboard import SummaryWriter
 
 from artperl.evaluation.pictures import curves, overlays
 from artperl.evaluation.scoring import Scored
-from artperl.methods.full import Estimator
+from artperl.methods.protocol import Method
 from artsim.common.files import write_atomic, write_error
 from artsim.observing.sample import Sample
 
 _SHOWN = 8
 
 
-def write_report(
-    out: Path, estimator: Estimator, samples: Sequence[Sample], scored: Sequence[Scored], table: str
-) -> None:
+def write_report(out: Path, estimator: Method, samples: Sequence[Sample], scored: Sequence[Scored], table: str) -> None:
     """Write ``curves.png``, ``overlays.png``, ``worst.png`` and ``report.html`` into the folder of a run.
 
     Parameters
     ----------
     out : Path
-    estimator : Estimator
+    estimator : Method
     samples : sequence of Sample
         That the estimator was tested on.
     scored : sequence of Scored

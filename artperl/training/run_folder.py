@@ -23,6 +23,7 @@ from artsim.common.files import parse_json, read_bounded, write_atomic, write_er
 from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import DatasetError
 
+_FORMAT = 2
 _MAX_JSON = 64_000_000
 _SHOWN = 6
 """Differing options that are named."""
@@ -38,7 +39,7 @@ class RunFolder:
     """
 
     def __init__(self, path: Path):
-        self.path = path
+        self.path, self.best = path, path / "best"
         self._json, self._tensors = path / "state.json", path / "state.safetensors"
         self._next = path / ".state.safetensors.next"
         self.fix = (
@@ -62,7 +63,7 @@ class RunFolder:
             When another run is writing here.
         """
         with folder_lock(self.path):
-            for folder in (self.path, self.path / "best"):
+            for folder in (self.path, self.best):
                 for part in (*folder.glob(".*.part"), *folder.glob(".*.safetensors"), *folder.glob(".*.npz")):
                     part.unlink(missing_ok=True)
             yield
@@ -86,7 +87,7 @@ class RunFolder:
         ConfigError
             When the folder cannot be written to, or the disk is full; what was written before is still there.
         """
-        kept = {**state, "tensors_sha256": write_tensors(tensors, self._next)}
+        kept = {**state, "format": _FORMAT, "tensors_sha256": write_tensors(tensors, self._next)}
         digest = _digest(kept)
         write_atomic(self._json, (json.dumps({**kept, "sha256": digest}, indent=1) + "\n").encode())
         try:
@@ -111,21 +112,23 @@ class RunFolder:
             raise DatasetError(error.what, self._json, self.fix) from error
         except ValueError as error:
             raise DatasetError(f"the state of the run is damaged ({error})", self._json, self.fix) from error
-        if not isinstance(state, dict) or not {"best", "history"} <= state.keys() or not _is_options(state):
+        if not isinstance(state, dict) or not isinstance(state.get("options"), dict) or "sha256" not in state:
             raise DatasetError("the state of the run is damaged (there is no run in it)", self._json, self.fix)
-        digest = state.pop("sha256", None)
-        if digest is not None and digest != _digest(state):
+        if state.get("format") != _FORMAT:
+            raise DatasetError(f"format {state.get('format')!r:.20} is not {_FORMAT}", self._json, self.fix)
+        digest = str(state.pop("sha256"))
+        if digest != _digest(state):
             raise DatasetError("the state of the run is damaged (its checksum differs)", self._json, self.fix)
         wanted = state.pop("tensors_sha256", None)
         if self._next.exists():  # the run was killed before these tensors were in place, or before they were named
             with contextlib.suppress(DatasetError):
-                if wanted is not None and self._read_tensors(self._next)[1] == wanted:
+                if self._read_tensors(self._next)[1] == wanted:
                     self._next.replace(self._tensors)
             self._next.unlink(missing_ok=True)
         tensors, found = self._read_tensors(self._tensors)
-        if wanted not in (None, found):  # runs of earlier versions name none
+        if wanted != found:
             raise DatasetError("these are not the tensors that state.json names", self._tensors, self.fix)
-        return state, tensors, digest or ""
+        return state, tensors, digest
 
     def _read_tensors(self, path: Path) -> tuple[dict[str, Tensor], str]:
         return read_tensors(path, "the state of the run", self.fix)
@@ -154,10 +157,6 @@ class RunFolder:
             board.close()
         except OSError as error:
             raise write_error(error, events) from error
-
-
-def _is_options(state: Mapping[str, Any]) -> bool:
-    return isinstance(state.get("options"), dict)
 
 
 def differences(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:

@@ -56,12 +56,10 @@ def _estimator(folder: Path) -> None:
 
 
 def _state(folder: Path) -> None:
-    from artperl.training.run import completed
     from artperl.training.run_folder import RunFolder, differences
 
     state, _, _ = RunFolder(folder).read()
-    known = json.loads(json.dumps(asdict(TrainOptions())))
-    differences(completed(known, state["options"]), known)
+    differences(state["options"], json.loads(json.dumps(asdict(TrainOptions()))))
 
 
 def _dataset(folder: Path) -> None:

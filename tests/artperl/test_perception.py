@@ -12,7 +12,7 @@ from artperl.core.neighbours import nearest_by_products, nearest_by_trees
 from artperl.core.pointnet2 import Neighbourhoods, interpolated, strongest
 from artperl.data.batches import batches
 from artperl.data.categories import ARTIMAGE, objects_of
-from artperl.data.sources import Samples
+from artperl.data.sources import DataOptions, Samples
 from artperl.data.truth import Truth
 from artperl.estimator import load_estimator
 from artperl.evaluation.scoring import VALIDATION_SEEDS, frozen_samples
@@ -24,7 +24,7 @@ from artsim.observing.sample import Sample
 
 @pytest.fixture(scope="module")
 def batch() -> tuple[Clouds, Truth]:
-    return next(batches(["laptop", "eyeglasses"], 4, 128, 4, workers=0))
+    return next(batches(DataOptions(["laptop", "eyeglasses"]), 4, 128, 4, workers=0))
 
 
 def network(rows: int = 4) -> Perception:
@@ -69,7 +69,7 @@ def test_place_and_size_of_a_cloud_do_not_matter(batch: tuple[Clouds, Truth]) ->
 
 def test_truth_is_what_the_sample_says() -> None:
     options = SampleOptions(num_points=64)
-    clouds, truth = next(batches(["laptop"], 3, 64, 16, seed=5, workers=0))
+    clouds, truth = next(batches(DataOptions(["laptop"]), 3, 64, 16, seed=5, workers=0))
     samples = Samples(["laptop"], options, 5, 4, 3)
     for b in range(4):
         sample = samples[b]
@@ -85,10 +85,10 @@ def test_truth_is_what_the_sample_says() -> None:
 
 
 def test_batch_n_is_always_the_same() -> None:
-    stream = batches(["laptop"], 2, 32, 4, workers=0)
+    stream = batches(DataOptions(["laptop"]), 2, 32, 4, workers=0)
     batch_list = [next(stream) for _ in range(3)]
-    later = next(batches(["laptop"], 2, 32, 4, first_batch=2, workers=0))
-    worked = batches(["laptop"], 2, 32, 4, workers=2)
+    later = next(batches(DataOptions(["laptop"]), 2, 32, 4, first_batch=2, workers=0))
+    worked = batches(DataOptions(["laptop"]), 2, 32, 4, workers=2)
     parallel = [next(worked) for _ in range(3)]
     for i in range(3):
         assert torch.equal(batch_list[i][0].points, parallel[i][0].points)
@@ -98,7 +98,7 @@ def test_batch_n_is_always_the_same() -> None:
 
 def test_clouds_are_seen_in_several_batches_and_then_never_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("artperl.data.batches._WINDOW", 3)
-    stream = batches(["laptop"], 2, 32, 8, workers=0)
+    stream = batches(DataOptions(["laptop"]), 2, 32, 8, workers=0)
     centers = [set(next(stream)[0].center[:, 0].round(decimals=5).tolist()) for _ in range(12)]
     fresh = [now.difference(*centers[:n]) for n, now in enumerate(centers)]
     assert [len(views) for views in fresh] == [2] * 12
@@ -109,8 +109,8 @@ def test_clouds_are_seen_in_several_batches_and_then_never_again(monkeypatch: py
 
 def test_some_clouds_are_as_a_sensor_sees_them() -> None:
     """The same views, of which a share is rough: points lie off the surfaces that they would lie on."""
-    clean, noisy = (next(batches(["drawer"], 4, 256, 32, workers=0, noisy=share)) for share in (0.0, 0.5))
-    again = next(batches(["drawer"], 4, 256, 32, workers=2, noisy=0.5))
+    clean, noisy = (next(batches(DataOptions(["drawer"], noisy=share), 4, 256, 32, workers=0)) for share in (0.0, 0.5))
+    again = next(batches(DataOptions(["drawer"], noisy=0.5), 4, 256, 32, workers=2))
     assert again[0].points.equal(noisy[0].points)
     same = [bool((a == b).all()) for a, b in zip(clean[0].points, noisy[0].points, strict=True)]
     assert 4 < sum(same) < 28
@@ -189,7 +189,7 @@ def test_votes_are_learnt_and_losses_vanish_for_true_ones(batch: tuple[Clouds, T
 def test_what_is_true_of_joints_is_what_the_sample_says() -> None:
     """A door's axis passes its box at the pivot; a drawer has a direction alone; a link's level counts its joints."""
     for category in ("storage_furniture", "robot_arm"):
-        _, truth = next(batches([category], 10, 64, 4, seed=3, workers=0, parts="any"))
+        _, truth = next(batches(DataOptions([category], parts="any"), 10, 64, 4, seed=3, workers=0))
         samples = Samples([category], SampleOptions(num_points=64), 3, 1, 10, "any")
         sample, joint = samples[0], truth.joint[0].double().numpy()
         for k, kind in enumerate(sample.joint_type):

@@ -9,6 +9,7 @@ import torch
 
 import artsim
 from artperl.data.fitting_problems import Problem, Problems
+from artperl.data.sources import DataOptions
 from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.retrieval.box_embedding import by_boxes
@@ -28,7 +29,7 @@ def small_base(*categories: str, objects: int = 6) -> ShapeBase:
 @cache
 def small_problem(*categories: str, batch: int = 6) -> Problem:
     """A few fitting problems."""
-    return Problems(categories, small_base(*categories), batch, 128, seed=3)[0]
+    return Problems(DataOptions(categories), small_base(*categories), batch, 128, seed=3)[0]
 
 
 def view(obj: ArticulatedObject, seed: int, num_points: int = 2048) -> Sample:

@@ -19,11 +19,11 @@ import torch
 
 from artperl import cli
 from artperl.core.tensor_files import read_tensors, write_tensors
-from artperl.training.boxes import _load as load_records
+from artperl.training.box_records import load_records
 from artperl.training.run import Training
 from artperl.training.run_folder import RunFolder, differences
 from artsim.errors import ArtsimError, ConfigError, DatasetError
-from tests.artperl.test_training import TINY, ends_alike
+from tests.artperl.training.test_run import TINY, ends_alike
 from tests.conftest import ASSETS
 
 ROOT = ASSETS.parent
@@ -32,7 +32,7 @@ CHILD = """
 import os, signal, sys
 from pathlib import Path
 from artperl.training.run import Training
-from tests.artperl.test_run_folder import OPTIONS
+from tests.artperl.training.test_run_folder import OPTIONS
 
 place = Path.replace
 def stop_at_the_second(self, target):
@@ -104,7 +104,7 @@ def test_what_another_process_has_trained_meanwhile_is_taken_up(whole: Path, tmp
     late = Training(OPTIONS, tmp_path / "run", workers=0, progress=False)
     shutil.copytree(whole, tmp_path / "run")
     late.run()
-    assert late.done["perception"] == 2
+    assert late.context.state.done["perception"] == 2
     for name in ("state.json", "state.safetensors"):
         assert (tmp_path / "run" / name).read_bytes() == (whole / name).read_bytes()
 
@@ -243,7 +243,7 @@ def full_disk(monkeypatch: pytest.MonkeyPatch, after: int) -> Iterator[None]:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
-        patched.setattr("artsim.common.files.os.fsync", fsync)
+        patched.setattr(os, "fsync", fsync)
         yield
 
 

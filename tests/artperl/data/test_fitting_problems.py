@@ -8,6 +8,7 @@ import torch
 from artperl.agent.actions import residual
 from artperl.core.pose import pose_parts
 from artperl.data.fitting_problems import Problems, StartOptions, part_truth
+from artperl.data.sources import DataOptions
 from artperl.evaluation import metrics
 from artperl.retrieval.box_embedding import box_embedding
 from tests.artperl.worlds import small_base
@@ -15,7 +16,7 @@ from tests.artperl.worlds import small_base
 
 @pytest.mark.parametrize("category", ["laptop", "eyeglasses"])
 def test_goals_are_the_true_poses_and_boxes_of_the_sample(category: str) -> None:
-    problems = Problems([category], small_base(category), 4, 64, seed=2)
+    problems = Problems(DataOptions([category]), small_base(category), 4, 64, seed=2)
     problem = problems[1]
     posed = pose_parts(problem.shapes.trees, problem.goal, problem.shapes.box_center)
     for b in range(4):
@@ -32,7 +33,7 @@ def test_goals_are_the_true_poses_and_boxes_of_the_sample(category: str) -> None
 
 
 def test_goals_within_the_limits_of_the_reference_are_exact() -> None:
-    problems = Problems(["laptop"], small_base("laptop"), 4, 64, seed=2)
+    problems = Problems(DataOptions(["laptop"]), small_base("laptop"), 4, 64, seed=2)
     sample = problems.samples[0]
     problem = problems[0]
     posed = pose_parts(problem.shapes.trees, problem.goal, problem.shapes.box_center)
@@ -48,7 +49,7 @@ def test_goals_within_the_limits_of_the_reference_are_exact() -> None:
 
 def test_batch_n_is_always_the_same() -> None:
     base = small_base("laptop")
-    one, other = (Problems(["laptop"], base, 3, 64, seed=9) for _ in range(2))
+    one, other = (Problems(DataOptions(["laptop"]), base, 3, 64, seed=9) for _ in range(2))
     one[0]
     first, again = one[4], other[4]
     assert torch.equal(first.observed.points, again.observed.points)
@@ -59,7 +60,7 @@ def test_batch_n_is_always_the_same() -> None:
 
 def test_starts_are_as_far_from_the_goal_as_asked() -> None:
     options = StartOptions(rotation=0.4, translation=0.1, scale=0.05)
-    problems = Problems(["laptop"], small_base("laptop"), 16, 64, start=options)
+    problems = Problems(DataOptions(["laptop"]), small_base("laptop"), 16, 64, start=options)
     problem = problems[0]
     points = problem.observed.points
     radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
@@ -93,7 +94,13 @@ def test_an_object_with_as_many_parts_is_nearer_than_one_with_the_same_boxes() -
 def test_deformed_references_have_the_objects_own_trees_and_lead_to_the_truth() -> None:
     categories = ["storage_furniture", "robot_arm"]
     problems = Problems(
-        categories, small_base(*categories), 4, 64, seed=4, parts="any", views_per_object=1, references="deformed"
+        DataOptions(categories, "any"),
+        small_base(*categories),
+        4,
+        64,
+        seed=4,
+        views_per_object=1,
+        references="deformed",
     )
     problem = problems[0]
     trees = problem.shapes.trees

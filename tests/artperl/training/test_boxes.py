@@ -6,22 +6,20 @@ import os
 import signal
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
 
-import artsim
 from artperl.boxes.evidence import PERCEIVED, SHARES, Evidence, roughness
 from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import concatenate
 from artperl.estimator import load_estimator
 from artperl.evaluation.box_overlap import iou_aligned
 from artperl.evaluation.scoring import frozen_samples
-from artperl.methods.full import Estimator
-from artperl.training import boxes as box_training
+from artperl.training import box_records
+from artperl.training.boxes import best_without_own_references
 from artperl.training.options import TrainOptions
 from artperl.training.run import Training
 
@@ -174,31 +172,30 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
     unit = float(np.linalg.norm([0.2, 0.4, 0.3]))
     true_size, true_center = torch.tensor([[[0.22, 0.4, 0.3]]]) / unit, torch.tensor([[[0.01, 0.0, 0.0]]]) / unit
     rest = true_center + torch.tensor([0.01, 0.0, 0.0]) / unit
-    records = concatenate([box_training.Records(e, true_center, true_size, rest) for e in evidence])
-    boxes = box_training.learn(records, 1, 80, 150, 0, progress=False)
+    records = concatenate([box_records.Records(e, true_center, true_size, rest) for e in evidence])
+    boxes = box_records.learn(records, 1, 80, 150, 0, progress=False)
     center, size, farther = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
     assert iou_aligned(center, size, true_center, true_size).min() > 0.97
     assert float(farther[0, 0] * unit) == pytest.approx(0.01, abs=0.002)
-    again = box_training.learn(records, 1, 80, 150, 0, progress=False)
+    again = box_records.learn(records, 1, 80, 150, 0, progress=False)
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
 
 
-def test_recording_goes_on_where_it_stopped_whoever_estimates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recording_goes_on_where_it_stopped_whoever_estimates(tmp_path: Path) -> None:
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
     Training(STAGE, whole, workers=2, progress=False).run()
-    examined, calls = box_training._examined, []
+    seen = []
 
-    def interrupted(*arguments: Any) -> Any:
-        calls.append(1)
-        if len(calls) == 3:
-            os.kill(os.getpid(), signal.SIGINT)
-        return examined(*arguments)
+    def interrupt(group: str, figures: dict[str, float], step: int) -> None:
+        if group == "boxes":
+            seen.append(step)
+            if step == 2:
+                os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(box_training, "_examined", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        Training(STAGE, stopped, workers=0, progress=False).run()
+        Training(STAGE, stopped, workers=0, progress=False, report=interrupt).run()
     Training(STAGE, stopped, workers=0, progress=False).run()
-    assert len(calls) == 4
+    assert seen == [0, 1, 2]
     assert (whole / "boxes.safetensors").read_bytes() == (stopped / "boxes.safetensors").read_bytes()
     weights = [folder / "best" / "weights.safetensors" for folder in (whole, stopped)]
     assert weights[0].read_bytes() == weights[1].read_bytes()
@@ -212,25 +209,17 @@ def test_a_run_that_learns_nothing_calibrates_what_it_begins_with(tmp_path: Path
     assert all(torch.equal(a, b) for a, b in tensors)
 
 
-def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(tmp_path: Path) -> None:
     """Given objects are in the base; in use, those that are seen will not be."""
-    own = artsim.make("laptop", 7)
-    monkeypatch.setattr("artperl.training.run._given", lambda options: [own])
-    training = Training(replace(STAGE, box_views=2), tmp_path, workers=0, progress=False)
-    estimators = []
-
-    def watched(estimator: Estimator, *arguments: Any) -> Any:
-        estimators.append(estimator)
-        return box_training.record(estimator, *arguments)
-
-    monkeypatch.setattr("artperl.training.run.record", watched)
+    options = replace(STAGE, box_views=2, files=("urdf_assets/laptop",))
+    training = Training(options, tmp_path, workers=0, progress=False)
+    (own,) = training.context.objects.given
     training.run()
-    (learnt_from,) = estimators
-    assert own.object_id not in learnt_from.base.object_ids
-    assert len(learnt_from.base) == STAGE.base_objects
-    assert own.object_id in load_estimator(tmp_path / "best").base.object_ids
+    best = load_estimator(tmp_path / "best")
+    learner = best_without_own_references(best, training.context)
+    assert own.object_id in best.base.object_ids
+    assert own.object_id not in learner.base.object_ids
+    assert len(learner.base) == STAGE.base_objects
 
 
 def test_a_shipped_estimator_moves_faces_and_labels_but_no_part() -> None:

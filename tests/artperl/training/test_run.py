@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,16 +18,15 @@ from artperl import cli
 from artperl.agent.decision_process import FittingOptions
 from artperl.agent.ppo import PPOOptions
 from artperl.boxes.network import Boxes
-from artperl.core.part_order import visible_order
-from artperl.data.batches import batches
-from artperl.data.sources import Given, Recorded
+from artperl.data.sources import Given
 from artperl.estimator import load_estimator, read_settings, save_estimator
 from artperl.evaluation.scoring import TEST_SEEDS, VALIDATION_SEEDS
+from artperl.training.context import Report
+from artperl.training.objects import BASE_SEEDS
 from artperl.training.options import PRESETS, TrainOptions
-from artperl.training.run import BASE_SEEDS, Training
+from artperl.training.run import Training
 from artperl.training.steps import one_cycle
 from artsim import generate
-from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import family_sources
@@ -60,24 +58,24 @@ def test_a_run_leaves_an_estimator_a_table_and_curves(whole: Path) -> None:
     points = np.random.default_rng(0).normal(size=(200, 3)) * 0.1 + [0.0, 0.0, 1.0]
     assert np.isfinite(estimator(points).T_camera_part).all()
     history = json.loads((whole / "state.json").read_text())["history"]
-    assert [(h["done"]["perception"], h["done"]["agent"]) for h in history] == [(2, 0), (3, 0), (5, 0), (5, 2), (5, 3)]
+    stages = ("perception", "dense", "agent")
+    assert [tuple(h["done"].get(stage, 0) for stage in stages) for h in history] == [
+        (2, 0, 0), (3, 0, 0), (3, 2, 0), (3, 2, 2), (3, 2, 3),
+    ]  # fmt: skip
+    assert [h["step"] for h in history] == [2, 3, 5, 7, 8]
 
 
 def test_an_estimator_looks_at_twice_the_points_of_a_learnt_cloud(whole: Path) -> None:
     assert load_estimator(whole / "best").options.num_points == 2 * TINY.num_points
 
 
-@pytest.mark.parametrize("stop", [("perception", 2), ("perception", 4), ("agent", 1)], ids=str)
-def test_a_stopped_run_ends_as_if_it_had_not_been(
-    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: tuple[str, int]
-) -> None:
+@pytest.mark.parametrize("stop", [("perception", 2), ("dense", 1), ("agent", 1)], ids=str)
+def test_a_stopped_run_ends_as_if_it_had_not_been(whole: Path, tmp_path: Path, stop: tuple[str, int]) -> None:
     stage, after = stop
-    monkeypatch.setattr("artperl.training.run.write_scalars", _interrupt(stage, after))
     with pytest.raises(KeyboardInterrupt):
-        Training(TINY, tmp_path, workers=0, progress=False).run()
-    monkeypatch.undo()
+        Training(TINY, tmp_path, workers=0, progress=False, report=_interrupt(stage, after)).run()
     again = Training(TINY, tmp_path, workers=0, progress=False)
-    assert again.done[stage] == after
+    assert again.context.state.done[stage] == after
     again.run()
     ends_alike(whole, tmp_path)
 
@@ -96,14 +94,17 @@ def ends_alike(*runs: Path) -> None:
     assert timeless[0] == timeless[1]
 
 
-def _interrupt(group: str, after: int) -> Callable[..., None]:
-    """Ctrl-C in the midst of a step."""
+def _interrupt(stage: str, after: int) -> Report:
+    """Ctrl-C in the midst of a step of a stage."""
+    steps = 0
 
-    def write(board: object, written: str, figures: dict[str, float], step: int) -> None:
-        if written == group and step + 1 == after:
+    def report(group: str, figures: dict[str, float], step: int) -> None:
+        nonlocal steps
+        steps += group == stage
+        if group == stage and steps == after:
             os.kill(os.getpid(), signal.SIGINT)
 
-    return write
+    return report
 
 
 def test_families_with_any_parts_are_learnt_by_votes_and_learnt_on_by_number(tmp_path: Path) -> None:
@@ -119,11 +120,12 @@ def test_families_with_any_parts_are_learnt_by_votes_and_learnt_on_by_number(tmp
         start_from=str(tmp_path / "any" / "best"),
     )  # fmt: skip
     training = Training(files, tmp_path / "files", workers=0, progress=False)
-    begun = training.perception
+    begun = training.context.estimator().perception
     assert not begun.votes
-    assert training.boxes is None  # they learnt from parts by votes
+    assert training.context.estimator().boxes is None  # they learnt from parts by votes
     same_head = replace(options, start_from=str(tmp_path / "any" / "best"))
-    assert Training(same_head, tmp_path / "again", workers=0, progress=False).boxes is not None
+    again = Training(same_head, tmp_path / "again", workers=0, progress=False)
+    assert again.context.estimator().boxes is not None
     same = {
         name: torch.equal(t, begun.state_dict()[name]) for name, t in learnt.state_dict().items() if "head" not in name
     }
@@ -219,32 +221,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return generate(sources, tmp_path_factory.mktemp("recorded"), num_samples=24, sample=options).folder
 
 
-def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
-    samples = Recorded(recorded, ["laptop"], 3, 2, 96)
-    train = [sample for sample in open_dataset(recorded, "train") if sample.category == "laptop"]
-    first, second = ([samples[i].index for i in range(n, n + len(train))] for n in (0, len(train)))
-    assert sorted(first) == sorted(second) == [sample.index for sample in train]
-    assert first != second
-    assert len(samples.object(0)) == 2
-    rows, _ = next(batches(["laptop"], 2, 96, 4, workers=0, seed=3, dataset=recorded))
-    assert rows.points.shape == (4, 96, 3)
-    with pytest.raises(DatasetError, match="no scissors"):
-        Recorded(recorded, ["scissors"], 0, 2, 96)
-    with pytest.raises(DatasetError, match="fewer than 1024"):
-        Recorded(recorded, ["laptop"], 0, 2, 1024)
-
-
-def test_an_estimator_for_any_parts_reads_a_dataset_in_the_order_that_it_knows(tmp_path: Path) -> None:
-    sources = family_sources(["storage_furniture"], 3)
-    folder = generate(sources, tmp_path / "data", num_samples=12, sample=SampleOptions(num_points=64)).folder
-    samples = Recorded(folder, ["storage_furniture"], 0, 10, 64, "any")
-    for i in range(4):
-        sample, obj = samples[i], samples.object(i)
-        np.testing.assert_allclose(sample.box_center, obj.box_center, atol=1e-6)
-        order = visible_order(sample.joint_parent, sample.box_center, sample.box_size)
-        assert order == list(range(len(obj)))
-
-
 def test_a_run_on_a_dataset_ends_like_any_other(recorded: Path, tmp_path: Path) -> None:
     options = replace(TINY, dataset=str(recorded))
     with pytest.raises(DatasetError, match="fewer than 192"):
@@ -261,18 +237,17 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
     urdf = Path("urdf_assets/cabinet/mobility.urdf")
     options = replace(TINY, categories=(), files=(str(urdf),), parts="any", max_parts=6)
     training = Training(options, tmp_path, workers=0, progress=False)
-    assert (len(training.base), training.perception.num_rows) == (1, 6)
+    objects = training.context.objects
+    assert (len(objects.base), training.context.estimator().perception.num_rows) == (1, 6)
     training.run()
     figures = json.loads((tmp_path / "figures.json").read_text())
     ((category, figure),) = figures.items()
     assert category == load(urdf).category
     assert len(figure["parts"]) == len(load(urdf))
-    samples = Given(training.given, SampleOptions(num_points=64), 5, 2, 6)
+    samples = Given(objects.given, SampleOptions(num_points=64), 5, 2, 6)
     states = [samples[i].joint_state for i in range(3)]
     assert not np.array_equal(states[0], states[1])
-    np.testing.assert_array_equal(
-        states[0], Given(training.given, SampleOptions(num_points=64), 5, 2, 6)[0].joint_state
-    )
+    np.testing.assert_array_equal(states[0], Given(objects.given, SampleOptions(num_points=64), 5, 2, 6)[0].joint_state)
     with pytest.raises(ConfigError, match="more than 2"):
         Training(replace(options, max_parts=2), tmp_path / "few", workers=0, progress=False)
     # What it was learnt from is no family, so that a test needs to be told its objects.

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 import artsim
 from artperl.data.batches import batches
+from artperl.data.sources import DataOptions
 from artperl.data.stretching import stretch, stretchable
 from artperl.evaluation.artimage import real_objects
 from artsim.model.kinematics import Array, KinematicTree
@@ -113,11 +114,11 @@ def _density(points: Array) -> float:
 
 
 def test_batches_with_stretched_clouds_are_always_the_same() -> None:
-    alone = batches(["drawer"], 4, 64, 8, workers=0, stretched=0.5)
+    alone = batches(DataOptions(["drawer"], stretched=0.5), 4, 64, 8, workers=0)
     first, second = next(alone), next(alone)
-    beside = batches(["drawer"], 4, 64, 8, workers=2, stretched=0.5)
+    beside = batches(DataOptions(["drawer"], stretched=0.5), 4, 64, 8, workers=2)
     assert next(beside)[0].points.equal(first[0].points)
-    later = next(batches(["drawer"], 4, 64, 8, first_batch=1, workers=0, stretched=0.5))
+    later = next(batches(DataOptions(["drawer"], stretched=0.5), 4, 64, 8, first_batch=1, workers=0))
     assert later[1].box_size.equal(second[1].box_size)
-    as_made = next(batches(["drawer"], 4, 64, 8, workers=0))
+    as_made = next(batches(DataOptions(["drawer"]), 4, 64, 8, workers=0))
     assert not as_made[1].box_size.equal(first[1].box_size)

@@ -123,3 +123,51 @@ def test_episodes_do_not_depend_on_their_neighbours(problem: Problem) -> None:
     torch.testing.assert_close(together.distance[2:3], alone.distance, atol=1e-5, rtol=1e-4)
     for one, other in pairwise((together.theta.state[2], alone.theta.state[0])):
         torch.testing.assert_close(one, other, atol=1e-5, rtol=1e-4)
+
+
+def test_a_child_acts_after_its_parent_and_never_with_it(problem: Problem) -> None:
+    """Root first: whatever the action says, a step moves the parts of one level, and both levels come in turn."""
+    fitting = Fitting(problem.shapes, problem.observed, problem.start, replace(OPTIONS, order="root first", steps=2))
+    trees, anything = problem.shapes.trees, torch.full((*problem.shapes.trees.valid.shape, 9), 8)
+    for step in range(4):
+        before = fitting.theta
+        fitting.step(anything)
+        after = fitting.theta
+        root = torch.linalg.matrix_norm(after.rotation - before.rotation) > 1e-4
+        assert (root == (step % 2 == 0)).all()
+        assert ((after.state != before.state).any(1) <= (step % 2 == 1)).all()
+        assert ((after.shift != before.shift).any((1, 2)) == (step % 2 == 1)).all()
+        grown = (after.log_scale != before.log_scale).any(1)
+        assert (grown == (step % 2 == 0)).all()
+    assert fitting.done
+    assert (trees.depth.amax(1) == 1).all()
+
+
+def test_what_a_child_sees_follows_the_action_of_its_parent(problem: Problem) -> None:
+    fitting = Fitting(problem.shapes, problem.observed, problem.start, replace(OPTIONS, order="root first"))
+    before = fitting.view()
+    action = torch.full((*problem.shapes.trees.valid.shape, 9), 5)
+    action[:, 0, 3] = 9  # the root moves by 0.09 radii along the camera's x axis
+    fitting.step(action)
+    moved = (fitting.view().reference - before.reference)[before.shown][:, 0]
+    torch.testing.assert_close(moved, torch.full_like(moved, 0.09), atol=1e-5, rtol=1e-4)
+    assert not fitting.mask[:, 0].any()
+
+
+def test_only_what_faces_the_camera_counts(problem: Problem) -> None:
+    """Points whose surface leans away from the camera change neither the distance nor what the agent sees."""
+    options = replace(OPTIONS, facing=True, distance="both")
+    fitting = Fitting(problem.shapes, problem.observed, problem.start, options)
+    posed = fitting.posed
+    points = posed.points(fitting.shapes.points, fitting.shapes.box_center)
+    away = (points * posed.normals(fitting.shapes.normals)).sum(-1) >= 0
+    assert 0.2 < away.float().mean() < 0.8
+    hidden = problem.shapes.points.clone()
+    few = OPTIONS.reference_points
+    hidden[:, :, :few] = torch.where(away[..., None], points.new_tensor(0.0), hidden[:, :, :few])
+    # A point that leans away may be anywhere, as long as it does so from there, too.
+    other = Fitting(replace(problem.shapes, points=hidden), problem.observed, problem.start, options)
+    stay = (other.shown == fitting.shown).all((1, 2))
+    assert stay.any()
+    torch.testing.assert_close(other.distance[stay], fitting.distance[stay])
+    assert (fitting.view().reference[~fitting.shown] == 0).all()

@@ -10,29 +10,33 @@ import torch
 
 from artperl.agent.actions import MOVE, NUM_AXES, NUM_BINS, SCALE, action_mask
 from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.agent.policy import Agent
+from artperl.agent.policy import Agent, StatePolicy
 from artperl.agent.ppo import (
+    CLONING,
+    JOINT,
+    REINFORCEMENT,
+    Buffer,
+    Phase,
     PPOOptions,
-    Rollout,
-    acting,
     advantages,
+    algorithm_1,
     cloning_loss,
-    collect,
     log_probability,
     ppo_losses,
+    rollout,
     update,
 )
-from artperl.core.pose import KINDS
+from artperl.core.pose import KINDS, Theta
 from tests.artperl.worlds import small_problem
 from tests.conftest import installed
 
 FITTING = FittingOptions(steps=3, observed_points=96, reference_points=32)
 
 
-def a_rollout(agent: Agent, options: PPOOptions, seed: int = 0, kinds: tuple[str, ...] = ("laptop",)) -> Rollout:
+def a_buffer(agent: Agent, phase: Phase, seed: int = 0, kinds: tuple[str, ...] = ("laptop",)) -> Buffer:
     problem = small_problem(*kinds)
     fitting = Fitting(problem.shapes, problem.observed, problem.start, FITTING)
-    return collect(agent, fitting, problem.goal, options, torch.Generator().manual_seed(seed))
+    return rollout(agent, fitting, problem.goal, phase, PPOOptions(), torch.Generator().manual_seed(seed))
 
 
 def an_agent(seed: int = 0, width: int = 16) -> Agent:
@@ -57,25 +61,25 @@ def test_losses_are_those_of_stable_baselines() -> None:
     """The formulas of Stable-Baselines3's PPO.train, on its own distribution over MultiDiscrete actions."""
     distributions = installed("stable_baselines3.common.distributions")
     options = PPOOptions()
-    rollout = a_rollout(an_agent(), options)
+    buffer = a_buffer(an_agent(), JOINT)
     moved = an_agent(1)
-    logits, value = moved(rollout.view)
-    logits = acting(logits, options)
-    rows = torch.arange(len(rollout.log_prob))
-    advantage = rollout.advantage - rollout.advantage.mean()
-    ours = ppo_losses(logits, value, rollout, advantage, rows, options)
-    has = rollout.mask[0]
-    assert (rollout.mask == has).all()  # so that masked axes can be left out of the oracle's action space
+    logits, value = moved(buffer.view)
+    logits = JOINT.sharpness * logits
+    rows = torch.arange(len(buffer.log_prob))
+    advantage = buffer.advantage - buffer.advantage.mean()
+    ours = ppo_losses(logits, value, buffer, advantage, rows, options)
+    has = buffer.mask[0]
+    assert (buffer.mask == has).all()  # so that masked axes can be left out of the oracle's action space
     theirs = distributions.MultiCategoricalDistribution([NUM_BINS] * int(has.sum()))
     theirs = theirs.proba_distribution(logits[:, has].flatten(1))
-    log_prob = theirs.log_prob(rollout.action[:, has])
-    ratio = torch.exp(log_prob - rollout.log_prob)
+    log_prob = theirs.log_prob(buffer.action[:, has])
+    ratio = torch.exp(log_prob - buffer.log_prob)
     clipped = advantage * torch.clamp(ratio, 1 - options.clip, 1 + options.clip)
     wanted = {
         "policy": -torch.min(advantage * ratio, clipped).mean(),
-        "value": torch.nn.functional.mse_loss(rollout.result, value),
+        "value": torch.nn.functional.mse_loss(buffer.result, value),
         "entropy": theirs.entropy().mean(),
-        "divergence": torch.mean((torch.exp(log_prob - rollout.log_prob) - 1) - (log_prob - rollout.log_prob)),
+        "divergence": torch.mean((torch.exp(log_prob - buffer.log_prob) - 1) - (log_prob - buffer.log_prob)),
     }
     for name, value_wanted in wanted.items():
         torch.testing.assert_close(ours[name], value_wanted, atol=1e-5, rtol=1e-5)
@@ -83,12 +87,12 @@ def test_losses_are_those_of_stable_baselines() -> None:
 
 def test_a_policy_has_not_yet_diverged_from_itself() -> None:
     agent, options = an_agent(), PPOOptions()
-    rollout = a_rollout(agent, options)
-    rows = torch.arange(len(rollout.log_prob))
-    logits, value = agent(rollout.view)
-    losses = ppo_losses(acting(logits, options), value, rollout, rollout.advantage, rows, options)
+    buffer = a_buffer(agent, JOINT)
+    rows = torch.arange(len(buffer.log_prob))
+    logits, value = agent(buffer.view)
+    losses = ppo_losses(JOINT.sharpness * logits, value, buffer, buffer.advantage, rows, options)
     assert losses["divergence"].item() == pytest.approx(0.0, abs=1e-5)
-    assert losses["policy"].item() == pytest.approx(-rollout.advantage.mean().item(), abs=1e-5)
+    assert losses["policy"].item() == pytest.approx(-buffer.advantage.mean().item(), abs=1e-5)
 
 
 def test_actions_are_drawn_as_likely_as_the_policy_says() -> None:
@@ -122,28 +126,27 @@ def test_cloning_weighs_rotation_translation_and_scale() -> None:
         assert cloning_loss(sure, expert, mask, kind, options).item() == pytest.approx(gained, rel=1e-4)
 
 
-@pytest.mark.parametrize("reinforcement", [False, True])
-def test_the_agent_learns_what_the_expert_does(reinforcement: bool) -> None:
-    options = PPOOptions(reinforcement=reinforcement, epochs=25, minibatch=18)
+@pytest.mark.parametrize("phase", [CLONING, JOINT], ids=["cloning", "joint"])
+def test_the_agent_learns_what_the_expert_does(phase: Phase) -> None:
+    options = PPOOptions(epochs=25, minibatch=18)
     agent = an_agent()
-    rollout = a_rollout(agent, options)
-    seen: list[dict[str, float]] = []
+    buffer = a_buffer(agent, phase)
     optimizer = torch.optim.Adam(agent.parameters(), 3e-3)
-    update(agent, optimizer, rollout, options, torch.Generator().manual_seed(0), seen.append)
+    seen = update(agent, optimizer, buffer, phase, options, torch.Generator().manual_seed(0))
     assert seen[-1]["cloning"] < 0.8 * seen[0]["cloning"]
     assert seen[-1]["accuracy"] > seen[0]["accuracy"] + 0.1
 
 
 def test_rewarded_actions_become_likelier() -> None:
-    options = PPOOptions(behaviour_cloning=False, epochs=3)
+    options = PPOOptions(epochs=3)
     agent = an_agent()
-    rollout = a_rollout(agent, options)
+    buffer = a_buffer(agent, REINFORCEMENT)
     with torch.no_grad():
-        rollout.advantage.copy_((torch.arange(len(rollout.advantage)) % 2).float())
+        buffer.advantage.copy_((torch.arange(len(buffer.advantage)) % 2).float())
     optimizer = torch.optim.Adam(agent.parameters(), 1e-3)
-    update(agent, optimizer, rollout, options, torch.Generator().manual_seed(0))
-    logits, _ = agent(rollout.view)
-    gain = log_probability(acting(logits, options), rollout.action, rollout.mask) - rollout.log_prob
+    update(agent, optimizer, buffer, REINFORCEMENT, options, torch.Generator().manual_seed(0))
+    logits, _ = agent(buffer.view)
+    gain = log_probability(JOINT.sharpness * logits, buffer.action, buffer.mask) - buffer.log_prob
     assert gain[1::2].mean() > gain[0::2].mean()
 
 
@@ -163,3 +166,24 @@ def test_the_policy_knows_parts_by_their_joints_not_by_their_rows() -> None:
     torch.testing.assert_close(value, value_again, atol=1e-5, rtol=1e-4)
     rows = torch.tensor([2, 0, 1])
     torch.testing.assert_close(agent(view[rows])[0], logits[rows], atol=1e-5, rtol=1e-4)
+
+
+def test_algorithm_1_goes_on_as_if_it_had_not_been_stopped() -> None:
+    problem = small_problem("laptop")
+
+    def episodes(n: int) -> tuple[Fitting, Theta]:
+        return Fitting(problem.shapes, problem.observed, problem.start, FITTING), problem.goal
+
+    def run(policy: StatePolicy, optimizer: torch.optim.Optimizer, first: int, last: int) -> list[dict[str, float]]:
+        phases = (CLONING, CLONING, JOINT, JOINT)
+        return list(algorithm_1(policy, optimizer, episodes, phases.__getitem__, PPOOptions(), 3, first, last))
+
+    ends = []
+    for parts in ([(0, 4)], [(0, 1), (1, 3), (3, 4)]):
+        torch.manual_seed(0)
+        policy = StatePolicy(8)
+        optimizer = torch.optim.Adam(policy.parameters(), 1e-3)
+        figures = [figure for first, last in parts for figure in run(policy, optimizer, first, last)]
+        assert len(figures) == 4
+        ends.append(torch.cat([tensor.flatten() for tensor in policy.state_dict().values()]))
+    assert torch.equal(*ends)

@@ -1,0 +1,146 @@
+"""The verb ``artperl evaluate``."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+from artsim.common.files import write_atomic
+from artsim.common.progress import say
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import ConfigError
+from artsim.loading.roots import PackageRoots
+from artsim.model.draws import StateMode, StateOptions, ViewOptions, ViewPreset
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Test an estimator on unseen objects, procedural ones or those of files, and print the table of its errors.
+
+    Or fill the rows of a benchmark with the estimators that come with the package:
+    artperl evaluate --benchmark artimage --json figures.json
+    """
+
+    estimator: tyro.conf.Positional[Path | None] = None
+    """Folder of the estimator, or the name of one that comes with the package. For a benchmark, folder of the
+    estimators by category; by default those that come with the package."""
+    method: Literal["full", "artperl"] = "full"
+    """Method of the estimator."""
+    benchmark: Literal["artimage"] | None = None
+    """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
+    ablation: bool = False
+    """Test the estimator with one stage after the other left out or changed."""
+    cloned: Path | None = None
+    """For the ablation: estimator whose agent learnt by behaviour cloning alone."""
+    reinforced: Path | None = None
+    """For the ablation: estimator whose agent learnt by PPO alone."""
+    rows: tuple[Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"], ...] = ()
+    """Rows of the benchmark; by default all that there are objects and weights for."""
+    real_weights: Path | None = None
+    """For the row real_trained: folder of the estimators that have learnt from real objects, too."""
+    partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
+    """For the rows of real objects: unpacked PartNet-Mobility; by default what ARTSIM_PARTNET_DIR names."""
+    category: tuple[str, ...] = ()
+    """Procedural categories; by default those that it was trained on."""
+    objects: int = 40
+    """Unseen procedural objects of each category."""
+    files: tuple[Path, ...] = ()
+    """Instead of procedural objects: URDF files, object folders, or folders of them. An estimator of one category of
+    ArtImage is tested on them as ArtImage has it: parts that move otherwise stay at rest, and drawers open to the
+    front."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
+    views: int | None = None
+    """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
+    states: StateMode = "uniform"
+    """In which states objects are: anywhere within their limits, at rest (shut, but for eyeglasses), at the ends, or
+    mixed. A benchmark has them anywhere."""
+    preset: ViewPreset = "artimage"
+    """From where objects are seen."""
+    seen_from: tuple[float, float] | None = None
+    """Azimuths that the estimator is told that the camera is within, degrees about the object's vertical, 0 for its
+    front. By default it is not told."""
+    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
+    """Depth sensor of the clouds."""
+    num_points: int = 8192
+    """Points of a cloud: pixels of the object, drawn at random."""
+    json: Path | None = None
+    """Write the figures to this file."""
+
+    def run(self) -> None:
+        figures = self._single() if self.benchmark is None else self._rows()
+        if self.json is not None:
+            write_atomic(self.json, _json(figures))
+
+    def _rows(self) -> dict[str, Any]:
+        from artperl.data.categories import ARTIMAGE
+        from artperl.evaluation.artimage import ROWS, VIEWS
+        from artperl.evaluation.benchmark_rows import run_rows
+
+        if (self.states, self.preset, self.noise) != ("uniform", "artimage", "none"):
+            raise ConfigError(
+                "a benchmark has states, viewpoints and noise of its own", "states, preset, noise",
+                "leave them out, or name an estimator instead of the benchmark",
+            )  # fmt: skip
+        rows = self.rows or tuple(
+            row
+            for row in ROWS
+            if not (row == "real_trained" and self.real_weights is None)
+            and not (row.startswith("real") and self.partnet is None)
+        )
+        for row in (row for row in ROWS if not self.rows and row not in rows):
+            print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
+        return run_rows(
+            rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
+            self.views or VIEWS, self.num_points, True, say, self.seen_from,
+        )  # fmt: skip
+
+    def _single(self) -> dict[str, Any]:
+        from artperl.estimator import folder_of, load_estimator, read_settings
+        from artperl.evaluation.artimage import as_known
+        from artperl.evaluation.scoring import evaluate, frozen_samples, samples_of, summary, table
+        from artperl.methods.full import Estimator
+        from artsim.loading.sources import find_sources
+
+        if self.estimator is None:
+            raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
+        told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
+        estimator = load_estimator(self.estimator, method=self.method, **told)
+        learnt = read_settings(folder_of(self.estimator))["about"]["options"]
+        options = SampleOptions(
+            self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
+        )
+        views, parts = self.views or 4, learnt.get("parts", "artimage")
+        categories = self.category or tuple(learnt["categories"])
+        if self.files:
+            objects = (
+                as_known(source.load(), categories, parts) for source in find_sources(self.files, self.package_root)
+            )
+            samples = samples_of(objects, views, options)
+        elif not categories:
+            raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")
+        else:
+            samples = frozen_samples(categories, self.objects, views, options, parts=parts)
+        if self.ablation:
+            if not isinstance(estimator, Estimator):
+                raise ConfigError("the ablation leaves out stages of the method full", "ablation", "leave it out")
+            from artperl.evaluation.ablation import run_ablation, variants
+            from artperl.evaluation.basin import basin_problem, run_basin
+
+            agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
+            result = run_ablation(variants(estimator, *agents), samples, say, True)
+            if estimator.agent is not None and not self.files:
+                result["start"] = run_basin(estimator, basin_problem(estimator, categories, parts), say)
+            return result
+        figures = summary(evaluate(estimator, samples, progress=True))
+        print(table(figures))
+        return figures
+
+
+def _json(record: Any) -> bytes:
+    return (json.dumps(record, indent=1) + "\n").encode()

@@ -1,0 +1,169 @@
+"""The verb ``artperl train``."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from artsim.errors import ConfigError
+from artsim.loading.roots import PackageRoots
+from artsim.model.draws import StateMode, ViewPreset
+
+if TYPE_CHECKING:
+    from artperl.training.options import TrainOptions
+    from artperl.training.recipes import Recipe
+
+_FILE_VIEWS = 40
+"""Views of files, at least, that an estimator is tested with."""
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train an estimator on fresh procedural objects, or on objects of your own, and test it as it learns.
+
+    Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
+    the same command goes on where it stopped, with the same result. Curves: tensorboard --logdir OUT.
+
+    To see it learn: python train.py --category laptop --preset quick
+
+    To train well: python train.py --category eyeglasses --preset full --out out/eyeglasses
+
+    To make an estimator that comes with the package: artperl train --recipe laptop
+
+    For a robot of your own, from the estimator for any tree:
+    python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000 --agent-rollouts 0
+
+    What is not given is as the preset or the recipe has it.
+    """
+
+    preset: Literal["quick", "full", "gpu", "joint"] | None = None
+    """quick: under five minutes on two cores, to see it learn; full: within the hour; gpu: longer, on a GPU, never
+    measured; joint: one estimator for many categories, with any parts. By default the recipe's, else quick."""
+    recipe: str | None = None
+    """A recipe that comes with the package, by the name of its estimator, or a JSON file. With a preset, the run is as
+    long as that preset's. A finished run is left as it is."""
+    out: Path | None = None
+    """Folder of the run; by default out/train/CATEGORY-PRESET."""
+    workers: int = 1
+    """Processes that make clouds while the network learns, and estimates that boxes learn from; the result does not
+    depend on it."""
+    threads: int | None = None
+    """Processor threads of the network; by default torch's choice."""
+
+    # From here on: fields of TrainOptions under their own names, then those of its parts.
+    method: Literal["full", "artperl"] | None = None
+    """full: the method that comes with trained weights; artperl: section 4 of the paper as printed."""
+    categories: Annotated[tuple[str, ...] | None, tyro.conf.arg(name="category")] = None
+    """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By
+    default laptop."""
+    files: tuple[Path, ...] | None = None
+    """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
+    and from other sides; for objects that were not learnt from use artperl evaluate --files."""
+    package_roots: Annotated[PackageRoots | None, tyro.conf.arg(name="package-root")] = None
+    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
+    parts: Literal["artimage", "any"] | None = None
+    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
+    objects of the families."""
+    seed: int | None = None
+    perception_steps: int | None = None
+    """Batches that perception learns from."""
+    dense_steps: int | None = None
+    """More batches, of fewer, denser clouds: of as many points as the estimator looks at."""
+    denser: int | None = None
+    """Times the points of a training cloud that the estimator looks at."""
+    stretched: float | None = None
+    """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
+    noisy: float | None = None
+    """Share of perception's other training clouds that are as a depth sensor, a D435, sees them."""
+    perception_rate: float | None = None
+    """Highest learning rate of perception; a lower one changes less of what --start-from brings along."""
+    agent_rollouts: int | None = None
+    """Batches of episodes that the agent learns from, 0 for no agent."""
+    box_views: int | None = None
+    """Fresh views whose estimates teach where boxes end, 0 to keep those of the references."""
+    box_width: int | None = None
+    """Channels of the network that says where boxes end."""
+    real: bool = False
+    """Learn from real objects, too: every other one, of the half of ArtImage's frozen split that is not for testing."""
+    dataset: Path | None = None
+    """Learn from the train split of a dataset that generate.py wrote, instead of from fresh objects."""
+    start_from: Path | None = None
+    """Folder of an estimator whose networks are learnt on; by default they begin at random."""
+    device: Literal["cpu", "cuda"] | None = None
+    """Where the networks learn."""
+    learning: Literal["both", "cloning", "reinforcement"] | None = None
+    """How the agent learns: behaviour cloning and PPO, or one of them alone."""
+    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] | None = None
+    """Depth sensor of the clouds."""
+    states: StateMode | None = None
+    """In which states objects are learnt and tested: anywhere within their limits; at rest; at the ends; or mixed,
+    every other object anywhere, the others at rest or at the ends, as things at home mostly are."""
+    views: ViewPreset | None = None
+    """From where objects are seen: from the front, as in ArtImage, from all round, or half of them each way."""
+
+    def run(self) -> None:
+        import torch
+
+        from artperl.training.recipes import Recipe, is_made
+        from artperl.training.run import Training
+
+        if self.threads is not None:
+            torch.set_num_threads(self.threads)
+        recipe = None if self.recipe is None else Recipe.read(self.recipe)
+        options = self._options(recipe)
+        preset = self.preset or (recipe.preset if recipe else "quick")
+        name = recipe.name if recipe else "-".join(self.categories or ()) or Path((*options.files, "laptop")[0]).stem
+        method = "" if options.method == "full" else f"{options.method}-"
+        out = self.out or Path("out/train") / f"{name}-{method}{preset}"
+        if recipe is None or not is_made(out, recipe):
+            try:
+                Training(options, out, self.workers, recipe=recipe).run()
+            except KeyboardInterrupt:
+                print(f"stopped; the same command goes on from {out}", file=sys.stderr)
+                sys.exit(130)
+        print((out / "table.txt").read_text(), end="")
+        print(f"estimator: {out / 'best'}")
+
+    def _options(self, recipe: Recipe | None) -> TrainOptions:
+        """Those of the preset or the recipe, with what is given."""
+        from artperl.training.options import TrainOptions, changed, preset_of
+        from artsim.families import FAMILIES
+
+        known = {field.name for field in fields(TrainOptions)}
+        changes = {
+            field.name: _plain(value)
+            for field in fields(self)
+            if field.name in known and (value := getattr(self, field.name)) is not None and value is not False
+        }
+        seen = {"noise": self.noise, "states": self.states and {"mode": self.states},
+                "views": self.views and {"preset": self.views}}  # fmt: skip
+        if any(seen.values()):
+            changes["sample"] = {name: value for name, value in seen.items() if value is not None}
+        if recipe is not None:
+            if changes.keys() - {"device"}:
+                raise ConfigError(
+                    f"the recipe says that itself: {', '.join(changes)}", "recipe", "give no other options with it"
+                )
+            return changed(recipe.train_options(self.preset), changes)
+        preset = preset_of(self.method or "full", self.preset or "quick")
+        if self.files:
+            if self.categories or self.real or self.parts == "artimage":
+                raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")
+            views = max(preset.test_objects, _FILE_VIEWS)
+            changes |= {"categories": [], "parts": "any", "test_objects": views}
+        elif self.categories == ("all",):
+            changes["categories"] = list(FAMILIES)
+        return changed(preset, changes)
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if isinstance(value, dict):
+        return [[name, str(root)] for name, root in value.items()]
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, Path) else value

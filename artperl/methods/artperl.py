@@ -1,0 +1,262 @@
+"""ArtPERL as the paper has it, section 4 (see docs/method_artperl.md for each equation and deviation).
+
+An observed cloud is segmented into parts; a reference is retrieved by part-pooled embeddings (4.2); an agent fits the
+reference's joint states, from the root to the leaves (4.3); a gradient optimiser refines them under the kinematic
+constraints (4.4). The 9D poses of the parts follow from the joint states (4.1).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+from torch import Tensor, nn
+
+from artperl.agent.actions import expected_action
+from artperl.agent.decision_process import Fitting, FittingOptions
+from artperl.agent.policy import StatePolicy
+from artperl.agent.start import MeanView, mean_start
+from artperl.core.clouds import Clouds
+from artperl.core.estimate import Calibration, Estimate, visibility
+from artperl.core.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
+from artperl.core.shapes import Observed, Shapes
+from artperl.fitting.paper_energy import refine_by_gradient
+from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.preprocess import as_cloud, clean, draw
+from artperl.perception.segmentation import Segmentation
+from artperl.retrieval.part_names import part_names
+from artperl.retrieval.shape_base import ShapeBase
+from artperl.retrieval.siamese import POINTS, Siamese
+from artsim.common.json_records import from_json_values
+from artsim.model.objects import MAX_PARTS
+
+Array = NDArray[np.float64]
+
+_MAX_WIDTH = 2048
+
+
+@dataclass(frozen=True)
+class ArtPERLOptions:
+    """What section 4 leaves to choose."""
+
+    num_points: int = 2048
+    """Points of an observation (section 5.1)."""
+    refine_points: int = 1024
+    """Of these, points that the refinement sees."""
+    refine_iterations: int = 100
+    """Steps of the gradient optimiser."""
+    refine_rate: float = 0.01
+    """Its first step, in radians and diagonals."""
+    start: MeanView = field(default_factory=MeanView)
+    """View that the reference is turned to before the agent's first step."""
+    fitting: FittingOptions = field(
+        default_factory=lambda: FittingOptions(steps=12, distance="both", facing=True, order="root first")
+    )
+    """The decision process of the agent."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of the networks.
+
+    ``num_rows`` is K, the most parts; the others are the channels of the first layers.
+    """
+
+    num_rows: int
+    segmentation: int = 48
+    siamese: int = 24
+    policy: int = 64
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.num_rows <= MAX_PARTS:
+            raise ValueError(f"num_rows is {self.num_rows}, not 1 to {MAX_PARTS}")
+        if not all(1 <= width <= _MAX_WIDTH for width in (self.segmentation, self.siamese, self.policy)):
+            raise ValueError(f"widths are not within 1 to {_MAX_WIDTH}")
+
+
+def networks_of(sizes: Sizes) -> dict[str, nn.Module]:
+    """New networks of these sizes, by name."""
+    return {
+        "segmentation": Segmentation(sizes.num_rows, sizes.segmentation),
+        "siamese": Siamese(sizes.num_rows, sizes.siamese),
+        "policy": StatePolicy(sizes.policy),
+    }
+
+
+class ArtPERL:
+    """The paper's method.
+
+    Parameters
+    ----------
+    segmentation : Segmentation
+    siamese : Siamese
+    policy : StatePolicy
+    base : ShapeBase
+        References with their embeddings by ``siamese``.
+    options : ArtPERLOptions, optional
+    """
+
+    name: ClassVar[str] = "artperl"
+
+    def __init__(
+        self, segmentation: Segmentation, siamese: Siamese, policy: StatePolicy, base: ShapeBase,
+        options: ArtPERLOptions | None = None,
+    ):  # fmt: skip
+        self.segmentation, self.siamese, self.policy = segmentation, siamese, policy
+        self.device = next(policy.parameters()).device
+        self.base = base.to(self.device)
+        self.options = options or ArtPERLOptions()
+        for network in self.networks().values():
+            network.eval()
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Categories of the references."""
+        return tuple(dict.fromkeys(self.base.categories))
+
+    def __call__(self, points: ArrayLike) -> Estimate:
+        """Estimate the pose of every part of the object that a cloud shows.
+
+        Parameters
+        ----------
+        points : (N, 3) float
+            Camera frame, metres.
+
+        Raises
+        ------
+        ArtsimError
+            When there is no object to be seen in the cloud.
+        """
+        clock = _Clock()
+        cloud = as_cloud(points)
+        good = clean(cloud)
+        warnings = cloud_warnings(cloud, good)
+        chosen = draw(len(good), self.options.num_points, np.random.default_rng(0))
+        sampled = torch.from_numpy(cloud[good[chosen]].astype(np.float32))[None].to(self.device)
+        with clock("segmentation"):
+            part = self.segment(sampled)
+        with clock("retrieval"):
+            row = int(self.retrieve(sampled, part)[0, 0])
+            reference = self.base.shapes[[row]]
+        observed = Observed.of(sampled, part)
+        with clock("agent"):
+            path = self.fit(reference, observed)
+        with clock("refinement"):
+            few = observed.map(lambda values: values[:, : self.options.refine_points])
+            refined = refine_by_gradient(
+                reference, few, path[-1], self.options.refine_iterations, self.options.refine_rate
+            )
+        labels = np.full(len(cloud), -1)
+        observed, reference = observed.to("cpu"), reference.to("cpu")
+        nearest = cKDTree(observed.points[0].numpy()).query(cloud[good], workers=1)[1]
+        labels[good] = observed.part[0].numpy()[nearest]
+        steps = [theta.to("cpu") for theta in (*path, refined.theta)]
+        return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
+
+    @torch.no_grad()
+    def segment(self, points: Tensor) -> Tensor:
+        """(B, N) parts of points (B, N, 3), section 4.2."""
+        return self.segmentation(Clouds.of(points).points).argmax(-1)
+
+    @torch.no_grad()
+    def retrieve(self, points: Tensor, part: Tensor, count: int = 1) -> Tensor:
+        """(B, count) rows of the references nearest to segmented clouds, by equation 1."""
+        few, labels = points[:, :POINTS], part[:, :POINTS]
+        return self.base.nearest(self.siamese(Clouds.of(few).points, labels), count)[0]
+
+    @torch.no_grad()
+    def fit(self, reference: Shapes, observed: Observed) -> list[Theta]:
+        """States of the reference from the start on, after each action of the agent, section 4.3."""
+        start = mean_start(reference, observed.points, self.options.start)
+        fitting, path = Fitting(reference, observed, start, self.options.fitting), [start]
+        while not fitting.done:
+            fitting.step(expected_action(self.policy(fitting.view())[0]))
+            path.append(fitting.theta)
+        return path
+
+    def networks(self) -> dict[str, nn.Module]:
+        """The three networks."""
+        return {"segmentation": self.segmentation, "siamese": self.siamese, "policy": self.policy}
+
+    def settings(self) -> dict[str, Any]:
+        """Sizes and options, in JSON's terms."""
+        sizes = Sizes(self.segmentation.num_rows, self.segmentation.width, self.siamese.width, self.policy.width)
+        return {"sizes": asdict(sizes), "options": asdict(self.options)}
+
+    @classmethod
+    def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> ArtPERL:
+        """The method with these settings, its networks untrained."""
+        sizes = from_json_values(Sizes, settings.get("sizes"))
+        options = from_json_values(ArtPERLOptions, settings.get("options"))
+        own: dict[str, Any] = networks_of(sizes)
+        return cls(**own, base=base, options=options)
+
+    def _report(
+        self, row: int, reference: Shapes, observed: Observed, path: list[Theta], labels: NDArray[np.int64],
+        warnings: tuple[str, ...], milliseconds: dict[str, float],
+    ) -> Estimate:  # fmt: skip
+        """The 9D poses that Theta stands for, section 4.1, and what goes with them."""
+        trees, theta, K = reference.trees, path[-1], int(reference.trees.valid[0].sum())
+        posed = pose_parts(trees, theta, reference.box_center)
+        axis, origin = joint_axes(trees, posed)
+        limits = torch.stack([trees.lower, trees.upper], dim=-1)
+        limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
+        poses = np.stack([_transforms(reference, step)[:K] for step in path])
+        surface = posed.points(reference.points, reference.box_center)[0][reference.has_surface[0]].flatten(0, 1)
+        unit = float(reference.diagonal[0] * theta.log_scale[0].mean().exp())
+        residual = float(torch.cdist(observed.points[0], surface).amin(1).square().mean().sqrt()) / unit
+        return Estimate(
+            rotation=_numpy(posed.rotation)[:K],
+            translation=_numpy(posed.center)[:K],
+            size=_numpy(reference.box_size * posed.scale)[:K],
+            T_camera_part=poses[-1],
+            state=_numpy(joint_states(trees, theta))[:K],
+            joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),
+            joint_parent=np.where(np.arange(K) == 0, -1, trees.parent[0, :K].numpy()),
+            joint_axis=_numpy(axis)[:K],
+            joint_origin=_numpy(origin)[:K],
+            part=labels,
+            reference=f"{self.base.categories[row]}:{self.base.object_ids[row]}",
+            residual=residual,
+            disagreement=0.0,
+            visibility=visibility(reference, observed, posed)[:K],
+            confidence=Calibration()(residual, 0.0, 0.0),
+            trajectory=poses,
+            milliseconds=milliseconds,
+            part_names=part_names(self.base, row, reference),
+            joint_limits=_numpy(limits)[:K],
+            warnings=warnings,
+        )
+
+
+class _Clock:
+    """Milliseconds by stage."""
+
+    def __init__(self) -> None:
+        self.milliseconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        self.milliseconds[stage] = 1e3 * (time.perf_counter() - begun)
+
+
+def _transforms(shapes: Shapes, theta: Theta) -> Array:
+    """(P, 4, 4) ``T_camera_part``."""
+    posed = pose_parts(shapes.trees, theta, shapes.box_center)
+    transforms = np.tile(np.eye(4), (posed.rotation.shape[1], 1, 1))
+    transforms[:, :3, :3], transforms[:, :3, 3] = _numpy(posed.rotation), _numpy(posed.translation)
+    return transforms
+
+
+def _numpy(values: Tensor) -> Array:
+    """The first row, in double precision."""
+    return values[0].double().numpy()

@@ -1,0 +1,54 @@
+"""What a method is: it makes an estimate of a cloud."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Protocol
+
+from numpy.typing import ArrayLike
+from torch import nn
+from typing_extensions import Self
+
+from artperl.core.estimate import Estimate
+from artperl.retrieval.shape_base import ShapeBase
+
+
+class Method(Protocol):
+    """A method of estimating 9D poses, trained. What scores, draws or applies a method knows it by this alone."""
+
+    name: ClassVar[str]
+    """As the registry :data:`artperl.methods.METHODS` has it."""
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Categories of the objects that it knows, each once."""
+        ...
+
+    def __call__(self, points: ArrayLike) -> Estimate:
+        """Estimate the pose of every part of the object that a cloud (N, 3) shows, camera frame, metres."""
+        ...
+
+
+class Stored(Method, Protocol):
+    """A method that can be written down: networks are what is learnt, settings what is chosen."""
+
+    base: ShapeBase
+    """References, with the embeddings that they are found by."""
+
+    def networks(self) -> dict[str, nn.Module]:
+        """Its networks by name."""
+        ...
+
+    def settings(self) -> dict[str, Any]:
+        """Sizes of its networks and options, in JSON's terms."""
+        ...
+
+    @classmethod
+    def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> Self:
+        """The method with these settings, its networks untrained.
+
+        Raises
+        ------
+        ValueError
+            When the settings are none of this method.
+        """
+        ...

@@ -1,0 +1,104 @@
+"""What every stage of a training run works with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
+
+import torch
+
+from artperl.estimator import load_estimator
+from artperl.methods.artperl import ArtPERL
+from artperl.methods.full import Estimator
+from artperl.training.objects import TrainingObjects
+from artperl.training.options import TrainOptions
+from artperl.training.report import rounded
+from artperl.training.run_folder import RunFolder
+from artperl.training.state import RunState
+from artperl.training.steps import Stop
+from artsim.errors import DatasetError
+
+
+class Report(Protocol):
+    """Hears the figures of every step."""
+
+    def __call__(self, group: str, figures: dict[str, float], step: int) -> None: ...
+
+
+@dataclass
+class Context:
+    """What every stage of a run works with.
+
+    Attributes
+    ----------
+    options : TrainOptions
+    folder : RunFolder
+    objects : TrainingObjects
+    state : RunState
+        The stages change it in place.
+    parent : Estimator or ArtPERL or None
+        The estimator that the run started from.
+    assemble : callable
+        Makes an estimator of the networks as they stand.
+    device : torch.device
+    workers : int
+        Processes that make training clouds and estimates; the result does not depend on it.
+    progress : bool
+        Show bars.
+    provenance : dict
+        See :func:`artperl.training.recipes.provenance`.
+    report : Report
+        Hears the figures of every step.
+    stop : Stop
+        Whether the run is to stop after the present step.
+    """
+
+    options: TrainOptions
+    folder: RunFolder
+    objects: TrainingObjects
+    state: RunState
+    parent: Estimator | ArtPERL | None
+    assemble: Callable[[Context], Estimator | ArtPERL]
+    device: torch.device
+    workers: int
+    progress: bool
+    provenance: dict[str, Any]
+    report: Report
+    stop: Stop = field(default_factory=Stop)
+
+    def estimator(self) -> Estimator | ArtPERL:
+        """The estimator as it stands."""
+        return self.assemble(self)
+
+    def best(self, device: torch.device | str = "cpu") -> Estimator | ArtPERL:
+        """The best estimator so far.
+
+        Raises
+        ------
+        DatasetError
+            When its files are damaged or missing.
+        """
+        try:
+            return load_estimator(self.folder.best, device, method=self.options.method)
+        except DatasetError as error:
+            raise DatasetError(f"the best estimator is lost ({error.what})", error.where, self.folder.fix) from error
+
+    def about(self, figures: dict[str, Any]) -> dict[str, Any]:
+        """What an estimator's file says about its training."""
+        return {**self.provenance, "options": asdict(self.options), "done": dict(self.state.done), **rounded(figures)}
+
+    def save(self) -> None:
+        """Write where the run stands."""
+        self.state.save(self.folder, self.options)
+
+    def stop_if_asked(self) -> None:
+        """Write where the run stands and end it, if somebody has asked for that.
+
+        Raises
+        ------
+        KeyboardInterrupt
+        """
+        if self.stop.asked:
+            self.save()
+            raise KeyboardInterrupt

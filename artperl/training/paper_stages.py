@@ -1,0 +1,224 @@
+"""Stages that the paper's method learns in: segmentation, retrieval (equation 2), the agent (Algorithm 1).
+
+Each goes on where it stopped: its batches, rates and actions are functions of the number of the step alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from artperl.agent.decision_process import Fitting
+from artperl.agent.ppo import algorithm_1
+from artperl.agent.start import mean_start
+from artperl.core.clouds import Clouds
+from artperl.core.pose import Theta, clamp_state, theta_from_parts
+from artperl.core.shapes import Observed, Shapes
+from artperl.data.batches import batches
+from artperl.data.fitting_problems import part_truth
+from artperl.data.sources import Source
+from artperl.estimator import save_estimator
+from artperl.methods.artperl import ArtPERL, Sizes, networks_of
+from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss
+from artperl.training.context import Context
+from artperl.training.options import TrainOptions
+from artperl.training.steps import autocast, one_cycle, set_rate
+from artsim.common.progress import track
+
+_VIEWS = 4
+"""Views in a row of one object: an object takes longer to make than a view of it."""
+_SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
+"""Steps and rollouts after which a run is saved, against a stop that nobody asked for."""
+_CHOICES = 4
+"""Nearest references among which the agent's is drawn: at test time, too, it is seldom the best one."""
+
+
+def paper_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
+    """New networks of the method, by name."""
+    return networks_of(Sizes(num_rows, segmentation=options.width))
+
+
+def paper_estimator(context: Context) -> ArtPERL:
+    """The method as the networks of a run stand."""
+    own: dict[str, Any] = context.state.networks
+    base = by_siamese(context.objects.base, own["siamese"].eval())
+    return ArtPERL(own["segmentation"], own["siamese"], own["policy"], base)
+
+
+@dataclass(frozen=True)
+class SegmentationStage:
+    """Cross-entropy of the parts of points, on fresh clouds."""
+
+    name: str = "segmentation"
+
+    def run(self, context: Context) -> None:
+        """Take the steps that are left."""
+        options, total = context.options, context.options.perception_steps
+        network, optimizer = context.state.networks[self.name], context.state.optimizers[self.name]
+        first = context.state.done[self.name]
+        if first >= total:
+            return
+        data = batches(
+            context.objects.data, context.objects.num_rows, options.num_points, options.batch_size, first, options.seed,
+            context.workers,
+        )  # fmt: skip
+        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
+        network.train()
+        for step in range(first, total):
+            clouds, truth = next(data)
+            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
+            with autocast(context.device, options.mixed_precision):
+                logits = network(clouds.points.to(context.device)).float()
+            part = truth.part.to(context.device)
+            loss = nn.functional.cross_entropy(logits.flatten(0, 1), part.flatten())
+            _descend(optimizer, network, loss)
+            right = float((logits.argmax(-1) == part).float().mean())
+            context.report(self.name, {"loss": loss.item(), "accuracy": right}, step)
+            bar.set_postfix_str(f"{100 * right:.1f} % of points right")
+            bar.update()
+            _count(context, self.name, step + 1, _SAVE_STEPS)
+        bar.close()
+
+
+@dataclass(frozen=True)
+class RetrievalStage:
+    """Equation 2: a cloud, with the parts that the segmentation tells, is to be near its own object at rest."""
+
+    name: str = "retrieval"
+
+    def run(self, context: Context) -> None:
+        """Take the steps that are left."""
+        options, total = context.options, context.options.retrieval_steps
+        network, optimizer = context.state.networks["siamese"], context.state.optimizers["siamese"]
+        first = context.state.done[self.name]
+        if first >= total:
+            return
+        method, base = paper_estimator(context), context.objects.base.shapes
+        samples = _source(context, POINTS, options.seed + 1, 1)
+        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
+        network.train()
+        for step in range(first, total):
+            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
+            numbers = range(step * options.batch_size, (step + 1) * options.batch_size)
+            objects = [samples.object(i).with_diagonal(1.0) for i in numbers]
+            own = Shapes.from_objects(objects, base.points.shape[2], base.trees.num_rows).to(context.device)
+            points = _stacked([samples[i].points for i in numbers]).to(context.device)
+            generator = torch.Generator().manual_seed((options.seed << 32) + step)
+            vectors = network(Clouds.of(points).points, method.segment(points))
+            loss = contrastive_loss(vectors, network(*canonical_clouds(own, generator)))
+            _descend(optimizer, network, loss)
+            context.report(self.name, {"loss": loss.item()}, step)
+            bar.set_postfix_str(f"loss {loss.item():.4f}")
+            bar.update()
+            _count(context, self.name, step + 1, _SAVE_STEPS)
+        bar.close()
+        network.eval()
+
+
+@dataclass(frozen=True)
+class AgentStage:
+    """Algorithm 1 on retrieved references and predicted labels: first cloning alone, then cloning and PPO."""
+
+    name: str = "agent"
+
+    def run(self, context: Context) -> None:
+        """Make the rollouts that are left."""
+        options, total = context.options, context.options.agent_rollouts
+        policy, optimizer = context.state.networks["policy"], context.state.optimizers["policy"]
+        first = context.state.done[self.name]
+        if first >= total:
+            return
+        method = paper_estimator(context)
+        samples = _source(context, method.options.num_points, options.seed + 2, _VIEWS)
+
+        def episodes(n: int) -> tuple[Fitting, Theta]:
+            set_rate(optimizer, options.agent_rate * one_cycle(n, total))
+            return fitting_episodes(method, samples, options.episodes, options.seed, n)
+
+        rounds = algorithm_1(method.policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
+        bar = track(self.name, total=total, initial=first, smoothing=0.1, shown=context.progress)
+        policy.train()
+        for n, figures in enumerate(rounds, first):
+            context.report(self.name, figures, n)
+            bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
+            bar.update()
+            _count(context, self.name, n + 1, _SAVE_ROLLOUTS)
+        bar.close()
+        policy.eval()
+
+
+@dataclass(frozen=True)
+class KeepStage:
+    """The estimator is kept as the last stage leaves it: no validation chooses one."""
+
+    name: str = "keep"
+
+    def run(self, context: Context) -> None:
+        """Write the estimator."""
+        context.save()
+        save_estimator(paper_estimator(context), context.folder.best, context.about({}))
+
+
+def paper_stages(options: TrainOptions) -> list[Any]:
+    """The stages, in their order."""
+    return [SegmentationStage(), RetrievalStage(), AgentStage(), KeepStage()]
+
+
+def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n: int) -> tuple[Fitting, Theta]:
+    """Episodes of one rollout, and their goals: fresh views, as the method segments, retrieves and starts.
+
+    The goal is the state of the retrieved reference that is nearest to the true 9D poses.
+
+    Parameters
+    ----------
+    method : ArtPERL
+        Its segmentation and retrieval are taken as they are.
+    samples : Source
+    count : int
+        Episodes.
+    seed, n : int
+        Rollout ``n`` is a function of both.
+    """
+    generator = torch.Generator().manual_seed((seed << 32) + n)
+    views = [samples[i] for i in range(n * count, (n + 1) * count)]
+    points = _stacked([view.points for view in views]).to(method.device)
+    part = method.segment(points)
+    nearest = method.retrieve(points, part, min(_CHOICES, len(method.base)))
+    drawn = torch.randint(nearest.shape[1], (count, 1), generator=generator).to(method.device)
+    reference = method.base.shapes[nearest.gather(1, drawn)[:, 0]]
+    trees = reference.trees
+    truth = [part_truth(view, trees.num_rows) for view in views]
+    _, rotation, center, size, _, _ = (torch.stack(values).to(method.device) for values in zip(*truth, strict=True))
+    goal = theta_from_parts(trees, reference.box_center, reference.box_size, rotation, center, size)
+    goal = Theta(**{**vars(goal), "state": clamp_state(trees, goal.state)})
+    start = mean_start(reference, points, method.options.start)
+    fitting = Fitting(reference, Observed.of(points, part), start, method.options.fitting)
+    return fitting, goal
+
+
+def _source(context: Context, num_points: int, seed: int, views: int) -> Source:
+    return context.objects.data.source(context.objects.num_rows, num_points, seed, views)
+
+
+def _stacked(clouds: list[np.ndarray]) -> Tensor:
+    return torch.from_numpy(np.stack(clouds)).float()
+
+
+def _descend(optimizer: torch.optim.Optimizer, network: nn.Module, loss: Tensor) -> None:
+    """One step of an optimiser."""
+    optimizer.zero_grad()
+    loss.backward()
+    nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+    optimizer.step()
+
+
+def _count(context: Context, stage: str, done: int, save_every: int) -> None:
+    """Count a step of a stage, save at intervals, and stop if somebody has asked for it."""
+    context.state.done[stage] = done
+    if done % save_every == 0:
+        context.save()
+    context.stop_if_asked()

@@ -1,0 +1,73 @@
+"""Stage: perception learns what is true of fresh clouds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import nn
+
+from artperl.data.batches import batches
+from artperl.training.context import Context
+from artperl.training.perception_losses import perception_figures, perception_losses
+from artperl.training.steps import autocast, one_cycle, set_rate
+from artperl.training.validation import step_taken
+from artsim.common.progress import track
+
+_SAVE_STEPS = 100
+"""Steps after which the run is saved, against a stop that nobody asked for."""
+
+
+@dataclass(frozen=True)
+class PerceptionStage:
+    """Supervised learning of perception, with its own cycle of the learning rate.
+
+    Attributes
+    ----------
+    name : str
+    steps : int
+        Batches.
+    num_points : int
+        Points of a cloud.
+    batch_size : int
+    seed : int
+        Of the stream of clouds.
+    """
+
+    name: str
+    steps: int
+    num_points: int
+    batch_size: int
+    seed: int
+
+    def run(self, context: Context) -> None:
+        """Take the steps that are left."""
+        options, state = context.options, context.state
+        perception, optimizer = state.networks["perception"], state.optimizers["perception"]
+        first, before = state.done[self.name], state.step - state.done[self.name]
+        if first >= self.steps:
+            return
+        data = batches(
+            context.objects.data, context.objects.num_rows, self.num_points, self.batch_size, first, self.seed,
+            context.workers,
+        )  # fmt: skip
+        bar = track(self.name, total=self.steps, initial=first, smoothing=0.02, shown=context.progress)
+        for step in range(first, self.steps):
+            clouds, truth = next(data)
+            clouds, truth = clouds.to(context.device), truth.to(context.device)
+            set_rate(optimizer, options.perception_rate * one_cycle(step, self.steps))
+            perception.train()
+            with autocast(context.device, options.mixed_precision):
+                perceived = perception(clouds.points)
+            losses = perception_losses(perceived, truth)
+            loss = torch.stack(list(losses.values())).sum()
+            optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(perception.parameters(), 1.0)
+            optimizer.step()
+            figures = {name: value.item() for name, value in losses.items()} | perception_figures(perceived, truth)
+            context.report(self.name, figures, before + step)
+            bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
+            bar.update()
+            step_taken(context, self.name, step + 1, self.steps, options.validate_every, _SAVE_STEPS)
+        bar.close()

@@ -1,0 +1,115 @@
+"""Recipes: one file for each estimator that comes with the package, from which a training run makes it."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from artperl.estimator import WEIGHTS, folder_of, read_settings, weights_sha256
+from artperl.training.options import PRESETS, TrainOptions, changed
+from artsim.common.files import parse_json, read_bounded
+from artsim.errors import ConfigError, DatasetError
+
+RECIPES = Path(__file__).parents[1] / "recipes"
+"""Folder of the recipes that come with the package."""
+
+_MAX_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How an estimator is made.
+
+    Attributes
+    ----------
+    name : str
+    preset : str
+        Of :data:`artperl.training.options.PRESETS`.
+    options : dict
+        What it learns from, as :func:`artperl.training.options.changed` takes it.
+    lengths : dict
+        How long it learns; another preset than the recipe's has its own.
+    sha256 : str
+        Digest of its file.
+    """
+
+    name: str
+    preset: str
+    options: dict[str, Any]
+    lengths: dict[str, Any]
+    sha256: str
+
+    @classmethod
+    def read(cls, name: str) -> Recipe:
+        """A recipe that comes with the package by its name, or one of a JSON file by its path.
+
+        Raises
+        ------
+        ConfigError
+            When there is none, or it is not one.
+        """
+        path = Path(name) if name.endswith(".json") else RECIPES / f"{name}.json"
+        known = ", ".join(sorted(recipe.stem for recipe in RECIPES.glob("*.json")))
+        if not path.is_file():
+            raise ConfigError(f"there is no recipe {name!r:.80}", "recipe", f"use one of {known}, or a JSON file")
+        data = read_bounded(path, _MAX_BYTES, "the recipe", ConfigError)
+        try:
+            recipe = parse_json(data)
+        except ValueError as error:
+            raise ConfigError(f"the recipe is not JSON ({error})", path) from error
+        if not isinstance(recipe, dict) or recipe.keys() != {"preset", "options", "lengths"}:
+            raise ConfigError("a recipe has a preset, options and lengths", path, f"write it like {known}")
+        if recipe["preset"] not in PRESETS:
+            raise ConfigError(f"there is no preset {recipe['preset']!r:.80}", path, f"use {', '.join(PRESETS)}")
+        made = cls(path.stem, sha256=hashlib.sha256(data).hexdigest(), **recipe)
+        made.train_options()
+        return made
+
+    def train_options(self, preset: str | None = None) -> TrainOptions:
+        """Options of the run that makes the estimator; with another preset it learns as long as that preset has it."""
+        if preset in (None, self.preset):
+            return changed(PRESETS[self.preset], self.options | self.lengths)
+        return changed(PRESETS[str(preset)], self.options)
+
+
+def provenance(options: TrainOptions, recipe: Recipe | None) -> dict[str, Any]:
+    """Where an estimator comes from: the recipe, the commit or version of this package, and its parents.
+
+    Returns
+    -------
+    dict
+        ``recipe``: name and SHA-256, or None; ``commit``: str; ``parents``: name and SHA-256 of the weights of each
+        estimator that it started from.
+    """
+    parents = [] if options.start_from is None else [folder_of(options.start_from)]
+    return {
+        "recipe": None if recipe is None else {"name": recipe.name, "sha256": recipe.sha256},
+        "commit": _commit(),
+        "parents": [{"name": folder.name, "sha256": weights_sha256(folder)} for folder in parents],
+    }
+
+
+def is_made(out: Path, recipe: Recipe) -> bool:
+    """Whether the run in a folder has made and tested the estimator of this very recipe."""
+    try:
+        about = read_settings(out / "best")["about"]
+    except DatasetError:
+        return False
+    found = about.get("recipe")
+    return "test" in about and isinstance(found, dict) and found.get("sha256") == recipe.sha256
+
+
+def _commit() -> str:
+    """The commit of the clone that this package is in, with + for changed files; outside a clone its version."""
+    clone = WEIGHTS.parents[1]
+    if (clone / ".git").exists():
+        try:
+            command = ["git", "-C", str(clone), "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+"]
+            return subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
+        except (OSError, subprocess.SubprocessError):  # git is not installed, or refuses somebody else's clone
+            pass
+    return version("artsim")

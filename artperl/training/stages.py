@@ -1,0 +1,97 @@
+"""What a run of each method learns: its networks, its stages in their order, and the estimator that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from torch import nn
+
+from artperl.agent.policy import Agent
+from artperl.fitting.options import EstimatorOptions
+from artperl.methods.artperl import ArtPERL
+from artperl.methods.full import Estimator
+from artperl.perception.network import Perception
+from artperl.training.agent import AgentStage
+from artperl.training.boxes import BoxStage
+from artperl.training.context import Context
+from artperl.training.options import TrainOptions
+from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
+from artperl.training.perception import PerceptionStage
+from artperl.training.validation import Calibration
+
+
+class Stage(Protocol):
+    """A part of a run. It counts its steps in ``context.state.done[name]`` and goes on where it stopped."""
+
+    @property
+    def name(self) -> str: ...
+
+    def run(self, context: Context) -> None: ...
+
+
+@dataclass(frozen=True)
+class Programme:
+    """What a run of a method learns.
+
+    Attributes
+    ----------
+    networks : callable
+        New networks by name, from the options and the number of rows for parts. Each gets an optimiser.
+    stages : callable
+        The stages, in their order.
+    estimator : callable
+        The estimator that the networks of a context make as they stand.
+    """
+
+    networks: Callable[[TrainOptions, int], dict[str, nn.Module]]
+    stages: Callable[[TrainOptions], list[Stage]]
+    estimator: Callable[[Context], Estimator | ArtPERL]
+
+
+def stages_of(options: TrainOptions) -> list[Stage]:
+    """The stages of a run, in their order."""
+    return PROGRAMMES[options.method].stages(options)
+
+
+def perception_stages(options: TrainOptions) -> list[Stage]:
+    """Perception on clouds of few points, then on denser ones, fewer at a time."""
+    points, clouds = options.num_points, options.batch_size
+    return [
+        PerceptionStage("perception", options.perception_steps, points, clouds, options.seed),
+        PerceptionStage(
+            "dense", options.dense_steps, points * options.denser, max(1, clouds // options.denser), options.seed + 3
+        ),
+    ]
+
+
+def _full_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
+    return {"perception": Perception(num_rows, options.width, options.votes), "agent": Agent()}
+
+
+def _full_stages(options: TrainOptions) -> list[Stage]:
+    return [*perception_stages(options), AgentStage(), Calibration(), BoxStage()]
+
+
+def _full_estimator(context: Context) -> Estimator:
+    """Without an agent until it has learnt; with the parent's boxes, if parts are found as the parent finds them."""
+    networks, parent, options = context.state.networks, context.parent, context.options
+    assert isinstance(parent, Estimator | None)
+    perception, agent = networks["perception"], networks["agent"]
+    assert isinstance(perception, Perception)
+    assert isinstance(agent, Agent)
+    knows = context.state.done["agent"] or (parent is not None and parent.agent is not None)
+    alike = parent is not None and parent.perception.votes == perception.votes
+    return Estimator(
+        perception, context.objects.base, agent if knows else None,
+        EstimatorOptions(num_points=options.denser * options.num_points),
+        boxes=parent.boxes if parent is not None and alike else None,
+    )  # fmt: skip
+
+
+PROGRAMMES = {
+    "full": Programme(_full_networks, _full_stages, _full_estimator),
+    "artperl": Programme(paper_networks, paper_stages, paper_estimator),
+}
+"""By the name of the method."""

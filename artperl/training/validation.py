@@ -1,0 +1,138 @@
+"""Validation of a run on a frozen set of unseen objects, its calibration, and its test."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from typing import Any
+
+from artperl.estimator import read_settings, save_estimator
+from artperl.evaluation.scoring import (
+    NUM_POINTS,
+    TEST_SEEDS,
+    VALIDATION_SEEDS,
+    calibrate,
+    evaluate,
+    frozen_samples,
+    headline,
+    mistake,
+    retry_residual,
+    samples_of,
+    summary,
+    table,
+)
+from artperl.methods.full import Estimator
+from artperl.training.context import Context
+from artperl.training.report import rounded, scalars, write_report
+from artsim.common.files import write_atomic
+from artsim.common.progress import say
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import ArtsimError
+from artsim.families import FAMILIES
+from artsim.observing.sample import Sample
+
+_AS_GOOD = 1.01
+"""Of two estimators whose scores differ by less than this factor, the one that learnt longer is kept."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Validates the estimator of a run that has no other stage to learn in: its confidence is calibrated anew."""
+
+    name: str = "calibration"
+
+    def run(self, context: Context) -> None:
+        """Validate, unless another stage has."""
+        if not context.state.history:
+            validate(context)
+
+
+def step_taken(context: Context, stage: str, done: int, total: int, validate_every: int, save_every: int) -> None:
+    """Count a step of a stage; validate or save at intervals and at the stage's end; stop if somebody asked for it.
+
+    Raises
+    ------
+    KeyboardInterrupt
+    """
+    context.state.done[stage] = done
+    if done % validate_every == 0 or done == total:
+        validate(context)
+    elif done % save_every == 0:
+        context.save()
+    context.stop_if_asked()
+
+
+def validate(context: Context) -> None:
+    """Score the estimator on unseen objects, keep it if it is the best so far, and write where the run stands."""
+    state, options = context.state, context.options
+    estimator = context.estimator()
+    assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves
+    scored = evaluate(estimator, unseen_samples(context, options.validation_views, VALIDATION_SEEDS), context.progress)
+    figures, score = summary(scored), headline(scored)
+    state.history.append({"step": state.step, "score": score, "done": dict(state.done)})
+    context.report("validation", scalars(figures) | {"score": score}, state.step)
+    if score < _AS_GOOD * state.best:
+        state.best = min(score, state.best)
+        judge = evaluate if options.votes else mistake  # by votes, any parts are right if they are where they are
+        foreign = judge(estimator, _foreign_samples(context))
+        best = replace(estimator, calibration=calibrate(scored, foreign))
+        best.options = replace(best.options, retry_residual=retry_residual(scored))
+        save_estimator(best, context.folder.best, context.about({"validation": figures}))
+    context.save()
+    say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
+
+
+def test(context: Context) -> dict[str, Any]:
+    """Test the best estimator on objects that had no say in which one that is; write its figures and a report."""
+    out, best = context.folder.path, context.best()
+    samples = unseen_samples(context, context.options.test_views, TEST_SEEDS)
+    scored = evaluate(best, samples, context.progress)
+    figures = summary(scored)
+    about = dict(read_settings(context.folder.best)["about"])
+    about.pop("validation", None)  # these figures chose this estimator, and are no measurement of it
+    save_estimator(best, context.folder.best, {**about, "test": rounded(figures)})
+    write_atomic(out / "figures.json", (json.dumps(figures, indent=1) + "\n").encode())
+    write_atomic(out / "table.txt", (table(figures) + "\n").encode())
+    try:
+        write_report(out, best, samples, scored, table(figures))
+    except ArtsimError as error:  # without matplotlib there are no pictures
+        say(f"no report: {error}")
+    return figures
+
+
+def unseen_samples(context: Context, views: int, first_seed: int, noise: str | None = None) -> list[Sample]:
+    """Frozen samples of objects that nothing was learnt from; of files, other states and views of the same objects.
+
+    Parameters
+    ----------
+    context : Context
+    views : int
+        Of each object.
+    first_seed : int
+    noise : str, optional
+        Depth sensor; by default that of the options.
+    """
+    options = context.options
+    if not options.categories:
+        return given_samples(context, options.test_objects * views, first_seed, noise)
+    return frozen_samples(
+        options.categories, options.test_objects, views, _as_tested(context, noise), first_seed, options.parts,
+        options.max_parts,
+    )  # fmt: skip
+
+
+def given_samples(context: Context, views: int, first_seed: int, noise: str | None = None) -> list[Sample]:
+    """At least so many views of the given objects, of each as many."""
+    given = context.objects.given
+    return samples_of(given, -(-views // len(given)), _as_tested(context, noise), first_seed)
+
+
+def _as_tested(context: Context, noise: str | None) -> SampleOptions:
+    sample = replace(context.options.sample, num_points=NUM_POINTS)
+    return sample if noise is None else SampleOptions(**{**vars(sample), "noise": noise})
+
+
+def _foreign_samples(context: Context) -> list[Sample]:
+    """Objects of other categories: confidence is to be low for them."""
+    others = [category for category in FAMILIES if category not in context.objects.base.categories]
+    return frozen_samples(others[: context.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")

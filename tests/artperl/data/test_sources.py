@@ -1,0 +1,51 @@
+"""Sources: samples by number, of a dataset or of fresh objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from artperl.core.part_order import visible_order
+from artperl.data.batches import batches
+from artperl.data.sources import DataOptions, Recorded
+from artsim import generate
+from artsim.datasets.dataset import open_dataset
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import DatasetError
+from artsim.loading.sources import family_sources
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset of laptops and eyeglasses."""
+    sources = family_sources(["laptop", "eyeglasses"], 3)
+    options = SampleOptions(num_points=96)
+    return generate(sources, tmp_path_factory.mktemp("recorded"), num_samples=24, sample=options).folder
+
+
+def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
+    samples = Recorded(recorded, ["laptop"], 3, 2, 96)
+    train = [sample for sample in open_dataset(recorded, "train") if sample.category == "laptop"]
+    first, second = ([samples[i].index for i in range(n, n + len(train))] for n in (0, len(train)))
+    assert sorted(first) == sorted(second) == [sample.index for sample in train]
+    assert first != second
+    assert len(samples.object(0)) == 2
+    rows, _ = next(batches(DataOptions(["laptop"], dataset=recorded), 2, 96, 4, workers=0, seed=3))
+    assert rows.points.shape == (4, 96, 3)
+    with pytest.raises(DatasetError, match="no scissors"):
+        Recorded(recorded, ["scissors"], 0, 2, 96)
+    with pytest.raises(DatasetError, match="fewer than 1024"):
+        Recorded(recorded, ["laptop"], 0, 2, 1024)
+
+
+def test_an_estimator_for_any_parts_reads_a_dataset_in_the_order_that_it_knows(tmp_path: Path) -> None:
+    sources = family_sources(["storage_furniture"], 3)
+    folder = generate(sources, tmp_path / "data", num_samples=12, sample=SampleOptions(num_points=64)).folder
+    samples = Recorded(folder, ["storage_furniture"], 0, 10, 64, "any")
+    for i in range(4):
+        sample, obj = samples[i], samples.object(i)
+        np.testing.assert_allclose(sample.box_center, obj.box_center, atol=1e-6)
+        order = visible_order(sample.joint_parent, sample.box_center, sample.box_size)
+        assert order == list(range(len(obj)))

@@ -1,0 +1,156 @@
+"""The paper's method estimates what it can, and comes back from disk as it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import artsim
+from artperl.agent.start import MeanView
+from artperl.data.fitting_problems import part_truth
+from artperl.estimator import load_estimator, save_estimator
+from artperl.evaluation.metrics import rotation_error
+from artperl.evaluation.scoring import evaluate
+from artperl.methods import METHODS, method_of
+from artperl.methods.artperl import ArtPERL, ArtPERLOptions, Sizes, networks_of
+from artperl.perception.segmentation import Segmentation
+from artperl.retrieval.shape_base import ShapeBase
+from artperl.retrieval.siamese import by_siamese
+from artperl.training.options import PAPER_PRESETS
+from artperl.training.run import Training
+from artsim.errors import ConfigError, DatasetError
+from artsim.observing.sample import Sample
+from tests.artperl.worlds import view
+
+SIZES = Sizes(2, segmentation=16, siamese=8, policy=16)
+
+
+class Truth(Segmentation):
+    """Knows the part of every point of one sample."""
+
+    def __init__(self, sample: Sample):
+        super().__init__(2, 16)
+        points = torch.from_numpy(sample.points).float()
+        self.center, local = points.mean(0), points - points.mean(0)
+        self.points, self.part = local, torch.from_numpy(sample.part.astype(np.int64))
+
+    def forward(self, points: torch.Tensor) -> torch.Tensor:
+        known = self.points / torch.linalg.vector_norm(self.points, dim=-1).square().mean().sqrt() / 2.0
+        nearest = torch.cdist(points[0], known).argmin(-1)
+        return 10.0 * torch.nn.functional.one_hot(self.part[nearest], 2)[None].float()
+
+
+def untrained(base: ShapeBase, options: ArtPERLOptions | None = None) -> ArtPERL:
+    torch.manual_seed(0)
+    networks = networks_of(SIZES)
+    siamese = networks["siamese"]
+    return ArtPERL(**networks, base=by_siamese(base, siamese.eval()), options=options)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def base() -> ShapeBase:
+    return ShapeBase.of([artsim.make("laptop", seed) for seed in range(4)], 128)
+
+
+def test_its_own_object_is_fitted_from_a_near_start() -> None:
+    """True labels, the object itself as reference, and a policy that does nothing: equations 6 and 7 do the rest."""
+    obj = artsim.make("laptop", 11)
+    sample = view(obj, 3)
+    method = untrained(ShapeBase.of([obj], 256))
+    method.segmentation = Truth(sample)
+    for parameter in method.policy.heads.parameters():
+        torch.nn.init.zeros_(parameter)  # every bin is as likely, so that the mean step is none
+    _, rotation, _, _, _, _ = part_truth(sample, 2)
+    # The start is the true view but for ten degrees, and the joint is where the start has it: half-way.
+    seen = rotation[0].T.numpy() @ np.array([0.0, 0.0, -1.0])  # towards the camera, in the rest frame
+    azimuth, elevation = np.rad2deg(np.arctan2(-seen[1], -seen[0])), np.rad2deg(np.arcsin(seen[2]))
+    method.options = replace(
+        method.options, start=MeanView(azimuth + 8.0, elevation + 6.0), refine_iterations=200, refine_rate=0.02
+    )
+    estimate = method(sample.points)
+    assert rotation_error(estimate.rotation, rotation.numpy()).max() < 4.0
+    assert (estimate.part == sample.part).mean() > 0.99
+    assert len(estimate.trajectory) == 1 + 12 * 2 + 1  # start, the agent's steps of both levels, refinement
+    start = rotation_error(estimate.trajectory[0][:, :3, :3], rotation.numpy())
+    assert start.max() > 8.0
+
+
+def test_the_root_scales_and_its_scale_reaches_the_boxes(base: ShapeBase) -> None:
+    method = untrained(base)
+    estimate = method(view(artsim.make("laptop", 7), 1).points)
+    row = method.base.object_ids.index(estimate.reference.split(":")[1])
+    ratio = estimate.size / base.shapes.box_size[row, :2].numpy()
+    np.testing.assert_allclose(ratio[0], ratio[1], rtol=1e-4)  # one scale of all parts, by Theta
+    assert np.ptp(ratio[0]) > 1e-3  # along each axis its own: the untrained policy has scaled
+
+
+def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path: Path) -> None:
+    method, sample = untrained(base), view(artsim.make("laptop", 5), 2)
+    for network in method.networks().values():
+        network.half().float()  # as precise as files are
+    method.base = by_siamese(base, method.siamese)
+    save_estimator(method, tmp_path, {"options": {"categories": ["laptop"]}})
+    loaded = load_estimator(tmp_path, method="artperl")
+    assert loaded.options == method.options
+    one, other = method(sample.points), loaded(sample.points)
+    np.testing.assert_allclose(one.T_camera_part, other.T_camera_part, atol=2e-3)
+    assert (one.part == other.part).all()
+    assert one.reference == other.reference
+    with pytest.raises(DatasetError, match=r"method 'artperl', not full.*--method artperl"):
+        load_estimator(tmp_path)
+
+
+def test_the_method_without_shipped_weights_says_how_to_train_it() -> None:
+    with pytest.raises(
+        DatasetError, match=r"train it: python train.py --category laptop --method artperl --preset full"
+    ):
+        load_estimator("laptop", method="artperl")
+
+
+def test_an_estimator_of_the_method_full_is_not_taken_for_one(base: ShapeBase, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no such option"):
+        load_estimator(tmp_path, method="artperl", seen_from=(-75.0, 75.0))
+    with pytest.raises(ConfigError, match="there is no method 'other'"):
+        load_estimator(tmp_path, method="other")
+
+
+def test_damaged_settings_are_refused(base: ShapeBase, tmp_path: Path) -> None:
+    save_estimator(untrained(base), tmp_path, {})
+    settings = (tmp_path / "estimator.json").read_text()
+    for old, new in (('"num_rows": 2', '"num_rows": 2000000000'), ('"siamese": 8', '"siamese": 9')):
+        assert old in settings
+        (tmp_path / "estimator.json").write_text(settings.replace(old, new))
+        with pytest.raises(DatasetError):
+            load_estimator(tmp_path, method="artperl")
+
+
+def test_every_method_of_the_registry_is_found_by_its_name() -> None:
+    for name in METHODS:
+        assert method_of(name).name == name
+
+
+def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path) -> None:
+    options = replace(
+        PAPER_PRESETS["quick"], base_objects=3, reference_points=48, width=16, perception_steps=3, retrieval_steps=2,
+        batch_size=4, num_points=96, agent_rollouts=2, episodes=2, test_objects=1, test_views=1,
+    )  # fmt: skip
+    heard: dict[str, list[dict[str, float]]] = {}
+
+    def report(group: str, figures: dict[str, float], step: int) -> None:
+        heard.setdefault(group, []).append(figures)
+
+    training = Training(options, tmp_path, workers=0, progress=False, report=report)
+    networks = training.context.state.networks
+    before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
+    training.run()
+    assert {name: len(figures) for name, figures in heard.items()} == {"segmentation": 3, "retrieval": 2, "agent": 2}
+    for name, network in networks.items():
+        assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
+    method = load_estimator(tmp_path / "best", method="artperl")
+    (scored,) = evaluate(method, [view(artsim.make("laptop", 9), 4)])
+    assert np.isfinite(scored.rotation).all()
+    assert (tmp_path / "table.txt").exists()
