@@ -26,7 +26,7 @@ _SEEN = 0.03
 class Calibration:
     """Confidence as a logistic function of what a fit says about itself.
 
-    The defaults are guesses; :func:`artperl.evaluation.scoring.calibrate` fits them to a validation set.
+    The defaults are guesses; :func:`artperl.evaluation.calibration.calibrate` fits them to a validation set.
     """
 
     bias: float = 2.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from artperl.core.estimate import Estimate, brought_to_rest, labels_by_boxes, slid, widen
-from artperl.evaluation.scoring import frozen_samples, true_poses
+from artperl.evaluation.metrics import true_poses
+from artperl.evaluation.samples import frozen_samples
 
 
 def test_points_are_of_a_part_whose_box_they_are_in() -> None:

@@ -15,7 +15,7 @@ from benchmarks.fuzz.inputs import Desk, Input, input_at, input_of
 from benchmarks.fuzz.targets import TARGETS, Target
 from benchmarks.fuzz.worker import Report, examine
 
-FOUND = sorted((Path(__file__).parent / "cases" / "fuzz").iterdir())
+FOUND = sorted((Path(__file__).parents[1] / "cases" / "fuzz").iterdir())
 """What the fuzzer has found before."""
 
 
