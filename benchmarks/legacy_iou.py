@@ -21,7 +21,8 @@ import tyro
 from artperl.data.categories import ARTIMAGE
 from artperl.evaluation.artimage import OBJECTS, Row, row_samples
 from artperl.evaluation.benchmark import find_estimator
-from artperl.evaluation.metrics import iou_omad_legacy, iou_rest_exact, rest_centers
+from artperl.evaluation.box_overlap import iou_omad_legacy
+from artperl.evaluation.metrics import iou_rest_exact, rest_centers
 from artperl.evaluation.tables import PUBLISHED
 from artperl.methods.full import Estimator
 from artsim.common.progress import track

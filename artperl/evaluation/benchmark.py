@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from artperl.estimator import WEIGHTS, load_estimator
-from artperl.evaluation.artimage import OBJECTS, Row, VIEWS, has_train_half, row_samples
+from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_train_half, row_samples
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate
 from artperl.evaluation.tables import against_published, summary, table

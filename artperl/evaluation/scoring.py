@@ -6,8 +6,9 @@ A failed estimate counts with the worst values of :data:`artperl.evaluation.metr
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,13 @@ from scipy.optimize import linear_sum_assignment
 
 from artperl.core.estimate import Estimate
 from artperl.evaluation.metrics import METRICS, rotation_error, translation_error, true_poses
-from artperl.methods.full import Estimator
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
 from artsim.observing.sample import Sample
 
 Array = NDArray[np.float64]
+Estimating = Callable[[NDArray[Any]], Estimate]
+"""Any method: from the points (N, 3) of a cloud, camera frame, metres, to an estimate."""
 
 _RIGHT = (10.0, 0.05)
 """An estimate is right when every part is within that many degrees and diagonals: what confidence speaks of."""
@@ -76,19 +78,19 @@ class Scored:
         return bool((self.rotation <= _RIGHT[0]).all() and (self.translation <= _RIGHT[1]).all())
 
 
-def evaluate(estimator: Estimator, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
+def evaluate(estimator: Estimating, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
     """Score an estimator on samples, one at a time."""
     views = track("evaluating", samples, unit="view", leave=False, shown=progress)
     return [score(estimator, sample) for sample in views]
 
 
-def evaluate_foreign(estimator: Estimator, samples: Iterable[Sample]) -> list[Scored]:
+def evaluate_foreign(estimator: Estimating, samples: Iterable[Sample]) -> list[Scored]:
     """Scores of estimates for objects that are not of the estimator's categories: whatever it says is wrong."""
     estimates = ((sample, estimator(sample.points)) for sample in samples)
     return [_mismatch(sample, estimate, sum(estimate.milliseconds.values())) for sample, estimate in estimates]
 
 
-def score(estimator: Method, sample: Sample) -> Scored:
+def score(estimator: Estimating, sample: Sample) -> Scored:
     """Errors of the estimate of one sample."""
     begun = time.perf_counter()
     try:

@@ -11,7 +11,16 @@ import torch
 
 from artperl.agent.policy import Agent
 from artperl.estimator import save_estimator
-from artperl.evaluation.ablation import MARGINS, STAGES, WHOLE, losses, permute_references, run_ablation, verdict, verdict_lines
+from artperl.evaluation.ablation import (
+    MARGINS,
+    STAGES,
+    WHOLE,
+    losses,
+    permute_references,
+    run_ablation,
+    verdict,
+    verdict_lines,
+)
 from artperl.evaluation.samples import frozen_samples
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
