@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from artperl.core.listing import listed, short
+from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed
 from artperl.core.shapes import Observed, Shapes
 
@@ -117,10 +117,10 @@ class Estimate:
         return tuple(units.get(kind, "rad") for kind in self.joint_type)
 
     def __str__(self) -> str:
-        return listed(self)
+        return full_text(self)
 
     def __repr__(self) -> str:
-        return short(self)
+        return short_text(self)
 
 
 def slid(estimate: Estimate, farther: Array) -> Estimate:
