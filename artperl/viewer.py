@@ -49,13 +49,13 @@ def page(estimate: Estimate, points: ArrayLike, title: str) -> str:
         "colours": [f"rgb({r},{g},{b})" for r, g, b in PALETTE.tolist()],
     }
     return _PAGE.format(
-        title=_escaped(title), summary=_escaped(summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
-        warnings="\n".join(f"<p><b>Warning:</b> {_escaped(text)}</p>" for text in estimate.warnings),
+        title=_escape(title), summary=_escape(summary(estimate)), rows=_rows(estimate), data=json.dumps(data),
+        warnings="\n".join(f"<p><b>Warning:</b> {_escape(text)}</p>" for text in estimate.warnings),
         head="".join(f"<th>{name}</th>" for name in HEAD), last=len(T) - 1,
     )  # fmt: skip
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     """Text as a browser shows it, names out of files included."""
     return html.escape(printable(text, 1000))
 
@@ -65,7 +65,7 @@ def _rows(estimate: Estimate) -> str:
     for k, (part, *values) in enumerate(cells(estimate)):
         colour = "rgb({},{},{})".format(*PALETTE[k % len(PALETTE)])
         rows.append(
-            f'<tr><td style="color:{colour}">■ {_escaped(part)}</td>'
+            f'<tr><td style="color:{colour}">■ {_escape(part)}</td>'
             + "".join(f"<td>{html.escape(c)}</td>" for c in values)
             + "</tr>"
         )

@@ -31,9 +31,10 @@ from artperl.core.estimate import Estimate
 from artperl.data.categories import ARTIMAGE, objects_of
 from artperl.evaluation import metrics
 from artperl.evaluation.artimage import real_objects
-from artperl.evaluation.benchmark_rows import find_estimator
+from artperl.evaluation.benchmark import find_estimator
+from artperl.evaluation.metrics import rest_centers, true_poses
 from artperl.evaluation.pictures import overlays
-from artperl.evaluation.scoring import NUM_POINTS, VALIDATION_SEEDS, rest_centers, samples_of, true_poses
+from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS, samples_of
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perceived
 from artsim.common.files import atomic_file, write_atomic
@@ -113,7 +114,7 @@ def main(options: Options) -> None:
                 roots.append(metrics.rotation_error(estimate.rotation[0], true_poses(sample)[0][0]))
                 faces.append(root_faces(estimate, sample))
             else:
-                roots.append(np.array(metrics.FAILED["rotation_deg"]))
+                roots.append(np.array(metrics.METRICS["rotation_deg"].failed))
         if not rows:
             print(f"{category}: no object with the parts of ArtImage, or no estimate with as many")
             continue

@@ -17,7 +17,7 @@ import tyro
 
 from artperl.data.categories import ARTIMAGE
 from artperl.evaluation.artimage import row_samples
-from artperl.evaluation.benchmark_rows import find_estimator
+from artperl.evaluation.benchmark import find_estimator
 
 WARM_UP = 5
 

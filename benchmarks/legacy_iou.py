@@ -20,9 +20,10 @@ import tyro
 
 from artperl.data.categories import ARTIMAGE
 from artperl.evaluation.artimage import OBJECTS, Row, row_samples
-from artperl.evaluation.benchmark_rows import PUBLISHED, find_estimator
-from artperl.evaluation.metrics import iou_omad_legacy, iou_rest_exact
-from artperl.evaluation.scoring import rest_centers
+from artperl.evaluation.benchmark import find_estimator
+from artperl.evaluation.box_overlap import iou_omad_legacy
+from artperl.evaluation.metrics import iou_rest_exact, rest_centers
+from artperl.evaluation.tables import PUBLISHED
 from artperl.methods.full import Estimator
 from artsim.common.progress import track
 from artsim.observing.sample import Sample
@@ -59,7 +60,7 @@ def main(options: Options) -> None:
             print(f"{category}: no object")
             continue
         result[category] = overlaps(find_estimator(options.weights, category), samples)
-        published = PUBLISHED[category]["iou"]
+        published = PUBLISHED[category]["iou_omad_legacy"]
         print(f"{category}: {len(samples)} views, mean overlap of each part, %")
         for name, values in [*result[category].items(), ("published, of other objects", published)]:
             print(f"  {name:40s}" + "".join(f"{100 * value:7.1f}" for value in values), flush=True)

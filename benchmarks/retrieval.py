@@ -22,8 +22,8 @@ from artperl.core.shapes import Shapes
 from artperl.data.categories import ARTIMAGE, objects_of
 from artperl.data.sources import Samples
 from artperl.evaluation.artimage import row_samples
-from artperl.evaluation.benchmark_rows import find_estimator
-from artperl.evaluation.scoring import TEST_SEEDS
+from artperl.evaluation.benchmark import find_estimator
+from artperl.evaluation.samples import TEST_SEEDS
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.siamese import Siamese, canonical_clouds, contrastive_loss

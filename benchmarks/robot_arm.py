@@ -22,8 +22,9 @@ import torch
 import tyro
 
 from artperl.estimator import load_estimator
-from artperl.evaluation.ablation import variants
-from artperl.evaluation.scoring import evaluate, samples_of, summary
+from artperl.evaluation.samples import samples_of
+from artperl.evaluation.scoring import evaluate
+from artperl.evaluation.tables import summary
 from artperl.training.options import PRESETS
 from artperl.training.run import Training
 from artsim.common.files import write_atomic
@@ -37,7 +38,6 @@ PUBLISHED = {
 """Rotation, degrees, and translation, metres, of each part; table 3 of the paper, other images of the same arm."""
 
 _LOCKED = ("panda_joint7", "panda_finger_joint1", "panda_finger_joint2")
-_VARIANTS = ("whole", "no beam search", "no rest-frame coordinates", "the same, refinement only")
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,16 @@ def main(options: Options) -> None:
     estimator = load_estimator(options.out / "run" / "best")
     samples = samples_of([load(arm)], options.views, sample)
     without_beam = replace(estimator, options=replace(estimator.options, beam=0))
-    table = variants(estimator) | {"no beam search": without_beam}
+    without_coordinates = replace(estimator, options=replace(estimator.options, perceived_start=False))
+    variants = {
+        "whole": estimator,
+        "no beam search": without_beam,
+        "no rest-frame coordinates": without_coordinates,
+        "the same, refinement only": replace(without_coordinates, agent=None),
+    }
     result: dict[str, Any] = {}
-    for name in _VARIANTS:
-        (result[name],) = summary(evaluate(table[name], samples, progress=True)).values()
+    for name, variant in variants.items():
+        (result[name],) = summary(evaluate(variant, samples, progress=True)).values()
         parts = result[name]["parts"]
         diagonal = float(samples[0].diagonal)
         rotation = [(part["rotation_deg"]["median"], part["rotation_deg"]["mean"]) for part in parts]

@@ -124,7 +124,7 @@ class Estimate:
         )  # fmt: skip
 
     def _estimate_one(self, file: Path, estimator: Estimator) -> None:
-        from artperl.core.listing import listed
+        from artperl.core.listing import full_text
         from artperl.inputs import read_cloud
         from artperl.viewer import page
 
@@ -140,7 +140,7 @@ class Estimate:
             print(json.dumps(record, indent=1))
             return
         _warn(cloud.warnings)
-        print(listed(result))
+        print(full_text(result))
         if self.out is not None and self.out.suffix == ".npz":
             with atomic_file(self.out) as out:
                 np.savez(out, allow_pickle=False, **arrays_of(result, cloud))

@@ -27,18 +27,15 @@ class Evaluate:
     """
 
     estimator: tyro.conf.Positional[Path | None] = None
-    """Folder of the estimator, or the name of one that comes with the package. For a benchmark, folder of the
-    estimators by category; by default those that come with the package."""
+    """Folder of the estimator, or the name of one that comes with the package. For a benchmark and the
+    ablation, folder of the estimators by category; by default those that come with the package."""
     method: Literal["full", "artperl"] = "full"
-    """Method of the estimator."""
+    """Method of the estimator. A benchmark and the ablation are of the method full."""
     benchmark: Literal["artimage"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
     ablation: bool = False
-    """Test the estimator with one stage after the other left out or changed."""
-    cloned: Path | None = None
-    """For the ablation: estimator whose agent learnt by behaviour cloning alone."""
-    reinforced: Path | None = None
-    """For the ablation: estimator whose agent learnt by PPO alone."""
+    """Measure what each stage brings: the estimators of all categories without one stage after the other, on validation
+    objects. With --json, a run that was stopped goes on from the rows of the file."""
     rows: tuple[Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"], ...] = ()
     """Rows of the benchmark; by default all that there are objects and weights for."""
     real_weights: Path | None = None
@@ -56,7 +53,8 @@ class Evaluate:
     package_root: PackageRoots = field(default_factory=dict)
     """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     views: int | None = None
-    """Views of each object, by default 4; of a benchmark, the least number of views of each category."""
+    """Views of each object, by default 4; of a benchmark, the least number of views of each category; of the
+    ablation, the least number of each row, by default 32."""
     states: StateMode = "uniform"
     """In which states objects are: anywhere within their limits, at rest (shut, but for eyeglasses), at the ends, or
     mixed. A benchmark has them anywhere."""
@@ -73,14 +71,27 @@ class Evaluate:
     """Write the figures to this file."""
 
     def run(self) -> None:
-        figures = self._single() if self.benchmark is None else self._rows()
+        if self.method != "full" and (self.ablation or self.benchmark):
+            raise ConfigError("a benchmark and the ablation are of the method full", "method", "leave it out")
+        if self.ablation:
+            self._ablation()
+            return
+        figures = self._single() if self.benchmark is None else self._benchmark()
         if self.json is not None:
             write_atomic(self.json, _json(figures))
 
-    def _rows(self) -> dict[str, Any]:
+    def _ablation(self) -> None:
+        from artperl.data.categories import ARTIMAGE
+        from artperl.evaluation.ablation import run_ablation, verdict_lines
+
+        categories = self.category or tuple(ARTIMAGE)
+        record = run_ablation(categories, self.estimator, self.partnet, self.views or 32, self.json, True, say)
+        print("\n".join(verdict_lines(record)))
+
+    def _benchmark(self) -> dict[str, Any]:
         from artperl.data.categories import ARTIMAGE
         from artperl.evaluation.artimage import ROWS, VIEWS
-        from artperl.evaluation.benchmark_rows import run_rows
+        from artperl.evaluation.benchmark import run_benchmark
 
         if (self.states, self.preset, self.noise) != ("uniform", "artimage", "none"):
             raise ConfigError(
@@ -95,16 +106,17 @@ class Evaluate:
         )
         for row in (row for row in ROWS if not self.rows and row not in rows):
             print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
-        return run_rows(
+        return run_benchmark(
             rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
             self.views or VIEWS, self.num_points, True, say, self.seen_from,
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
         from artperl.estimator import folder_of, load_estimator, read_settings
-        from artperl.evaluation.artimage import as_known
-        from artperl.evaluation.scoring import evaluate, frozen_samples, samples_of, summary, table
-        from artperl.methods.full import Estimator
+        from artperl.evaluation.artimage import match_category
+        from artperl.evaluation.samples import frozen_samples, samples_of
+        from artperl.evaluation.scoring import evaluate
+        from artperl.evaluation.tables import summary, table
         from artsim.loading.sources import find_sources
 
         if self.estimator is None:
@@ -118,25 +130,13 @@ class Evaluate:
         views, parts = self.views or 4, learnt.get("parts", "artimage")
         categories = self.category or tuple(learnt["categories"])
         if self.files:
-            objects = (
-                as_known(source.load(), categories, parts) for source in find_sources(self.files, self.package_root)
-            )
+            sources = find_sources(self.files, self.package_root)
+            objects = (match_category(source.load(), categories, parts) for source in sources)
             samples = samples_of(objects, views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")
         else:
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
-        if self.ablation:
-            if not isinstance(estimator, Estimator):
-                raise ConfigError("the ablation leaves out stages of the method full", "ablation", "leave it out")
-            from artperl.evaluation.ablation import run_ablation, variants
-            from artperl.evaluation.basin import basin_problem, run_basin
-
-            agents = (None if path is None else load_estimator(path).agent for path in (self.cloned, self.reinforced))
-            result = run_ablation(variants(estimator, *agents), samples, say, True)
-            if estimator.agent is not None and not self.files:
-                result["start"] = run_basin(estimator, basin_problem(estimator, categories, parts), say)
-            return result
         figures = summary(evaluate(estimator, samples, progress=True))
         print(table(figures))
         return figures

@@ -53,11 +53,11 @@ class Lines:
 
     def done(self) -> frozenset[str]:
         """Files that have a line, without an error, and have not changed since."""
-        return frozenset(name for name, changed in self._done.items() if _changed(Path(name)) == changed)
+        return frozenset(name for name, changed in self._done.items() if _modification_time(Path(name)) == changed)
 
     def write(self, file: Path, record: dict[str, Any]) -> None:
         """Add the line of a file; it is on the disk, or sent on, when this returns."""
-        line = {"file": str(file), **record, "setup": self._setup, "changed": _changed(file)}
+        line = {"file": str(file), **record, "setup": self._setup, "changed": _modification_time(file)}
         try:
             self._file.write(json.dumps(line) + "\n")
             self._file.flush()
@@ -90,7 +90,7 @@ class Lines:
         return size
 
 
-def _changed(file: Path) -> float | None:
+def _modification_time(file: Path) -> float | None:
     try:
         return file.stat().st_mtime
     except OSError:

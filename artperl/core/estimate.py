@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from artperl.core.listing import listed, short
+from artperl.core.listing import full_text, short_text
 from artperl.core.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 
@@ -29,7 +29,7 @@ _SEEN = 0.03
 class Calibration:
     """Confidence as a logistic function of what a fit says about itself.
 
-    The defaults are guesses; :func:`artperl.evaluation.scoring.calibrate` fits them to a validation set.
+    The defaults are guesses; :func:`artperl.evaluation.calibration.calibrate` fits them to a validation set.
     """
 
     bias: float = 2.0
@@ -120,10 +120,10 @@ class Estimate:
         return tuple(units.get(kind, "rad") for kind in self.joint_type)
 
     def __str__(self) -> str:
-        return listed(self)
+        return full_text(self)
 
     def __repr__(self) -> str:
-        return short(self)
+        return short_text(self)
 
 
 def slid(estimate: Estimate, farther: Array) -> Estimate:

@@ -15,7 +15,7 @@ _MOST_PARTS = 40
 """Parts that are listed: as many as fit a screen."""
 
 
-def listed(estimate: Estimate) -> str:
+def full_text(estimate: Estimate) -> str:
     """What it found, for a terminal."""
     rows = [HEAD, *cells(estimate)[:_MOST_PARTS]]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -33,7 +33,7 @@ def summary(estimate: Estimate) -> str:
     )
 
 
-def short(estimate: Estimate) -> str:
+def short_text(estimate: Estimate) -> str:
     """The least that tells it from others, as in a list of estimates."""
     states = [f"{name} {state}".strip() for name, _, state, *_ in cells(estimate)[:8]]
     states += ["..."] if len(estimate.joint_type) > 8 else []

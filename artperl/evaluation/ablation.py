@@ -1,105 +1,81 @@
-"""What each stage contributes: the same estimator with one thing changed, on the same test samples."""
+"""What each stage of an estimate brings: the same estimator without it, on the same views of validation objects.
+
+A row is a category, a source of objects, a view and a noise. A stage earns its place when, without it, a mean over the
+views of a category and source is worse by its margin and by more than twice the standard error of the paired
+differences.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
-from artperl.agent.policy import Agent
-from artperl.core.batch import concatenate
-from artperl.core.clock import Clock
-from artperl.core.clouds import Clouds
-from artperl.core.estimate import Estimate
-from artperl.core.pose import Theta, pose_parts
-from artperl.core.rotations import rotate
-from artperl.core.shapes import Observed
-from artperl.evaluation.scoring import evaluate, summary
-from artperl.fitting.initial_pose import part_poses, start
-from artperl.fitting.levenberg_marquardt import refine
+from artperl.data.categories import objects_of
+from artperl.evaluation.artimage import real_objects
+from artperl.evaluation.benchmark import find_estimator
+from artperl.evaluation.metrics import METRICS
+from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS, samples_of
+from artperl.evaluation.scoring import Scored, score
 from artperl.methods.full import Estimator
-from artperl.perception.preprocess import clean, draw
-from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.shape_base import ShapeBase
+from artsim.common.files import read_json, write_atomic
+from artsim.common.progress import track
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import ConfigError
+from artsim.model.draws import ViewOptions, ViewPreset
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
+Array = NDArray[np.float64]
+Change = Callable[[Estimator], Estimator]
+Record = dict[str, dict[str, list[list[float]]]]
+"""``{row: {variant: a list of the figures of MARGINS for each view}}``."""
 
-def variants(
-    estimator: Estimator, cloned: Agent | None = None, reinforced: Agent | None = None
-) -> dict[str, Estimator]:
-    """Estimators by what is changed in them.
+MARGINS = {"rotation_deg": 0.1, "iou_exact": 0.01, "right": 0.01}
+"""Least loss of a mean that counts: 0.1 degree, a point of exact IoU, one per cent of the views right."""
+_CERTAIN = 2.0
+"""Standard errors that a loss must exceed."""
 
-    Parameters
-    ----------
-    estimator : Estimator
-        The whole.
-    cloned, reinforced : Agent, optional
-        Agents that learnt by behaviour cloning alone, and by PPO alone.
-    """
-
-    def changed(whole: Estimator = estimator, **options: Any) -> Estimator:
-        return replace(whole, options=replace(whole.options, **options))
-
-    without_agent = replace(estimator, agent=None)
-    unrefined = replace(estimator.options.refine, iterations=0)
-    table = {
-        "whole": estimator,
-        "random reference": replace(estimator, base=shuffled(estimator.base)),
-        "part by part, no kinematics": PartByPart(**vars(estimator)),
-        "labels of each point by itself": changed(coherent=False),
-        "boxes of the references": replace(estimator, boxes=None),
-        "not uncovered": changed(uncovered=False),
-        "not squared": changed(squared=False),
-        "no refinement, not squared": changed(refine=unrefined, squared=False),
-        "refinement only: no agent": without_agent,
-        "no second try": changed(retry_residual=float("inf")),
-        "single start": changed(retry_residual=float("inf"), references=1),
-        "no rest-frame coordinates": changed(perceived_start=False),
-        "the same, agent only, not squared": changed(perceived_start=False, refine=unrefined, squared=False),
-        "the same, refinement only": changed(without_agent, perceived_start=False),
-    }
-    for name, agent in (("cloning only", cloned), ("PPO only", reinforced)):
-        if agent is not None:
-            other = replace(estimator, agent=agent)
-            table |= {name: other, f"no rest-frame coord., {name}": changed(other, perceived_start=False)}
-    return table
+WHOLE = "whole"
+_VIEWS: tuple[ViewPreset, ...] = ("artimage", "sphere")
+_NOISE: tuple[Literal["none", "d435"], ...] = ("none", "d435")
 
 
-def run_ablation(
-    table: dict[str, Estimator], samples: Sequence[Sample], say: Callable[[str], None] = print, progress: bool = False
-) -> dict[str, Any]:
-    """Evaluate every variant on the same samples.
-
-    Returns
-    -------
-    dict
-        ``{variant: figures}``, figures as :func:`artperl.evaluation.scoring.summary` gives them.
-    """
-    result = {}
-    say(f"{'':42s}{'rotation deg':>16s}{'translation %':>16s}{'IoU as OMAD %':>14s}{'right':>8s}{'ms':>7s}")
-    for name, estimator in table.items():
-        result[name] = summary(evaluate(estimator, samples, progress))
-        for category, figures in result[name].items():
-            parts = figures["parts"]
-            mean = {
-                metric: np.mean([[part[metric]["median"], part[metric]["mean"]] for part in parts], axis=0)
-                for metric in ("rotation_deg", "translation_percent_diagonal", "iou_omad_legacy")
-            }
-            rotation, translation, iou = mean.values()
-            say(
-                f"{f'{name}, {category}':42s}{rotation[0]:9.2f}{rotation[1]:7.2f}{translation[0]:9.2f}"
-                f"{translation[1]:7.2f}{100 * iou[1]:14.1f}{100 * figures['right']:7.0f} %"
-                f"{figures['ms_per_instance']:7.0f}"
-            )
-    say("medians and means over instances, averaged over parts")
-    return result
+def _options(**options: Any) -> Change:
+    """Other options of the estimator."""
+    return lambda whole: replace(whole, options=replace(whole.options, **options))
 
 
-def shuffled(base: ShapeBase) -> ShapeBase:
+def _refinement(**options: Any) -> Change:
+    """Other options of its refinement."""
+    return lambda whole: _options(refine=replace(whole.options.refine, **options))(whole)
+
+
+STAGES: dict[str, Change] = {
+    "label smoothing": _options(coherent=False),
+    "retrieval of the nearest reference": lambda whole: replace(whole, base=permute_references(whole.base)),
+    "more than one reference": _options(references=1),
+    "start from rest-frame coordinates": _options(perceived_start=False),
+    "beam search": _options(beam=0),
+    "outline term": _refinement(outline_weight=0.0),
+    "second try": _options(retry_residual=float("inf")),
+    "agent": lambda whole: replace(whole, agent=None),
+    "hidden parts": _options(uncovered=False),
+    "normal alignment": _options(squared=False),
+    "network for boxes": lambda whole: replace(whole, boxes=None),
+}
+"""Changes that take a stage away, by the stage. A new stage is one line."""
+
+
+def permute_references(base: ShapeBase) -> ShapeBase:
     """A base that finds any object with the right kinematic tree, instead of the nearest one."""
     assert base.embeddings is not None
     kinds = [(tree.types, tuple(tree.parents)) for tree in base.trees]
@@ -110,34 +86,153 @@ def shuffled(base: ShapeBase) -> ShapeBase:
     return base.with_embeddings(base.embeddings[torch.from_numpy(rows)])
 
 
-class PartByPart(Estimator):
-    """Every part is registered on its own: part-centric pose modelling, as in A-NCSH."""
+@dataclass(frozen=True)
+class Loss:
+    """How much worse the means of one category and source are without a stage.
 
-    @torch.inference_mode()
-    def __call__(self, points: ArrayLike) -> Estimate:
-        """As :class:`artperl.methods.full.Estimator`; joint states and axes are those of the whole estimator."""
-        whole = super().__call__(points)
-        known = np.asarray(points, dtype=np.float64)
-        known = known[clean(known)]
-        chosen = draw(len(known), self.options.num_points, np.random.default_rng(0))
-        cloud = torch.from_numpy(known[chosen].astype(np.float32))[None]
-        clouds = Clouds.of(cloud)
-        perceived = self.perceive(clouds, Clock())
-        query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-        shapes, _ = start(clouds, perceived, self.base.shapes[self.base.nearest(query)[0][0]], 1)
-        P = int(shapes.trees.valid.sum())
-        alone = concatenate([shapes.part(k) for k in range(P)])
-        own = torch.nn.functional.one_hot(perceived.part[0], perceived.part_logits.shape[2])[:, :P].T
-        observed = Observed.of(cloud.expand(P, -1, -1), torch.zeros_like(own), own.float())
-        rotation, center, _ = (pose[0, :P] for pose in part_poses(clouds, perceived))
-        placed = replace(
-            Theta.at_rest(alone.trees), rotation=rotation, translation=center - rotate(rotation, alone.box_center[:, 0])
-        )
-        options = replace(self.options.refine, outline_weight=0.0)  # the outline is that of all parts together
-        posed = pose_parts(alone.trees, refine(alone, observed, placed, options).theta, alone.box_center)
-        transforms = np.tile(np.eye(4), (P, 1, 1))
-        transforms[:, :3, :3], transforms[:, :3, 3] = posed.rotation[:, 0].numpy(), posed.translation[:, 0].numpy()
-        return replace(
-            whole, rotation=transforms[:, :3, :3], translation=posed.center[:, 0].double().numpy(),
-            size=(alone.box_size * posed.scale)[:, 0].double().numpy(), T_camera_part=transforms,
-        )  # fmt: skip
+    Attributes
+    ----------
+    mean, error : dict of float
+        Of the paired differences, worse is positive, and their standard errors; keys of :data:`MARGINS`.
+    """
+
+    mean: dict[str, float]
+    error: dict[str, float]
+
+    @property
+    def large(self) -> list[str]:
+        """Figures whose loss reaches its margin."""
+        return [name for name, margin in MARGINS.items() if self.mean[name] >= margin]
+
+    @property
+    def certain(self) -> list[str]:
+        """Of these, the ones whose loss is not chance."""
+        return [name for name in self.large if self.mean[name] > _CERTAIN * self.error[name]]
+
+
+def run_ablation(
+    categories: Sequence[str],
+    weights: Path | None = None,
+    partnet: Path | None = None,
+    views: int = 32,
+    out: Path | None = None,
+    progress: bool = False,
+    say: Callable[[str], None] = print,
+    stages: Mapping[str, Change] = STAGES,
+) -> Record:
+    """Score the whole estimator and those without one stage on every row, and print the losses of each row.
+
+    Parameters
+    ----------
+    categories : sequence of str
+    weights : Path, optional
+        Folder of estimators; by default those that come with the package.
+    partnet : Path, optional
+        Folder of real objects; without it, rows are of procedural objects.
+    views : int
+        Of a row, at least.
+    out : Path, optional
+        JSON file, written after each row. What it holds already is not measured again.
+    progress : bool
+    say : callable
+        Gets the lines.
+    stages : mapping
+        Stages that are taken away: :data:`STAGES`.
+
+    Raises
+    ------
+    ConfigError
+        When the file has rows of another number of views.
+    """
+    record: Record = {} if out is None or not out.exists() else read_json(out, "ablation", ConfigError)
+    for category in categories:
+        whole = find_estimator(weights, category)
+        variants = {WHOLE: whole} | {name: change(whole) for name, change in stages.items()}
+        for row, objects, options in rows_of(category, views, partnet):
+            done = record.setdefault(row, {})
+            missing = {name: variant for name, variant in variants.items() if name not in done}
+            if missing:
+                samples = samples_of(objects, -(-views // len(objects)), options, VALIDATION_SEEDS)
+                if any(len(figures) != len(samples) for figures in done.values()):
+                    raise ConfigError(f"{row} has other views than {len(samples)}", str(out), "name another file")
+                record[row] = done | _score_variants(missing, samples, row, progress)
+                if out is not None:
+                    write_atomic(out, (json.dumps(record) + "\n").encode())
+            say("\n".join([row, *loss_lines({row: record[row]})]))
+    return record
+
+
+def _score_variants(
+    variants: Mapping[str, Estimator], samples: Sequence[Sample], row: str, progress: bool
+) -> dict[str, list[list[float]]]:
+    """Figures of each view, view by view: a slow hour of the machine slows all variants."""
+    figures: dict[str, list[list[float]]] = {name: [] for name in variants}
+    for sample in track(row, samples, unit="view", leave=False, shown=progress):
+        for name, variant in variants.items():
+            figures[name].append(_figures(score(variant, sample)))
+    return figures
+
+
+def _figures(scored: Scored) -> list[float]:
+    """Figures of one view, those of :data:`MARGINS`: means over its parts."""
+    return [float(scored.right if name == "right" else scored.errors[name].mean()) for name in MARGINS]
+
+
+def rows_of(
+    category: str, views: int, partnet: Path | None
+) -> Iterator[tuple[str, Sequence[ArticulatedObject], SampleOptions]]:
+    """Name, objects for validation and samples' options of each row of a category."""
+    sources: dict[str, Sequence[ArticulatedObject]] = {"procedural": objects_of([category], views, VALIDATION_SEEDS)}
+    if partnet is not None and (real := real_objects(category, "train", partnet)):
+        sources["real"] = real
+    for (source, objects), preset, noise in product(sources.items(), _VIEWS, _NOISE):
+        options = SampleOptions(num_points=NUM_POINTS, views=ViewOptions(preset=preset), noise=noise)
+        yield f"{category} {source} {preset} {noise}", objects, options
+
+
+def losses(record: Record) -> dict[str, dict[str, Loss]]:
+    """Losses by stage, and by the category and source whose rows they are of."""
+    pooled: dict[str, dict[str, list[list[float]]]] = {}
+    for row, variants in record.items():
+        group = pooled.setdefault(" ".join(row.split()[:2]), {})
+        for name, figures in variants.items():
+            group[name] = group.get(name, []) + figures
+    result: dict[str, dict[str, Loss]] = {}
+    for group_name, group in pooled.items():
+        for name in group.keys() - {WHOLE}:
+            result.setdefault(name, {})[group_name] = _loss(np.array(group[name]), np.array(group[WHOLE]))
+    return result
+
+
+def _loss(without: Array, whole: Array) -> Loss:
+    sign = [1.0 if name in METRICS and METRICS[name].less_is_better else -1.0 for name in MARGINS]
+    worse = np.array(sign) * (without - whole)
+    error = worse.std(axis=0, ddof=1) / np.sqrt(len(worse)) if len(worse) > 1 else np.full(len(MARGINS), np.inf)
+    return Loss(
+        dict(zip(MARGINS, worse.mean(axis=0).tolist(), strict=True)), dict(zip(MARGINS, error.tolist(), strict=True))
+    )
+
+
+def verdict(groups: Mapping[str, Loss]) -> str:
+    """Whether a stage stays: some loss is large and certain; goes: none is large; else more views have to tell."""
+    if any(loss.certain for loss in groups.values()):
+        return "stays"
+    return "unclear" if any(loss.large for loss in groups.values()) else "goes"
+
+
+def loss_lines(record: Record) -> list[str]:
+    """One line for each stage, category and source: what is lost without the stage, and its standard error."""
+    return [
+        f"  {stage:36s}{group:24s}"
+        + "  ".join(f"{name} {loss.mean[name]:+.3f} +- {loss.error[name]:.3f}" for name in MARGINS)
+        for stage, groups in losses(record).items()
+        for group, loss in groups.items()
+    ]
+
+
+def verdict_lines(record: Record) -> list[str]:
+    """One line for each stage: its verdict, and the categories and sources where it earns its place."""
+    return [
+        f"{stage:38s}{verdict(groups):9s}" + ", ".join(name for name, loss in groups.items() if loss.certain)
+        for stage, groups in losses(record).items()
+    ]

@@ -23,7 +23,7 @@ import numpy as np
 
 from artperl.core.part_order import as_seen
 from artperl.data.categories import ARTIMAGE, Parts, objects_of, opens_to_the_back
-from artperl.evaluation.scoring import NUM_POINTS, TEST_SEEDS, samples_of
+from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, samples_of
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import AssetError, ConfigError
 from artsim.loading.urdf import load
@@ -91,7 +91,7 @@ def real_objects(category: str, half: Literal["train", "test"], partnet: Path | 
             raise AssetError("an object of the split is missing", path, "complete the folder")
         if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
             raise AssetError("differs from the file that was split", path, "restore it")
-        objects.append(reduced(load(path), ARTIMAGE[category], category))
+        objects.append(restrict_joints(load(path), ARTIMAGE[category], category))
     return objects
 
 
@@ -116,16 +116,18 @@ def real_train_objects(categories: Sequence[str]) -> list[ArticulatedObject]:
     return objects
 
 
-def as_known(obj: ArticulatedObject, categories: Sequence[str], parts: Parts) -> ArticulatedObject:
+def match_category(obj: ArticulatedObject, categories: Sequence[str], parts: Parts) -> ArticulatedObject:
     """An object of a file as an estimator of these categories and parts knows such objects.
 
     Files number their parts in any order, and may have some that a category does not have in ArtImage.
     """
     category = categories[0] if len(set(categories)) == 1 else ""
-    return reduced(obj, ARTIMAGE[category], category) if parts == "artimage" and category in ARTIMAGE else as_seen(obj)
+    if parts == "artimage" and category in ARTIMAGE:
+        return restrict_joints(obj, ARTIMAGE[category], category)
+    return as_seen(obj)
 
 
-def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:
+def restrict_joints(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:
     """The object as one of another category: parts that move otherwise, such as a dishwasher's buttons, stay at rest.
 
     Which of two temples or of three drawers comes first differs from file to file, and a file's table may have its
@@ -142,7 +144,7 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     """
     tree = obj.native_tree
     if "prismatic" in joint_types and opens_to_the_back(tree.types, [joint.axis for joint in tree.joints]):
-        obj = turned_round(obj)
+        obj = half_turn(obj)
         tree = obj.native_tree
     owner = list(range(len(tree)))
     for k in range(1, len(tree)):
@@ -161,7 +163,7 @@ def reduced(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -
     return as_seen(replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={}))
 
 
-def turned_round(obj: ArticulatedObject) -> ArticulatedObject:
+def half_turn(obj: ArticulatedObject) -> ArticulatedObject:
     """The object turned by half a turn about the vertical, without what is known of its parts but their surfaces."""
     half = np.array([-1.0, -1.0, 1.0])
     parts = tuple(replace(part, vertices=part.vertices * half, body=None) for part in obj.parts)

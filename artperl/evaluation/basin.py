@@ -88,7 +88,7 @@ def run_basin(
 
     result = []
     for angle in ANGLES:
-        start = turned(problem, np.deg2rad(angle), joints)
+        start = perturb_goal(problem, np.deg2rad(angle), joints)
         with torch.inference_mode():
             led = agent_steps(estimator.agent, problem.shapes, few, start, options.agent_steps)[-1]
             ends = {"refinement": refined(start), "agent": led, "agent and refinement": refined(led)}
@@ -106,7 +106,7 @@ def run_basin(
     return result
 
 
-def turned(problem: Problem, angle: float, joints: Joints = "halfway") -> Theta:
+def perturb_goal(problem: Problem, angle: float, joints: Joints = "halfway") -> Theta:
     """Starts that are turned by an angle, in radians, from the goals."""
     shapes, goal = problem.shapes, problem.goal
     trees, generator = shapes.trees, torch.Generator().manual_seed(_SEED)

@@ -1,23 +1,25 @@
-"""Errors of estimated 9D part poses and joints. Every function is batched over leading dimensions.
+"""Errors of estimated 9D part poses and joints; :data:`METRICS` is the list of what an evaluation reports.
 
-Rotations are those of ``T_camera_part``, centres those of the posed part boxes in the camera frame, sizes those of the
-part boxes. A failed estimate is not left out: see :data:`FAILED`.
+The first functions compare arrays and are batched over leading dimensions. Rotations are those of ``T_camera_part``,
+centres those of the posed part boxes in the camera frame, sizes those of the part boxes.
+
+A new metric is one function of an estimate and a sample, and one line of :data:`METRICS`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import rankdata
 
+from artperl.core.estimate import Estimate, brought_to_rest
 from artperl.evaluation.box_overlap import iou, iou_aligned, iou_omad_legacy
+from artsim.observing.sample import Sample
 
 Array = NDArray[np.float64]
-
-FAILED = {"rotation_deg": 180.0, "translation": 1.0, "iou": 0.0}
-"""What an estimate that does not exist counts as: half a turn, one diagonal, no overlap. Frames are never skipped."""
 
 PARTNET_DIAGONAL = {
     "laptop": 2.0,
@@ -32,36 +34,9 @@ Its objects are scaled to about 2 in the state in which they were modelled. Boxe
 measure 1.3 to 1.7), so that errors given as a share of the diagonal at rest come out too large here, never too small.
 """
 
-__all__ = [
-    "FAILED",
-    "PARTNET_DIAGONAL",
-    "axis_error",
-    "iou_exact",
-    "iou_omad_legacy",
-    "iou_rest_exact",
-    "line_distance",
-    "rotation_error",
-    "state_error",
-    "translation_error",
-    "translation_error_omad",
-]
 
-
-def rotation_error(
-    estimate: ArrayLike,
-    truth: ArrayLike,
-    symmetries: ArrayLike | None = None,
-    symmetry_axis: ArrayLike | None = None,
-) -> Array:
-    """Angle between rotations, degrees.
-
-    Parameters
-    ----------
-    estimate, truth : (..., 3, 3) float
-    symmetries : (S, 3, 3) float, optional
-        Rotations of the part onto itself, in its rest frame, the identity among them: the least error counts.
-    symmetry_axis : (3,) float, optional
-        Instead: the part is a body of revolution about this direction of its rest frame, whose own error counts.
+def rotation_error(estimate: ArrayLike, truth: ArrayLike) -> Array:
+    """Angle between rotations (..., 3, 3), degrees.
 
     Returns
     -------
@@ -69,13 +44,6 @@ def rotation_error(
         0 to 180; exact near both ends, where the arc cosine of the trace is not.
     """
     estimate, truth = np.asarray(estimate, np.float64), np.asarray(truth, np.float64)
-    if symmetry_axis is not None:
-        axis = np.asarray(symmetry_axis, np.float64)
-        return axis_error(estimate @ axis, truth @ axis, signed=True)
-    if symmetries is not None:
-        images = truth[..., None, :, :] @ np.asarray(symmetries, np.float64)
-        least: Array = rotation_error(estimate[..., None, :, :], images).min(axis=-1)
-        return least
     relative = np.swapaxes(estimate, -1, -2) @ truth
     twist = relative - np.swapaxes(relative, -1, -2)
     sine = 0.5 * np.linalg.norm(np.stack([twist[..., 2, 1], twist[..., 0, 2], twist[..., 1, 0]], axis=-1), axis=-1)
@@ -92,20 +60,6 @@ def translation_error(estimate: ArrayLike, truth: ArrayLike, diagonal: ArrayLike
     distance = np.linalg.norm(np.asarray(estimate, np.float64) - np.asarray(truth, np.float64), axis=-1)
     share: Array = distance / np.asarray(diagonal, np.float64)
     return share
-
-
-def translation_error_omad(T_estimate: ArrayLike, T_truth: ArrayLike, diagonal: ArrayLike) -> Array:
-    """Distance between the images of the rest frame's origin, the centre of the whole object at rest, under a part.
-
-    Part of a child's rotation error leaks into it by the distance of the object's centre from the part.
-
-    Parameters
-    ----------
-    T_estimate, T_truth : (..., 4, 4) float
-        ``T_camera_part``.
-    diagonal : (...) float
-    """
-    return translation_error(np.asarray(T_estimate)[..., :3, 3], np.asarray(T_truth)[..., :3, 3], diagonal)
 
 
 def iou_exact(
@@ -125,38 +79,12 @@ def iou_rest_exact(center: ArrayLike, size: ArrayLike, true_center: ArrayLike, t
     return iou_aligned(center, size, true_center, true_size)
 
 
-def axis_error(estimate: ArrayLike, truth: ArrayLike, signed: bool = False) -> Array:
-    """Angle between directions (..., 3), degrees; opposite directions are one axis unless ``signed``."""
+def axis_error(estimate: ArrayLike, truth: ArrayLike) -> Array:
+    """Angle between directions (..., 3), degrees, 0 to 90: opposite directions are one axis."""
     a, b = np.asarray(estimate, np.float64), np.asarray(truth, np.float64)
     sine, cosine = np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)
-    angle: Array = np.rad2deg(np.arctan2(sine, cosine if signed else np.abs(cosine)))
+    angle: Array = np.rad2deg(np.arctan2(sine, np.abs(cosine)))
     return angle
-
-
-def line_distance(origin: ArrayLike, axis: ArrayLike, true_origin: ArrayLike, true_axis: ArrayLike) -> Array:
-    """Shortest distance between two lines, metres; stable when they are parallel.
-
-    Parameters
-    ----------
-    origin, true_origin : (..., 3) float
-        A point on each line.
-    axis, true_axis : (..., 3) float
-        Unit directions.
-
-    Notes
-    -----
-    For lines at an angle the distance is ``|d . n| / |n|`` with ``n = a x b``. Both are differences of nearly equal
-    numbers when the lines are nearly parallel; below a milliradian the lines count as parallel.
-    """
-    a, b = np.asarray(axis, np.float64), np.asarray(true_axis, np.float64)
-    between = np.asarray(true_origin, np.float64) - np.asarray(origin, np.float64)
-    normal = np.cross(a, b)
-    sine = np.linalg.norm(normal, axis=-1)
-    parallel = sine < 1e-3
-    skew = np.abs((between * normal).sum(axis=-1)) / np.where(parallel, 1.0, sine)
-    across = np.linalg.norm(np.cross(between, b), axis=-1)
-    distance: Array = np.where(parallel, across, skew)
-    return distance
 
 
 def state_error(estimate: ArrayLike, truth: ArrayLike, joint_type: Sequence[str]) -> Array:
@@ -199,3 +127,127 @@ def auroc(score: ArrayLike, positive: ArrayLike) -> float | None:
     rank, own = rankdata(np.asarray(score)), np.asarray(positive, bool)
     pairs = int(own.sum()) * int((~own).sum())
     return float(rank[own].sum() - own.sum() * (own.sum() + 1) / 2) / pairs if pairs else None
+
+
+def true_poses(sample: Sample) -> tuple[Array, Array]:
+    """Rotation (K, 3, 3) and posed box centre (K, 3) of every part."""
+    rotation, translation = sample.T_camera_part[:, :3, :3], sample.T_camera_part[:, :3, 3]
+    return rotation, np.einsum("kij,kj->ki", rotation, sample.box_center) + translation
+
+
+def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array:
+    """(K, 3) box centres in the estimated rest frame, whose origin is the middle of all boxes, as the true one's is.
+
+    Parameters
+    ----------
+    translation, size : (K, 3) float
+        Posed box centres in the camera frame, and sizes of the boxes, metres.
+    T_camera_part : (K, 4, 4) float
+    """
+    center = brought_to_rest(translation, T_camera_part)
+    low, high = center - 0.5 * size, center + 0.5 * size
+    middle: Array = 0.5 * (low.min(axis=0) + high.max(axis=0))
+    return center - middle
+
+
+@dataclass(frozen=True)
+class Metric:
+    """How far an estimate is from the truth, for every part.
+
+    Attributes
+    ----------
+    errors : callable
+        Gives (K,) values for an estimate of the K parts of a sample; NaN where the metric does not apply.
+    failed : float or callable
+        Value of every part when there is no estimate; or a callable that gives (K,) of them for a sample.
+    title : str
+        Column of the table; empty: figures go to JSON only.
+    factor : float
+        From the values to the unit of the table.
+    digits : int
+        Decimals in the table.
+    less_is_better : bool
+    """
+
+    errors: Callable[[Estimate, Sample], Array]
+    failed: float | Callable[[Sample], Array]
+    title: str = ""
+    factor: float = 1.0
+    digits: int = 2
+    less_is_better: bool = True
+
+    def failed_values(self, sample: Sample) -> Array:
+        """(K,) values of an estimate that does not exist."""
+        return self.failed(sample) if callable(self.failed) else np.full(len(sample.joint_type), self.failed)
+
+
+def _rotation(estimate: Estimate, sample: Sample) -> Array:
+    return rotation_error(estimate.rotation, true_poses(sample)[0])
+
+
+def _translation(estimate: Estimate, sample: Sample) -> Array:
+    return translation_error(estimate.translation, true_poses(sample)[1], sample.diagonal)
+
+
+def _percent(estimate: Estimate, sample: Sample) -> Array:
+    return 100.0 * _translation(estimate, sample)
+
+
+def _partnet_diagonal(sample: Sample) -> Array:
+    return np.full(len(sample.joint_type), PARTNET_DIAGONAL.get(sample.category, np.nan))
+
+
+def _partnet_units(estimate: Estimate, sample: Sample) -> Array:
+    return _partnet_diagonal(sample) * _translation(estimate, sample)
+
+
+def _iou_exact(estimate: Estimate, sample: Sample) -> Array:
+    boxes = estimate.rotation, estimate.translation, estimate.size
+    return iou_exact(*boxes, *true_poses(sample), sample.box_size)
+
+
+def _iou_rest_exact(estimate: Estimate, sample: Sample) -> Array:
+    center = rest_centers(estimate.translation, estimate.size, estimate.T_camera_part)
+    return iou_rest_exact(center, estimate.size, sample.box_center, sample.box_size)
+
+
+def _iou_omad_legacy(estimate: Estimate, sample: Sample) -> Array:
+    center = rest_centers(estimate.translation, estimate.size, estimate.T_camera_part)
+    return iou_omad_legacy(center, estimate.size, sample.box_center, sample.box_size)
+
+
+def _joint_state(estimate: Estimate, sample: Sample) -> Array:
+    return state_error(estimate.state, sample.joint_state, sample.joint_type)
+
+
+def _joint_range(sample: Sample) -> Array:
+    """(K,) whole range of each joint, degrees or metres; half a turn where it has no end."""
+    low, high = sample.joint_limits.T
+    span = np.where(np.isfinite(high - low), high - low, np.pi)
+    return state_error(np.zeros(len(span)), span, sample.joint_type)
+
+
+def _joint_axis(estimate: Estimate, sample: Sample) -> Array:
+    off = axis_error(estimate.joint_axis, sample.joint_axis_camera)
+    return np.where(np.array(sample.joint_type) == "free", 0.0, off)
+
+
+def _right_angle(sample: Sample) -> Array:
+    return np.where(np.array(sample.joint_type) == "free", 0.0, 90.0)
+
+
+METRICS: dict[str, Metric] = {
+    "rotation_deg": Metric(_rotation, 180.0, "rotation deg"),
+    "translation_percent_diagonal": Metric(_percent, 100.0, "translation %"),
+    "translation_partnet": Metric(_partnet_units, _partnet_diagonal, "PartNet units", digits=4),
+    "iou_exact": Metric(_iou_exact, 0.0, "IoU exact %", 100.0, 1, less_is_better=False),
+    "iou_rest_exact": Metric(_iou_rest_exact, 0.0, "IoU rest %", 100.0, 1, less_is_better=False),
+    "iou_omad_legacy": Metric(_iou_omad_legacy, 0.0, less_is_better=False),
+    "joint_state": Metric(_joint_state, _joint_range),
+    "joint_axis_deg": Metric(_joint_axis, _right_angle),
+}
+"""Metrics by their keys in the JSON of ``artperl evaluate --json``.
+
+A failed estimate counts with the worst values: half a turn, one diagonal, no overlap, the whole range of a joint. Views
+are never left out.
+"""

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artperl.core.estimate import Estimate
-from artperl.evaluation.scoring import compare, true_poses
+from artperl.evaluation.metrics import true_poses
+from artperl.evaluation.scoring import compare
 from artperl.methods.protocol import Method
 from artsim.common.extras import needs
 from artsim.common.names import printable

@@ -57,7 +57,7 @@ def read_file(path: Path, what: str, limit: int = MAX_BYTES) -> bytes:
     return read_bounded(path, limit, what, ConfigError, fix="thin it out, or crop it to the object")
 
 
-def guarded(read: Callable[[], Any], path: Path, what: str, fix: str) -> Any:
+def guard(read: Callable[[], Any], path: Path, what: str, fix: str) -> Any:
     """What ``read`` returns; whatever goes wrong with bytes that are not what they should be is one readable error."""
     try:
         return read()
@@ -77,7 +77,7 @@ def read_npy(path: Path, what: str, fix: str) -> Arrays:
             file.seek(0)
             return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
 
-    return guarded(read, path, what, fix)
+    return guard(read, path, what, fix)
 
 
 def read_npz(path: Path, what: str, fix: str, fits: Callable[[tuple[int, ...], np.dtype[Any]], bool]) -> Choice:
@@ -103,7 +103,7 @@ def read_npz(path: Path, what: str, fix: str, fits: Callable[[tuple[int, ...], n
                         shapes[member.filename.removesuffix(".npy")] = shape, dtype
         return Choice(path, what, fix, {n: shape for n, (shape, dtype) in shapes.items() if fits(shape, dtype)}, shapes)
 
-    return guarded(read, path, what, fix)
+    return guard(read, path, what, fix)
 
 
 class Choice:
@@ -139,7 +139,7 @@ class Choice:
                 f"{count} of its arrays fits a {self.what} (it holds {listing[:300]})", self.path,
                 f"save the {self.what} as '{names[0]}'",
             )  # fmt: skip
-        return name, guarded(lambda: self._read(name), self.path, self.what, self.fix)
+        return name, guard(lambda: self._read(name), self.path, self.what, self.fix)
 
     def _read(self, name: str) -> Arrays:
         with io.BytesIO(read_file(self.path, self.what)) as file, zipfile.ZipFile(file) as archive:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import MAX_VALUES, guarded, read_file
+from artperl.inputs.bounds import MAX_VALUES, guard, read_file
 from artsim.errors import ConfigError
 
 FORMATS = ("PNG", "TIFF", "PPM", "JPEG", "BMP", "WEBP", "GIF")
@@ -52,7 +52,7 @@ def read_picture(path: Path, what: str) -> Picture:
     ConfigError
         When it is missing, too large, damaged, or of another format.
     """
-    return guarded(lambda: _read(path, what), path, what, f"save the {what} again, as PNG or .npy")
+    return guard(lambda: _read(path, what), path, what, f"save the {what} again, as PNG or .npy")
 
 
 def _read(path: Path, what: str) -> Picture:

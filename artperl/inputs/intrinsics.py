@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import guarded, read_file, read_npy, read_npz
+from artperl.inputs.bounds import guard, read_file, read_npy, read_npz
 from artperl.inputs.intrinsics_formats import Hints, Stated, stated_camera
 from artsim.common.extras import needs
 from artsim.common.files import parse_json
@@ -82,7 +82,7 @@ def read_camera(path: Path, hints: Hints | None = None, pixel_center: PixelCente
     ConfigError
         When there is no camera in it, or none that can be.
     """
-    stated: Stated = guarded(lambda: stated_camera(_content(path), hints or Hints(), path), path, "intrinsics", FIX)
+    stated: Stated = guard(lambda: stated_camera(_content(path), hints or Hints(), path), path, "intrinsics", FIX)
     center = stated.center if pixel_center is None else float(pixel_center)
     K = _upright(stated.K, path)
     check_matrix(K, path, None)
@@ -104,7 +104,7 @@ def read_intrinsics(path: Path, pixel_center: PixelCenter | None = None) -> Arra
     return read_camera(path, None, pixel_center).K
 
 
-def fitted(camera: Intrinsics, size: tuple[int, int], path: Path) -> Intrinsics:
+def check_camera(camera: Intrinsics, size: tuple[int, int], path: Path) -> Intrinsics:
     """The camera, if it may be that of an image of a size (width, height).
 
     Raises
@@ -116,7 +116,7 @@ def fitted(camera: Intrinsics, size: tuple[int, int], path: Path) -> Intrinsics:
     if camera.size is not None and camera.size != size:
         raise ConfigError(
             f"it is of an image of {camera.size[0]} x {camera.size[1]} pixels, and the depth image has"
-            f" {width} x {height}", path, "give the intrinsics of this image" + _rescaled(camera, size),
+            f" {width} x {height}", path, "give the intrinsics of this image" + _rescale_hint(camera, size),
         )  # fmt: skip
     check_matrix(camera.K, path, size)
     if camera.size is not None:
@@ -216,7 +216,7 @@ def _yaml(data: bytes, path: Path) -> Any:
     return next(iter(yaml.load_all(text, Loader=Plain)), None)  # rostopic echo writes one document a message
 
 
-def _rescaled(camera: Intrinsics, size: tuple[int, int]) -> str:
+def _rescale_hint(camera: Intrinsics, size: tuple[int, int]) -> str:
     """The intrinsics of an image of the same view in another size, to be pasted; none where sides differ in ratio."""
     assert camera.size is not None
     if not min(camera.size) > 0:

@@ -123,17 +123,19 @@ def _of_numbers(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
         shown: NDArray[np.bool_] = values == number
         if not shown.any():
             raise ConfigError(
-                f"no pixel has the number {mask_id} (it has {_listed(found)})", path, "choose one of these: --mask-id N"
+                f"no pixel has the number {mask_id} (it has {_join(found)})",
+                path,
+                "choose one of these: --mask-id N",
             )
         return Mask(shown)
     if kind == "auto" and _INSTANCES in path.name.lower():
-        raise ConfigError(f"it holds several objects (it has {_listed(found)})", path, "choose one: --mask-id N")
+        raise ConfigError(f"it holds several objects (it has {_join(found)})", path, "choose one: --mask-id N")
     if kind == "parts" or (kind == "auto" and _is_of_parts(values, found, path)):
         return _of_parts(values, path)
     shown = values != 0
     if kind == "auto" and len(found) > 2:
         return Mask(shown, (), (
-            f"the mask holds the numbers {_listed(found)}: all but 0 are taken for the object. Fix: add --mask-id N to"
+            f"the mask holds the numbers {_join(found)}: all but 0 are taken for the object. Fix: add --mask-id N to"
             " choose one, or --mask-kind binary if it is right as it is",
         ))  # fmt: skip
     warnings: tuple[str, ...] = ()
@@ -157,7 +159,7 @@ def _is_of_parts(values: NDArray[Any], found: NDArray[Any], path: Path) -> bool:
 
 def _of_parts(values: NDArray[Any], path: Path) -> Mask:
     shown: NDArray[np.bool_] = values != _NONE
-    note = f"a part mask of artsim: the object is what is not {_NONE}, parts {_listed(np.unique(values[shown]))}"
+    note = f"a part mask of artsim: the object is what is not {_NONE}, parts {_join(np.unique(values[shown]))}"
     warnings: tuple[str, ...] = ()
     if "part_ids" in path.name.lower():
         warnings = (
@@ -212,7 +214,7 @@ def _of_palette(picture: Picture, path: Path, mask_id: str | None) -> Mask:
     warnings: tuple[str, ...] = ()
     if len(objects) > 1:
         warnings = (
-            f"the mask holds the indices {_listed(np.array(objects))}: all are taken for the object. Fix: add"
+            f"the mask holds the indices {_join(np.array(objects))}: all are taken for the object. Fix: add"
             " --mask-id N to choose one",
         )
     return Mask(shown, (note,) if note else (), warnings)
@@ -273,5 +275,5 @@ def _colours(values: NDArray[Any]) -> tuple[str, bool]:
     return " ".join(shown) + (" ..." if len(found) > _LISTED else ""), len(found) > 1
 
 
-def _listed(found: NDArray[Any]) -> str:
+def _join(found: NDArray[Any]) -> str:
     return ", ".join(f"{value:g}" for value in found[:_LISTED].tolist()) + (", ..." if len(found) > _LISTED else "")

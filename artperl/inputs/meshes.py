@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import MAX_TEXT_BYTES, MAX_VERTICES, check_count, guarded, read_file
+from artperl.inputs.bounds import MAX_TEXT_BYTES, MAX_VERTICES, check_count, guard, read_file
 from artperl.inputs.text import parse_columns
 from artsim.errors import ConfigError
 
@@ -29,7 +29,7 @@ def read_obj(path: Path) -> tuple[Array, tuple[str, ...]]:
         data = read_file(path, "cloud", MAX_TEXT_BYTES).replace(b"\r", b"\n")
         return _lines_of(rb"^[ \t]*v[ \t]+([^\n]*)", data)
 
-    points = guarded(read, path, "cloud", _FIX)
+    points = guard(read, path, "cloud", _FIX)
     return points, _SAID if len(points) else ()
 
 
@@ -50,7 +50,7 @@ def read_stl(path: Path) -> tuple[Array, tuple[str, ...]]:
             corners = _lines_of(rb"\bvertex[ \t]+([^\r\n]*)", data)
         return np.unique(corners, axis=0)
 
-    return guarded(read, path, "cloud", _FIX), _SAID
+    return guard(read, path, "cloud", _FIX), _SAID
 
 
 def read_off(path: Path) -> tuple[Array, tuple[str, ...]]:
@@ -73,7 +73,7 @@ def read_off(path: Path) -> tuple[Array, tuple[str, ...]]:
             raise ConfigError(f"it is cut off: it does not hold its {count:,} vertices", path, _FIX)
         return points
 
-    return guarded(read, path, "cloud", _FIX), _SAID
+    return guard(read, path, "cloud", _FIX), _SAID
 
 
 def _lines_of(pattern: bytes, data: bytes) -> Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import MAX_VALUES, check_count, guarded, read_file
+from artperl.inputs.bounds import MAX_VALUES, check_count, guard, read_file
 from artperl.inputs.text import parse_columns
 from artsim.errors import ConfigError
 
@@ -28,7 +28,7 @@ def read_pcd(path: Path) -> tuple[Array, tuple[str, ...]]:
     ConfigError
         When the file is no PCD, is cut off, or has no x, y, z.
     """
-    return guarded(lambda: _read(path), path, "cloud", _FIX)
+    return guard(lambda: _read(path), path, "cloud", _FIX)
 
 
 def _read(path: Path) -> tuple[Array, tuple[str, ...]]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from artperl.inputs.clouds import READERS, read_cloud_file
 from artperl.inputs.depth_images import ARRAYS, PICTURES, DepthKind, points_of_depth, read_depth
-from artperl.inputs.intrinsics import PixelCenter, fitted, read_camera
+from artperl.inputs.intrinsics import PixelCenter, check_camera, read_camera
 from artperl.inputs.intrinsics_formats import Hints
 from artperl.inputs.masks import MASK_FILES, MaskKind, read_mask
 from artsim.errors import ConfigError
@@ -125,7 +125,7 @@ def _of_depth(path: Path, intrinsics: Path, options: InputOptions) -> Cloud:
     image = read_depth(path)
     height, width = image.values.shape
     hints = Hints(options.image_id, path.stem, (width, height))
-    camera = fitted(read_camera(intrinsics, hints, options.pixel_center), (width, height), intrinsics)
+    camera = check_camera(read_camera(intrinsics, hints, options.pixel_center), (width, height), intrinsics)
     notes, warnings = [*image.notes, *camera.notes], [*image.warnings, *camera.warnings]
     shown = None
     if options.mask is not None:

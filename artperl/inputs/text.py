@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import MAX_LINE_BYTES, MAX_LINES, MAX_TEXT_BYTES, guarded, read_file
+from artperl.inputs.bounds import MAX_LINE_BYTES, MAX_LINES, MAX_TEXT_BYTES, guard, read_file
 from artsim.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ def read_text(path: Path) -> tuple[Array, tuple[str, ...]]:
     ConfigError
         When a line is no point.
     """
-    return guarded(lambda: _read(path), path, "cloud", _FIX)
+    return guard(lambda: _read(path), path, "cloud", _FIX)
 
 
 def parse_columns(

@@ -21,7 +21,7 @@ from artperl.core.batch import Batch, concatenate
 from artperl.core.estimate import brought_to_rest
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artperl.data.batches import ignore_interrupt
-from artperl.evaluation.scoring import true_poses
+from artperl.evaluation.metrics import true_poses
 from artperl.methods.full import Estimator
 from artperl.training.context import Report
 from artperl.training.steps import Stop, one_cycle, set_rate

@@ -10,7 +10,9 @@ from artperl.boxes.network import Boxes
 from artperl.data.batches import SENSOR
 from artperl.data.sources import Source
 from artperl.estimator import save_estimator
-from artperl.evaluation.scoring import NUM_POINTS, VALIDATION_SEEDS, evaluate, mean_iou, summary
+from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS
+from artperl.evaluation.scoring import evaluate, mean_iou
+from artperl.evaluation.tables import summary
 from artperl.methods.full import Estimator
 from artperl.training.box_records import learn, record
 from artperl.training.context import Context

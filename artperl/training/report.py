@@ -88,7 +88,7 @@ def write_scalars(board: SummaryWriter, group: str, figures: dict[str, float], s
 
 
 def scalars(figures: dict[str, Any]) -> dict[str, float]:
-    """What a board shows of :func:`artperl.evaluation.scoring.summary`: the medians of each part."""
+    """What a board shows of :func:`artperl.evaluation.tables.summary`: the medians of each part."""
     return {
         f"{category}/{k}/{name}": part[name]["median"]
         for category, figure in figures.items()

@@ -7,20 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from artperl.estimator import read_settings, save_estimator
-from artperl.evaluation.scoring import (
-    NUM_POINTS,
-    TEST_SEEDS,
-    VALIDATION_SEEDS,
-    calibrate,
-    evaluate,
-    frozen_samples,
-    headline,
-    mistake,
-    retry_residual,
-    samples_of,
-    summary,
-    table,
-)
+from artperl.evaluation.calibration import calibrate, retry_residual
+from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, VALIDATION_SEEDS, frozen_samples, samples_of
+from artperl.evaluation.scoring import evaluate, evaluate_foreign, headline
+from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
 from artperl.training.context import Context
 from artperl.training.report import rounded, scalars, write_report
@@ -73,7 +63,8 @@ def validate(context: Context) -> None:
     context.report("validation", scalars(figures) | {"score": score}, state.step)
     if score < _AS_GOOD * state.best:
         state.best = min(score, state.best)
-        judge = evaluate if options.votes else mistake  # by votes, any parts are right if they are where they are
+        # By votes, any parts are right if they are where they are.
+        judge = evaluate if options.votes else evaluate_foreign
         foreign = judge(estimator, _foreign_samples(context))
         best = replace(estimator, calibration=calibrate(scored, foreign))
         best.options = replace(best.options, retry_residual=retry_residual(scored))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import artsim
-from artperl.evaluation.scoring import frozen_samples
+from artperl.evaluation.samples import frozen_samples
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase

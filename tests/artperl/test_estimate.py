@@ -7,7 +7,8 @@ import pytest
 
 from artperl.core.estimate import Estimate, brought_to_rest, slid, widen
 from artperl.core.labels import labels_by_boxes
-from artperl.evaluation.scoring import frozen_samples, true_poses
+from artperl.evaluation.metrics import true_poses
+from artperl.evaluation.samples import frozen_samples
 
 
 def test_points_are_of_a_part_whose_box_they_are_in() -> None:

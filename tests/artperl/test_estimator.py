@@ -21,7 +21,10 @@ from artperl.core.shapes import Shapes
 from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
 from artperl.estimator import load_estimator, save_estimator
-from artperl.evaluation.scoring import TEST_SEEDS, frozen_samples, metrics, score, true_poses
+from artperl.evaluation import metrics
+from artperl.evaluation.metrics import true_poses
+from artperl.evaluation.samples import TEST_SEEDS, frozen_samples
+from artperl.evaluation.scoring import score
 from artperl.fitting.hypotheses import Context, References, chain_states, half_turn_about_vertical, part_weights
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.search import outside

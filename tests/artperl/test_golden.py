@@ -11,8 +11,9 @@ import pytest
 
 from artperl.data.categories import ARTIMAGE
 from artperl.estimator import load_estimator
+from artperl.evaluation import metrics
 from artperl.evaluation.artimage import row_samples
-from artperl.evaluation.scoring import evaluate, metrics
+from artperl.evaluation.scoring import evaluate
 from tests.artperl import golden
 
 _DEGREES, _SHARE = 0.2, 0.005

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from artperl.core.clouds import Clouds
 from artperl.data.truth import Truth, to_batch, training_rows
-from artperl.evaluation.scoring import frozen_samples
+from artperl.evaluation.samples import frozen_samples
 from artperl.perception.network import Votes
 from artperl.perception.part_grouping import clusters, differences, grouped
 from artsim.observing.sample import Sample

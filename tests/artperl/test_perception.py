@@ -15,7 +15,7 @@ from artperl.data.categories import ARTIMAGE, objects_of
 from artperl.data.sources import DataOptions, Samples
 from artperl.data.truth import Truth
 from artperl.estimator import load_estimator
-from artperl.evaluation.scoring import VALIDATION_SEEDS, frozen_samples
+from artperl.evaluation.samples import VALIDATION_SEEDS, frozen_samples
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.training.perception_losses import perception_figures, perception_losses
 from artsim.datasets.plan import SampleOptions

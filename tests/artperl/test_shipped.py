@@ -9,9 +9,11 @@ import pytest
 
 from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings
+from artperl.evaluation import metrics
 from artperl.evaluation.artimage import real_objects
 from artperl.evaluation.basin import basin_problem, run_basin
-from artperl.evaluation.scoring import evaluate, frozen_samples, metrics, samples_of
+from artperl.evaluation.samples import frozen_samples, samples_of
+from artperl.evaluation.scoring import evaluate
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import StateOptions, ViewOptions
 

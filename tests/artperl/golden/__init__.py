@@ -20,7 +20,7 @@ import numpy as np
 from artperl.core.estimate import Estimate
 from artperl.data.categories import ARTIMAGE
 from artperl.evaluation.artimage import real_objects
-from artperl.evaluation.scoring import frozen_samples, samples_of
+from artperl.evaluation.samples import frozen_samples, samples_of
 from artsim.common.files import write_atomic
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import ViewOptions

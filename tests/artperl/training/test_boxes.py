@@ -17,7 +17,7 @@ from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import concatenate
 from artperl.estimator import load_estimator
 from artperl.evaluation.box_overlap import iou_aligned
-from artperl.evaluation.scoring import frozen_samples
+from artperl.evaluation.samples import frozen_samples
 from artperl.training import box_records
 from artperl.training.boxes import best_without_own_references
 from artperl.training.options import TrainOptions

@@ -20,7 +20,7 @@ from artperl.agent.ppo import PPOOptions
 from artperl.boxes.network import Boxes
 from artperl.data.sources import Given
 from artperl.estimator import load_estimator, read_settings, save_estimator
-from artperl.evaluation.scoring import TEST_SEEDS, VALIDATION_SEEDS
+from artperl.evaluation.samples import TEST_SEEDS, VALIDATION_SEEDS
 from artperl.training.context import Report
 from artperl.training.objects import BASE_SEEDS
 from artperl.training.options import PRESETS, TrainOptions

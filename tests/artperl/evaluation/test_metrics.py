@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 from artperl.evaluation import metrics
-from artperl.evaluation.box_overlap import intersection_volume
+from artperl.evaluation.box_overlap import intersection_volume, iou_omad_legacy
 from benchmarks.legacy_iou import FRAMES
 
 Box = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -126,7 +126,7 @@ def test_published_sampler_equals_the_exact_overlap_where_its_slip_does_no_harm(
     ]
     size = rng.uniform(0.5, 1.0, size=(20, 2, 3))
     center = low + 0.5 * size
-    legacy = metrics.iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
+    legacy = iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     exact = metrics.iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     assert np.abs(legacy - exact).max() < 0.05
 
@@ -134,7 +134,7 @@ def test_published_sampler_equals_the_exact_overlap_where_its_slip_does_no_harm(
 def test_published_sampler_is_off_elsewhere_by_as_much_as_reported() -> None:
     rng = np.random.default_rng(6)
     center, size = 0.2 * rng.normal(size=(120, 2, 3)), rng.uniform(0.3, 1.0, size=(120, 2, 3))
-    legacy = metrics.iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
+    legacy = iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     exact = metrics.iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     assert 0.02 < np.abs(legacy - exact).mean() < 0.3
 
@@ -146,7 +146,7 @@ def test_published_sampler_depends_on_the_frame_and_the_exact_overlap_does_not()
     for R in FRAMES.values():
         boxes = R @ center, np.abs(R) @ size, R @ (center + off), np.abs(R) @ size
         assert metrics.iou_rest_exact(*boxes) == pytest.approx(0.6, abs=1e-12)
-        legacy.append(float(metrics.iou_omad_legacy(*boxes)))
+        legacy.append(float(iou_omad_legacy(*boxes)))
     assert max(legacy) == 1.0
     assert min(legacy) == 0.0
 
@@ -161,34 +161,14 @@ def test_rotation_error_is_the_angle_turned_by(degrees: float) -> None:
     np.testing.assert_allclose(metrics.rotation_error(estimate, truth), degrees, atol=1e-6, rtol=1e-6)
 
 
-def test_symmetries_forgive_what_cannot_be_seen() -> None:
-    truth = Rotation.random(20, random_state=2).as_matrix()
-    half_turn = Rotation.from_euler("z", 180, degrees=True).as_matrix()
-    group = np.stack([np.eye(3), half_turn])
-    tilt = Rotation.from_euler("x", 4, degrees=True).as_matrix()
-    np.testing.assert_allclose(metrics.rotation_error(truth @ half_turn, truth), 180.0)
-    np.testing.assert_allclose(metrics.rotation_error(truth @ half_turn @ tilt, truth, group), 4.0)
-    spun = truth @ Rotation.from_euler("z", 77, degrees=True).as_matrix()
-    np.testing.assert_allclose(metrics.rotation_error(spun, truth, symmetry_axis=[0, 0, 1]), 0.0, atol=1e-9)
-    np.testing.assert_allclose(metrics.rotation_error(spun @ tilt, truth, symmetry_axis=[0, 0, 1]), 4.0)
-
-
 def test_translation_is_measured_in_diagonals() -> None:
     assert metrics.translation_error([0.0, 0.03, 0.04], [0.0, 0.0, 0.0], 2.0) == pytest.approx(0.025)
-    T = np.eye(4)
-    T[:3, 3] = [0, 0, 0.1]
-    assert metrics.translation_error_omad(T, np.eye(4), 0.5) == pytest.approx(0.2)
 
 
-def test_joint_lines() -> None:
-    x, y, zero = np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), np.zeros(3)
+def test_opposite_directions_are_one_axis() -> None:
+    x, y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     assert metrics.axis_error(x, -x) == pytest.approx(0.0)
-    assert metrics.axis_error(x, -x, signed=True) == pytest.approx(180.0)
     assert metrics.axis_error(x, y) == pytest.approx(90.0)
-    assert metrics.line_distance(zero, x, [5.0, 3.0, 0.2], y) == pytest.approx(0.2)
-    assert metrics.line_distance(zero, x, [5.0, 0.3, 0.4], x) == pytest.approx(0.5)
-    tilted = Rotation.from_euler("z", 1e-7).apply(x)
-    assert metrics.line_distance(zero, x, [5.0, 0.3, 0.4], tilted) == pytest.approx(0.5, abs=1e-5)
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30))

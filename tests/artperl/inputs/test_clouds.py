@@ -16,7 +16,7 @@ from artperl.inputs.bounds import MAX_VALUES
 from artperl.inputs.pcd import unpack_lzf
 from artsim.errors import ConfigError
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 POINTS = (np.random.default_rng(5).integers(-900, 900, (40, 3)) / 256.0 + [0.0, 0.0, 8.0]).astype(np.float64)
 """Exact in single precision and in text."""
 

@@ -17,7 +17,7 @@ from artperl.inputs.depth_images import read_depth
 from artperl.inputs.masks import read_mask
 from artsim.errors import ArtsimError, ConfigError
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 SHOWN = np.zeros((24, 32), dtype=bool)
 SHOWN[6:18, 8:26] = True
 SHOWN[6:10, 8:12] = False

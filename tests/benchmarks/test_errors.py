@@ -9,7 +9,8 @@ import pytest
 
 from artperl.core.estimate import Estimate
 from artperl.estimator import load_estimator
-from artperl.evaluation.scoring import frozen_samples, true_poses
+from artperl.evaluation.metrics import true_poses
+from artperl.evaluation.samples import frozen_samples
 from artsim.observing.sample import Sample
 from benchmarks.errors import BINS, Told, in_bins, moving_parts
 

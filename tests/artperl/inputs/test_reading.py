@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import artsim
-from artperl.evaluation.scoring import samples_of
+from artperl.evaluation.samples import samples_of
 from artperl.inputs import points_of_depth, read_intrinsics, read_points
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception

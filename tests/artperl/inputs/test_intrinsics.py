@@ -17,7 +17,7 @@ from artsim.errors import ConfigError
 from artsim.scenes.ground_truth import observe_scene, write_view
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 K = np.array([[376.617315730203, 0.0, 167.25], [0.0, 289.7056274847714, 116.5], [0.0, 0.0, 1.0]])
 """The first pixel's centre is at (0.5, 0.5)."""
 THEIRS = K - [[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]]

@@ -14,7 +14,7 @@ from artperl import cli
 from artperl.commands.estimate import estimator_folder
 from artsim.errors import ConfigError
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 
 
 class Program:

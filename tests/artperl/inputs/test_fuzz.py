@@ -16,11 +16,11 @@ from artperl.inputs import InputOptions, read_cloud
 from artperl.inputs.intrinsics import read_camera
 from artperl.inputs.masks import read_mask
 from artsim.errors import ArtsimError
-from tests.artperl.test_inputs_clouds import _files
-from tests.artperl.test_inputs_intrinsics import FORMATS
-from tests.artperl.test_inputs_masks import _pictures
+from tests.artperl.inputs.test_clouds import _files
+from tests.artperl.inputs.test_intrinsics import FORMATS
+from tests.artperl.inputs.test_masks import _pictures
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 
 
 def _corpus(folder: Path) -> list[tuple[str, bytes]]:

@@ -1,0 +1,133 @@
+"""Figures of an evaluation: their summary in JSON's terms, their table, and the published means beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artperl.evaluation.metrics import METRICS, auroc
+from artperl.evaluation.scoring import Scored
+
+Array = NDArray[np.float64]
+
+PUBLISHED: dict[str, dict[str, tuple[float, ...]]] = {
+    "laptop": {"rotation_deg": (4.9, 4.7), "translation_partnet": (0.053, 0.066), "iou_omad_legacy": (0.646, 0.504)},
+    "eyeglasses": {
+        "rotation_deg": (4.1, 6.2, 6.0),
+        "translation_partnet": (0.047, 0.095, 0.091),
+        "iou_omad_legacy": (0.586, 0.465, 0.517),
+    },
+    "dishwasher": {
+        "rotation_deg": (3.9, 4.3),
+        "translation_partnet": (0.055, 0.079),
+        "iou_omad_legacy": (0.893, 0.676),
+    },
+    "scissors": {"rotation_deg": (2.2, 2.6), "translation_partnet": (0.031, 0.042), "iou_omad_legacy": (0.409, 0.463)},
+    "drawer": {
+        "rotation_deg": (3.5, 3.5, 3.5, 3.5),
+        "translation_partnet": (0.061, 0.112, 0.121, 0.104),
+        "iou_omad_legacy": (0.848, 0.786, 0.790, 0.812),
+    },
+}
+"""Means of ArtPERL on the original ArtImage, by part (its table 1)."""
+
+_NAME, _MEDIAN, _MEAN = 14, 9, 7
+"""Widths of the table's columns."""
+
+
+def summary(scored: Sequence[Scored]) -> dict[str, Any]:
+    """Figures by category and part, in JSON's terms: the format of ``artperl evaluate --json``.
+
+    Returns
+    -------
+    dict
+        ``{category: {"parts": [{metric: {"median": x, "mean": x}}], "failures": n, "instances": n,
+        "ms_per_instance": median, ...}}``, without the metrics that do not apply.
+    """
+    return {category: _category_summary(scored, category) for category in dict.fromkeys(s.category for s in scored)}
+
+
+def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]:
+    own = [s for s in scored if s.category == category]
+    right, confidence = np.array([s.right for s in own]), np.array([s.confidence for s in own])
+    return {
+        "parts": [_part_summary(own, k) for k in range(max(len(s.rotation) for s in own))],
+        "instances": len(own),
+        "failures": sum(s.failed for s in own),
+        "right": float(right.mean()),
+        "parts_found": float(np.mean([s.parts_found for s in own])),
+        "segmentation": float(np.mean([s.segmentation for s in own])),
+        "confidence_of_right": _median(confidence[right]),
+        "confidence_of_wrong": _median(confidence[~right]),
+        "confidence_auroc": auroc(confidence, right),
+        "ms_per_instance": float(np.median([s.milliseconds for s in own])),
+    }
+
+
+def _part_summary(scored: Sequence[Scored], k: int) -> dict[str, dict[str, float]]:
+    columns = {name: [s.errors[name][k] for s in scored if len(s.rotation) > k] for name in METRICS}
+    return {
+        name: {"median": float(np.median(values)), "mean": float(np.mean(values))}
+        for name, values in columns.items()
+        if not np.isnan(values).any()
+    }
+
+
+def _median(values: Array) -> float | None:
+    return float(np.median(values)) if len(values) else None
+
+
+def table(figures: dict[str, Any]) -> str:
+    """The paper's table: one line for each category and part, one pair of columns for each metric with a title.
+
+    Parameters
+    ----------
+    figures : dict
+        As :func:`summary` gives them.
+    """
+    columns = {name: metric for name, metric in METRICS.items() if metric.title}
+    lines = [
+        " " * _NAME + "".join(f"{metric.title:>{_MEDIAN + _MEAN}s}" for metric in columns.values()),
+        " " * _NAME + f"{'median':>{_MEDIAN}s}{'mean':>{_MEAN}s}" * len(columns),
+    ]
+    for category, figure in figures.items():
+        for k, part in enumerate(figure["parts"]):
+            lines.append(f"{f'{category} {k}':{_NAME}s}" + "".join(_cell(part, name) for name in columns))
+        lines.append(
+            f"{'':{_NAME}s}{figure['instances']} instances, {figure['failures']} failures, "
+            f"{100 * figure['right']:.0f} % right, {100 * figure['parts_found']:.0f} % of parts found, "
+            f"{100 * figure['segmentation']:.1f} % of points right, "
+            f"{figure['ms_per_instance']:.0f} ms"
+        )
+        if figure["confidence_auroc"] is not None:
+            lines.append(
+                f"{'':{_NAME}s}confidence of right ones {100 * figure['confidence_of_right']:.0f} %, of wrong ones "
+                f"{100 * figure['confidence_of_wrong']:.0f} % in the median, AUROC {figure['confidence_auroc']:.2f}"
+            )
+    return "\n".join(lines)
+
+
+def _cell(part: dict[str, dict[str, float]], name: str) -> str:
+    """Median and mean of one metric; blank where it does not apply."""
+    if name not in part:
+        return " " * (_MEDIAN + _MEAN)
+    metric, figure = METRICS[name], part[name]
+    median, mean = (f"{metric.factor * figure[middle]:.{metric.digits}f}" for middle in ("median", "mean"))
+    return f"{median:>{_MEDIAN}s}{mean:>{_MEAN}s}"
+
+
+def against_published(category: str, figures: dict[str, Any]) -> str:
+    """Where means are better than those published for other images of the category, and where not."""
+    published = PUBLISHED[category]
+    names = {"rotation_deg": "rotation", "translation_partnet": "translation", "iou_omad_legacy": "IoU as OMAD's"}
+    texts = []
+    for name, title in names.items():
+        own = [part[name]["mean"] for part in figures["parts"]]
+        other = published[name]
+        sign = 1.0 if METRICS[name].less_is_better else -1.0
+        worse = [k for k, (a, b) in enumerate(zip(own, other, strict=True)) if sign * a >= sign * b]
+        texts.append(f"{title} {'better' if not worse else f'not better for part {worse}'}")
+    return f"{'':14s}against ArtPERL's published means: {', '.join(texts)}"

@@ -1,0 +1,76 @@
+"""Confidence is calibrated; estimates that fit worst are looked for again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from artperl.core.estimate import Calibration
+from artperl.evaluation.calibration import calibrate, retry_residual
+from artperl.evaluation.samples import frozen_samples
+from artperl.evaluation.scoring import Scored, evaluate
+from artperl.methods.full import Estimator
+from artsim.observing.sample import Sample
+
+
+def _off(scored: Scored, degrees: float) -> Scored:
+    """The same with a rotation error of every part."""
+    return replace(scored, errors=scored.errors | {"rotation_deg": np.full(len(scored.rotation), degrees)})
+
+
+def test_a_quarter_is_looked_for_again(estimator: Estimator, sample: Sample) -> None:
+    one = evaluate(estimator, [sample])[0]
+    scored = [replace(one, residual=r) for r in np.linspace(0.0, 0.1, 101)] + [replace(one, residual=np.inf)]
+    assert retry_residual(scored) == pytest.approx(0.075)
+    assert retry_residual([]) == 0.0
+
+
+def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:
+    """Where half of the estimates with a residual are right, confidence says so; and it never rises with it."""
+    one: Scored = evaluate(estimator, [sample])[0]
+    rng = np.random.default_rng(0)
+    residual = rng.uniform(0.0, 0.1, 2000)
+    chance = 1.0 / (1.0 + np.exp(80.0 * (residual - 0.05)))
+    right = rng.random(2000) < chance
+    scored = [
+        replace(_off(one, 1.0 if ok else 90.0), residual=r, disagreement=0.02, visibility=0.5)
+        for r, ok in zip(residual, right, strict=True)
+    ]
+    fitted = calibrate(scored)
+    found = np.array([fitted(r, 0.02, 0.5) for r in residual])
+    assert np.abs(found - chance).mean() < 0.05
+    assert fitted(0.3, 0.3, 0.5) < 0.01
+    assert calibrate([]) == Calibration()
+
+
+@pytest.mark.parametrize("better", [True, False])
+def test_confidence_takes_notice_of_what_does_not_show(estimator: Estimator, sample: Sample, better: bool) -> None:
+    """Where estimates of what hardly shows are wrong more often, it says by how much; it never trusts them more."""
+    one: Scored = evaluate(estimator, [sample])[0]
+    rng = np.random.default_rng(0)
+    shows = rng.uniform(0.0, 1.0, 2000)
+    chance = 1.0 / (1.0 + np.exp((-1.0 if better else 1.0) * 12.0 * (shows - 0.3)))
+    right = rng.random(2000) < chance
+    fitted = calibrate([
+        replace(_off(one, 1.0 if ok else 90.0), residual=0.004, disagreement=0.02, visibility=v)
+        for v, ok in zip(shows, right, strict=True)
+    ])  # fmt: skip
+    found = np.array([fitted(0.004, 0.02, v) for v in np.linspace(0.0, 1.0, 11)])
+    assert (np.diff(found) >= 0.0).all()
+    if better:
+        assert np.abs(np.array([fitted(0.004, 0.02, v) for v in shows]) - chance).mean() < 0.05
+    else:
+        assert np.ptp(found) < 1e-3
+
+
+def test_estimates_with_other_parts_are_wrong_whatever_they_fit(estimator: Estimator, sample: Sample) -> None:
+    (other,) = evaluate(estimator, frozen_samples(["eyeglasses"], 1, 1))
+    assert other.failed
+    assert np.isfinite([other.residual, other.disagreement]).all()
+    told = {name: getattr(other, name) for name in ("residual", "disagreement", "visibility")}
+    right = [replace(evaluate(estimator, [sample])[0], **told)]
+    among = calibrate(20 * right + 20 * [other])
+    assert among(**told) == pytest.approx(0.5, abs=0.02)
+    assert calibrate(20 * right)(**told) > 0.9
