@@ -60,7 +60,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
 CALLS = {
     "import artperl": "",
     "import artsim; artsim.make_renderer('raycast')": "",
-    **{f"import artsim; artsim.make_renderer({name!r})": name.partition("-")[0] for name in RENDERERS[1:]},
+    **{f"import artsim; artsim.make_renderer({name!r})": name.partition("-")[0] for name in list(RENDERERS)[1:]},
     "import artperl; artperl.load_estimator('laptop')": "train",
     "import artsim.envs": "envs",
     "import artperl.training.gym_env": "train",
