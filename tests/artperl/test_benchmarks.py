@@ -42,6 +42,7 @@ def test_no_real_object_is_both_learnt_from_and_tested_on() -> None:
     assert tested & tuned_on == {"Table/26387"}
 
 
+@pytest.mark.slow
 def test_real_objects_have_the_parts_of_artimage(partnet_dir: Path) -> None:
     for category, joints in ARTIMAGE.items():
         for half in ("train", "test"):
@@ -195,6 +196,7 @@ def test_parts_are_covered_when_their_surfaces_are_near() -> None:
         assert (apart > 0.1).all() == (share == 1.0)
 
 
+@pytest.mark.slow
 def test_parts_of_real_objects_come_in_the_order_of_procedural_ones(partnet_dir: Path) -> None:
     procedural = [*objects_of(["eyeglasses"], 5, 10), *objects_of(["drawer"], 20, 10)]
     right = [in_reading_order(range(1, len(obj)), obj.box_center, obj.box_size) == list(range(1, len(obj)))

@@ -25,6 +25,8 @@ from artperl.training import boxes as box_training
 from artperl.training.options import TrainOptions
 from artperl.training.run import Training
 
+pytestmark = pytest.mark.slow
+
 SIGNS = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 """Of the faces' outward normals."""
 STAGE = TrainOptions(

@@ -20,6 +20,8 @@ from tests.artperl.test_inputs_clouds import _files
 from tests.artperl.test_inputs_intrinsics import FORMATS
 from tests.artperl.test_inputs_masks import _pictures
 
+pytestmark = pytest.mark.slow
+
 CASES = Path(__file__).parents[1] / "cases"
 
 

@@ -118,6 +118,7 @@ def test_drawers_come_back(drawers: tuple[Shapes, Observed, Theta]) -> None:
     assert np.median(translation) < 0.02
 
 
+@pytest.mark.slow
 def test_another_laptop_takes_on_the_shape_of_the_one_seen() -> None:
     _, samples = views("laptop", 12, first_seed=50)
     others = Shapes.from_objects([artsim.make("laptop", 200 + i).with_diagonal(1.0) for i in range(12)])
@@ -130,6 +131,7 @@ def test_another_laptop_takes_on_the_shape_of_the_one_seen() -> None:
     assert np.median(translation) < np.median(errors(others, fixed.theta, truth)[1])
 
 
+@pytest.mark.slow
 def test_expected_sizes_are_met_where_the_view_leaves_them_open() -> None:
     objects, samples = views("laptop", 12, first_seed=50)
     others = Shapes.from_objects([artsim.make("laptop", 200 + i).with_diagonal(1.0) for i in range(12)])
@@ -148,6 +150,7 @@ def test_expected_sizes_are_met_where_the_view_leaves_them_open() -> None:
     assert wrong(unsure)[0] < 0.5 * wrong(None)[0]
 
 
+@pytest.mark.slow
 def test_energy_never_rises_from_any_start(laptops: tuple[Shapes, Observed, Theta]) -> None:
     shapes, observed, truth = laptops
     for seed, degrees, length in ((0, 0.0, 0.0), (1, 5.0, 0.02), (2, 60.0, 0.3), (3, 170.0, 0.5)):
@@ -156,6 +159,7 @@ def test_energy_never_rises_from_any_start(laptops: tuple[Shapes, Observed, Thet
             assert (result.energy <= result.start_energy).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_states_never_leave_their_limits(drawers: tuple[Shapes, Observed, Theta], seed: int) -> None:
     shapes, observed, truth = drawers
@@ -202,6 +206,7 @@ def test_a_batch_gives_what_its_objects_give_alone(drawers: tuple[Shapes, Observ
         torch.testing.assert_close(single.theta.state[0], together.theta.state[b, :K], atol=2e-3, rtol=0.0)
 
 
+@pytest.mark.slow
 def test_hinges_lean_as_the_points_say_and_as_far_as_they_may() -> None:
     """References whose hinges lean by six degrees the other way; both hinges of a pair lean together."""
     objects, samples = views("eyeglasses", 32, first_seed=30)
@@ -303,6 +308,7 @@ def test_part_energy_is_the_chamfer_distance_of_each_part() -> None:
     assert float(found) == pytest.approx(expected / float(shapes.diagonal) ** 2, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_papers_energy_leads_back_too(laptops: tuple[Shapes, Observed, Theta]) -> None:
     shapes, observed, truth = laptops
     start = perturbed(shapes, truth, 10.0, 0.05)
@@ -322,6 +328,7 @@ def test_points_of_a_shape_are_spread_evenly() -> None:
     assert first > 0.4 * 2 * spacing
 
 
+@pytest.mark.slow
 def test_options_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ConfigError):
         RefineOptions(iterations=-1)

@@ -15,6 +15,8 @@ from artperl.evaluation.scoring import evaluate, frozen_samples, metrics, sample
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import StateOptions, ViewOptions
 
+pytestmark = pytest.mark.slow
+
 _SEEDS = 1_200_000
 """Neither of streams and bases, nor of the test and validation sets."""
 SHIPPED = (*ARTIMAGE, "any")

@@ -81,6 +81,8 @@ CALLS = {
 DRIVER = """
 import contextlib, io, json, runpy, sys
 
+pytestmark = pytest.mark.slow
+
 def told(run):
     out, err = io.StringIO(), io.StringIO()
     code = 0
