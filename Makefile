@@ -1,24 +1,31 @@
-# Two commands do everything on a fresh machine: `make demo` and `make test`.
+# `make help` lists the targets. `make demo` and `make test` do everything on a fresh machine.
 PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
+# Two processes of one thread each: four threads on two cores wait for each other.
+PYTEST := OMP_NUM_THREADS=1 $(PY) -m pytest -n 2
 
-.PHONY: demo test lint bench audit clean system assets weights
+.PHONY: help demo check test lint bench audit weights assets system clean
 
-demo: $(VENV)/.ready
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*##/\1 /p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-8s %s\n' "$$name" "$$text"; done
+
+demo: $(VENV)/.ready  ## draw all categories, make a dataset, train a small estimator, in out/demo
 	$(PY) examples/demo/main.py out/demo
 
-# Two processes of one thread each: four threads on two cores wait for each other.
-test: system $(VENV)/.ready-dev lint
-	OMP_NUM_THREADS=1 $(PY) -m pytest -n 2 --dist loadfile
+check: $(VENV)/.ready-dev lint  ## lint, types and the fast tests: in two minutes, before each commit
+	$(PYTEST) --dist worksteal -m "not slow"
 
-lint: $(VENV)/.ready-dev
+test: system $(VENV)/.ready-dev lint  ## lint, types and every test: what continuous integration runs
+	$(PYTEST) --dist loadfile
+
+lint: $(VENV)/.ready-dev  ## format, lint, types and import contracts
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
 
-bench: $(VENV)/.ready-dev
+bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 	$(PY) -m benchmarks.kinematics
 	$(PY) -m benchmarks.agreement
 	$(PY) -m benchmarks.renderers
@@ -35,23 +42,21 @@ bench: $(VENV)/.ready-dev
 	$(PY) -m benchmarks.joint
 	$(PY) -m benchmarks.robot_arm
 
-# Sim-readiness of 10,000 procedural objects, and of the real ones in ARTSIM_PARTNET_DIR.
-audit: $(VENV)/.ready-dev
+audit: $(VENV)/.ready-dev  ## test 10,000 procedural objects, and those in ARTSIM_PARTNET_DIR, for simulators
 	$(PY) -m benchmarks.audit
 
-# The estimators that come with the package, each from its recipe; stop it at any moment: the same command goes on.
-# To try one: make weights RECIPES=laptop PRESET=quick
+# Stop it at any moment: the same command goes on. To try one: make weights RECIPES=laptop PRESET=quick
 RECIPES ?= $(basename $(notdir $(wildcard artperl/recipes/*.json)))
-weights: $(VENV)/.ready-dev
+weights: $(VENV)/.ready-dev  ## make the shipped estimators again, each from its recipe
 	for recipe in $(RECIPES); do \
 		$(VENV)/bin/artperl train --recipe $$recipe $(if $(PRESET),--preset $(PRESET)) --workers 2 --threads 1 || exit; \
 	done
 
-assets: $(VENV)/.ready-dev
+assets: $(VENV)/.ready-dev  ## make the objects in urdf_assets again
 	$(PY) urdf_assets/build.py
 
 # System libraries that PyBullet's EGL renderer needs, and SAPIEN's Vulkan driver; everything else comes from pip.
-system:
+system:  ## install what EGL and SAPIEN need; wants root
 	scripts/install-system.sh
 	scripts/install-vulkan.sh
 
@@ -65,5 +70,5 @@ $(VENV)/.ready-dev: pyproject.toml constraints.txt
 	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view,train,dev]'
 	touch $(VENV)/.ready $@
 
-clean:
+clean:  ## remove the environment and everything made
 	rm -rf $(VENV) out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -20,6 +20,7 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
+from artsim.renderers import RendererName
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
 
 _LISTED = 50
@@ -205,8 +206,8 @@ class Scene:
     """Seed of the first scene: the same seed and options make the same files."""
     scene: Annotated[SceneOptions, tyro.conf.arg(name="")] = field(default_factory=SceneOptions)
     camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
-    renderer: Literal["sapien", "pybullet", "pybullet-egl", "raycast", "warp"] = "sapien"
-    """Only the first three make colour images."""
+    renderer: RendererName = "sapien"
+    """Only sapien, pybullet and pybullet-egl make colour images."""
     rgb_samples: int = 8
     """Pictures that each colour image is the mean of: more give softer shadows and smoother edges."""
     num_points: int = 2048
@@ -382,7 +383,7 @@ class Doctor:
     """Try every backend: does it work, on which device, how fast, and what to do if not."""
 
     backends: tyro.conf.Positional[tuple[str, ...]] = ()
-    """raycast, pybullet, pybullet-egl, sapien, maniskill, warp, ray, torch; by default all of them."""
+    """raycast, pybullet, pybullet-egl, sapien, warp, maniskill, ray, torch; by default all of them."""
 
     def run(self) -> None:
         from artsim.doctor import BACKENDS, examine, finding_table

@@ -13,9 +13,11 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 
 from artsim.common.extras import import_failure, install_command
 from artsim.errors import ArtsimError, ConfigError, RenderError
+from artsim.renderers import RENDERERS
 
 SIZE = 128
 """Width and height of the pictures that rates are measured with, pixels."""
@@ -94,7 +96,8 @@ def examine(backend: str) -> Finding:
 
 
 def _failure(backend: str, problem: str, fix: str = "") -> Finding:
-    return Finding(backend, works=False, problem=problem, fix=fix or _FIXES[backend])
+    fix = fix or _FIXES.get(backend, "read in its module what it needs")
+    return Finding(backend, works=False, problem=problem, fix=fix)
 
 
 def finding_table(findings: list[Finding]) -> str:
@@ -142,12 +145,9 @@ def _processor() -> str:
     return f"CPU ({names[0]}, {len(names)} threads)" if names else "CPU"
 
 
-def _raycast() -> tuple[str, float | None]:
-    return _processor(), _renderer_fps("raycast")
-
-
-def _pybullet() -> tuple[str, float | None]:
-    return _processor(), _renderer_fps("pybullet")
+def _renderer(name: str) -> tuple[str, float | None]:
+    """A renderer that draws on the processor."""
+    return _processor(), _renderer_fps(name)
 
 
 def _pybullet_egl() -> tuple[str, float | None]:
@@ -211,12 +211,11 @@ def _torch() -> tuple[str, float | None]:
 
 
 BACKENDS: dict[str, Callable[[], tuple[str, float | None]]] = {
-    "raycast": _raycast,
-    "pybullet": _pybullet,
+    **{name: partial(_renderer, name) for name in RENDERERS},
     "pybullet-egl": _pybullet_egl,
     "sapien": _sapien,
-    "maniskill": _maniskill,
     "warp": _warp,
+    "maniskill": _maniskill,
     "ray": _ray,
     "torch": _torch,
 }

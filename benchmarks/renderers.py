@@ -38,7 +38,7 @@ class Options:
     objects: int = 20
     views: int = 10
     """Frames of each object that count, each of another state and view."""
-    renderers: tuple[str, ...] = RENDERERS
+    renderers: tuple[str, ...] = tuple(RENDERERS)
 
 
 def resized(camera: Camera, width: int, height: int) -> Camera:

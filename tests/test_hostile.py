@@ -226,6 +226,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     return {name: one | {"text": cases[name][2], "written": written} for name, one in zip(cases, found, strict=True)}
 
 
+@pytest.mark.slow
 def test_each_is_read_or_refused_in_one_line(outcomes: dict[str, dict[str, Any]]) -> None:
     wrong = {}
     for name, one in outcomes.items():

@@ -65,6 +65,7 @@ def commands(text: str) -> list[list[str]]:
 COMMANDS = [(page.name, words) for page in PAGES for words in commands(page.read_text())]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("page", "words"), COMMANDS, ids=lambda value: value if isinstance(value, str) else " ".join(value)[:60]
 )
@@ -159,6 +160,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_what_readme_and_tutorial_show_works_in_order(tmp_path: Path) -> None:
     """Shell and Python blocks, in one new folder, as a reader pastes them."""
     (tmp_path / "urdf_assets").symlink_to(ASSETS)

@@ -44,6 +44,7 @@ def made() -> dict[str, dict[str, str]]:
     return {processor: json.loads(on(processor, "-m", "tests.reproduce")) for processor in PROCESSORS}
 
 
+@pytest.mark.slow
 def test_every_family_makes_the_same_objects_on_every_processor(made: dict[str, dict[str, str]]) -> None:
     names = [f"{category}:{seed}{what}" for category in CATEGORIES for seed in (0, 1) for what in ("", " whole")]
     for name in names:

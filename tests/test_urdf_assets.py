@@ -311,6 +311,7 @@ def test_parts_of_the_demo_objects_never_touch(folder: Path) -> None:
             assert a.min_gap(b, 1.0) > 0.25, f"overlap of {(a ^ b).volume():.2f} mm^3 at {q}"
 
 
+@pytest.mark.slow
 def test_rebuilding_changes_no_byte(tmp_path: Path) -> None:
     """In a process of its own: build.py tells numpy which kernels to use."""
     subprocess.run([sys.executable, ASSETS / "build.py", tmp_path], check=True)

@@ -24,7 +24,7 @@ from artsim.model.draws import (
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
-from artsim.renderers import Renderer
+from artsim.renderers import RENDERERS, Renderer, RendererName
 
 _VIEW_ATTEMPTS = 50
 _SEEN_OFTEN_ENOUGH = 3
@@ -32,7 +32,6 @@ _SEEN_OFTEN_ENOUGH = 3
 PLANNED_ATTEMPTS = 1000
 """Views drawn for a sample of a dataset, whose objects were all seen by three of fifty at least."""
 
-RendererName = Literal["raycast", "pybullet", "pybullet-egl", "sapien", "warp"]
 ImageName = Literal["depth", "part_mask", "rgb"]
 SensorName = Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"]
 
@@ -90,7 +89,7 @@ class SampleOptions:
                 },
             ),
             views=ViewOptions(**{name: _VIEW_FIELDS[name](value, name) for name, value in views.items()}),
-            renderer=json_values.one_of(own["renderer"], "renderer", get_args(RendererName)),
+            renderer=json_values.one_of(own["renderer"], "renderer", tuple(RENDERERS)),
             images=tuple(
                 json_values.one_of(v, "image", get_args(ImageName))
                 for v in json_values.sequence(own["images"], "images", 3)

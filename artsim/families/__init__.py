@@ -2,7 +2,7 @@
 
 A family is a function ``build(rng) -> Assembly`` that draws a new, plausible object from an explicit generator. It
 draws proportions, details and the shape of the kinematic tree, in metres, with Z up and the front towards -X, and
-leaves a gap between parts in every joint state. ``docs/adding_a_category.md`` shows how to add one.
+leaves a gap between parts in every joint state. ``CONTRIBUTING.md`` shows how to add one.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -13,7 +15,19 @@ from artsim.model.frame import Frame
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers.base import CameraBatch, Renderer
 
-RENDERERS = ("raycast", "pybullet", "pybullet-egl", "sapien", "warp")
+RENDERERS = {
+    "raycast": "artsim.renderers.raycast:RaycastRenderer",
+    "pybullet": "artsim.renderers.bullet:BulletRenderer",
+    "pybullet-egl": "artsim.renderers.bullet:EglRenderer",
+    "sapien": "artsim.renderers.sapien:SapienRenderer",
+    "warp": "artsim.renderers.warp:WarpRenderer",
+}
+"""The registry: each renderer's name, and the ``module:class`` that is imported when it is first asked for."""
+
+if TYPE_CHECKING:
+    RendererName: TypeAlias = str
+else:  # command lines and files of options read the names from this type, which type checkers cannot
+    RendererName = Literal[tuple(RENDERERS)]
 
 
 def make_renderer(name: str) -> Renderer:
@@ -26,23 +40,11 @@ def make_renderer(name: str) -> Renderer:
     RenderError
         When its backend is not installed or does not start.
     """
-    if name == "raycast":
-        from artsim.renderers.raycast import RaycastRenderer
-
-        return RaycastRenderer()
-    if name in ("pybullet", "pybullet-egl"):
-        from artsim.renderers.bullet import BulletRenderer
-
-        return BulletRenderer(egl=name == "pybullet-egl")
-    if name == "sapien":
-        from artsim.renderers.sapien import SapienRenderer
-
-        return SapienRenderer()
-    if name == "warp":
-        from artsim.renderers.warp import WarpRenderer
-
-        return WarpRenderer()
-    raise ConfigError(f"there is no renderer {name!r}", "renderer", f"use one of {', '.join(RENDERERS)}")
+    if name not in RENDERERS:
+        raise ConfigError(f"there is no renderer {name!r}", "renderer", f"use one of {', '.join(RENDERERS)}")
+    module, _, kind = RENDERERS[name].partition(":")
+    renderer: Renderer = getattr(import_module(module), kind)()
+    return renderer
 
 
 @cache
@@ -122,6 +124,7 @@ __all__ = [
     "RENDERERS",
     "CameraBatch",
     "Renderer",
+    "RendererName",
     "make_renderer",
     "render",
     "render_cameras",

@@ -43,22 +43,18 @@ class BulletRenderer:
 
     Each object has a physics world of its own; the least recently drawn are dropped.
 
-    Parameters
-    ----------
-    egl : bool
-        Draw with OpenGL through EGL instead of TinyRenderer.
-
     Raises
     ------
     RenderError
         When PyBullet is not installed, or EGL does not start.
     """
 
-    def __init__(self, egl: bool = False):
-        self.name = "pybullet-egl" if egl else "pybullet"
-        self._egl = egl
+    name = "pybullet"
+    _egl = False
+
+    def __init__(self) -> None:
         self._worlds: GeometryCache[_World] = GeometryCache(_MAX_WORLDS[self.name])
-        _World((), egl).close()  # says now, rather than at the first frame, that the backend is missing
+        _World((), self._egl).close()  # says now, rather than at the first frame, that the backend is missing
 
     def render(
         self, obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None
@@ -107,6 +103,13 @@ class BulletRenderer:
     def close(self) -> None:
         """Drop every world."""
         self._worlds.close()
+
+
+class EglRenderer(BulletRenderer):
+    """Draws with OpenGL through EGL instead of TinyRenderer."""
+
+    name = "pybullet-egl"
+    _egl = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,6 +64,7 @@ def search(seed: int) -> Theta:
     return beam(shapes, cloud, labels, leaning(seed), 8, 64, _RIGID)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 3, 7])
 def test_an_arm_is_found_where_refinement_alone_does_not_find_it(seed: int) -> None:
     shapes, true, cloud, part = view(seed)

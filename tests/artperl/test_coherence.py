@@ -54,6 +54,7 @@ def test_labels_drawn_at_random_give_way_to_those_around(category: str, seed: in
     assert (label != sample.part).mean() < 0.2 * (guess.argmax(1) != sample.part).mean()
 
 
+@pytest.mark.slow
 def test_so_they_do_on_real_objects(partnet_dir: Path) -> None:
     for obj in real_objects("laptop", "train", partnet_dir)[:2]:
         sample = view(obj, 0)
@@ -62,6 +63,7 @@ def test_so_they_do_on_real_objects(partnet_dir: Path) -> None:
         assert (label != sample.part).mean() < 0.2 * (guess.argmax(1) != sample.part).mean()
 
 
+@pytest.mark.slow
 @given(scale=st.floats(0.01, 100.0), seed=st.integers(0, 5))
 def test_they_are_probabilities_whatever_the_pose_size_and_order(scale: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -57,6 +57,7 @@ def test_a_step_needs_a_reset() -> None:
         fresh.step(nothing(fresh))
 
 
+@pytest.mark.slow
 def test_ppo_of_stable_baselines_runs_on_it_unchanged(env: PoseFittingEnv) -> None:
     baselines = installed("stable_baselines3")
     model = baselines.PPO("MultiInputPolicy", env, n_steps=16, batch_size=8, n_epochs=1, device="cpu")

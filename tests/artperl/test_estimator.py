@@ -223,6 +223,7 @@ class Voter(Oracle):
         return Votes(**{name: v if v.ndim == 1 else v[:, nearest] for name, v in vars(true_votes(truth)).items()})
 
 
+@pytest.mark.slow
 def test_a_cabinet_of_a_mix_that_no_reference_has_is_put_together_from_votes() -> None:
     """Parts, axes and states of fresh furniture, from a base of other furniture."""
     base = by_boxes(ShapeBase.of(objects_of(["storage_furniture"], 12, 2_000_000, "any", 10), 64))

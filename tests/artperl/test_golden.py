@@ -16,6 +16,8 @@ from artperl.evaluation.artimage import row_samples
 from artperl.evaluation.scoring import evaluate
 from tests.artperl import golden
 
+pytestmark = pytest.mark.slow
+
 _DEGREES, _SHARE = 0.2, 0.005
 """By which another processor's rounding may move an estimate, with a margin of ten; a share of the object's size."""
 

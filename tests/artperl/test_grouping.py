@@ -24,6 +24,7 @@ def seen(sample: Sample, num_points: int = 2048) -> tuple[Clouds, Truth]:
     return to_batch({name: torch.from_numpy(np.asarray(values)[None]) for name, values in rows.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", ["storage_furniture", "drawer", "robot_arm", "eyeglasses"])
 @pytest.mark.parametrize("noise", [0.0, 0.004])
 def test_true_votes_find_the_parts_that_are_seen(category: str, noise: float) -> None:

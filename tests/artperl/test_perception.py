@@ -107,6 +107,7 @@ def test_clouds_are_seen_in_several_batches_and_then_never_again(monkeypatch: py
     assert any(views & centers[n + 2] for n, views in enumerate(fresh[:-2]))
 
 
+@pytest.mark.slow
 def test_some_clouds_are_as_a_sensor_sees_them() -> None:
     """The same views, of which a share is rough: points lie off the surfaces that they would lie on."""
     clean, noisy = (next(batches(DataOptions(["drawer"], noisy=share), 4, 256, 32, workers=0)) for share in (0.0, 0.5))
@@ -124,6 +125,7 @@ def test_objects_with_too_many_parts_give_way_to_others() -> None:
     assert samples[2].object_id == samples[2].object_id
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", sorted(ARTIMAGE))
 def test_objects_have_the_parts_of_artimage(category: str) -> None:
     samples = Samples([category], SampleOptions(num_points=16), 0, 2, 4)
@@ -131,6 +133,7 @@ def test_objects_have_the_parts_of_artimage(category: str) -> None:
     assert {obj.tree.types[1:] for obj in objects_of([category], 4, 1_000_000)} == {ARTIMAGE[category]}
 
 
+@pytest.mark.slow
 def test_it_learns_a_batch_by_heart(batch: tuple[Clouds, Truth]) -> None:
     clouds, truth = batch
     net = network().train()
@@ -260,6 +263,7 @@ def test_interpolated_is_the_weighted_sum_over_neighbours_with_its_gradient() ->
     torch.testing.assert_close(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", sorted(ARTIMAGE))
 def test_a_denser_cloud_is_read_as_well(category: str) -> None:
     net = load_estimator(category).perception

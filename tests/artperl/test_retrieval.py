@@ -159,6 +159,7 @@ def test_an_object_is_composed_of_its_own_parts() -> None:
         torch.testing.assert_close(across, torch.zeros_like(across), atol=1e-5, rtol=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", ["storage_furniture", "robot_arm"])
 def test_what_no_object_is_like_is_composed_of_several(category: str) -> None:
     """Doors, flaps, drawers and links at other places: the tree is right, and so are the axes."""

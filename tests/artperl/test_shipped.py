@@ -17,6 +17,8 @@ from artperl.evaluation.scoring import evaluate
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import StateOptions, ViewOptions
 
+pytestmark = pytest.mark.slow
+
 _SEEDS = 1_200_000
 """Neither of streams and bases, nor of the test and validation sets."""
 SHIPPED = (*ARTIMAGE, "any")

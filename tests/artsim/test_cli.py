@@ -7,7 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.conftest import ROOT
+
+pytestmark = pytest.mark.slow
 
 LAPTOP = "urdf_assets/laptop"
 ARTSIM = str(Path(sys.executable).with_name("artsim"))

@@ -14,6 +14,8 @@ from artsim.renderers import RENDERERS
 from tests.conftest import absent
 from tests.without import environment
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("backend", [*RENDERERS, "maniskill"])
 def test_installed_renderers_are_found_to_work(backend: str) -> None:

@@ -51,6 +51,7 @@ def test_parts_are_told_apart_by_how_far_they_have_moved(drawers: list[Sample]) 
         assert sum(means["parts"] for means in in_bins(table, by).values()) == len(rows)
 
 
+@pytest.mark.slow
 def test_an_estimator_that_is_told_labels_uses_them(drawers: list[Sample]) -> None:
     estimator = load_estimator("drawer")
     for sample in drawers:

@@ -25,12 +25,14 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Desk:
     return Desk(tmp_path_factory.mktemp("desk"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", FOUND, ids=lambda file: file.name)
 def test_what_was_found_once_is_found_no_more(file: Path, desk: Desk) -> None:
     _, finding = examine(0, input_of(file, corpus()), desk)
     assert finding is None or finding.sort == "large", finding.text  # memory here is that of all tests before
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("kind", TARGETS)
 def test_mutated_files_end_in_our_own_errors(kind: str, desk: Desk) -> None:
@@ -80,6 +82,7 @@ def test_a_run_goes_on_where_it_stopped() -> None:
     assert state.runs == CHUNK + 10
 
 
+@pytest.mark.slow
 def test_a_run_of_worker_processes_counts_what_it_read(tmp_path: Path) -> None:
     options = Options(runs=30, workers=1, kinds=("side",), out=tmp_path / "out")
     state = run(options)

@@ -51,6 +51,7 @@ def test_there_must_be_something_to_load(tmp_path: Path) -> None:
         urdf_files([tmp_path / "nowhere"])
 
 
+@pytest.mark.slow
 def test_pybullets_own_robots_load_as_given() -> None:
     """Of its files, those without the thousand random ones that are alike; each failure is known by its reason."""
     spec = importlib.util.find_spec("pybullet_data")

@@ -14,6 +14,8 @@ from artperl import cli
 from artperl.commands.estimate import estimator_folder
 from artsim.errors import ConfigError
 
+pytestmark = pytest.mark.slow
+
 CASES = Path(__file__).parents[2] / "cases"
 
 

@@ -40,6 +40,7 @@ def check(before: Sample, after: Sample) -> None:
         np.testing.assert_allclose(*ends, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(category=st.sampled_from(CATEGORIES), seed=st.integers(0, 3), draw=st.integers(0, 99))
 def test_points_boxes_and_poses_still_agree(category: str, seed: int, draw: int) -> None:
     before = made(category, seed)
@@ -48,6 +49,7 @@ def test_points_boxes_and_poses_still_agree(category: str, seed: int, draw: int)
     check(before, after)
 
 
+@pytest.mark.slow
 @given(category=st.sampled_from(CATEGORIES), seed=st.integers(0, 3), draw=st.integers(0, 99))
 def test_joints_do_not_mind_how_far_along_such_an_axis_they_are(category: str, seed: int, draw: int) -> None:
     tree, rng = artsim.make(category, seed).tree, np.random.default_rng(draw)
@@ -113,6 +115,7 @@ def _density(points: Array) -> float:
     return float(density.std() / density.mean())
 
 
+@pytest.mark.slow
 def test_batches_with_stretched_clouds_are_always_the_same() -> None:
     alone = batches(DataOptions(["drawer"], stretched=0.5), 4, 64, 8, workers=0)
     first, second = next(alone), next(alone)

@@ -62,6 +62,7 @@ def test_overlap_equals_that_of_random_points() -> None:
         assert abs(float(intersection_volume(*a, *b)) - share * volume_a) < error
 
 
+@pytest.mark.slow
 def test_a_box_overlaps_itself_wholly_however_it_is_turned() -> None:
     rng = np.random.default_rng(2)
     turns = Rotation.create_group("O").as_matrix()

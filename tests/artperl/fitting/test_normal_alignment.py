@@ -52,6 +52,7 @@ def degrees_apart(shapes: Shapes, one: Theta, other: Theta) -> NDArray[np.float6
     return angle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", ["dishwasher", "drawer", "microwave", "storage_furniture"])
 def test_what_has_flat_sides_faces_where_they_do(category: str) -> None:
     """Parts of at least 200 points; fits are off by about half a degree, these by 1.5."""

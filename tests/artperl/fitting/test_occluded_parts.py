@@ -41,6 +41,7 @@ def found(shapes: Shapes, theta: Theta, sample: Sample) -> Theta:
     return pose_occluded_parts(shapes, theta, sample.points.astype(np.float64), sample.part.astype(np.int64))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [40.0, 60.0, 80.0])
 def test_temples_of_a_few_points_are_folded_as_far_as_they_are(degrees: float) -> None:
     """Fits leave them open, where they would show."""

@@ -20,6 +20,8 @@ from tests.artperl.inputs.test_clouds import _files
 from tests.artperl.inputs.test_intrinsics import FORMATS
 from tests.artperl.inputs.test_masks import _pictures
 
+pytestmark = pytest.mark.slow
+
 CASES = Path(__file__).parents[2] / "cases"
 
 

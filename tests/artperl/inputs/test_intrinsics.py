@@ -187,6 +187,7 @@ def test_what_is_not_undone_is_said(tmp_path: Path) -> None:
     assert "far from the middle" in cloud.warnings[0]
 
 
+@pytest.mark.slow
 def test_a_written_scene_is_read_as_it_was_rendered(tmp_path: Path) -> None:
     """Whatever artsim writes: the depth image, the instance mask and the camera of a scene."""
     scene = make_scene(SceneOptions(categories=("laptop", "box"), distractors=0), 3)

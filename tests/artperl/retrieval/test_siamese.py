@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from artperl.retrieval.siamese import Siamese, contrastive_loss, spread_order
@@ -29,6 +30,7 @@ def test_vectors_depend_on_which_part_a_point_belongs_to() -> None:
     assert torch.isfinite(network(cloud, torch.zeros_like(part))).all()
 
 
+@pytest.mark.slow
 def test_learning_draws_clouds_of_the_same_object_together() -> None:
     torch.manual_seed(1)
     shapes = torch.randn(6, 160, 3) * torch.linspace(0.3, 1.5, 6)[:, None, None]

@@ -23,6 +23,8 @@ from artperl.training.boxes import best_without_own_references
 from artperl.training.options import TrainOptions
 from artperl.training.run import Training
 
+pytestmark = pytest.mark.slow
+
 SIGNS = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 """Of the faces' outward normals."""
 STAGE = TrainOptions(

@@ -33,6 +33,8 @@ from artsim.loading.sources import family_sources
 from artsim.loading.urdf import load
 from artsim.stream import STREAM_SEEDS
 
+pytestmark = pytest.mark.slow
+
 TINY = TrainOptions(
     base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, stretched=0.5, batch_size=4,
     num_points=96, agent_rollouts=3, episodes=3, box_views=0, validate_every=2, validate_rollouts=2, test_objects=2,

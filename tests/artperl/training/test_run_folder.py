@@ -64,6 +64,7 @@ def trained(whole: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole, tmp_path / "trained"))
 
 
+@pytest.mark.slow
 def test_two_processes_never_train_in_one_folder_and_a_killed_one_is_gone_on_with(
     whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -100,6 +101,7 @@ def test_a_second_trainer_is_refused_even_before_anything_is_written_down(tmp_pa
         training.run()
 
 
+@pytest.mark.slow
 def test_what_another_process_has_trained_meanwhile_is_taken_up(whole: Path, tmp_path: Path) -> None:
     late = Training(OPTIONS, tmp_path / "run", workers=0, progress=False)
     shutil.copytree(whole, tmp_path / "run")
@@ -191,6 +193,7 @@ def test_damage_is_named_with_what_to_do(name: str, damage: Callable[[Path], obj
     assert text.endswith(f"rm {tmp_path / 'state.json'} {tmp_path / 'state.safetensors'}")
 
 
+@pytest.mark.slow
 def test_the_command_that_a_damaged_run_names_begins_it_anew(
     whole: Path, trained: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -247,6 +250,7 @@ def full_disk(monkeypatch: pytest.MonkeyPatch, after: int) -> Iterator[None]:
         yield
 
 
+@pytest.mark.slow
 def test_a_full_disk_loses_nothing(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "run"
     with (

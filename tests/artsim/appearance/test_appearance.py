@@ -73,6 +73,7 @@ def floor(size: float = 2.0) -> Thing:
     return place_solid("floor", box((-size, -size, -0.1), (size, size, 0.0)), MATT)
 
 
+@pytest.mark.slow
 def test_a_sun_of_strength_1_shows_a_surface_in_its_own_colour(sapien: Renderer) -> None:
     straight = Lights(Sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)), NONE, NONE)
     assert seen_from_above((floor(),), straight, sapien)[32, 32] == pytest.approx(MATT.colour, abs=0.012)

@@ -37,6 +37,7 @@ def test_laptops_have_dark_keys_and_a_lit_screen() -> None:
     assert lid.uv[shown].max() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", ["drawer", "scissors", "globe", "random_tree", "kitchen_pot"])
 def test_coats_fit_their_parts_and_come_from_chance_alone(category: str) -> None:
     obj = make(category, 1)

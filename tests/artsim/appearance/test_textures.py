@@ -8,6 +8,7 @@ import pytest
 from artsim.appearance.textures import TEXTURES, noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TEXTURES))
 def test_textures_are_pictures_of_about_their_tone_and_the_same_for_the_same_chance(name: str) -> None:
     tone = np.array([0.6, 0.5, 0.4])

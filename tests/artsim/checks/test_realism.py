@@ -26,6 +26,8 @@ from artsim.making.solids import Solid, box
 from artsim.model.objects import ArticulatedObject
 from tests.conftest import ROOT
 
+pytestmark = pytest.mark.slow
+
 SPLIT = ROOT / "benchmarks" / "splits" / "partnet_dev.json"
 SURFACE, PARTS, BOXES, JOINTS, RANGES = range(5)
 

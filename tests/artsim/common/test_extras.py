@@ -60,7 +60,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
 CALLS = {
     "import artperl": "",
     "import artsim; artsim.make_renderer('raycast')": "",
-    **{f"import artsim; artsim.make_renderer({name!r})": name.partition("-")[0] for name in RENDERERS[1:]},
+    **{f"import artsim; artsim.make_renderer({name!r})": name.partition("-")[0] for name in list(RENDERERS)[1:]},
     "import artperl; artperl.load_estimator('laptop')": "train",
     "import artsim.envs": "envs",
     "import artperl.training.gym_env": "train",
@@ -80,6 +80,8 @@ CALLS = {
 # Every entry point in one process: to start twenty of them takes half a minute.
 DRIVER = """
 import contextlib, io, json, runpy, sys
+
+pytestmark = pytest.mark.slow
 
 def told(run):
     out, err = io.StringIO(), io.StringIO()

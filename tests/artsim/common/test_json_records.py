@@ -7,6 +7,8 @@ import pytest
 
 from artsim.common.json_records import from_json_values
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_value_of_another_type_is_named() -> None:
     from artperl.fitting.options import EstimatorOptions

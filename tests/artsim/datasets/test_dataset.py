@@ -61,6 +61,7 @@ def test_a_sample_survives_its_members() -> None:
         assert_equal(sample, sample_from_members(sample_members(sample), "here"))
 
 
+@pytest.mark.slow
 def test_length_indexing_and_splits(folder: Path) -> None:
     everything = artsim.open_dataset(folder)
     assert len(everything) == 150

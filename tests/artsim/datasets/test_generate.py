@@ -27,6 +27,8 @@ from artsim.model.draws import sample_view
 from artsim.model.kinematics import Array
 from tests.conftest import BOX_LAPTOP, ROOT
 
+pytestmark = pytest.mark.slow
+
 OPTIONS = SampleOptions(num_points=128)
 
 

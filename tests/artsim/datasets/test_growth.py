@@ -18,6 +18,8 @@ from artsim.loading.sources import family_sources
 from tests.artsim.datasets.test_plan import plan
 from tests.artsim.datasets.troublesome import digests
 
+pytestmark = pytest.mark.slow
+
 pytestmark = pytest.mark.usefixtures("quick_workers")
 
 SOURCES = family_sources(["laptop", "drawer"], 4)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from artsim.datasets.layout import at_place
 from artsim.datasets.splits import SPLITS, showing_order
+
+pytestmark = pytest.mark.slow
 
 
 @given(st.integers(1, 60), st.integers(0, 100), st.integers(0, 59))

@@ -218,6 +218,7 @@ def problems(folder: Path) -> str:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", DAMAGES)
 def test_damage_is_found_and_repaired_or_refused(case: str, folder: Path, sound: Path) -> None:
     damage = DAMAGES[case]

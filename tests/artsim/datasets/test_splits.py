@@ -62,6 +62,7 @@ def test_keys_are_unique_and_safe() -> None:
     assert not any("/" in key or "." in key for key in keys)
 
 
+@pytest.mark.slow
 def test_splits_and_keys_do_not_depend_on_geometry() -> None:
     """Another processor may round a vertex otherwise: then geometry and digests differ, but no object changes sides."""
     asked = Plan(0, 10, 8, (0.5, 0.25, 0.25), SampleOptions(), ())
@@ -79,6 +80,7 @@ def test_splits_and_keys_do_not_depend_on_geometry() -> None:
     assert {o.split for o in one} == set(SPLITS)
 
 
+@pytest.mark.slow
 def test_objects_of_one_content_share_a_split_whatever_they_are_called() -> None:
     asked = Plan(0, 10, 8, (0.4, 0.3, 0.3), SampleOptions(), ())
     source = CompiledSource("", "5" * 64, "laptop", "1", "6" * 64, 2, False, (), "")

@@ -143,6 +143,7 @@ def rewrite(folder: Path, change: Callable[[list[Sample]], list[Sample]]) -> lis
     return [str(problem) for problem in verify(folder, progress=False)]
 
 
+@pytest.mark.slow
 def test_a_sound_dataset_has_no_problems(folder: Path) -> None:
     assert verify(folder, progress=False) == []
     assert rewrite(folder, lambda samples: samples) == []

@@ -37,6 +37,7 @@ def generate(sources: list[Source], out: Path, **more: object) -> artsim.dataset
     return artsim.generate(sources, out, 12, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_no_object_stops_a_run_that_may_leave_it_out(tmp_path: Path) -> None:
     """The others are what they are without it, whatever it does to its process."""
     good = family_sources(["laptop"], 3)

@@ -55,6 +55,7 @@ def test_parts_are_drawn_in_their_own_colours() -> None:
         assert np.argmin([np.linalg.norm(mean / mean.sum() - c / c.sum()) for c in PALETTE[:4]]) == k
 
 
+@pytest.mark.slow
 def test_a_sheet_shows_as_many_samples_as_there_are(tmp_path: Path) -> None:
     sources = find_sources([ASSETS / "laptop", ASSETS / "quirks" / "merged"])
     options = SampleOptions(num_points=64, images=("depth", "part_mask"))

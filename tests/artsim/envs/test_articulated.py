@@ -35,6 +35,7 @@ def new(**options: Any) -> ArticulatedEnv:
     return env
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"control": "velocity", **IMAGES}], ids=["plain", "images"])
 def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
     with warnings.catch_warnings():
@@ -43,6 +44,7 @@ def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
         check_env(new(**options))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{"control": "velocity", "categories": ("safe", "window")}, IMAGES])
 def test_equal_seeds_make_equal_episodes(options: dict[str, Any]) -> None:
     def episode(env: ArticulatedEnv, seed: int | None) -> list[Any]:
@@ -161,6 +163,7 @@ def test_a_wrong_action_is_refused(action: Any) -> None:
         env.step(action)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [

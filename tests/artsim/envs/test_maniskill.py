@@ -32,6 +32,8 @@ from artsim.envs.maniskill.goal import BEST, dense_reward  # noqa: E402
 from artsim.envs.maniskill.task import ArticulatedTask  # noqa: E402
 from artsim.envs.maniskill.truth import truth_of  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 ID = "ArtSimArticulated-v1"
 GRIPPER = "floating_panda_gripper"
 

@@ -24,6 +24,7 @@ def content(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
+@pytest.mark.slow
 def test_bytes_depend_on_the_seed_alone_and_whole_objects_are_kept(tmp_path: Path) -> None:
     formats = [name for name in FORMATS if name != "usd"]
     one = generate_objects(["laptop", "drawer"], tmp_path / "one", 2, 5, formats, workers=1, progress=False)
@@ -61,6 +62,7 @@ def test_usd_is_written_to_the_same_bytes_each_time(tmp_path: Path) -> None:
     assert content(tmp_path / "one") == content(tmp_path / "two")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "problem"),
     [
@@ -95,6 +97,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
             generate_objects(["laptop"], tmp_path, 1, progress=False)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_whole_objects_and_leaves_nothing_else(tmp_path: Path) -> None:
     options = ["--category", "laptop", "--count", "2000", "--workers", "1", "--out", str(tmp_path)]
     run = subprocess.Popen(

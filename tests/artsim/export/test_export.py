@@ -45,6 +45,7 @@ def assert_same(loaded: ArticulatedObject, obj: ArticulatedObject) -> None:
     np.testing.assert_allclose(loaded.tree.forward_kinematics(q), obj.tree.forward_kinematics(q), atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", FAMILIES)
 def test_every_family_is_written_strictly_and_reads_back_as_it_was(category: str, tmp_path: Path) -> None:
     for seed in (0, 11):

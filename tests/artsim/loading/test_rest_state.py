@@ -30,6 +30,7 @@ def normal(obj: ArticulatedObject, k: int) -> np.ndarray:
     return np.linalg.eigh(np.cov(points.T))[1][:, 0]
 
 
+@pytest.mark.slow
 def test_a_closed_laptops_lid_lies_on_its_base(partnet_dir: Path) -> None:
     for obj in real(partnet_dir, "Laptop"):
         low, high = obj.part_bounds[:, 0], obj.part_bounds[:, 1]
@@ -48,6 +49,7 @@ def test_a_closed_laptops_lid_lies_on_its_base(partnet_dir: Path) -> None:
         assert raised[:, 0].max() > high[base, 0] - 0.35 * obj.box_size[base, 0]  # hinged at the back: front is -X
 
 
+@pytest.mark.slow
 def test_a_closed_box_is_shut(partnet_dir: Path) -> None:
     for obj in real(partnet_dir, "Box"):
         body = obj.part_bounds[0]
@@ -89,6 +91,7 @@ def test_a_closed_knife_is_short(partnet_dir: Path) -> None:
         assert obj.diagonal < 1.02 * min(lengths), obj.object_id
 
 
+@pytest.mark.slow
 def test_rest_states_lie_within_the_limits(partnet_dir: Path) -> None:
     for category in ("Laptop", "Box", "Stapler", "Suitcase", "Knife", "Bucket"):
         for obj in real(partnet_dir, category):

@@ -95,6 +95,7 @@ def test_scales_are_diagonals() -> None:
     assert 0.48 < max(diagonals) <= 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

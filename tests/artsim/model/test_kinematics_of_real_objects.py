@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from artsim.loading.sources import find_sources
 from benchmarks.kinematics import bullet_robots, compare
 from tests.conftest import ASSETS
+
+pytestmark = pytest.mark.slow
 
 
 def test_every_real_object_moves_as_in_pybullet_and_yourdfpy(partnet_dir: Path) -> None:

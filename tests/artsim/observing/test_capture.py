@@ -52,6 +52,7 @@ def test_points_lie_on_their_own_posed_part(path: Path) -> None:
         assert list(sample_problems(sample, obj.scaled(sample.scale))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", REAL)
 def test_points_lie_on_their_own_posed_part_of_real_objects(category: str, partnet_dir: Path) -> None:
     for source in find_sources([partnet_dir / category])[:2]:

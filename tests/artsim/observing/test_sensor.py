@@ -60,6 +60,7 @@ PUBLISHED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", DEPTHS)
 @pytest.mark.parametrize("name", NOISY)
 def test_a_preset_has_the_sigma_of_its_closed_form(name: str, depth: float) -> None:
@@ -89,6 +90,7 @@ def scene(obj: ArticulatedObject, seed: int = 5) -> tuple[ArticulatedObject, Arr
     return obj, q, sample_view(obj, q, ViewOptions(), rng)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", NOISY)
 def test_rays_and_images_give_the_same_noisy_cloud_and_true_ground_truth(noise: str, obj: ArticulatedObject) -> None:
     rays = observe(*scene(obj), num_points=500, noise=noise, rng=np.random.default_rng(2))
@@ -150,6 +152,7 @@ def test_pixels_without_a_return_are_in_no_cloud(obj: ArticulatedObject) -> None
     assert sample.points[:, 2].min() > 0
 
 
+@pytest.mark.slow
 def test_a_dataset_with_noise_is_sound_and_says_which(tmp_path: Path) -> None:
     artsim.generate(
         find_sources([ASSETS / "laptop", ASSETS / "cabinet"]),

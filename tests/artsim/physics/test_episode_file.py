@@ -72,6 +72,7 @@ def test_a_motion_depends_on_its_number_and_the_seed_alone(motions: list[Motion]
     assert more[2].obj.sha256 != more[0].obj.sha256
 
 
+@pytest.mark.slow
 def test_the_program_records_files(tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ["record", "--out", out, "--objects", ASSETS / "laptop", "--motions", "1", "--frames", "3"]

@@ -23,6 +23,7 @@ def simulator(request: pytest.FixtureRequest) -> str:
     return name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", FAMILIES)
 def test_every_family_is_the_same_everywhere(category: str, simulator: str, tmp_path: Path) -> None:
     obj = make(category, 3)
@@ -85,6 +86,7 @@ def test_mujoco_fuses_the_root_unless_told_not_to(tmp_path: Path) -> None:
     assert mujoco.MjModel.from_xml_path(str(file)).nbody - 1 == len(obj) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", FAMILIES)
 def test_every_family_stands_apart_at_rest_and_moves_calmly(category: str, tmp_path: Path) -> None:
     """A second under gravity in MuJoCo: no part touches another at first, nothing blows up, limits hold."""

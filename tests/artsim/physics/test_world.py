@@ -90,6 +90,7 @@ def test_energy_is_kept_without_damping_and_friction(category: str) -> None:
         assert abs(now - start) < 0.02 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", sorted(FAMILIES))
 def test_joints_never_leave_their_limits_and_followers_follow(category: str) -> None:
     obj = make(category, 0)
@@ -259,6 +260,7 @@ def test_loaded_objects_move_too(path: Path) -> None:
     assert np.all(simulation.state >= obj.tree.limits[:, 0] - 1e-3)
 
 
+@pytest.mark.slow
 def test_real_objects_stay_within_their_limits(partnet_dir: Path) -> None:
     for source in find_sources([partnet_dir])[::12]:
         obj = source.load()
@@ -275,6 +277,7 @@ def test_a_wrong_action_is_refused(action: object, one_drawer: ArticulatedObject
         Simulation(one_drawer).step(action)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options", [{"time_step": 0.0}, {"time_step": 1.0}, {"substeps": 0}, {"damping": -1.0}, {"gravity": np.nan}]
 )

@@ -13,6 +13,8 @@ from artsim import Camera, make_renderer, observe
 from benchmarks.agreement import LIMITS, choose, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_renderers_agree_on_real_objects(name: str, partnet_dir: Path) -> None:

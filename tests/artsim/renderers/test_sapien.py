@@ -24,6 +24,8 @@ from benchmarks.agreement import LIMITS, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
 from tests.without import environment
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def sapien() -> Iterator[Renderer]:

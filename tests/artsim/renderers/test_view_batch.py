@@ -28,6 +28,7 @@ def traits(obj: ArticulatedObject, q: np.ndarray, T_world_camera: np.ndarray) ->
     return [*q[1:], np.arctan2(-away[1], -away[0]), np.arcsin(away[2] / distance), distance / radius]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("states", "preset"),
     [

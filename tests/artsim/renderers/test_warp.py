@@ -60,6 +60,7 @@ def views_of(scenes: list[Scene]) -> tuple[list[ArticulatedObject], Views]:
     return objects, Views.of(numbers, [q for _, q, _ in scenes], [camera for _, _, camera in scenes])
 
 
+@pytest.mark.slow
 def test_one_object_of_each_category_in_one_launch_looks_as_embree_sees_it(renderer: WarpRenderer) -> None:
     scenes = scenes_of([make(category, seed=3) for category in FAMILIES], states=2)
     objects, views = views_of(scenes)
@@ -263,6 +264,7 @@ def test_an_unknown_device_is_refused_with_those_there_are(device: str, warp: Mo
         WarpRenderer(device)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("missing", "mend"), [("warp", "[warp]"), ("cache", "WARP_CACHE_PATH")])
 def test_what_warp_lacks_is_said_with_the_mend(missing: str, mend: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
@@ -282,6 +284,7 @@ def test_importing_artsim_does_not_import_warp() -> None:
     assert subprocess.run([sys.executable, "-c", program], timeout=120).returncode == 0
 
 
+@pytest.mark.slow
 def test_the_kernels_compile_for_a_gpu_that_is_not_here(tmp_path: Path, warp: ModuleType) -> None:
     program = (
         "import sys, warp\n"

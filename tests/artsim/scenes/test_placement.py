@@ -13,6 +13,8 @@ from artsim.renderers.scene import Thing, rigid_object
 from artsim.scenes.placement import Area, Arrangement, are_apart, resting_rotation
 from artsim.scenes.props import place_solid
 
+pytestmark = pytest.mark.slow
+
 GREY = Material((0.5, 0.5, 0.5), specular=0.0)
 
 

@@ -8,6 +8,8 @@ import trimesh
 
 from artsim.scenes.props import DISTRACTORS, distractor
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", sorted(DISTRACTORS))
 def test_distractors_are_closed_solids_of_a_handy_size(name: str) -> None:

@@ -31,6 +31,8 @@ from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_sc
 from benchmarks.agreement import LIMITS
 from tests.conftest import backend
 
+pytestmark = pytest.mark.slow
+
 CAMERA = SceneCameraOptions(width=320, height=200, aspect=(0.9, 1.1), off_center=0.05)
 TABLE = SceneOptions(distractors=4)
 FURNITURE = SceneOptions(categories=("storage_furniture", "dishwasher", "trash_can"), distractors=1)

@@ -49,6 +49,7 @@ def survives(data: bytes, kind: str) -> None:
     assert len(faces) == 0 or (faces.min() >= 0 and faces.max() < len(vertices))
 
 
+@pytest.mark.slow
 @settings(max_examples=1500, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.sampled_from(SEEDS), data=st.data())
 def test_damaged_files(seed: tuple[str, bytes], data: st.DataObject) -> None:

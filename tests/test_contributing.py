@@ -1,0 +1,93 @@
+"""CONTRIBUTING.md stays true: what it adds to a copy of the packages works there as it says."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ASSETS
+
+pytestmark = pytest.mark.slow
+
+ROOT = ASSETS.parent
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SECTIONS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S))
+# As the installed programs are, but of the copy.
+PROGRAMS = {
+    "python": [],
+    "artsim": ["-c", "from artsim.cli import main; main()"],
+    "artperl": ["-c", "from artperl.cli import main; main()"],
+}
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the packages, with every block of code of every walk in its place."""
+    folder = tmp_path_factory.mktemp("clone")
+    for name in ("artsim", "artperl", "benchmarks", "tests"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("weights", "golden", "__pycache__"))
+    (folder / "artperl" / "weights").symlink_to(ROOT / "artperl" / "weights")
+    (folder / "urdf_assets").symlink_to(ASSETS)
+    for name in ("generate.py", "pyproject.toml"):
+        shutil.copy(ROOT / name, folder)
+    for section in SECTIONS.values():
+        for _, block in filter(lambda found: found[0] == "python", BLOCK.findall(section)):
+            put(block, folder)
+    return folder
+
+
+def put(block: str, folder: Path) -> None:
+    """A new file, where the first line is ``# path``; lines of a registry, where it is ``# path, in NAME``."""
+    first, _, code = block.partition("\n")
+    path, _, registry = first.removeprefix("# ").partition(", in ")
+    if not registry:
+        assert not (folder / path).exists(), path
+        (folder / path).write_text(code)
+        return
+    text = (folder / path).read_text()
+    changed = re.sub(rf"^({registry}\b[^\n]*[({{[]\n)", lambda found: found[1] + code, text, count=1, flags=re.M)
+    assert changed != text, f"{path} has no registry {registry}"
+    (folder / path).write_text(changed)
+
+
+def run(words: list[str], folder: Path) -> str:
+    """What a command prints in the copy; its packages come first."""
+    assert words[0] in PROGRAMS, words
+    done = subprocess.run(
+        [sys.executable, *PROGRAMS[words[0]], *words[1:]], cwd=folder, capture_output=True, text=True, timeout=300,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+    )  # fmt: skip
+    assert done.returncode == 0, f"{shlex.join(words)}\n{done.stdout[-2000:]}{done.stderr[-3000:]}"
+    return done.stdout
+
+
+def follow(section: str, folder: Path) -> list[str]:
+    """What each command of a section prints."""
+    blocks = [block for kind, block in BLOCK.findall(SECTIONS[section]) if kind == "sh"]
+    return [run(shlex.split(line, comments=True), folder) for block in blocks for line in block.splitlines()]
+
+
+def test_a_category_is_generated_and_passes_every_gate(clone: Path) -> None:
+    _, _, inspected = follow("Add a category", clone)
+    assert "door" in inspected
+    assert (clone / "out" / "mailbox.png").stat().st_size > 1000
+    program = (
+        "from artsim import make; from artsim.checks.validity import check; "
+        "print([str(gate) for seed in range(10) for gate in check(make('mailbox', seed)) if not gate.passed])"
+    )
+    assert run(["python", "-c", program], clone).strip() == "[]"
+    tested = run(["python", "-m", "pytest", "-p", "no:cacheprovider", "tests/artsim/families", "-k", "mailbox"], clone)
+    assert re.search(r"\b[2-9] passed", tested)
+
+
+def test_a_renderer_agrees_with_rays_and_makes_a_dataset(clone: Path) -> None:
+    compared, _, verified = follow("Add a renderer", clone)
+    assert '"agrees": true' in compared.splitlines()[-1]
+    assert verified.endswith(": sound\n")
