@@ -9,17 +9,19 @@ from artsim.common.extras import needs
 
 if TYPE_CHECKING:
     from artperl.core.estimate import Estimate
-    from artperl.methods.full import Estimator
+    from artperl.methods.protocol import Method
 
 __all__ = ["Estimate", "load_estimator"]
 
 
-def load_estimator(name: str | Path, **changes: Any) -> Estimator:
+def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Method:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
 
     Parameters
     ----------
     name : str or Path
+    method : str
+        full, which comes with the package, or artperl, section 4 of the paper as printed: a folder of your own.
     **changes
         Of its options, such as ``seen_from=(-75.0, 75.0)``, degrees, where the camera is known to be in front of the
         object. :class:`artperl.fitting.options.EstimatorOptions` has them all.
@@ -34,7 +36,7 @@ def load_estimator(name: str | Path, **changes: Any) -> Estimator:
     with needs("artperl"):
         from artperl.estimator import load_estimator as load  # torch takes seconds to import
 
-    return load(name, **changes)
+    return load(name, method=method, **changes)
 
 
 def __getattr__(name: str) -> Any:

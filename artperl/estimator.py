@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, cast, overload
 
 import torch
 from safetensors.torch import load as load_tensors
@@ -24,6 +24,7 @@ from artperl.fitting.options import EstimatorOptions
 from artperl.methods import method_of
 from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
+from artperl.methods.protocol import Untrained
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base import ShapeBase
@@ -108,17 +109,18 @@ def load_estimator(
 @overload
 def load_estimator(
     name: str | Path, device: torch.device | str = "cpu", *, method: str, **changes: Any
-) -> Estimator | ArtPERL: ...
+) -> Estimator | ArtPERL | Untrained: ...
 
 
 def load_estimator(
     name: str | Path, device: torch.device | str = "cpu", method: str = "full", **changes: Any
-) -> Estimator | ArtPERL:
+) -> Estimator | ArtPERL | Untrained:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
 
     Parameters
     ----------
     name : str or Path
+        For a method that needs no training, a category.
     device : torch.device or str
         Where it works, such as "cuda".
     method : str
@@ -133,8 +135,11 @@ def load_estimator(
     DatasetError
         When there is no such estimator, or its files are damaged.
     """
-    if method_of(method) is ArtPERL:
+    kind = method_of(method)
+    if kind is ArtPERL:
         return _load_artperl(name, device, changes)
+    if kind is not Estimator:
+        return cast(type[Untrained], kind).of_category(str(name))
     unknown = ", ".join(changes.keys() - {field.name for field in fields(EstimatorOptions)})
     if unknown:
         raise ConfigError("an estimator has no such option", unknown, "see artperl.fitting.options.EstimatorOptions")

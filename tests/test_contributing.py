@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -91,3 +92,15 @@ def test_a_renderer_agrees_with_rays_and_makes_a_dataset(clone: Path) -> None:
     compared, _, verified = follow("Add a renderer", clone)
     assert '"agrees": true' in compared.splitlines()[-1]
     assert verified.endswith(": sound\n")
+
+
+def test_a_metric_stands_in_the_table_and_in_the_figures(clone: Path) -> None:
+    (printed,) = follow("Add a metric", clone)
+    assert "size %" in printed
+    (laptop,) = json.loads((clone / "out" / "figures.json").read_text()).values()
+    assert all(0.0 < part["size_percent"]["median"] < 100.0 for part in laptop["parts"])
+
+
+def test_a_method_is_evaluated_by_its_name(clone: Path) -> None:
+    (printed,) = follow("Add a method", clone)
+    assert re.search(r"2 instances, 0 failures, 0 % right", printed)

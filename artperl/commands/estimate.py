@@ -19,7 +19,7 @@ from artsim.errors import ArtsimError, ConfigError
 if TYPE_CHECKING:
     from artperl.core.estimate import Estimate as Result
     from artperl.inputs import Cloud, InputOptions
-    from artperl.methods.full import Estimator
+    from artperl.methods.protocol import Method
 
 _STDOUT = Path("-")
 _NAMED = 8
@@ -60,6 +60,8 @@ class Estimate:
     """Files, or folders of them; all is read in one process."""
     category: str = "laptop"
     """An estimator that comes with the package, by its name; or its folder; or the folder of a training run."""
+    method: Literal["full", "artperl"] = "full"
+    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed."""
     out: Path | None = None
     """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list. Of
     several files: .jsonl, a line each; the same command goes on where it stopped."""
@@ -98,7 +100,8 @@ class Estimate:
         several = len(self.clouds) != 1 or self.clouds[0].is_dir()
         self._check(several)
         files = self._files() if several else list(self.clouds)
-        estimator = load_estimator(estimator_folder(self.category), seen_from=self.seen_from)
+        told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
+        estimator = load_estimator(estimator_folder(self.category), method=self.method, **told)
         if several:
             self._estimate_all(files, estimator)
         else:
@@ -123,7 +126,7 @@ class Estimate:
             pixel_center=self.pixel_center, image_id=self.image_id,
         )  # fmt: skip
 
-    def _estimate_one(self, file: Path, estimator: Estimator) -> None:
+    def _estimate_one(self, file: Path, estimator: Method) -> None:
         from artperl.core.listing import full_text
         from artperl.inputs import read_cloud
         from artperl.viewer import page
@@ -174,7 +177,7 @@ class Estimate:
             )
         return files
 
-    def _estimate_all(self, files: list[Path], estimator: Estimator) -> None:
+    def _estimate_all(self, files: list[Path], estimator: Method) -> None:
         """A line of JSON for each file, written as soon as it is known, so that Ctrl-C loses nothing."""
         from artperl.commands.resumed_lines import Lines
 
@@ -194,7 +197,7 @@ class Estimate:
             print(f"error: {failed} of {len(files)} files failed; each line with an 'error' says why", file=sys.stderr)
             sys.exit(1)
 
-    def _line(self, file: Path, estimator: Estimator) -> dict[str, Any]:
+    def _line(self, file: Path, estimator: Method) -> dict[str, Any]:
         from artperl.inputs import read_cloud
 
         try:

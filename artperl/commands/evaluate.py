@@ -29,8 +29,9 @@ class Evaluate:
     estimator: tyro.conf.Positional[Path | None] = None
     """Folder of the estimator, or the name of one that comes with the package. For a benchmark and the
     ablation, folder of the estimators by category; by default those that come with the package."""
-    method: Literal["full", "artperl"] = "full"
-    """Method of the estimator. A benchmark and the ablation are of the method full."""
+    method: str = "full"
+    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; or one
+    that you add (CONTRIBUTING.md). A benchmark and the ablation are of the method full."""
     benchmark: Literal["artimage"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
     ablation: bool = False
@@ -117,18 +118,20 @@ class Evaluate:
         from artperl.evaluation.samples import frozen_samples, samples_of
         from artperl.evaluation.scoring import evaluate
         from artperl.evaluation.tables import summary, table
+        from artperl.methods import STORED_METHODS
         from artsim.loading.sources import find_sources
 
         if self.estimator is None:
             raise ConfigError("which estimator is to be tested?", "evaluate", "name its folder, or a --benchmark")
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
         estimator = load_estimator(self.estimator, method=self.method, **told)
-        learnt = read_settings(folder_of(self.estimator))["about"]["options"]
+        stored = self.method in STORED_METHODS
+        learnt = read_settings(folder_of(self.estimator))["about"]["options"] if stored else {}
         options = SampleOptions(
             self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
         )
         views, parts = self.views or 4, learnt.get("parts", "artimage")
-        categories = self.category or tuple(learnt["categories"])
+        categories = self.category or tuple(learnt.get("categories", estimator.categories))
         if self.files:
             sources = find_sources(self.files, self.package_root)
             objects = (match_category(source.load(), categories, parts) for source in sources)

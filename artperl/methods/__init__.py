@@ -18,6 +18,8 @@ METHODS = {
     "artperl": "artperl.methods.artperl:ArtPERL",
 }
 """Module and class of each method: full, which comes with trained weights; artperl, section 4 of the paper."""
+STORED_METHODS = ("full", "artperl")
+"""Those that are trained and written down; others make themselves for a category."""
 
 
 def method_of(name: str) -> type[Method]:

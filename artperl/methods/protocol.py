@@ -28,6 +28,15 @@ class Method(Protocol):
         ...
 
 
+class Untrained(Method, Protocol):
+    """A method that needs no training."""
+
+    @classmethod
+    def of_category(cls, category: str) -> Self:
+        """The method for objects of a category."""
+        ...
+
+
 class Stored(Method, Protocol):
     """A method that can be written down: networks are what is learnt, settings what is chosen."""
 
