@@ -85,6 +85,12 @@ class Evaluate:
         from artperl.data.categories import ARTIMAGE
         from artperl.evaluation.ablation import run_ablation, verdict_lines
 
+        own = ("benchmark", "rows", "real_weights", "objects", "files", "package_root", "states", "preset",
+               "seen_from", "noise", "num_points")  # fmt: skip
+        default = Evaluate()
+        given = [name for name in own if getattr(self, name) != getattr(default, name)]
+        if given:
+            raise ConfigError("the ablation has objects, views and noise of its own", ", ".join(given), "leave it out")
         categories = self.category or tuple(ARTIMAGE)
         record = run_ablation(categories, self.estimator, self.partnet, self.views or 32, self.json, True, say)
         print("\n".join(verdict_lines(record)))

@@ -150,11 +150,12 @@ def run_ablation(
         variants = {WHOLE: whole} | {name: change(whole) for name, change in stages.items()}
         for row, objects, options in rows_of(category, views, partnet):
             done = record.setdefault(row, {})
+            each = -(-views // len(objects))
+            if any(len(figures) != each * len(objects) for figures in done.values()):
+                raise ConfigError(f"{row} has other views than {each * len(objects)}", str(out), "name another file")
             missing = {name: variant for name, variant in variants.items() if name not in done}
             if missing:
-                samples = samples_of(objects, -(-views // len(objects)), options, VALIDATION_SEEDS)
-                if any(len(figures) != len(samples) for figures in done.values()):
-                    raise ConfigError(f"{row} has other views than {len(samples)}", str(out), "name another file")
+                samples = samples_of(objects, each, options, VALIDATION_SEEDS)
                 record[row] = done | _score_variants(missing, samples, row, progress)
                 if out is not None:
                     write_atomic(out, (json.dumps(record) + "\n").encode())
@@ -191,22 +192,24 @@ def rows_of(
 
 
 def losses(record: Record) -> dict[str, dict[str, Loss]]:
-    """Losses by stage, and by the category and source whose rows they are of."""
-    pooled: dict[str, dict[str, list[list[float]]]] = {}
+    """Losses by stage, and by the category and source whose rows they are of.
+
+    Views are paired row by row, so that a stage may lack rows that the file of a stopped run does not have yet.
+    """
+    sign = np.array([1.0 if name in METRICS and METRICS[name].less_is_better else -1.0 for name in MARGINS])
+    pooled: dict[str, dict[str, list[Array]]] = {}
     for row, variants in record.items():
-        group = pooled.setdefault(" ".join(row.split()[:2]), {})
-        for name, figures in variants.items():
-            group[name] = group.get(name, []) + figures
-    result: dict[str, dict[str, Loss]] = {}
-    for group_name, group in pooled.items():
-        for name in group.keys() - {WHOLE}:
-            result.setdefault(name, {})[group_name] = _loss(np.array(group[name]), np.array(group[WHOLE]))
-    return result
+        for stage in (name for name in variants if name != WHOLE):
+            worse = sign * (np.array(variants[stage]) - np.array(variants[WHOLE]))
+            pooled.setdefault(stage, {}).setdefault(" ".join(row.split()[:2]), []).append(worse)
+    return {
+        stage: {group: _loss(np.concatenate(rows)) for group, rows in groups.items()}
+        for stage, groups in pooled.items()
+    }
 
 
-def _loss(without: Array, whole: Array) -> Loss:
-    sign = [1.0 if name in METRICS and METRICS[name].less_is_better else -1.0 for name in MARGINS]
-    worse = np.array(sign) * (without - whole)
+def _loss(worse: Array) -> Loss:
+    """Mean and standard error of paired differences (views, figures)."""
     error = worse.std(axis=0, ddof=1) / np.sqrt(len(worse)) if len(worse) > 1 else np.full(len(MARGINS), np.inf)
     return Loss(
         dict(zip(MARGINS, worse.mean(axis=0).tolist(), strict=True)), dict(zip(MARGINS, error.tolist(), strict=True))

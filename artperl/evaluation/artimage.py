@@ -158,7 +158,7 @@ def restrict_joints(obj: ArticulatedObject, joint_types: Sequence[str], category
         mimic = joint.mimic if joint.mimic is not None and joint.mimic.source in number else None
         mimic = None if mimic is None else replace(mimic, source=number[mimic.source])
         joints.append(replace(joint, parent=-1 if k == 0 else number[owner[joint.parent]], mimic=mimic))
-    parts = tuple(_joined([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
+    parts = tuple(_join([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
     # What the file calls its joints no longer fits.
     return as_seen(replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={}))
 
@@ -175,7 +175,7 @@ def half_turn(obj: ArticulatedObject) -> ArticulatedObject:
     return replace(obj, parts=parts, native_tree=KinematicTree(joints), T_base_rest=T_base_rest)
 
 
-def _joined(parts: Sequence[Part]) -> Part:
+def _join(parts: Sequence[Part]) -> Part:
     """One part of several; the first gives its name."""
     if len(parts) == 1:
         return parts[0]

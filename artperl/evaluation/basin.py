@@ -80,7 +80,7 @@ def run_basin(
     few = problem.observed.map(lambda tensor: tensor[:, :_POINTS])
     options = estimator.options
 
-    def refined(theta: Theta) -> Theta:
+    def refine_twice(theta: Theta) -> Theta:
         iterations = min(options.early_iterations, options.refine.iterations)
         early = replace(options.refine, iterations=iterations)
         theta = refine(problem.shapes, few, theta, early, rigid=True).theta
@@ -91,7 +91,7 @@ def run_basin(
         start = perturb_goal(problem, np.deg2rad(angle), joints)
         with torch.inference_mode():
             led = agent_steps(estimator.agent, problem.shapes, few, start, options.agent_steps)[-1]
-            ends = {"refinement": refined(start), "agent": led, "agent and refinement": refined(led)}
+            ends = {"refinement": refine_twice(start), "agent": led, "agent and refinement": refine_twice(led)}
         valid = problem.shapes.trees.valid.numpy()
         near = {name: (_off(problem, end) < _FOUND) | ~valid for name, end in ends.items()}
         found = {name: round(float(right.all(1).mean()), 3) for name, right in near.items()}

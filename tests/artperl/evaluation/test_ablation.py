@@ -67,7 +67,18 @@ def test_an_ablation_goes_on_from_its_file(tmp_path: Path) -> None:
         assert {len(figures) for figures in variants.values()} == {2}
     assert len(verdict_lines(more)) == 2
     with pytest.raises(ConfigError, match="other views"):
-        run_ablation(["laptop"], tmp_path, None, 3, out, stages=STAGES)
+        run_ablation(["laptop"], tmp_path, None, 3, out, stages=stages)
+
+
+def test_losses_pair_the_views_of_each_row_where_a_stopped_run_lacks_rows() -> None:
+    whole, off = [1.0, 0.5, 1.0], [1.5, 0.5, 1.0]
+    record = {
+        "laptop procedural artimage none": {WHOLE: [whole] * 2, "one": [off] * 2, "other": [off] * 2},
+        "laptop procedural artimage d435": {WHOLE: [whole] * 4, "one": [whole] * 4},
+    }
+    groups = losses(record)
+    assert groups["one"]["laptop procedural"].mean["rotation_deg"] == pytest.approx(0.5 * 2 / 6)
+    assert groups["other"]["laptop procedural"].mean["rotation_deg"] == pytest.approx(0.5)
 
 
 def test_a_stage_stays_where_its_loss_is_large_and_certain() -> None:
