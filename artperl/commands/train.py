@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -63,7 +63,7 @@ class Train:
     files: tuple[Path, ...] | None = None
     """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
     and from other sides; for objects that were not learnt from use artperl evaluate --files."""
-    package_roots: Annotated[PackageRoots | None, tyro.conf.arg(name="package-root")] = None
+    package_roots: Annotated[PackageRoots, tyro.conf.arg(name="package-root")] = field(default_factory=dict)
     """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
@@ -133,11 +133,11 @@ class Train:
         from artperl.training.options import TrainOptions, changed, preset_of
         from artsim.families import FAMILIES
 
-        known = {field.name for field in fields(TrainOptions)}
+        known = {own.name for own in fields(TrainOptions)}
         changes = {
-            field.name: _plain(value)
-            for field in fields(self)
-            if field.name in known and (value := getattr(self, field.name)) is not None and value is not False
+            own.name: _plain(value)
+            for own in fields(self)
+            if own.name in known and (value := getattr(self, own.name)) not in (None, False, {})
         }
         seen = {"noise": self.noise, "states": self.states and {"mode": self.states},
                 "views": self.views and {"preset": self.views}}  # fmt: skip

@@ -24,6 +24,8 @@ from artsim.renderers import RENDERERS
 from tests.conftest import BOX_LAPTOP, ROOT, absent
 from tests.without import beyond_the_core, distributions_of, environment, normal
 
+pytestmark = pytest.mark.slow
+
 BENCHMARKS = sorted(
     path.stem if path.name != "__main__.py" else path.parent.name
     for path in [*ROOT.glob("benchmarks/*.py"), *ROOT.glob("benchmarks/*/__main__.py")]
@@ -80,8 +82,6 @@ CALLS = {
 # Every entry point in one process: to start twenty of them takes half a minute.
 DRIVER = """
 import contextlib, io, json, runpy, sys
-
-pytestmark = pytest.mark.slow
 
 def told(run):
     out, err = io.StringIO(), io.StringIO()
