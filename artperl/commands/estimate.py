@@ -60,8 +60,6 @@ class Estimate:
     """Files, or folders of them; all is read in one process."""
     category: str = "laptop"
     """An estimator that comes with the package, by its name; or its folder; or the folder of a training run."""
-    method: Literal["full", "artperl"] = "full"
-    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed."""
     out: Path | None = None
     """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list. Of
     several files: .jsonl, a line each; the same command goes on where it stopped."""
@@ -93,6 +91,8 @@ class Estimate:
     seen_from: tuple[float, float] | None = None
     """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
+    method: Literal["full", "artperl"] = "full"
+    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed."""
 
     def run(self) -> None:
         from artperl.estimator import load_estimator

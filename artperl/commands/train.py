@@ -137,7 +137,10 @@ class Train:
         changes = {
             own.name: _plain(value)
             for own in fields(self)
-            if own.name in known and (value := getattr(self, own.name)) not in (None, False, {})
+            if own.name in known
+            and (value := getattr(self, own.name)) is not None
+            and value is not False
+            and value != {}
         }
         seen = {"noise": self.noise, "states": self.states and {"mode": self.states},
                 "views": self.views and {"preset": self.views}}  # fmt: skip
