@@ -117,7 +117,7 @@ def test_what_was_repaired_is_stored_said_and_refused_if_asked(repaired: list[So
     with pytest.raises(AssetError, match=r"\(--strict\): files/swapped/mobility.urdf: repaired while loading: joint"):
         generate(repaired, tmp_path / "strict", workers=1, strict=True)
     strict = generate(repaired, tmp_path / "strict", workers=1, strict=True, skip_broken=True)
-    assert len(strict.objects) == 2
+    assert len(strict.objects) == 2, strict.left_out
     assert "swapped/mobility.urdf: repaired while loading" in strict.left_out[0]
 
 
