@@ -9,7 +9,8 @@ import pytest
 
 from artperl.core.part_order import visible_order
 from artperl.data.batches import batches
-from artperl.data.sources import DataOptions, Recorded
+from artperl.data.categories import ARTIMAGE, objects_of
+from artperl.data.sources import DataOptions, Recorded, Samples
 from artsim import generate
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions
@@ -49,3 +50,18 @@ def test_an_estimator_for_any_parts_reads_a_dataset_in_the_order_that_it_knows(t
         np.testing.assert_allclose(sample.box_center, obj.box_center, atol=1e-6)
         order = visible_order(sample.joint_parent, sample.box_center, sample.box_size)
         assert order == list(range(len(obj)))
+
+
+def test_objects_with_too_many_parts_give_way_to_others() -> None:
+    samples = Samples(["drawer"], SampleOptions(num_points=16), 0, 1, 3, "any")
+    sizes = [len(samples[i].joint_type) for i in range(6)]
+    assert max(sizes) <= 3
+    assert samples[2].object_id == samples[2].object_id
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("category", sorted(ARTIMAGE))
+def test_objects_have_the_parts_of_artimage(category: str) -> None:
+    samples = Samples([category], SampleOptions(num_points=16), 0, 2, 4)
+    assert {samples[i].joint_type[1:] for i in range(8)} == {ARTIMAGE[category]}
+    assert {obj.tree.types[1:] for obj in objects_of([category], 4, 1_000_000)} == {ARTIMAGE[category]}

@@ -1,4 +1,4 @@
-"""What is worked out from an estimate and the points: labels, boxes, how far parts have slid."""
+"""What is worked out from an estimate and the points: boxes, how far parts have slid."""
 
 from __future__ import annotations
 
@@ -6,19 +6,8 @@ import numpy as np
 import pytest
 
 from artperl.core.estimate import Estimate, brought_to_rest, slid, widen
-from artperl.core.labels import labels_by_boxes
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.samples import frozen_samples
-
-
-def test_points_are_of_a_part_whose_box_they_are_in() -> None:
-    """Two boxes side by side, the second one turned: odds decide within both and within neither, boxes elsewhere."""
-    T = np.tile(np.eye(4), (2, 1, 1))
-    T[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    center, size = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.array([[1.0, 1.0, 1.0], [0.2, 1.2, 1.0]])
-    points = np.array([[0.2, 0.0, 0.0], [0.2, 0.05, 0.0], [0.45, 0.0, 0.0], [1.4, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    odds = np.log([[0.1, 0.8, 0.1], [0.8, 0.1, 0.1], [0.3, 0.6, 0.1], [0.9, 0.05, 0.05], [np.nan] * 3])
-    assert labels_by_boxes(points, T, center, size, odds, 0.01).tolist() == [0, 0, 1, 1, -1]
 
 
 def test_points_widen_boxes_and_never_narrow_them() -> None:

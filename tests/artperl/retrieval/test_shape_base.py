@@ -13,11 +13,7 @@ import torch
 import artsim
 from artperl.core.shapes import Shapes
 from artperl.data.categories import objects_of
-from artperl.perception.network import Perceived
-from artperl.perception.part_grouping import Grouped
-from artperl.retrieval.box_embedding import by_boxes
-from artperl.retrieval.references import references
-from artperl.retrieval.shape_base import ShapeBase, moves, widened
+from artperl.retrieval.shape_base import ShapeBase, widened
 from artsim.errors import ConfigError, DatasetError
 from tests.artperl.worlds import small_base
 
@@ -104,37 +100,6 @@ def test_references_go_as_far_as_any_of_their_kind() -> None:
     assert laptops[0, 1, 1] == pytest.approx(farthest)
 
 
-def _perceived(base: ShapeBase, row: int) -> Perceived:
-    """What a network would say that knows an object of the base."""
-    shapes = base.shapes[row : row + 1]
-    one = torch.zeros(1, 1)
-    return Perceived(
-        part_logits=one[..., None], canonical=one[..., None].expand(-1, -1, 3), spread=one,
-        valid_logits=2.0 * shapes.trees.valid.float() - 1.0, box_center=shapes.box_center, box_size=shapes.box_size,
-        log_diagonal=one[0],
-    )  # fmt: skip
-
-
-def test_references_have_axes_of_every_lean() -> None:
-    base = by_boxes(ShapeBase.of([artsim.make("eyeglasses", seed) for seed in range(12)], 32))
-    axis = base.shapes.trees.axis[:, 1]
-    leans = torch.sign(axis[:, 1])
-    assert set(leans.tolist()) == {-1.0, 1.0}
-    assert base.embeddings is not None
-    for row in range(len(base)):
-        rows, shapes = references(base, _perceived(base, row), 3)
-        assert int(rows[0]) == row
-        assert base.leaning_otherwise(row).tolist() == (leans != leans[row]).tolist()
-        assert torch.sign(shapes.trees.axis[:2, 1, 1]).tolist() == [leans[row], -leans[row]]
-        torch.testing.assert_close(shapes.trees.axis[2, 1], torch.nn.functional.normalize(axis.mean(0), dim=0))
-    laptops = by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(6)], 32))
-    assert laptops.embeddings is not None
-    nearest = laptops.nearest(laptops.embeddings[:1], 3)[0][0]
-    rows, shapes = references(laptops, _perceived(laptops, 0), 3)
-    assert torch.equal(rows, nearest)
-    assert torch.equal(shapes.points, laptops.shapes.points[nearest])
-
-
 def _composed(base: ShapeBase, like: ShapeBase, row: int) -> Shapes:
     """Of a base, what is most like an object of another one."""
     K, shapes = len(like.trees[row]), like.shapes
@@ -184,20 +149,6 @@ def test_a_joint_that_no_object_has_is_as_it_is_perceived() -> None:
     assert float(made.trees.turn[0, 1]) == 1.0
     torch.testing.assert_close(made.trees.axis[0, 1], hinge[3:6])
     torch.testing.assert_close(made.trees.origin[0, 1], made.box_center[0, 1] + hinge[6:])
-
-
-def test_parts_by_votes_are_looked_for_among_objects_with_their_tree() -> None:
-    objects = objects_of(["storage_furniture"], 8, 30, "any", 8)
-    base, whole = by_boxes(ShapeBase.of(objects[:-1], 16)), ShapeBase.of(objects, 16)
-    for row in (2, 7):
-        seen = _perceived(whole, row)
-        tree = whole.shapes.trees[row : row + 1]
-        groups = Grouped(**vars(seen), joint=whole.joints[row : row + 1], parent=tree.parent)
-        rows, shapes = references(base, groups, 3)
-        K = len(objects[row])
-        assert shapes.trees.valid.sum(1).tolist() == [K] * len(rows)
-        assert bool((moves(base.joints[rows[:-1], :K]) == moves(groups.joint[0, :K])).all())
-        assert (int(rows[0]) == row) == (row < 7)
 
 
 def test_only_axes_of_one_sort_lean() -> None:

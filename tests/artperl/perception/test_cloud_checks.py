@@ -12,7 +12,7 @@ from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import clean
 from artsim.observing.sample import Sample
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 CLOUD = np.load(CASES / "E00" / "c.npy").astype(np.float64)
 
 

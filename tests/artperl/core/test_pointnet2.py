@@ -1,0 +1,47 @@
+"""PointNet++: neighbourhoods, maxima and weighted sums over them."""
+
+from __future__ import annotations
+
+import torch
+
+from artperl.core.pointnet2 import Neighbourhoods, interpolated, strongest
+
+
+def test_neighbours_are_the_nearest() -> None:
+    points = torch.randn(2, 40, 3, generator=torch.Generator().manual_seed(0))
+    near = Neighbourhoods.of(points, (10, 4), 5)
+    apart = torch.cdist(points[:, :10], points)
+    for b in range(2):
+        for i in range(10):
+            assert set(near.down[0][b, i].tolist()) == set(apart[b, i].argsort()[:5].tolist())
+    weight, index = near.up[0]
+    torch.testing.assert_close(weight.sum(-1), torch.ones(2, 40))
+    best = index.gather(2, weight.argmax(-1, keepdim=True))[..., 0]
+    assert torch.equal(best, torch.cdist(points, points[:, :10]).argmin(-1))
+
+
+def test_strongest_is_the_maximum_over_neighbours_with_its_gradient() -> None:
+    generator = torch.Generator().manual_seed(0)
+    features = torch.randn(2, 9, 4, generator=generator, requires_grad=True)
+    index = torch.randint(0, 9, (2, 5, 3), generator=generator)
+    direct = torch.stack([features[b][index[b]].amax(1) for b in range(2)])
+    found = strongest(features, index)
+    torch.testing.assert_close(found, direct)
+    (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
+    (other,) = torch.autograd.grad((direct**2).sum(), features)
+    torch.testing.assert_close(one, other)
+    torch.testing.assert_close(strongest(features.detach(), index), direct.detach())
+
+
+def test_interpolated_is_the_weighted_sum_over_neighbours_with_its_gradient() -> None:
+    generator = torch.Generator().manual_seed(0)
+    features = torch.randn(2, 9, 4, generator=generator, requires_grad=True)
+    index = torch.stack([torch.randperm(9, generator=generator)[:3] for _ in range(10)]).reshape(2, 5, 3)
+    weight = torch.rand(2, 5, 3, generator=generator)
+    direct = torch.stack([(weight[b][..., None] * features[b][index[b]]).sum(1) for b in range(2)])
+    found = interpolated(features, weight, index)
+    torch.testing.assert_close(found, direct)
+    torch.testing.assert_close(interpolated(features.detach(), weight, index), direct.detach())
+    (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
+    (other,) = torch.autograd.grad((direct**2).sum(), features)
+    torch.testing.assert_close(one, other)

@@ -1,0 +1,42 @@
+"""Generators of hypotheses, and what they look at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from artperl.core.clouds import Clouds
+from artperl.data.categories import objects_of
+from artperl.evaluation.samples import TEST_SEEDS, frozen_samples
+from artperl.fitting.hypotheses import Context, References, chain_states, part_weights
+from artperl.fitting.options import EstimatorOptions
+from artperl.methods.full import Estimator
+from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.references import references
+from artperl.retrieval.shape_base import ShapeBase
+from artsim.observing.sample import Sample
+from tests.artperl.worlds import Oracle
+
+
+def test_only_chains_of_joints_are_searched_for_down_the_tree(estimator: Estimator, sample: Sample) -> None:
+    (seen,) = frozen_samples(["robot_arm"], 1, 1, parts="any", max_parts=10)
+    arm = ShapeBase.of(objects_of(["robot_arm"], 1, TEST_SEEDS, "any", 10), 64)
+    for shown, base in ((sample, estimator.base), (seen, by_boxes(arm))):
+        oracle, cloud = Oracle(shown, len(shown.joint_type)), torch.from_numpy(shown.points)[None]
+        clouds = Clouds.of(cloud)
+        perceived = oracle(clouds.points)
+        row, shapes = references(base, perceived, 1)
+        context = Context(cloud, clouds, perceived, References(shapes, row), {}, None, EstimatorOptions())
+        proposed = chain_states(context, None)
+        assert (proposed is not None) == (shown is seen)
+        assert chain_states(replace(context, options=EstimatorOptions(beam=0)), None) is None
+
+
+def test_parts_count_by_the_root_of_their_points_but_no_point_for_more_than_eight() -> None:
+    part = torch.tensor([[0] * 1600 + [1] * 400 + [2], [0] * 500 + [2] * 1501])
+    weight = part_weights(part)
+    assert [weight[0, part[0] == k].sum().item() for k in range(3)] == [1600.0, 800.0, 8.0]
+    total = [weight[1, part[1] == k].sum().item() for k in (0, 2)]
+    assert total[0] / total[1] == pytest.approx((500 / 1501) ** 0.5)
