@@ -153,8 +153,6 @@ class Generator(Protocol):
 
 def perceived_pose(context: Context, best: Best | None) -> Hypotheses | None:
     """References where perception places the points in the rest frame."""
-    if not context.options.perceived_start:
-        return None
     shapes, theta = context.adapted
     return Hypotheses.of(shapes, theta, context.references.row.tolist())
 
@@ -162,8 +160,6 @@ def perceived_pose(context: Context, best: Best | None) -> Hypotheses | None:
 def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
     """The first reference, its hardly visible root where the part with most points lets it be."""
     shapes, theta = context.adapted[0][:1], context.adapted[1][:1]
-    if not context.options.perceived_start:
-        return None
     states = initial_pose.by_another_part(context.clouds, context.perceived, shapes, theta, _HINGE_STATES)
     return None if states is None else _of_first(context, shapes, states)
 
@@ -172,7 +168,7 @@ def chain_states(context: Context, best: Best | None) -> Hypotheses | None:
     """The first reference in the states that a beam search finds, where joints form a chain."""
     options = context.options
     shapes, theta = context.adapted[0][:1], context.adapted[1][:1]
-    if not (options.perceived_start and options.beam and int(shapes.trees.depth[0].max()) >= _CHAIN):
+    if not options.beam or int(shapes.trees.depth[0].max()) < _CHAIN:
         return None
     probability = context.perceived.part_probability[..., : shapes.trees.num_rows]
     states = beam_search.beam(

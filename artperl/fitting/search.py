@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -32,6 +33,8 @@ from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.options import EstimatorOptions
 from artperl.perception.network import Perceived
 
+Values = TypeVar("Values", float, Tensor)
+
 _DISAGREEMENT = 0.3
 """Weight of the disagreement with perception against the residual: a flat part fits a wrong pose just as well, but
 perception does not agree with that."""
@@ -39,7 +42,7 @@ _CLEARLY = 0.8
 """Share of the best score below which a hypothesis that perception did not propose wins: most others that fit are
 wrong."""
 _NEVER = 1e6
-"""Added to the score of an object that would be seen from where the camera is not."""
+"""Score of an object that would be seen from where the camera is not, besides what else it has."""
 _CAMERA_ARC = np.deg2rad(15.0)
 """Arc that a camera may be away from where it is known to be: an estimate need not have it to the degree."""
 _BELOW = np.deg2rad(10.0)
@@ -77,10 +80,6 @@ class Fit:
     disagreement: float
     outside: bool
 
-    def score(self, disagreement_weight: float = 0.0) -> float:
-        """What is to be low: the residual, the disagreement with perception, and a view from where no camera is."""
-        return self.residual + disagreement_weight * self.disagreement + _NEVER * self.outside
-
     def to(self, device: torch.device | str) -> Fit:
         """The fit on another device."""
         return replace(
@@ -91,6 +90,19 @@ class Fit:
     def ending(self, theta: Theta) -> Fit:
         """The fit with another end."""
         return replace(self, theta=theta, path=[*self.path[:-1], theta])
+
+
+def score(residual: Values, outside: Values, disagreement: float = 0.0) -> Values:
+    """What is to be low, of every hypothesis and of every fit.
+
+    Parameters
+    ----------
+    residual, outside
+        Numbers, or one of each for every hypothesis: see :class:`Fit`.
+    disagreement : float
+        With perception, as far as it counts: see :class:`Round`.
+    """
+    return residual + disagreement + _NEVER * outside
 
 
 @dataclass(frozen=True)
@@ -114,6 +126,10 @@ class Round:
     share: float = 1.0
     disagreement_weight: float = 0.0
 
+    def score(self, fit: Fit) -> float:
+        """The score by which fits of this round compete with the best one."""
+        return score(fit.residual, fit.outside, self.disagreement_weight * fit.disagreement)
+
 
 def fits_badly(best: Fit | None, options: EstimatorOptions) -> bool:
     """The gate: there is no fit, its residual is large, or the camera is elsewhere."""
@@ -121,7 +137,7 @@ def fits_badly(best: Fit | None, options: EstimatorOptions) -> bool:
 
 
 ROUNDS = (
-    Round((perceived_pose, hinged_root, chain_states), lambda best, options: best is None),
+    Round((perceived_pose, hinged_root, chain_states), lambda best, options: options.perceived_start),
     Round((half_turn,), lambda best, options: best is not None),
     Round((views_around,), fits_badly, _CLEARLY, _DISAGREEMENT),
 )
@@ -140,8 +156,7 @@ def find_fit(context: Context, clock: Clock) -> Fit:
             some += [] if hypotheses is None else [hypotheses]
         if some:
             fit = settle(Hypotheses.joined(some), context, clock)
-            weight = stage.disagreement_weight
-            if best is None or fit.score(weight) < stage.share * best.score(weight):
+            if best is None or stage.score(fit) < stage.share * stage.score(best):
                 best = fit
     assert best is not None  # the gate runs the last round where there is none
     with clock("labels"):
@@ -162,8 +177,7 @@ def settle(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
         early = refine(
             hypotheses.shapes, few, hypotheses.theta, replace(options.refine, iterations=count), rigid=True
         )  # fmt: skip
-        doubt = _residual(early.energy) + _NEVER * outside(early.theta, options.seen_from)
-        best = int(doubt.argmin())
+        best = int(score(_residual(early.energy), outside(early.theta, options.seen_from)).argmin())
         shapes, theta, row = hypotheses.shapes[best : best + 1], early.theta[best : best + 1], hypotheses.row[best]
     with clock("labels"):
         part = labels_by_surface(shapes, observed, theta, perceived.part_logits)
