@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from artperl.core.estimate import Estimate
 from artperl.core.listing import HEAD, cells, summary
-from artperl.perception.preprocess import measured
+from artperl.perception.preprocess import is_measured
 from artsim.common.names import printable
 from artsim.drawing.annotation import PALETTE
 
@@ -31,7 +31,7 @@ def page(estimate: Estimate, points: ArrayLike, title: str) -> str:
     title : str
     """
     points = np.asarray(points, dtype=np.float64)
-    shown = np.flatnonzero(measured(points))
+    shown = np.flatnonzero(is_measured(points))
     shown = np.random.default_rng(0).permutation(shown)[:_MOST]
     T = estimate.trajectory
     center = np.einsum(

@@ -82,7 +82,7 @@ class Told(Estimator):
     def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
         """What is perceived, but for the parts."""
         perceived = super().perceive(clouds, clock)
-        metres = (clouds.points[0] * clouds.radius + clouds.center).cpu().numpy()
+        metres = (clouds.points[0] * clouds.scale + clouds.center).cpu().numpy()
         part = torch.from_numpy(self.sample.part[cKDTree(self.sample.points).query(metres)[1]].astype(np.int64))
         true = torch.nn.functional.one_hot(part, perceived.part_logits.shape[-1]).to(perceived.part_logits)
         return replace(perceived, part_logits=_SURE * true[None])

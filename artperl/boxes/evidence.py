@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.core.batch import Batch
-from artperl.core.estimate import Estimate, brought_to_rest
+from artperl.core.estimate import Estimate, points_at_rest
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ class Evidence(Batch):
         )
         return evidence.map(lambda tensor: tensor[None]), unit
 
-    def padded(self, rows: int) -> Evidence:
+    def pad(self, rows: int) -> Evidence:
         """With that many rows for parts."""
         missing = rows - self.valid.shape[1]
 
@@ -196,10 +196,10 @@ def evidence_of_estimate(
     T, K = estimate.T_camera_part, len(estimate.size)
     slides = np.array(estimate.joint_type)[:, None] == "prismatic"
     arrays = (
-        points, T, np.where(slides, estimate.joint_axis, 0.0), brought_to_rest(estimate.translation, T), estimate.size,
+        points, T, np.where(slides, estimate.joint_axis, 0.0), points_at_rest(estimate.translation, T), estimate.size,
     )  # fmt: skip
     cloud, poses, axis, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
     evidence, unit = Evidence.of(
         cloud, torch.from_numpy(part), poses, axis, center, size, perceived_center[:K], perceived_size[:K], noise
     )  # fmt: skip
-    return evidence.padded(rows), float(unit)
+    return evidence.pad(rows), float(unit)

@@ -54,7 +54,7 @@ class Boxes(nn.Module):
         as much farther back along the axis.
         """
         valid = evidence.valid[..., None, None]
-        face = self.alone(self._described(evidence)) * valid
+        face = self.alone(self._features(evidence)) * valid
         same = [face.sum(1, keepdim=True) / valid.sum(1, keepdim=True), face.amax(1, keepdim=True), face[:, :1]]
         others = [face.roll(3, dims=2), face.mean(2, keepdim=True), *same]
         score = self.among(torch.cat([face, *(values.expand_as(face) for values in others)], dim=-1))
@@ -68,7 +68,7 @@ class Boxes(nn.Module):
         leads = torch.cat([-evidence.axis, evidence.axis], dim=-1).clamp(min=0.0)
         return 0.5 * (low + high), (high - low).clamp(min=0.0), (leads * beyond).sum(-1)
 
-    def _described(self, evidence: Evidence) -> Tensor:
+    def _features(self, evidence: Evidence) -> Tensor:
         """(B, P, 6, C) features of each face."""
         size, candidates = evidence.size, evidence.candidates
         unit = (0.5 * size + _THIN).repeat(1, 1, 2)[..., None]

@@ -19,24 +19,24 @@ class Clouds(Batch):
     Attributes
     ----------
     points : (B, N, 3) float
-        ``(camera-frame points - center) / radius``, in random order.
+        ``(camera-frame points - center) / scale``, in random order.
     center : (B, 3) float
         Mean of the points, metres, camera frame.
-    radius : (B,) float
+    scale : (B,) float
         Root of the mean squared distance from it, times two, metres.
     """
 
     points: Tensor
     center: Tensor
-    radius: Tensor
+    scale: Tensor
 
     @staticmethod
     def of(points: Tensor) -> Clouds:
         """Clouds of (B, N, 3) camera-frame points."""
         center = points.mean(1)
         local = points - center[:, None]
-        radius = 2.0 * local.square().sum(-1).mean(1).sqrt().clamp(min=1e-9)
-        return Clouds(local / radius[:, None, None], center, radius)
+        scale = 2.0 * local.square().sum(-1).mean(1).sqrt().clamp(min=1e-9)
+        return Clouds(local / scale[:, None, None], center, scale)
 
 
 def joint_rows(kinds: Sequence[str], axis: Array, origin: Array, center: Array, diagonal: float) -> Array:

@@ -126,7 +126,7 @@ class Estimate:
         return short_text(self)
 
 
-def slid(estimate: Estimate, farther: Array) -> Estimate:
+def slide_parts(estimate: Estimate, farther: Array) -> Estimate:
     """The estimate with parts that have slid farther (K,), metres, along their axes, and are where they were.
 
     Where they are at rest changes, and with them where everything is at rest that they carry.
@@ -141,7 +141,7 @@ def slid(estimate: Estimate, farther: Array) -> Estimate:
     return replace(estimate, T_camera_part=T, state=estimate.state + farther, trajectory=trajectory)
 
 
-def brought_to_rest(posed: Array, T_camera_part: Array) -> Array:
+def points_at_rest(posed: Array, T_camera_part: Array) -> Array:
     """(K, 3) one posed point of each part, in the rest frame that its part carries (K, 4, 4)."""
     rest: Array = np.einsum("kji,kj->ki", T_camera_part[:, :3, :3], posed - T_camera_part[:, :3, 3])
     return rest

@@ -43,7 +43,7 @@ def visible_order(parents: NDArray[np.int64], center: Array, size: Array) -> lis
     return order
 
 
-def reordered(obj: ArticulatedObject, order: Sequence[int]) -> ArticulatedObject:
+def reorder_parts(obj: ArticulatedObject, order: Sequence[int]) -> ArticulatedObject:
     """The same object with its parts, parents before children, in another order."""
     number = {k: n for n, k in enumerate(order)}
     joints = []
@@ -57,7 +57,7 @@ def reordered(obj: ArticulatedObject, order: Sequence[int]) -> ArticulatedObject
     )  # fmt: skip
 
 
-def reordered_sample(sample: Sample, order: Sequence[int]) -> Sample:
+def reorder_sample(sample: Sample, order: Sequence[int]) -> Sample:
     """The same sample with its parts in another order."""
     rows, number = np.asarray(order), np.argsort(order)
     per_part = (
@@ -76,6 +76,6 @@ def reordered_sample(sample: Sample, order: Sequence[int]) -> Sample:
     )  # fmt: skip
 
 
-def as_seen(obj: ArticulatedObject) -> ArticulatedObject:
+def sort_parts(obj: ArticulatedObject) -> ArticulatedObject:
     """The object with its parts in :func:`visible_order`."""
-    return reordered(obj, visible_order(obj.tree.parents, obj.box_center, obj.box_size))
+    return reorder_parts(obj, visible_order(obj.tree.parents, obj.box_center, obj.box_size))

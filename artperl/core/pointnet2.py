@@ -22,7 +22,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 from typing_extensions import ParamSpec
 
-from artperl.core.neighbours import nearest
+from artperl.core.neighbours import nearest_points
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -72,8 +72,8 @@ class Neighbourhoods:
         for size in sizes:
             fine = levels[-1]
             coarse = fine[:, :size]
-            down.append(nearest(coarse, fine, min(neighbours, fine.shape[1]))[1])
-            squared, index = nearest(fine, coarse, min(3, coarse.shape[1]))
+            down.append(nearest_points(coarse, fine, min(neighbours, fine.shape[1]))[1])
+            squared, index = nearest_points(fine, coarse, min(3, coarse.shape[1]))
             weight = 1.0 / (squared + 1e-8)
             up.append((weight / weight.sum(2, keepdim=True), index))
             levels.append(coarse)
@@ -93,7 +93,7 @@ def strongest(features: Tensor, index: Tensor) -> Tensor:
     return best.reshape(*index.shape[:2], -1)
 
 
-def interpolated(features: Tensor, weight: Tensor, index: Tensor) -> Tensor:
+def interpolate(features: Tensor, weight: Tensor, index: Tensor) -> Tensor:
     """(B, N, C) sums, with weights (B, N, k), of the rows of features (B, M, C) that indices (B, N, k) name."""
     if features.requires_grad or features.is_cuda:  # a product with a dense matrix is faster backwards
         return weight.new_zeros(*weight.shape[:2], features.shape[1]).scatter_(2, index, weight) @ features
@@ -135,7 +135,7 @@ class FeaturePropagation(nn.Module):
 
     def forward(self, coarse: Tensor, fine: Tensor, weight: Tensor, index: Tensor) -> Tensor:
         """(B, N, outputs) from coarse (B, M, C) and fine (B, N, C') features, and each point's (B, N, k) centres."""
-        return self.dense(interpolated(self.coarse(coarse), weight, index) + self.fine(fine))
+        return self.dense(interpolate(self.coarse(coarse), weight, index) + self.fine(fine))
 
 
 class PointNet2(nn.Module):

@@ -107,7 +107,7 @@ class Trees(Batch):
         arrays = {name: torch.from_numpy(np.stack([row[name] for row in rows])) for name in rows[0]}
         return Trees(**arrays).to(dtype)
 
-    def trimmed(self, num_rows: int) -> Trees:
+    def trim(self, num_rows: int) -> Trees:
         """The first rows alone; the others must be padding."""
         first = self.map(lambda tensor: tensor[:, :num_rows])
         return replace(first, carries=first.carries[..., :num_rows])

@@ -90,13 +90,13 @@ class Shapes(Batch):
         own = {name: getattr(self, name)[:, row : row + 1] for name in fields}
         return Shapes(trees=alone.to(self.points.device), diagonal=self.diagonal, **own)
 
-    def trimmed(self) -> Shapes:
+    def trim(self) -> Shapes:
         """Without rows for parts that no object of the batch has."""
         count = max(1, int(self.trees.valid.sum(1).max()))
         cut = {
             name: getattr(self, name)[:, :count] for name in ("box_center", "box_size", "points", "normals", "spacing")
         }
-        return replace(self, trees=self.trees.trimmed(count), **cut)
+        return replace(self, trees=self.trees.trim(count), **cut)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artperl.core.part_order import as_seen
+from artperl.core.part_order import sort_parts
 from artsim.errors import AssetError, ConfigError
 from artsim.loading.sources import FamilySource, family_sources
 from artsim.model.objects import MAX_PARTS, ArticulatedObject
@@ -60,7 +60,7 @@ def opens_to_the_back(joint_types: Sequence[str], joint_axes: ArrayLike) -> bool
 
 def order_parts(obj: ArticulatedObject, parts: Parts) -> ArticulatedObject:
     """The object with its parts in the order that an estimator for such objects knows them in."""
-    return as_seen(obj) if parts == "any" else obj
+    return sort_parts(obj) if parts == "any" else obj
 
 
 def objects_of(

@@ -15,7 +15,7 @@ from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.data.sources import DataOptions
-from artperl.fitting.initial_pose import adapted, sized
+from artperl.fitting.initial_pose import adapt_shapes, resize_shapes
 from artperl.perception.network import Perception
 from artperl.perception.part_grouping import perceive
 from artperl.retrieval.box_embedding import box_embedding
@@ -107,10 +107,10 @@ class Problems:
             shapes = deform(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
         else:
             query = box_embedding(valid, box_center, box_size)
-            nearest, _ = self.base.nearest(query, min(_CHOICES, len(self.base)))
+            nearest, _ = self.base.nearest_objects(query, min(_CHOICES, len(self.base)))
             pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
             shapes = self.base.shapes[nearest.gather(1, pick)[:, 0]]
-        shapes = sized(shapes, torch.tensor([sample.diagonal for sample in samples]))
+        shapes = resize_shapes(shapes, torch.tensor([sample.diagonal for sample in samples]))
         goal = theta_from_parts(shapes.trees, shapes.box_center, shapes.box_size, rotation, center, size)
         goal = Theta(**{**vars(goal), "state": clamp_state(shapes.trees, goal.state)})
         points = torch.from_numpy(np.stack([s.points for s in samples]))
@@ -155,7 +155,7 @@ def deform(shapes: Shapes, generator: torch.Generator) -> Shapes:
 
     whole, own = _STRETCH
     shift = _SHIFT * shapes.diagonal[:, None, None] * drawn(B, P, 3)
-    return adapted(
+    return adapt_shapes(
         shapes,
         replace(Theta.at_rest(shapes.trees), log_scale=whole * drawn(B, 3), stretch=own * drawn(B, P, 3), shift=shift),
     )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from artperl.core.part_order import reordered_sample, visible_order
+from artperl.core.part_order import reorder_sample, visible_order
 from artperl.data.categories import Parts, has_parts, order_parts
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions, draw_sample
@@ -160,7 +160,7 @@ class Recorded:
         sample = self.dataset[int(self._order[place])]
         if self.parts != "any":
             return sample
-        return reordered_sample(sample, visible_order(sample.joint_parent, sample.box_center, sample.box_size))
+        return reorder_sample(sample, visible_order(sample.joint_parent, sample.box_center, sample.box_size))
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""

@@ -30,7 +30,7 @@ class Truth(Batch):
     level : (B, P) int64
         How many joints are between the root and the part.
     diagonal : (B,) float
-        Over the cloud's radius.
+        Over the cloud's scale.
     """
 
     part: Tensor
@@ -80,4 +80,4 @@ def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
     """Collated rows of :func:`training_rows` as records."""
     clouds = Clouds.of(rows["points"])
     names = ("part", "canonical", "part_valid", "box_center", "box_size", "joint", "level")
-    return clouds, Truth(**{name: rows[name] for name in names}, diagonal=rows["diagonal"] / clouds.radius)
+    return clouds, Truth(**{name: rows[name] for name in names}, diagonal=rows["diagonal"] / clouds.scale)

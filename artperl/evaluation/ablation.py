@@ -60,7 +60,7 @@ def _refinement(**options: Any) -> Change:
 
 
 STAGES: dict[str, Change] = {
-    "label smoothing": _options(coherent=False),
+    "label smoothing": _options(label_smoothing=False),
     "retrieval of the nearest reference": lambda whole: replace(whole, base=permute_references(whole.base)),
     "more than one reference": _options(references=1),
     "start from rest-frame coordinates": _options(perceived_start=False),
@@ -68,8 +68,8 @@ STAGES: dict[str, Change] = {
     "outline term": _refinement(outline_weight=0.0),
     "second try": _options(retry_residual=float("inf")),
     "agent": lambda whole: replace(whole, agent=None),
-    "hidden parts": _options(uncovered=False),
-    "normal alignment": _options(squared=False),
+    "hidden parts": _options(occluded_parts=False),
+    "normal alignment": _options(normal_alignment=False),
     "network for boxes": lambda whole: replace(whole, boxes=None),
 }
 """Changes that take a stage away, by the stage. A new stage is one line."""

@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from artperl.core.part_order import as_seen
+from artperl.core.part_order import sort_parts
 from artperl.data.categories import ARTIMAGE, Parts, objects_of, opens_to_the_back
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, samples_of
 from artsim.datasets.plan import SampleOptions
@@ -124,7 +124,7 @@ def match_category(obj: ArticulatedObject, categories: Sequence[str], parts: Par
     category = categories[0] if len(set(categories)) == 1 else ""
     if parts == "artimage" and category in ARTIMAGE:
         return restrict_joints(obj, ARTIMAGE[category], category)
-    return as_seen(obj)
+    return sort_parts(obj)
 
 
 def restrict_joints(obj: ArticulatedObject, joint_types: Sequence[str], category: str) -> ArticulatedObject:
@@ -160,7 +160,7 @@ def restrict_joints(obj: ArticulatedObject, joint_types: Sequence[str], category
         joints.append(replace(joint, parent=-1 if k == 0 else number[owner[joint.parent]], mimic=mimic))
     parts = tuple(_join([part for part, own in zip(obj.parts, owner, strict=True) if own == k]) for k in kept)
     # What the file calls its joints no longer fits.
-    return as_seen(replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={}))
+    return sort_parts(replace(obj, category=category, parts=parts, native_tree=KinematicTree(joints), source_joints={}))
 
 
 def half_turn(obj: ArticulatedObject) -> ArticulatedObject:

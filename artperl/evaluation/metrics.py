@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import rankdata
 
-from artperl.core.estimate import Estimate, brought_to_rest
+from artperl.core.estimate import Estimate, points_at_rest
 from artperl.evaluation.box_overlap import iou, iou_aligned, iou_omad_legacy
 from artsim.observing.sample import Sample
 
@@ -144,7 +144,7 @@ def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array
         Posed box centres in the camera frame, and sizes of the boxes, metres.
     T_camera_part : (K, 4, 4) float
     """
-    center = brought_to_rest(translation, T_camera_part)
+    center = points_at_rest(translation, T_camera_part)
     low, high = center - 0.5 * size, center + 0.5 * size
     middle: Array = 0.5 * (low.min(axis=0) + high.max(axis=0))
     return center - middle

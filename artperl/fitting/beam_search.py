@@ -80,22 +80,22 @@ def beam(
     trees, solid = shapes.trees, shapes.has_surface[0]
     options = replace(options, outline_weight=options.outline_weight / max(1, int(solid.sum())))
     parts = {k: _part(shapes, k, cloud, probability[..., k]) for k in solid.nonzero()[:, 0].tolist()}
-    joints, turn = _from_the_root_down(trees)
+    joints, turn = _joint_order(trees)
     theta = _roots(parts[0], start, options) if 0 in parts else start
-    cost = _misfit(parts, turn == 0, _posed(shapes, theta), options)
+    cost = _misfit(parts, turn == 0, _pose(shapes, theta), options)
     for number, joint in enumerate(joints, start=1):
         states = torch.cat([_grid(trees, joint).expand(len(theta), -1), theta.state[:, joint, None]], dim=1)
         theta, cost = theta.repeat(states.shape[1]), cost.repeat_interleave(states.shape[1])
         state = theta.state.clone()
         state[:, joint] = states.flatten()
         theta = replace(theta, state=state)
-        cost = cost + _misfit(parts, turn == number, _posed(shapes, theta), options)
+        cost = cost + _misfit(parts, turn == number, _pose(shapes, theta), options)
         best = cost.argsort()[:width]
         theta, cost = theta[best], cost[best]
     return theta[:count]
 
 
-def half_turned(shapes: Shapes, theta: Theta) -> Theta | None:
+def half_turns(shapes: Shapes, theta: Theta) -> Theta | None:
     """Other states of a reference in which all but two of its parts lie where they do; None if there are none.
 
     Of three joints in a row, the first and the last turn by half, and the one between bends the other way. Where the
@@ -111,12 +111,12 @@ def half_turned(shapes: Shapes, theta: Theta) -> Theta | None:
     trees, parent = shapes.trees, shapes.trees.parent[0].tolist()
     turns = (trees.free[0] & (trees.turn[0] != 0.0) & (trees.slide[0] == 0.0)).tolist()
     in_a_row = [(parent[parent[k]], parent[k], k) for k in range(len(parent))]
-    others = [_other_way_round(trees, theta, *row) for row in in_a_row if all(turns[joint] for joint in row)]
+    others = [_bend_other_way(trees, theta, *row) for row in in_a_row if all(turns[joint] for joint in row)]
     if not others:
         return None
-    before, found = _posed(shapes, theta), []
+    before, found = _pose(shapes, theta), []
     for other, last in others:
-        after = _posed(shapes, other)
+        after = _pose(shapes, other)
         twist = (after.rotation - before.rotation)[:, last].abs().amax()
         apart = torch.linalg.vector_norm((after.center - before.center)[:, last]) / shapes.diagonal
         within = ((other.state >= trees.lower) & (other.state <= trees.upper) | (other.state == theta.state)).all()
@@ -125,7 +125,7 @@ def half_turned(shapes: Shapes, theta: Theta) -> Theta | None:
     return concatenate(found) if found else None
 
 
-def _other_way_round(trees: Trees, theta: Theta, first: int, middle: int, last: int) -> tuple[Theta, int]:
+def _bend_other_way(trees: Trees, theta: Theta, first: int, middle: int, last: int) -> tuple[Theta, int]:
     """The first and the last joint turned by half, the one between bent the other way; and the last one's number."""
     state = theta.state.clone()
     state[:, middle] = 2.0 * trees.rest[:, middle] - state[:, middle]
@@ -148,7 +148,7 @@ def _part(shapes: Shapes, part: int, cloud: Tensor, probability: Tensor) -> _Par
     return _Part(shapes.part(part), replace(target, share=share, rays=whole.rays, gap=whole.gap))
 
 
-def _from_the_root_down(trees: Trees) -> tuple[list[int], Tensor]:
+def _joint_order(trees: Trees) -> tuple[list[int], Tensor]:
     """Free joints in the order of their depth, and (P,) after how many of them each part has its place."""
     joints = [j for j in trees.depth[0].argsort(stable=True).tolist() if trees.free[0, j]]
     number = torch.zeros_like(trees.depth[0])
@@ -180,7 +180,7 @@ def _grid(trees: Trees, joint: int) -> Tensor:
     return lower + (upper - lower) * middle / _STATES
 
 
-def _posed(shapes: Shapes, theta: Theta) -> Posed:
+def _pose(shapes: Shapes, theta: Theta) -> Posed:
     """One reference in several states."""
     trees = shapes.trees.map(lambda tensor: tensor.expand(len(theta), *tensor.shape[1:]))
     return pose_parts(trees, theta, shapes.box_center)

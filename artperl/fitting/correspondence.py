@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 
 from artperl.core.batch import Batch
-from artperl.core.neighbours import nearest
+from artperl.core.neighbours import nearest_points
 from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 
@@ -80,7 +80,7 @@ class Target(Batch):
         middle = (share[..., None] * observed.points).sum(1, keepdim=True)
         rays = observed.points[..., :2] / observed.points[..., 2:].clamp(min=1e-6)
         rays = torch.where(observed.weight[..., None] > 0, rays, 1e3)
-        gap = _OUTLINE_GAP * (share * nearest(rays, rays, 2)[0].amax(-1).sqrt()).sum(
+        gap = _OUTLINE_GAP * (share * nearest_points(rays, rays, 2)[0].amax(-1).sqrt()).sum(
             1
         )  # each ray is the nearest to itself
         x = ((observed.points - middle) / unit[:, None, None]).float()  # small numbers, for single precision

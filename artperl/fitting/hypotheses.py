@@ -80,7 +80,7 @@ class Context:
     options: EstimatorOptions
 
     @cached_property
-    def adapted(self) -> tuple[Shapes, Theta]:
+    def start(self) -> tuple[Shapes, Theta]:
         """The references with the perceived boxes, and the states that bring them nearest to the points."""
         shapes = self.references.shapes
         return initial_pose.start(self.clouds, self.perceived, shapes, len(shapes))
@@ -153,21 +153,21 @@ class Generator(Protocol):
 
 def perceived_pose(context: Context, best: Best | None) -> Hypotheses | None:
     """References where perception places the points in the rest frame."""
-    shapes, theta = context.adapted
+    shapes, theta = context.start
     return Hypotheses.of(shapes, theta, context.references.row.tolist())
 
 
 def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
     """The first reference, its hardly visible root where the part with most points lets it be."""
-    shapes, theta = context.adapted[0][:1], context.adapted[1][:1]
-    states = initial_pose.by_another_part(context.clouds, context.perceived, shapes, theta, _HINGE_STATES)
+    shapes, theta = context.start[0][:1], context.start[1][:1]
+    states = initial_pose.starts_by_another_part(context.clouds, context.perceived, shapes, theta, _HINGE_STATES)
     return None if states is None else _of_first(context, shapes, states)
 
 
 def chain_states(context: Context, best: Best | None) -> Hypotheses | None:
     """The first reference in the states that a beam search finds, where joints form a chain."""
     options = context.options
-    shapes, theta = context.adapted[0][:1], context.adapted[1][:1]
+    shapes, theta = context.start[0][:1], context.start[1][:1]
     if not options.beam or int(shapes.trees.depth[0].max()) < _CHAIN:
         return None
     probability = context.perceived.part_probability[..., : shapes.trees.num_rows]
@@ -181,7 +181,7 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
     """The best fit with a shoulder or a wrist bent the other way."""
     if best is None or not context.options.beam:
         return None
-    states = beam_search.half_turned(best.shapes, best.theta)
+    states = beam_search.half_turns(best.shapes, best.theta)
     return None if states is None else Hypotheses.of(best.shapes.repeat(len(states)), states, [best.row] * len(states))
 
 
@@ -189,12 +189,12 @@ def views_around(context: Context, best: Best | None) -> Hypotheses | None:
     """The reference as seen from several sides, as it was found but turned round, and where the agent leads it."""
     options = context.options
     if best is None:
-        first, row = context.adapted[0][:1], int(context.references.row[0])
+        first, row = context.start[0][:1], int(context.references.row[0])
     else:
         first, row = best.shapes, best.row
     shapes = first.repeat(len(options.azimuths))
     middle = np.mean(options.seen_from or (0.0, 0.0))
-    theta = initial_pose.facing(
+    theta = initial_pose.starts_from_sides(
         shapes, context.clouds.center, middle + np.array(options.azimuths), options.elevation
     )  # fmt: skip
     if best is not None:

@@ -53,7 +53,7 @@ def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Te
     rotation = torch.where(unseen[..., None, None], rotation[:, :1], rotation)
     translation = torch.where(unseen[..., None], translation[:, :1], translation)
     center = rotate(rotation, perceived.box_center * unit) + translation
-    metres = clouds.radius[:, None, None]
+    metres = clouds.scale[:, None, None]
     return rotation, center * metres + clouds.center[:, None], perceived.box_size * unit * metres
 
 
@@ -87,23 +87,25 @@ def start(clouds: Clouds, perceived: Perceived, references: Shapes, count: int) 
     rows = trees.num_rows
     rotation, center, size = (pose[:, :rows].repeat_interleave(count, dim=0) for pose in part_poses(clouds, perceived))
     fitted = theta_from_parts(trees, references.box_center, references.box_size, rotation, center, size)
-    metres = (perceived.log_diagonal.exp() * clouds.radius).repeat_interleave(count, dim=0)[:, None, None]
+    metres = (perceived.log_diagonal.exp() * clouds.scale).repeat_interleave(count, dim=0)[:, None, None]
     whole = fitted.log_scale.exp()[:, None]
     # From where the reference's boxes are to where they are perceived; the root's lie on each other.
     missing = perceived.box_center[:, :rows].repeat_interleave(count, dim=0) * metres - whole * references.box_center
     origin, known = missing[:, :1], perceived.valid[:, :rows].repeat_interleave(count, dim=0) & trees.valid
     missing = torch.where(known[..., None], missing - origin, 0.0)
     shift = missing - missing.gather(1, trees.parent[..., None].expand(-1, -1, 3))
-    shapes = adapted(references, replace(fitted, shift=shift))
+    shapes = adapt_shapes(references, replace(fitted, shift=shift))
     plain = torch.zeros_like(shift)
     theta = replace(fitted, log_scale=plain[:, 0], stretch=plain, shift=plain, state=shapes.trees.rest)
     own = perceived[torch.arange(len(clouds)).repeat_interleave(count)]
     source = own.canonical * metres - origin
-    target = (clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]).repeat_interleave(count, dim=0)
+    target = (clouds.points * clouds.scale[:, None, None] + clouds.center[:, None]).repeat_interleave(count, dim=0)
     return shapes, _follow(shapes, theta, source, target, trust(own)[:, :rows])
 
 
-def by_another_part(clouds: Clouds, perceived: Perceived, shapes: Shapes, theta: Theta, states: int) -> Theta | None:
+def starts_by_another_part(
+    clouds: Clouds, perceived: Perceived, shapes: Shapes, theta: Theta, states: int
+) -> Theta | None:
     """Starts of one object whose root hardly shows: where the part with most points lets the root be.
 
     A base that is hidden behind its lid has no pose of its own to start from; but the lid is somewhere, and the base is
@@ -140,9 +142,9 @@ def by_another_part(clouds: Clouds, perceived: Perceived, shapes: Shapes, theta:
     theta = replace(
         theta, rotation=turn @ theta.rotation, translation=center + rotate(turn, theta.translation - posed.center[:, k])
     )
-    metres = (perceived.log_diagonal.exp() * clouds.radius)[:, None, None]
+    metres = (perceived.log_diagonal.exp() * clouds.scale)[:, None, None]
     source = perceived.canonical * metres - (perceived.box_center[:, :1] * metres - shapes.box_center[:, :1])
-    target = clouds.points * clouds.radius[:, None, None] + clouds.center[:, None]
+    target = clouds.points * clouds.scale[:, None, None] + clouds.center[:, None]
     every = [values.expand(states, -1, -1) for values in (source, target, weight)]
     return _follow(many, theta, *every)
 
@@ -183,7 +185,7 @@ def _follow(shapes: Shapes, theta: Theta, source: Tensor, target: Tensor, weight
     return theta
 
 
-def facing(shapes: Shapes, center: Tensor, azimuths: Sequence[float], elevation: float) -> Theta:
+def starts_from_sides(shapes: Shapes, center: Tensor, azimuths: Sequence[float], elevation: float) -> Theta:
     """References that stand where a cloud is and are seen from one side each, their joints half-way.
 
     Parameters
@@ -213,7 +215,7 @@ def facing(shapes: Shapes, center: Tensor, azimuths: Sequence[float], elevation:
     return replace(theta, translation=2.0 * center - (points * share).sum((1, 2)))
 
 
-def adapted(shapes: Shapes, theta: Theta) -> Shapes:
+def adapt_shapes(shapes: Shapes, theta: Theta) -> Shapes:
     """References that have the shape which ``theta`` gives them, so that a state without scale poses them alike."""
     trees = shapes.trees
     posed = pose_parts(trees, theta, shapes.box_center)
@@ -235,11 +237,11 @@ def adapted(shapes: Shapes, theta: Theta) -> Shapes:
     )  # fmt: skip
 
 
-def sized(shapes: Shapes, diagonal: Tensor) -> Shapes:
+def resize_shapes(shapes: Shapes, diagonal: Tensor) -> Shapes:
     """References with the diagonals (B,) asked for."""
     plain = Theta.at_rest(shapes.trees)
     log_scale = (diagonal.to(plain.state.dtype) / shapes.diagonal).log()[:, None].expand(-1, 3)
-    return adapted(shapes, replace(plain, log_scale=log_scale))
+    return adapt_shapes(shapes, replace(plain, log_scale=log_scale))
 
 
 def procrustes(source: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:

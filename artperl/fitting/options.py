@@ -22,7 +22,7 @@ class EstimatorOptions:
 
     num_points: int = 1024
     """Points that perception sees, and that are labelled in the end."""
-    coherent: bool = True
+    label_smoothing: bool = True
     """Labels of points on one smooth surface hold together: :mod:`artperl.perception.label_smoothing`."""
     early_points: int = 256
     """Of these, points by which the best start is found."""
@@ -46,9 +46,9 @@ class EstimatorOptions:
     """Steps of the agent from each of them; 0 goes without it."""
     refine: RefineOptions = field(default_factory=RefineOptions)
     """The last refinement."""
-    uncovered: bool = True
+    occluded_parts: bool = True
     """Parts that hardly show turn to where no more of them would be seen: :mod:`artperl.fitting.occluded_parts`."""
-    squared: bool = True
+    normal_alignment: bool = True
     """In the end, parts turn until their flat surfaces face along their axes:
     :mod:`artperl.fitting.normal_alignment`."""
     seen_from: tuple[float, float] | None = None

@@ -87,7 +87,7 @@ class Fit:
             path=[theta.to(device) for theta in self.path],
         )  # fmt: skip
 
-    def ending(self, theta: Theta) -> Fit:
+    def with_end(self, theta: Theta) -> Fit:
         """The fit with another end."""
         return replace(self, theta=theta, path=[*self.path[:-1], theta])
 

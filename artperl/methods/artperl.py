@@ -155,8 +155,8 @@ class ArtPERL:
             )
         labels = np.full(len(cloud), -1)
         observed, reference = observed.to("cpu"), reference.to("cpu")
-        nearest = cKDTree(observed.points[0].numpy()).query(cloud[good], workers=1)[1]
-        labels[good] = observed.part[0].numpy()[nearest]
+        near = cKDTree(observed.points[0].numpy()).query(cloud[good], workers=1)[1]
+        labels[good] = observed.part[0].numpy()[near]
         steps = [theta.to("cpu") for theta in (*path, refined.theta)]
         return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
 
@@ -169,7 +169,7 @@ class ArtPERL:
     def retrieve(self, points: Tensor, part: Tensor, count: int = 1) -> Tensor:
         """(B, count) rows of the references nearest to segmented clouds, by equation 1."""
         few, labels = points[:, :POINTS], part[:, :POINTS]
-        return self.base.nearest(self.siamese(Clouds.of(few).points, labels), count)[0]
+        return self.base.nearest_objects(self.siamese(Clouds.of(few).points, labels), count)[0]
 
     @torch.no_grad()
     def fit(self, reference: Shapes, observed: Observed) -> list[Theta]:

@@ -21,7 +21,7 @@ from artperl.boxes.evidence import Evidence, evidence_of_estimate, roughness
 from artperl.boxes.network import Boxes
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
-from artperl.core.estimate import Calibration, Estimate, estimate_of_fit, slid
+from artperl.core.estimate import Calibration, Estimate, estimate_of_fit, slide_parts
 from artperl.core.labels import labels_by_boxes
 from artperl.core.pose import reach
 from artperl.fitting.hypotheses import Context, References
@@ -32,7 +32,7 @@ from artperl.fitting.search import Fit, find_fit
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
-from artperl.perception.part_grouping import grouped
+from artperl.perception.part_grouping import group_votes
 from artperl.perception.preprocess import as_cloud, clean, draw
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.references import references
@@ -160,12 +160,12 @@ class Estimator:
             part = np.full(len(cloud.points), -1)
             part[cloud.good] = fit.observed.part[0].numpy()[near]
         few = cloud.points[cloud.few], part[cloud.few]
-        if self.options.uncovered:
+        if self.options.occluded_parts:
             with clock("occluded parts"):
-                fit = fit.ending(pose_occluded_parts(fit.shapes, fit.theta, *few))
-        if self.options.squared:
+                fit = fit.with_end(pose_occluded_parts(fit.shapes, fit.theta, *few))
+        if self.options.normal_alignment:
             with clock("normals"):
-                fit = fit.ending(align_normals(fit.shapes, fit.theta, *few))
+                fit = fit.with_end(align_normals(fit.shapes, fit.theta, *few))
         with clock("report"):
             log_odds = np.full((len(part), self.perception.num_rows), np.nan)
             log_odds[cloud.good] = perceived.part_logits.log_softmax(-1)[0].double().cpu().numpy()[near]
@@ -177,13 +177,13 @@ class Estimator:
         """What is perceived of one cloud."""
         with clock("perception"):
             seen = self.perception(clouds.points)
-        if self.options.coherent:
+        if self.options.label_smoothing:
             with clock("label smoothing"):
                 seen = smooth_perceived(clouds, seen)
         if not isinstance(seen, Votes):
             return seen
         with clock("part grouping"):
-            return grouped(seen)
+            return group_votes(seen)
 
     def _reported(self, estimate: Estimate, fit: Fit) -> Estimate:
         """The estimate with what the fit and the base say of it."""
@@ -211,7 +211,7 @@ class Estimator:
                 part = labels_by_boxes(known.points, T, center, size, known.log_odds, _OUTSIDE * unit)
         posed = np.einsum("kij,kj->ki", T[:, :3, :3], center) + T[:, :3, 3]
         farther = np.maximum(farther, np.minimum(known.lower - estimate.state, 0.0))
-        return slid(replace(estimate, translation=posed, size=size, part=part), farther)
+        return slide_parts(replace(estimate, translation=posed, size=size, part=part), farther)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,7 @@ class _Known:
     @staticmethod
     def of(cloud: Cloud, log_odds: Array, perceived: Perceived, clouds: Clouds, fit: Fit) -> _Known:
         """All of one cloud."""
-        trees, metres = fit.shapes.trees, (perceived.log_diagonal.exp() * clouds.radius).cpu()
+        trees, metres = fit.shapes.trees, (perceived.log_diagonal.exp() * clouds.scale).cpu()
         lower = (trees.lower * reach(trees, fit.theta.log_scale))[0].double().numpy()[: int(trees.valid[0].sum())]
         return _Known(
             cloud.points, log_odds, perceived.box_center[0].cpu() * metres, perceived.box_size[0].cpu() * metres,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.perception.preprocess import measured
+from artperl.perception.preprocess import is_measured
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def _axes(shown: Array) -> list[str]:
 
 def _missing(points: Array) -> list[str]:
     origin = float((points == 0).all(axis=1).mean())
-    lost = float((~measured(points)).mean()) - origin
+    lost = float((~is_measured(points)).mean()) - origin
     warnings = []
     if origin > _MANY:
         warnings.append(

@@ -32,7 +32,7 @@ class Perceived(Batch):
         Whether the object has each part.
     box_center, box_size : (B, P, 3) float
     log_diagonal : (B,) float
-        Logarithm of the object's diagonal over the cloud's radius.
+        Logarithm of the object's diagonal over the cloud's scale.
     """
 
     part_logits: Tensor

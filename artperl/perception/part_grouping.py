@@ -44,8 +44,8 @@ _DOUBT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Grouped(Perceived):
-    """What is perceived of B clouds whose parts were found by :func:`grouped`.
+class PerceivedTree(Perceived):
+    """What is perceived of B clouds whose parts were found by :func:`group_votes`.
 
     Attributes
     ----------
@@ -61,24 +61,24 @@ class Grouped(Perceived):
 def perceive(perception: Perception, points: Tensor) -> Perceived:
     """What is perceived of clouds (B, N, 3), the parts found by votes if those are what the network gives."""
     seen = perception(points)
-    return grouped(seen) if isinstance(seen, Votes) else seen
+    return group_votes(seen) if isinstance(seen, Votes) else seen
 
 
-def grouped(votes: Votes) -> Grouped:
+def group_votes(votes: Votes) -> PerceivedTree:
     """Parts of which points tell, in the order that :func:`artperl.core.part_order.visible_order` gives them."""
     box, joint, level = (values.double().cpu().numpy() for values in (votes.box, votes.joint, votes.level_logits))
     place = votes.canonical.double().cpu().numpy()
-    rows = [_grouped(*own) for own in zip(place, box, joint, log_softmax(level, axis=-1), strict=True)]
+    rows = [_group(*own) for own in zip(place, box, joint, log_softmax(level, axis=-1), strict=True)]
     fields = {name: torch.from_numpy(np.stack([row[name] for row in rows])) for name in rows[0]}
-    return Grouped(
+    return PerceivedTree(
         canonical=votes.canonical, spread=votes.spread, log_diagonal=votes.log_diagonal,
         **{name: t.to(votes.canonical) if t.is_floating_point() else t.to(votes.canonical.device)
            for name, t in fields.items()},
     )  # fmt: skip
 
 
-def _grouped(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dict[str, NDArray[Any]]:
-    """Of one cloud and P rows for parts, what :class:`Grouped` says of parts."""
+def _group(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dict[str, NDArray[Any]]:
+    """Of one cloud and P rows for parts, what :class:`PerceivedTree` says of parts."""
     rows, level = level_log_odds.shape[1], level_log_odds.argmax(1)
     level[level_log_odds[:, 0].argmax()] = 0  # there is a root
     members, depth, fewest = [np.flatnonzero(level == 0)], [0], max(_FEW, round(_FEWEST * len(box)))
@@ -98,13 +98,13 @@ def _grouped(place: Array, box: Array, joint: Array, level_log_odds: Array) -> d
         fit = label_log_odds(level_log_odds[:, depth[k]], differences(box, boxes[k]) if k else 0.0)
         log_odds[:, n] = np.logaddexp(fit, np.log(_DOUBT / K))
 
-    def padded(values: NDArray[Any]) -> NDArray[Any]:
+    def pad(values: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([values[order], np.zeros((rows - K, *values.shape[1:]), dtype=values.dtype)])
 
     return {
         "part_logits": log_odds, "valid_logits": np.where(np.arange(rows) < K, 1.0, -1.0),
-        "box_center": padded(boxes[:, :3]), "box_size": padded(boxes[:, 3:]), "joint": padded(joints),
-        "parent": padded(np.where(parents < 0, 0, number[parents])),
+        "box_center": pad(boxes[:, :3]), "box_size": pad(boxes[:, 3:]), "joint": pad(joints),
+        "parent": pad(np.where(parents < 0, 0, number[parents])),
     }  # fmt: skip
 
 

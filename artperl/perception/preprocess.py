@@ -44,7 +44,7 @@ def as_cloud(points: ArrayLike) -> Array:
     return cloud
 
 
-def measured(points: Array) -> NDArray[np.bool_]:
+def is_measured(points: Array) -> NDArray[np.bool_]:
     """(N,) which points a sensor can have measured: finite, not beyond all reach, and not at exactly 0 0 0.
 
     The origin is the camera itself; sensors and exporters write it where nothing came back.
@@ -61,13 +61,13 @@ def clean(points: Array) -> NDArray[np.int64]:
         When the array is no cloud, or hardly a point is left.
     """
     points = as_cloud(points)
-    good = np.flatnonzero(measured(points))
+    good = np.flatnonzero(is_measured(points))
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = cKDTree(points[known])
         usual = np.median(tree.query(points[known[:1024]], [_NEIGHBOURS + 1])[0])
         within = max(_OUTLIER * usual, 1e-9)
-        alone = ~_crowded(points[good], points[known], within)
+        alone = ~_is_crowded(points[good], points[known], within)
         apart = tree.query(points[good[alone]], [_FEW_NEIGHBOURS + 1], distance_upper_bound=within)[0][:, 0]
         alone[alone] = ~np.isfinite(apart)
         good = good[~alone]
@@ -78,7 +78,7 @@ def clean(points: Array) -> NDArray[np.int64]:
     return good
 
 
-def _crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]:
+def _is_crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]:
     """(N,) whether points share a cell, that long from corner to corner, with enough known ones: as most points do."""
     cells = [np.floor((values - np.median(known, axis=0)) * (np.sqrt(3.0) / within)) for values in (points, known)]
     number, own = (

@@ -48,7 +48,7 @@ def part_names(base: ShapeBase, reference: int, shapes: Shapes) -> tuple[str, ..
         name = "part" if joint is None else joint.name.removesuffix("_joint")
         # Numbers are of the objects that parts come from: they say nothing in a composed one.
         names.append(name if whole else re.sub(r"_\d+$", "", name))
-    return tuple(_told_apart(names))
+    return tuple(_number_alike(names))
 
 
 def _most_similar(base: ShapeBase, reference: int, apart: Tensor, kind: str) -> Joint | None:
@@ -78,7 +78,7 @@ def root_name(category: str) -> str:
         return _ROOT
 
 
-def _told_apart(names: list[str]) -> list[str]:
+def _number_alike(names: list[str]) -> list[str]:
     """Names of which no two are alike: those that are get new numbers."""
     count = Counter(names)
     twice = {re.sub(r"_\d+$", "", name) for name, times in count.items() if times > 1}

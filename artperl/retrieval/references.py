@@ -10,9 +10,9 @@ from torch import Tensor
 from artperl.core.batch import concatenate
 from artperl.core.shapes import Shapes
 from artperl.perception.network import Perceived
-from artperl.perception.part_grouping import Grouped
+from artperl.perception.part_grouping import PerceivedTree
 from artperl.retrieval.box_embedding import box_embedding
-from artperl.retrieval.shape_base import ShapeBase, moves, same_axes, weighed
+from artperl.retrieval.shape_base import ShapeBase, joint_features, motion, same_axes
 
 
 def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tensor, Shapes]:
@@ -24,33 +24,34 @@ def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tenso
     the object that has its root.
     """
     query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
-    if isinstance(perceived, Grouped):
-        return _references_of_groups(base, perceived, query, count)
-    return _leaning(base, query, base.nearest(query, count)[0][0])
+    if isinstance(perceived, PerceivedTree):
+        return _references_of_tree(base, perceived, query, count)
+    return _vary_axes(base, query, base.nearest_objects(query, count)[0][0])
 
 
-def _leaning(base: ShapeBase, query: Tensor, rows: Tensor) -> tuple[Tensor, Shapes]:
+def _vary_axes(base: ShapeBase, query: Tensor, rows: Tensor) -> tuple[Tensor, Shapes]:
     """References whose axes differ, if those of their kind do: the last but the first are for those that lean."""
-    otherwise, shapes = base.leaning_otherwise(int(rows[0])), base.shapes[rows]
+    otherwise, shapes = base.has_other_axes(int(rows[0])), base.shapes[rows]
     if len(rows) < 3 or not bool(otherwise.any()):
         return rows, shapes
-    rows = torch.cat([rows[:1], base.nearest(query, 1, otherwise)[0][0], rows[1:-1]])
+    rows = torch.cat([rows[:1], base.nearest_objects(query, 1, otherwise)[0][0], rows[1:-1]])
     shapes = base.shapes[rows]
     axis = torch.cat([shapes.trees.axis[:-1], base.mean_axis[rows[-1:]]])
     return rows, replace(shapes, trees=replace(shapes.trees, axis=axis))
 
 
-def _references_of_groups(base: ShapeBase, perceived: Grouped, query: Tensor, count: int) -> tuple[Tensor, Shapes]:
+def _references_of_tree(base: ShapeBase, perceived: PerceivedTree, query: Tensor, count: int) -> tuple[Tensor, Shapes]:
     """Up to so many objects with the perceived tree, and one that is composed."""
     trees, K = base.shapes.trees, int(perceived.valid[0].sum())
     tree = (trees.valid == perceived.valid[0]) & (trees.parent == perceived.parent[0])
-    joint = (moves(base.joints) == moves(perceived.joint[0])) & same_axes(base.joints, perceived.joint)
+    joint = (motion(base.joints) == motion(perceived.joint[0])) & same_axes(base.joints, perceived.joint)
     alike = (tree & joint).all(1)
-    further = torch.linalg.vector_norm(weighed(base.joints) - weighed(perceived.joint), dim=(1, 2))
+    further = torch.linalg.vector_norm(joint_features(base.joints) - joint_features(perceived.joint), dim=(1, 2))
     part = perceived.box_center[0, :K], perceived.box_size[0, :K], perceived.joint[0, :K], perceived.parent[0, :K]
-    row, own = base.composed(*part)
+    row, own = base.compose(*part)
     rows = torch.tensor([row], device=query.device)
     if not bool(alike.any()):
         return rows, own
-    found, shapes = _leaning(base, query, base.nearest(query, min(count, int(alike.sum())), alike, further[None])[0][0])
+    near = base.nearest_objects(query, min(count, int(alike.sum())), alike, further[None])[0][0]
+    found, shapes = _vary_axes(base, query, near)
     return torch.cat([found, rows]), concatenate([shapes, own])

@@ -97,7 +97,7 @@ class ShapeBase:
         numbers = {kind: number for number, kind in enumerate(dict.fromkeys(kinds))}
         return torch.tensor([numbers[kind] for kind in kinds], device=self.shapes.diagonal.device)
 
-    def leaning_otherwise(self, row: int) -> Tensor:
+    def has_other_axes(self, row: int) -> Tensor:
         """(B,) bool: objects of an object's kind of which some axis leans away from it beyond the mean."""
         axis, mean = self.shapes.trees.axis, self.mean_axis[row]
         apart, usual = _angle(axis, axis[row]), _angle(axis[row], mean)
@@ -111,7 +111,7 @@ class ShapeBase:
         """
         if not objects:
             raise ConfigError("a shape base needs objects", fix="pass at least one")
-        units = widened([obj.with_diagonal(1.0) for obj in objects])
+        units = widen_limits([obj.with_diagonal(1.0) for obj in objects])
         return ShapeBase(
             tuple(obj.object_id for obj in units),
             tuple(obj.category for obj in units),
@@ -145,7 +145,7 @@ class ShapeBase:
         ]
         return torch.from_numpy(np.stack(rows)).to(shapes.box_center)
 
-    def nearest(
+    def nearest_objects(
         self, queries: Tensor, count: int = 1, allowed: Tensor | None = None, further: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
         """The objects whose embeddings are nearest (section 4.2: Euclidean distance), nearest first.
@@ -182,7 +182,7 @@ class ShapeBase:
         distance, rows = apart.topk(count, largest=False)
         return rows, distance
 
-    def composed(self, center: Tensor, size: Tensor, joint: Tensor, parent: Tensor) -> tuple[int, Shapes]:
+    def compose(self, center: Tensor, size: Tensor, joint: Tensor, parent: Tensor) -> tuple[int, Shapes]:
         """An object whose parts and joints are those of any objects that are most like the ones asked for.
 
         No base holds every mix of doors and drawers, but a few objects have a door and a drawer of every kind. A part
@@ -204,15 +204,15 @@ class ShapeBase:
         trees, P = self.shapes.trees, self.shapes.trees.num_rows
         unit = self.shapes.diagonal[:, None, None]
         boxes = torch.cat([self.shapes.box_center / unit, self.shapes.box_size / unit], dim=-1).flatten(0, 1)
-        known = weighed(self.joints).flatten(0, 1)
+        known = joint_features(self.joints).flatten(0, 1)
         # Roots for the root; for other parts those that move alike, and any where there is none.
-        likely = 1 + (moves(self.joints).flatten()[:, None] == moves(joint))
+        likely = 1 + (motion(self.joints).flatten()[:, None] == motion(joint))
         likely[::P] = 0
         likely[:, 0] = torch.arange(len(likely), device=likely.device) % P == 0
         likely = likely * trees.valid.flatten()[:, None]
         possible = likely == likely.amax(0)
         shape = torch.cdist(boxes, torch.cat([center, size], dim=-1)).masked_fill(~possible, torch.inf).argmin(0)
-        mover = torch.cdist(known, weighed(joint)).masked_fill(~possible, torch.inf).argmin(0)
+        mover = torch.cdist(known, joint_features(joint)).masked_fill(~possible, torch.inf).argmin(0)
         rows, parts = shape // P, shape % P
         root = int(rows[0])
         joints = [self.trees[root].joints[0]]
@@ -236,7 +236,7 @@ class ShapeBase:
         own, trees = self.joints[row, part], self.shapes.trees
         pattern = replace(self.trees[row].joints[part], parent=parent, name=name, mimic=None)
         if not bool(same_axes(own, perceived)):
-            slides = int(moves(perceived)) == 1
+            slides = int(motion(perceived)) == 1
             axis = torch.nn.functional.normalize(perceived[:3] if slides else perceived[3:6], dim=0)
             far = 1.0 if slides else np.pi
             return replace(
@@ -254,7 +254,7 @@ class ShapeBase:
 
     def references(self, rows: Tensor) -> Shapes:
         """Shapes of the chosen objects, with no more rows for parts than they need."""
-        return self.shapes[rows].trimmed()
+        return self.shapes[rows].trim()
 
     def save(self, path: str | Path) -> None:
         """Write everything into one ``.npz`` file, without pickle."""
@@ -320,7 +320,7 @@ def _base(arrays: Mapping[str, NDArray[Any]]) -> ShapeBase:
     known = tuple(KinematicTree.from_dict(tree) for tree in trees)
     embeddings = arrays.get("embeddings")
     if embeddings is not None:
-        embeddings = _checked(embeddings, (len(ids), None), "embeddings")
+        embeddings = _check_array(embeddings, (len(ids), None), "embeddings")
     return ShapeBase(
         tuple(ids),
         tuple(categories),
@@ -351,7 +351,7 @@ def _clouds(arrays: Mapping[str, NDArray[Any]], count: int) -> dict[str, Tensor]
     # Parts without a surface have no spacing: it is infinite.
     unbounded = arrays["spacing"] == np.inf
     finite = dict(arrays) | {"spacing": np.where(unbounded, 1.0, arrays["spacing"])}
-    checked = {name: _checked(finite[name], shape, name) for name, shape in shapes.items()}
+    checked = {name: _check_array(finite[name], shape, name) for name, shape in shapes.items()}
     if not (checked["diagonal"] > 0).all() or not (checked["spacing"] >= 0).all() or (checked["box_size"] < 0).any():
         raise ValueError("a length is negative")
     checked["spacing"][unbounded] = np.inf
@@ -360,7 +360,7 @@ def _clouds(arrays: Mapping[str, NDArray[Any]], count: int) -> dict[str, Tensor]
     return tensors
 
 
-def _checked(values: NDArray[Any], shape: tuple[int | None, ...], name: str) -> NDArray[np.float32]:
+def _check_array(values: NDArray[Any], shape: tuple[int | None, ...], name: str) -> NDArray[np.float32]:
     """Finite numbers of that shape (None: any length), in single precision."""
     fits = len(shape) == values.ndim and all(want in (None, has) for want, has in zip(shape, values.shape, strict=True))
     if not fits or values.dtype.kind not in "iuf":
@@ -371,7 +371,7 @@ def _checked(values: NDArray[Any], shape: tuple[int | None, ...], name: str) -> 
     return values.astype(np.float32)
 
 
-def moves(joint: Tensor) -> Tensor:
+def motion(joint: Tensor) -> Tensor:
     """(...) int64 of joints (..., 9): 0 where nothing moves, 1 for slides, 2 where a part turns."""
     slides, turns = (torch.linalg.vector_norm(axis, dim=-1) for axis in (joint[..., :3], joint[..., 3:6]))
     return torch.where(turns > slides, 2, torch.where(slides > 0.0, 1, 0))
@@ -384,7 +384,7 @@ def same_axes(joint: Tensor, perceived: Tensor) -> Tensor:
     return (along >= _ALONG * length) | (length < _SURE)
 
 
-def weighed(joint: Tensor) -> Tensor:
+def joint_features(joint: Tensor) -> Tensor:
     """Joints (..., 9) whose Euclidean distance counts against that of boxes."""
     return torch.cat([joint[..., :6], _PIVOT * joint[..., 6:]], dim=-1)
 
@@ -399,7 +399,7 @@ def _angle(axis: Tensor, other: Tensor) -> Tensor:
     return torch.linalg.vector_norm(torch.linalg.cross(axis, other.expand_as(axis)), dim=-1).clamp(max=1.0).asin()
 
 
-def widened(objects: Sequence[ArticulatedObject]) -> list[ArticulatedObject]:
+def widen_limits(objects: Sequence[ArticulatedObject]) -> list[ArticulatedObject]:
     """Objects whose joints go as far as those of any other one of the same category and kinematic tree.
 
     How far the joints of an observed object go is not known, and a reference that stops earlier could not follow it.

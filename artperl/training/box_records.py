@@ -18,7 +18,7 @@ from torch.utils.data import DataLoader, Dataset
 from artperl.boxes.evidence import Evidence
 from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import Batch, concatenate
-from artperl.core.estimate import brought_to_rest
+from artperl.core.estimate import points_at_rest
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artperl.data.batches import ignore_interrupt
 from artperl.evaluation.metrics import true_poses
@@ -129,9 +129,9 @@ def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
     if estimate.residual > _FITS or len(estimate.size) != K:
         return []
     T, T_true = estimate.T_camera_part, sample.T_camera_part[0]
-    center = brought_to_rest(true_poses(sample)[1], T)
+    center = points_at_rest(true_poses(sample)[1], T)
     still = sample.box_center @ T_true[:3, :3].T + T_true[:3, 3]  # every part where it is at rest, in the camera frame
-    rest = brought_to_rest(still, np.broadcast_to(T[0], T.shape))
+    rest = points_at_rest(still, np.broadcast_to(T[0], T.shape))
     padded = np.zeros((3, 1, evidence.valid.shape[1], 3))
     padded[:, 0, :K] = center / unit, sample.box_size / unit, rest / unit
     return [Records(evidence, *torch.from_numpy(padded)).to(torch.float16)]

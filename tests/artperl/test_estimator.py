@@ -49,8 +49,8 @@ def test_a_missing_estimator_says_which_there_are() -> None:
 
 def test_options_change_as_an_estimator_is_loaded(base: ShapeBase, tmp_path: Path) -> None:
     save_estimator(Estimator(Perception(2, 16), base), tmp_path, {})
-    assert load_estimator(tmp_path, seen_from=(-75.0, 75.0), squared=False).options == EstimatorOptions(
-        seen_from=(-75.0, 75.0), squared=False
+    assert load_estimator(tmp_path, seen_from=(-75.0, 75.0), normal_alignment=False).options == EstimatorOptions(
+        seen_from=(-75.0, 75.0), normal_alignment=False
     )
     with pytest.raises(ConfigError, match="sene_from"):
         load_estimator(tmp_path, sene_from=(-75.0, 75.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from artperl.core.estimate import Estimate, brought_to_rest, slid, widen
+from artperl.core.estimate import Estimate, points_at_rest, slide_parts, widen
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.samples import frozen_samples
 
@@ -44,11 +44,11 @@ def test_what_has_slid_farther_is_where_it_was_and_was_elsewhere_at_rest(seed: i
         disagreement=0.0, visibility=np.ones(K), confidence=1.0, trajectory=sample.T_camera_part[None], milliseconds={},
     )  # fmt: skip
     farther = np.where(np.array(sample.joint_type) == "prismatic", rng.normal(0.0, 0.1, K), 0.0)
-    moved = slid(estimate, farther)
+    moved = slide_parts(estimate, farther)
     assert np.array_equal(moved.translation, estimate.translation)
     assert np.allclose(moved.state, sample.joint_state + farther)
     assert np.array_equal(moved.trajectory[-1], moved.T_camera_part)
-    back = [brought_to_rest(each.translation, each.T_camera_part) for each in (estimate, moved)]
+    back = [points_at_rest(each.translation, each.T_camera_part) for each in (estimate, moved)]
     for k in range(K):
         carriers, above = [k], int(sample.joint_parent[k])
         while above >= 0:

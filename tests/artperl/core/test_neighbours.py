@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from artperl.core.neighbours import nearest_by_products, nearest_by_trees
+from artperl.core.neighbours import nearest_points_by_products, nearest_points_by_trees
 
 
 def test_trees_and_products_find_the_same_neighbours() -> None:
@@ -13,8 +13,8 @@ def test_trees_and_products_find_the_same_neighbours() -> None:
     points, queries = (torch.randn(3, n, 3, generator=generator) for n in (50, 20))
     by_trees, by_products = (
         sorted(zip(near[2, 7].tolist(), index[2, 7].tolist(), strict=True))
-        for near, index in (nearest_by_trees(queries, points, 6), nearest_by_products(queries, points, 6))
+        for near, index in (nearest_points_by_trees(queries, points, 6), nearest_points_by_products(queries, points, 6))
     )
     assert [i for _, i in by_trees] == [i for _, i in by_products]
     np.testing.assert_allclose([d for d, _ in by_trees], [d for d, _ in by_products], atol=1e-5)
-    torch.testing.assert_close(nearest_by_trees(points, points, 1)[1][..., 0], torch.arange(50).expand(3, 50))
+    torch.testing.assert_close(nearest_points_by_trees(points, points, 1)[1][..., 0], torch.arange(50).expand(3, 50))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from artperl.core.pointnet2 import Neighbourhoods, interpolated, strongest
+from artperl.core.pointnet2 import Neighbourhoods, interpolate, strongest
 
 
 def test_neighbours_are_the_nearest() -> None:
@@ -39,9 +39,9 @@ def test_interpolated_is_the_weighted_sum_over_neighbours_with_its_gradient() ->
     index = torch.stack([torch.randperm(9, generator=generator)[:3] for _ in range(10)]).reshape(2, 5, 3)
     weight = torch.rand(2, 5, 3, generator=generator)
     direct = torch.stack([(weight[b][..., None] * features[b][index[b]]).sum(1) for b in range(2)])
-    found = interpolated(features, weight, index)
+    found = interpolate(features, weight, index)
     torch.testing.assert_close(found, direct)
-    torch.testing.assert_close(interpolated(features.detach(), weight, index), direct.detach())
+    torch.testing.assert_close(interpolate(features.detach(), weight, index), direct.detach())
     (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
     (other,) = torch.autograd.grad((direct**2).sum(), features)
     torch.testing.assert_close(one, other)

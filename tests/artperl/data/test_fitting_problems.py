@@ -77,7 +77,7 @@ def test_an_objects_own_boxes_find_it() -> None:
     base = small_base("laptop", "drawer", "eyeglasses")
     shapes = base.shapes
     query = box_embedding(shapes.trees.valid, shapes.box_center, shapes.box_size)
-    rows, distance = base.nearest(query)
+    rows, distance = base.nearest_objects(query)
     assert rows[:, 0].tolist() == list(range(len(base)))
     assert distance.max() < 1e-2
 
@@ -86,7 +86,7 @@ def test_an_object_with_as_many_parts_is_nearer_than_one_with_the_same_boxes() -
     base = small_base("laptop", "eyeglasses")
     shapes = base.shapes
     query = box_embedding(shapes.trees.valid, 1.2 * shapes.box_center, 1.2 * shapes.box_size)
-    rows, _ = base.nearest(query, 3)
+    rows, _ = base.nearest_objects(query, 3)
     parts = shapes.trees.valid.sum(1)
     assert (parts[rows] == parts[:, None]).all()
 

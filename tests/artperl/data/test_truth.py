@@ -16,14 +16,14 @@ def test_truth_is_what_the_sample_says() -> None:
     samples = Samples(["laptop"], options, 5, 4, 3)
     for b in range(4):
         sample = samples[b]
-        unit = float(clouds.radius[b])
+        unit = float(clouds.scale[b])
         assert float(truth.diagonal[b]) * unit == pytest.approx(sample.diagonal, rel=1e-5)
         assert truth.part_valid[b].tolist() == [True, True, False]
         rotation, translation = sample.T_camera_part[:, :3, :3], sample.T_camera_part[:, :3, 3]
         canonical = truth.canonical[b].numpy().astype(float) * sample.diagonal
         part = truth.part[b].numpy()
         there = np.einsum("nij,nj->ni", rotation[part], canonical) + translation[part]
-        given = (clouds.points[b] * clouds.radius[b] + clouds.center[b]).numpy()
+        given = (clouds.points[b] * clouds.scale[b] + clouds.center[b]).numpy()
         np.testing.assert_allclose(there, given, atol=2e-3 * sample.diagonal)
 
 

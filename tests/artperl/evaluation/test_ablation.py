@@ -32,7 +32,7 @@ def test_a_shuffled_base_finds_other_objects_of_the_same_tree() -> None:
     base = small_base("laptop", "eyeglasses")
     other = permute_references(base)
     assert base.embeddings is not None
-    found = other.nearest(base.embeddings)[0][:, 0].tolist()
+    found = other.nearest_objects(base.embeddings)[0][:, 0].tolist()
     assert sorted(found) == list(range(len(base)))
     assert found != list(range(len(base)))
     assert all(base.categories[a] == base.categories[b] for a, b in enumerate(found))

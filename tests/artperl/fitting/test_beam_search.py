@@ -16,7 +16,7 @@ import artsim
 from artperl.core.pose import Theta, Trees, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
-from artperl.fitting.beam_search import _from_the_root_down, _grid, beam, half_turned
+from artperl.fitting.beam_search import _grid, _joint_order, beam, half_turns
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
 from artsim.datasets.plan import SampleOptions, draw_sample
@@ -94,7 +94,7 @@ def test_a_part_has_its_place_once_all_joints_that_move_it_have_their_states() -
             Joint("drawer", "prismatic", 0, lower=0.0, upper=0.2),
         ]
     )
-    joints, turn = _from_the_root_down(Trees.stack([tree], 6))
+    joints, turn = _joint_order(Trees.stack([tree], 6))
     assert joints == [1, 4, 3]
     assert turn.tolist() == [0, 1, 3, 3, 2, 0]  # the rod waits for what it follows; padding has its place at once
 
@@ -132,7 +132,7 @@ def test_half_turns_leave_what_hangs_from_a_shoulder_where_it_is() -> None:
     state = rest.state.clone()
     state[:, 1:7] = torch.tensor([0.5, 0.8, -1.0, -1.5, 0.4, 2.0])
     theta = replace(rest, state=state)
-    others = half_turned(shapes, theta)
+    others = half_turns(shapes, theta)
     assert others is not None
     assert torch.allclose((others.state - state)[0, 1:4], torch.tensor([-np.pi, -1.6, np.pi], dtype=state.dtype))
     before, after = (pose_parts(shapes.trees, values, shapes.box_center) for values in (theta, others[:1]))
@@ -143,6 +143,6 @@ def test_half_turns_leave_what_hangs_from_a_shoulder_where_it_is() -> None:
 
 def test_limits_and_axes_that_do_not_meet_forbid_half_turns() -> None:
     shapes, true, _, _ = view(7)
-    assert half_turned(shapes, true) is None
+    assert half_turns(shapes, true) is None
     laptop = Shapes.from_objects([artsim.make("laptop", 0)], 64)
-    assert half_turned(laptop, Theta.at_rest(laptop.trees)) is None
+    assert half_turns(laptop, Theta.at_rest(laptop.trees)) is None

@@ -17,7 +17,14 @@ from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Samples
 from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.evaluation import metrics
-from artperl.fitting.initial_pose import adapted, by_another_part, part_poses, procrustes, sized, start
+from artperl.fitting.initial_pose import (
+    adapt_shapes,
+    part_poses,
+    procrustes,
+    resize_shapes,
+    start,
+    starts_by_another_part,
+)
 from artperl.perception.network import Perceived
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.datasets.plan import SampleOptions
@@ -118,7 +125,7 @@ def test_adapted_references_are_where_their_scale_had_put_them() -> None:
         stretch=0.2 * torch.randn(B, P, 3, generator=generator, dtype=torch.float64),
         state=low + torch.rand(B, P, generator=generator, dtype=torch.float64) * (high - low),
     )
-    small = adapted(shapes, theta)
+    small = adapt_shapes(shapes, theta)
     plain = torch.zeros_like(theta.stretch)
     state = joint_states(trees, theta)
     there = replace(theta, log_scale=plain[:, 0], stretch=plain, state=state)
@@ -135,7 +142,7 @@ def test_adapted_references_are_where_their_scale_had_put_them() -> None:
 
 def test_a_reference_gets_the_size_asked_for() -> None:
     shapes = Shapes.from_objects([artsim.make("drawer", 1), artsim.make("laptop", 1)], 32, dtype=torch.float64)
-    doubled = sized(shapes, 2.0 * shapes.diagonal)
+    doubled = resize_shapes(shapes, 2.0 * shapes.diagonal)
     torch.testing.assert_close(doubled.box_size, 2.0 * shapes.box_size)
     torch.testing.assert_close(doubled.diagonal, 2.0 * shapes.diagonal)
     slides = (shapes.trees.slide != 0) & (shapes.trees.turn == 0)
@@ -157,7 +164,7 @@ def test_hardly_visible_parts_start_where_their_joints_let_them(
     ]
     base = ShapeBase.of([artsim.make(category, seed) for seed in range(30)], 32)
     for b, kept in enumerate(few):
-        alone = Clouds(clouds.points[b : b + 1, kept], clouds.center[b : b + 1], clouds.radius[b : b + 1])
+        alone = Clouds(clouds.points[b : b + 1, kept], clouds.center[b : b + 1], clouds.scale[b : b + 1])
         own = truth[b : b + 1]
         known = replace(own, part=own.part[:, kept], canonical=own.canonical[:, kept])
         row = next(n for n, tree in enumerate(base.trees) if tree.types == samples[b].joint_type)
@@ -178,11 +185,11 @@ def test_a_root_that_hardly_shows_starts_where_another_part_lets_it_be() -> None
         assert len(lid) > 50
         for visible, hidden in ((3, True), (len(lid), False)):
             kept = torch.cat([lid, root[:visible]])
-            alone = Clouds(clouds.points[b : b + 1, kept], clouds.center[b : b + 1], clouds.radius[b : b + 1])
+            alone = Clouds(clouds.points[b : b + 1, kept], clouds.center[b : b + 1], clouds.scale[b : b + 1])
             own = truth[b : b + 1]
             known = knowing(replace(own, part=own.part[:, kept], canonical=own.canonical[:, kept]))
             shapes, theta = start(alone, known, base.shapes[[0]], 1)
-            starts = by_another_part(alone, known, shapes, theta, 16)
+            starts = starts_by_another_part(alone, known, shapes, theta, 16)
             assert (starts is not None) == (hidden or len(root) < len(lid) // 4)
             if starts is not None:
                 many = shapes.repeat(16)

@@ -12,7 +12,7 @@ from artperl.core.clouds import Clouds
 from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.evaluation.samples import frozen_samples
 from artperl.perception.network import Votes
-from artperl.perception.part_grouping import clusters, differences, grouped
+from artperl.perception.part_grouping import clusters, differences, group_votes
 from artsim.observing.sample import Sample
 from tests.artperl.worlds import true_votes
 
@@ -34,7 +34,7 @@ def test_true_votes_find_the_parts_that_are_seen(category: str, noise: float) ->
         truth = seen(sample)[1]
         votes = true_votes(truth)
         votes = Votes(**{**vars(votes), "box": votes.box + noise * torch.randn(votes.box.shape, generator=generator)})
-        found = grouped(votes)
+        found = group_votes(votes)
         count = truth.part[0].bincount(minlength=ROWS)
         if bool((count[truth.part_valid[0]] < 40).any()):
             continue  # of a part that is not seen nobody can tell
@@ -94,6 +94,6 @@ def test_there_is_a_root_even_if_no_point_says_so() -> None:
     votes = true_votes(truth)
     no_root = torch.full_like(votes.level_logits, -20.0)
     no_root[..., 1] = 0.0
-    found = grouped(Votes(**{**vars(votes), "level_logits": no_root}))
+    found = group_votes(Votes(**{**vars(votes), "level_logits": no_root}))
     assert bool(found.valid[0, 0])
     assert bool((found.joint[0, 0] == 0).all())

@@ -7,10 +7,10 @@ import torch
 import artsim
 from artperl.data.categories import objects_of
 from artperl.perception.network import Perceived
-from artperl.perception.part_grouping import Grouped
+from artperl.perception.part_grouping import PerceivedTree
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.references import references
-from artperl.retrieval.shape_base import ShapeBase, moves
+from artperl.retrieval.shape_base import ShapeBase, motion
 
 
 def _perceived(base: ShapeBase, row: int) -> Perceived:
@@ -33,12 +33,12 @@ def test_references_have_axes_of_every_lean() -> None:
     for row in range(len(base)):
         rows, shapes = references(base, _perceived(base, row), 3)
         assert int(rows[0]) == row
-        assert base.leaning_otherwise(row).tolist() == (leans != leans[row]).tolist()
+        assert base.has_other_axes(row).tolist() == (leans != leans[row]).tolist()
         assert torch.sign(shapes.trees.axis[:2, 1, 1]).tolist() == [leans[row], -leans[row]]
         torch.testing.assert_close(shapes.trees.axis[2, 1], torch.nn.functional.normalize(axis.mean(0), dim=0))
     laptops = by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(6)], 32))
     assert laptops.embeddings is not None
-    nearest = laptops.nearest(laptops.embeddings[:1], 3)[0][0]
+    nearest = laptops.nearest_objects(laptops.embeddings[:1], 3)[0][0]
     rows, shapes = references(laptops, _perceived(laptops, 0), 3)
     assert torch.equal(rows, nearest)
     assert torch.equal(shapes.points, laptops.shapes.points[nearest])
@@ -50,9 +50,9 @@ def test_parts_by_votes_are_looked_for_among_objects_with_their_tree() -> None:
     for row in (2, 7):
         seen = _perceived(whole, row)
         tree = whole.shapes.trees[row : row + 1]
-        groups = Grouped(**vars(seen), joint=whole.joints[row : row + 1], parent=tree.parent)
+        groups = PerceivedTree(**vars(seen), joint=whole.joints[row : row + 1], parent=tree.parent)
         rows, shapes = references(base, groups, 3)
         K = len(objects[row])
         assert shapes.trees.valid.sum(1).tolist() == [K] * len(rows)
-        assert bool((moves(base.joints[rows[:-1], :K]) == moves(groups.joint[0, :K])).all())
+        assert bool((motion(base.joints[rows[:-1], :K]) == motion(groups.joint[0, :K])).all())
         assert (int(rows[0]) == row) == (row < 7)

@@ -13,7 +13,7 @@ import torch
 import artsim
 from artperl.core.shapes import Shapes
 from artperl.data.categories import objects_of
-from artperl.retrieval.shape_base import ShapeBase, widened
+from artperl.retrieval.shape_base import ShapeBase, widen_limits
 from artsim.errors import ConfigError, DatasetError
 from tests.artperl.worlds import small_base
 
@@ -50,15 +50,15 @@ def test_clouds_lie_on_the_objects_they_stand_for(base: ShapeBase) -> None:
 
 def test_the_nearest_object_is_found_in_well_under_a_millisecond(base: ShapeBase) -> None:
     assert base.embeddings is not None
-    rows, distance = base.nearest(base.embeddings + 1e-3)
+    rows, distance = base.nearest_objects(base.embeddings + 1e-3)
     assert rows[:, 0].tolist() == list(range(len(base)))
     assert distance.max() < 0.01
-    laptops, _ = base.nearest(base.embeddings, 3, base.of_category("laptop"))
+    laptops, _ = base.nearest_objects(base.embeddings, 3, base.of_category("laptop"))
     assert sorted(laptops[5].tolist()) == [0, 1, 2]
     times = []
     for _ in range(50):
         start = time.perf_counter()
-        base.nearest(base.embeddings[:1])
+        base.nearest_objects(base.embeddings[:1])
         times.append(time.perf_counter() - start)
     assert min(times) < 1e-3
 
@@ -72,10 +72,10 @@ def test_references_have_no_more_rows_than_they_need(base: ShapeBase) -> None:
 
 def test_what_cannot_be_searched_or_read_is_refused(base: ShapeBase, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no embeddings"):
-        ShapeBase.of([artsim.make("laptop", 0)], 8).nearest(torch.zeros(1, 4))
+        ShapeBase.of([artsim.make("laptop", 0)], 8).nearest_objects(torch.zeros(1, 4))
     assert base.embeddings is not None
     with pytest.raises(ConfigError, match="fewer than 4"):
-        base.nearest(base.embeddings, 4, base.of_category("laptop"))
+        base.nearest_objects(base.embeddings, 4, base.of_category("laptop"))
     with pytest.raises(ConfigError, match="needs objects"):
         ShapeBase.of([])
     (tmp_path / "broken.npz").write_bytes(b"not a base")
@@ -86,7 +86,7 @@ def test_what_cannot_be_searched_or_read_is_refused(base: ShapeBase, tmp_path: P
 
 def test_references_go_as_far_as_any_of_their_kind() -> None:
     objects = [artsim.make("laptop", seed) for seed in range(4)] + [artsim.make("drawer", seed) for seed in range(6)]
-    wide = widened([obj.with_diagonal(1.0) for obj in objects])
+    wide = widen_limits([obj.with_diagonal(1.0) for obj in objects])
     for obj, other in zip(objects, wide, strict=True):
         own = obj.with_diagonal(1.0).tree
         assert other.tree.types == own.types
@@ -104,7 +104,7 @@ def _composed(base: ShapeBase, like: ShapeBase, row: int) -> Shapes:
     """Of a base, what is most like an object of another one."""
     K, shapes = len(like.trees[row]), like.shapes
     asked = shapes.box_center[row, :K], shapes.box_size[row, :K], like.joints[row, :K], shapes.trees.parent[row, :K]
-    return base.composed(*asked)[1]
+    return base.compose(*asked)[1]
 
 
 def test_an_object_is_composed_of_its_own_parts() -> None:
@@ -145,7 +145,7 @@ def test_a_joint_that_no_object_has_is_as_it_is_perceived() -> None:
     hinge = torch.tensor([0.0, 0.0, 0.0, 0.0, 0.6, 0.8, 0.1, 0.0, 0.0])
     joint = torch.stack([torch.zeros(9), hinge])
     center, size = torch.tensor([[0.0, 0.0, 0.0], [-0.2, 0.0, 0.1]]), torch.tensor([[0.5, 0.5, 0.6], [0.02, 0.4, 0.3]])
-    made = base.composed(center, size, joint, torch.tensor([0, 0]))[1]
+    made = base.compose(center, size, joint, torch.tensor([0, 0]))[1]
     assert float(made.trees.turn[0, 1]) == 1.0
     torch.testing.assert_close(made.trees.axis[0, 1], hinge[3:6])
     torch.testing.assert_close(made.trees.origin[0, 1], made.box_center[0, 1] + hinge[6:])

@@ -15,7 +15,7 @@ def test_a_value_of_another_type_is_named() -> None:
 
     assert from_json_values(EstimatorOptions, {"seen_from": [-75, 75.0]}).seen_from == (-75.0, 75.0)
     assert from_json_values(EstimatorOptions, {"retry_residual": float("inf")}).retry_residual == np.inf
-    for name, value in (("beam", True), ("beam", 2.0), ("coherent", 1), ("azimuths", 3), ("seen_from", [1.0]),
+    for name, value in (("beam", True), ("beam", 2.0), ("label_smoothing", 1), ("azimuths", 3), ("seen_from", [1.0]),
                         ("refine", []), ("refine", {"tolerance": "a"}), ("elevation", float("nan"))):  # fmt: skip
         with pytest.raises(ValueError, match=r"is |not a set"):
             from_json_values(EstimatorOptions, {name: value})
