@@ -16,10 +16,15 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.core.batch import Batch
+from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate, points_at_rest
+from artperl.perception.network import Perceived
+from artperl.perception.preprocess import Cloud
 
 Array = NDArray[np.float64]
 
+BOX_POINTS = 8192
+"""Points by which faces of boxes are looked for."""
 SHARES = (0.0, 0.004, 0.02, 0.1, 0.5)
 """Of a part's points, that lie farther out than a candidate: labels near a border are not always right."""
 NUM_CANDIDATES = len(SHARES) + 7
@@ -175,31 +180,56 @@ def _siblings(outermost: Tensor, seen: Tensor) -> Tensor:
     return torch.where(other.any(1), farthest, outermost)
 
 
-def evidence_of_estimate(
-    estimate: Estimate, points: Array, part: NDArray[np.int64], perceived_center: Tensor, perceived_size: Tensor,
-    noise: Tensor, rows: int,
-) -> tuple[Evidence, float]:  # fmt: skip
-    """Evidence for the boxes of one estimate, padded to that many rows, and its unit in metres.
+@dataclass(frozen=True, eq=False)
+class BoxContext:
+    """What tells about the boxes of one fitted cloud, besides its estimate.
 
-    Parameters
+    Attributes
     ----------
-    estimate : Estimate
-    points : (M, 3) float
+    points : (N, 3) float
         Camera frame, metres.
-    part : (M,) int64
-    perceived_center, perceived_size : (P, 3) float
-        Metres.
-    noise : () float
-        :func:`roughness` of the points, metres.
-    rows : int
+    log_odds : (N, P) float
+        Of each point to be of each part; NaN for outliers.
+    box_center, box_size : (P, 3) float
+        As perceived, in the rest frame, metres.
+    some : (M,) int64
+        Points by which faces of boxes are looked for.
+    roughness : () float
+        Of these, metres.
     """
-    T, K = estimate.T_camera_part, len(estimate.size)
-    slides = np.array(estimate.joint_type)[:, None] == "prismatic"
-    arrays = (
-        points, T, np.where(slides, estimate.joint_axis, 0.0), points_at_rest(estimate.translation, T), estimate.size,
-    )  # fmt: skip
-    cloud, poses, axis, center, size = (torch.from_numpy(values.astype(np.float32)) for values in arrays)
-    evidence, unit = Evidence.of(
-        cloud, torch.from_numpy(part), poses, axis, center, size, perceived_center[:K], perceived_size[:K], noise
-    )  # fmt: skip
-    return evidence.pad(rows), float(unit)
+
+    points: Array
+    log_odds: Array
+    box_center: Tensor
+    box_size: Tensor
+    some: NDArray[np.int64]
+    roughness: Tensor
+
+    @staticmethod
+    def of(cloud: Cloud, clouds: Clouds, perceived: Perceived) -> BoxContext:
+        """All that is known of one cloud."""
+        some, metres = cloud.some(BOX_POINTS), (perceived.log_diagonal.exp() * clouds.scale).cpu()
+        log_odds = perceived.part_logits.log_softmax(-1)[0].double().cpu().numpy()
+        return BoxContext(
+            cloud.points, cloud.for_every_point(log_odds, np.nan), perceived.box_center[0].cpu() * metres,
+            perceived.box_size[0].cpu() * metres, some, roughness(torch.from_numpy(_single(cloud.points[some]))),
+        )  # fmt: skip
+
+    def evidence(self, estimate: Estimate, rows: int) -> tuple[Evidence, float]:
+        """Evidence for the boxes of an estimate, padded to that many rows, and its unit in metres."""
+        T, K = estimate.T_camera_part, len(estimate.size)
+        slides = np.array(estimate.joint_type)[:, None] == "prismatic"
+        arrays = (
+            self.points[self.some], T, np.where(slides, estimate.joint_axis, 0.0),
+            points_at_rest(estimate.translation, T), estimate.size,
+        )  # fmt: skip
+        points, poses, axis, center, size = (torch.from_numpy(_single(values)) for values in arrays)
+        evidence, unit = Evidence.of(
+            points, torch.from_numpy(estimate.part[self.some]), poses, axis, center, size,
+            self.box_center[:K], self.box_size[:K], self.roughness,
+        )  # fmt: skip
+        return evidence.pad(rows), float(unit)
+
+
+def _single(values: Array) -> NDArray[np.float32]:
+    return values.astype(np.float32)

@@ -189,10 +189,8 @@ def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
     return seen
 
 
-def estimate_of_fit(
-    shapes: Shapes, observed: Observed, path: Sequence[Theta], points: Array, part: NDArray[np.int64]
-) -> Estimate:
-    """What a fitted reference says of K parts and of labelled points; nothing yet of how sure it is.
+def estimate_of_fit(shapes: Shapes, observed: Observed, path: Sequence[Theta], part: NDArray[np.int64]) -> Estimate:
+    """What a fitted reference says of K parts; nothing yet of how sure it is.
 
     Parameters
     ----------
@@ -201,9 +199,8 @@ def estimate_of_fit(
     observed : Observed
     path : sequence of Theta
         States of one row, the start first, the fit last.
-    points : (N, 3) float
-        Camera frame, metres.
     part : (N,) int64
+        Of each given point.
     """
     theta, trees = path[-1], shapes.trees
     K = int(trees.valid[0].sum())
@@ -212,12 +209,10 @@ def estimate_of_fit(
     poses = [_transforms(shapes, step)[:K] for step in path]
     limits = torch.stack([trees.lower, trees.upper], dim=-1)
     limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
-    rotation, center = _first(posed.rotation)[:K], _first(posed.center)[:K]
-    translation, size = widen(rotation, center, _first(shapes.box_size * posed.scale)[:K], points, part)
     return Estimate(
-        rotation=rotation,
-        translation=translation,
-        size=size,
+        rotation=_first(posed.rotation)[:K],
+        translation=_first(posed.center)[:K],
+        size=_first(shapes.box_size * posed.scale)[:K],
         T_camera_part=poses[-1],
         state=_first(joint_states(trees, theta))[:K],
         joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),

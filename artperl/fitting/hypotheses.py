@@ -18,13 +18,14 @@ from torch import Tensor
 from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Agent
-from artperl.core.batch import Batch, concatenate
+from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
-from artperl.core.pose import AxisPrior, Theta
+from artperl.core.pose import Theta
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting import beam_search, initial_pose
 from artperl.fitting.options import EstimatorOptions
 from artperl.perception.network import Perceived
+from artperl.retrieval.references import References
 
 _CHAIN = 3
 """Joints one after another from which parts below have to tell how those above have turned."""
@@ -34,22 +35,6 @@ _HINGE_STATES = 8
 """States of a joint by which a root that hardly shows is placed."""
 _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
-
-
-@dataclass(frozen=True, eq=False)
-class References(Batch):
-    """Objects of the base that may explain a cloud.
-
-    Attributes
-    ----------
-    shapes : Shapes
-        R rows.
-    row : (R,) int64
-        Of the base.
-    """
-
-    shapes: Shapes
-    row: Tensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +49,6 @@ class Context:
         The same at a common place and size.
     perceived : Perceived
     references : References
-        As the base has them, the nearest first.
-    axis_priors : dict
-        By row of the base, how the axes of such objects lean; None where they do not.
     agent : Agent, optional
     options : EstimatorOptions
     """
@@ -75,7 +57,6 @@ class Context:
     clouds: Clouds
     perceived: Perceived
     references: References
-    axis_priors: dict[int, AxisPrior | None]
     agent: Agent | None
     options: EstimatorOptions
 

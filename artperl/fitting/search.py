@@ -183,7 +183,7 @@ def settle(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
         part = labels_by_surface(shapes, observed, theta, perceived.part_logits)
         observed = replace(observed, part=part)
     with clock("last"):
-        refined = refine(shapes, observed, theta, options.refine, axis_prior=context.axis_priors[row])
+        refined = refine(shapes, observed, theta, options.refine, axis_prior=context.references.axis_priors[row])
         shapes = replace(shapes, trees=replace(shapes.trees, axis=refined.axis))
     end = refined.theta
     return Fit(

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
 import numpy as np
+import torch
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
+from torch import Tensor
 
 from artsim.errors import ArtsimError
 
@@ -25,6 +31,59 @@ _FARTHEST = 1e9
 """Coordinates beyond stand for no measurement, as the largest float does for some sensors; squares of them overflow."""
 _SMALLEST = 1e-6
 """Extent below which single precision, in which networks work, hardly tells points from each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """One cloud as it is given, and the points that a network sees of it.
+
+    Attributes
+    ----------
+    points : (N, 3) float
+        Camera frame, metres.
+    good : (G,) int64
+        Those that show the object.
+    seen : (M, 3) float32
+        Of these, the points that a network sees.
+    """
+
+    points: Array
+    good: NDArray[np.int64]
+    seen: NDArray[np.float32]
+
+    @staticmethod
+    def of(points: ArrayLike, count: int) -> Cloud:
+        """A cloud without outliers, of which a network sees so many points.
+
+        Raises
+        ------
+        ArtsimError
+            When it is no cloud, or hardly a point is left.
+        """
+        every = as_cloud(points)
+        good = clean(every)
+        chosen = good[draw(len(good), count, np.random.default_rng(0))]
+        return Cloud(every, good, every[chosen].astype(np.float32))
+
+    def tensor(self, device: torch.device) -> Tensor:
+        """(1, M, 3) points that a network sees."""
+        return torch.from_numpy(self.seen)[None].to(device)
+
+    def some(self, count: int) -> NDArray[np.int64]:
+        """(<= count,) indices of points that show the object."""
+        return self.good[draw(len(self.good), min(count, len(self.good)), np.random.default_rng(0))]
+
+    @cached_property
+    def _nearest(self) -> NDArray[np.int64]:
+        """(G,) of the seen points, the nearest to each that shows the object."""
+        index: NDArray[np.int64] = cKDTree(self.seen).query(self.points[self.good], workers=1)[1]
+        return index
+
+    def for_every_point(self, values: NDArray[Any], outlier: Any) -> NDArray[Any]:
+        """(N, ...) of values (M, ...) of the seen points, that of the nearest; outliers have one of their own."""
+        every = np.full((len(self.points), *values.shape[1:]), outlier, dtype=values.dtype)
+        every[self.good] = values[self._nearest]
+        return every
 
 
 def as_cloud(points: ArrayLike) -> Array:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from artperl.core.batch import concatenate
+from artperl.core.pose import AxisPrior
 from artperl.core.shapes import Shapes
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import PerceivedTree
@@ -15,18 +16,39 @@ from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.shape_base import ShapeBase, joint_features, motion, same_axes
 
 
-def references(base: ShapeBase, perceived: Perceived, count: int) -> tuple[Tensor, Shapes]:
-    """(count,) rows of the objects nearest to what is perceived of one cloud, and their shapes.
+@dataclass(frozen=True, eq=False)
+class References:
+    """R objects of the base that may explain a cloud, the nearest first.
+
+    Attributes
+    ----------
+    shapes : Shapes
+        R rows, as the base has them.
+    row : (R,) int64
+        Of the base.
+    axis_priors : dict
+        By row of the base, how the axes of such objects lean; None where they do not.
+    """
+
+    shapes: Shapes
+    row: Tensor
+    axis_priors: dict[int, AxisPrior | None]
+
+
+def retrieve_references(base: ShapeBase, perceived: Perceived, count: int) -> References:
+    """As many of the objects nearest to what is perceived of one cloud, or all if the base has fewer.
 
     Boxes do not tell how axes lean, and no hinge turns a part to where another one's would: where axes differ, there is
     an object whose axes lean otherwise than those of the nearest, and one with the mean axes. Where parts are found by
     votes, only objects with the same tree will do, and one is composed of the parts of several; its row is that of
     the object that has its root.
     """
-    query = box_embedding(perceived.valid, perceived.box_center, perceived.box_size)
+    query, count = box_embedding(perceived.valid, perceived.box_center, perceived.box_size), min(count, len(base))
     if isinstance(perceived, PerceivedTree):
-        return _references_of_tree(base, perceived, query, count)
-    return _vary_axes(base, query, base.nearest_objects(query, count)[0][0])
+        rows, shapes = _references_of_tree(base, perceived, query, count)
+    else:
+        rows, shapes = _vary_axes(base, query, base.nearest_objects(query, count)[0][0])
+    return References(shapes, rows, {row: base.axis_prior(row) for row in rows.tolist()})
 
 
 def _vary_axes(base: ShapeBase, query: Tensor, rows: Tensor) -> tuple[Tensor, Shapes]:

@@ -130,6 +130,10 @@ class ShapeBase:
         embeddings = None if self.embeddings is None else self.embeddings.to(device)
         return replace(self, shapes=self.shapes.to(device), embeddings=embeddings)
 
+    def name(self, row: int) -> str:
+        """Category and name of an object."""
+        return f"{self.categories[row]}:{self.object_ids[row]}"
+
     def of_category(self, category: str) -> Tensor:
         """(B,) bool: objects of a category."""
         return torch.tensor([name == category for name in self.categories], device=self.shapes.diagonal.device)

@@ -10,11 +10,11 @@ import torch
 from artperl.core.clouds import Clouds
 from artperl.data.categories import objects_of
 from artperl.evaluation.samples import TEST_SEEDS, frozen_samples
-from artperl.fitting.hypotheses import Context, References, chain_states, part_weights
+from artperl.fitting.hypotheses import Context, chain_states, part_weights
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import by_boxes
-from artperl.retrieval.references import references
+from artperl.retrieval.references import retrieve_references
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.observing.sample import Sample
 from tests.artperl.worlds import Oracle
@@ -27,8 +27,8 @@ def test_only_chains_of_joints_are_searched_for_down_the_tree(estimator: Estimat
         oracle, cloud = Oracle(shown, len(shown.joint_type)), torch.from_numpy(shown.points)[None]
         clouds = Clouds.of(cloud)
         perceived = oracle(clouds.points)
-        row, shapes = references(base, perceived, 1)
-        context = Context(cloud, clouds, perceived, References(shapes, row), {}, None, EstimatorOptions())
+        found = retrieve_references(base, perceived, 1)
+        context = Context(cloud, clouds, perceived, found, None, EstimatorOptions())
         proposed = chain_states(context, None)
         assert (proposed is not None) == (shown is seen)
         assert chain_states(replace(context, options=EstimatorOptions(beam=0)), None) is None

@@ -9,7 +9,7 @@ from artperl.data.categories import objects_of
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import PerceivedTree
 from artperl.retrieval.box_embedding import by_boxes
-from artperl.retrieval.references import references
+from artperl.retrieval.references import retrieve_references
 from artperl.retrieval.shape_base import ShapeBase, motion
 
 
@@ -31,7 +31,8 @@ def test_references_have_axes_of_every_lean() -> None:
     assert set(leans.tolist()) == {-1.0, 1.0}
     assert base.embeddings is not None
     for row in range(len(base)):
-        rows, shapes = references(base, _perceived(base, row), 3)
+        found = retrieve_references(base, _perceived(base, row), 3)
+        rows, shapes = found.row, found.shapes
         assert int(rows[0]) == row
         assert base.has_other_axes(row).tolist() == (leans != leans[row]).tolist()
         assert torch.sign(shapes.trees.axis[:2, 1, 1]).tolist() == [leans[row], -leans[row]]
@@ -39,7 +40,8 @@ def test_references_have_axes_of_every_lean() -> None:
     laptops = by_boxes(ShapeBase.of([artsim.make("laptop", seed) for seed in range(6)], 32))
     assert laptops.embeddings is not None
     nearest = laptops.nearest_objects(laptops.embeddings[:1], 3)[0][0]
-    rows, shapes = references(laptops, _perceived(laptops, 0), 3)
+    found = retrieve_references(laptops, _perceived(laptops, 0), 3)
+    rows, shapes = found.row, found.shapes
     assert torch.equal(rows, nearest)
     assert torch.equal(shapes.points, laptops.shapes.points[nearest])
 
@@ -51,7 +53,8 @@ def test_parts_by_votes_are_looked_for_among_objects_with_their_tree() -> None:
         seen = _perceived(whole, row)
         tree = whole.shapes.trees[row : row + 1]
         groups = PerceivedTree(**vars(seen), joint=whole.joints[row : row + 1], parent=tree.parent)
-        rows, shapes = references(base, groups, 3)
+        found = retrieve_references(base, groups, 3)
+        rows, shapes = found.row, found.shapes
         K = len(objects[row])
         assert shapes.trees.valid.sum(1).tolist() == [K] * len(rows)
         assert bool((motion(base.joints[rows[:-1], :K]) == motion(groups.joint[0, :K])).all())

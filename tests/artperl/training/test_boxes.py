@@ -119,7 +119,7 @@ def test_a_face_lies_where_all_candidates_say() -> None:
     with torch.no_grad():
         boxes = Boxes(3)
         boxes.among[-1].weight[-3], boxes.among[-1].bias[-3] = 0.0, 0.0  # no more moves
-        center, size, _ = boxes(agreed.padded(3))
+        center, size, _ = boxes(agreed.pad(3))
     assert torch.allclose(center[:, :1], evidence.center, atol=1e-6)
     assert torch.allclose(size[:, :1], evidence.size + 0.06)
 
@@ -143,7 +143,7 @@ def test_how_far_a_part_has_slid_is_told_by_its_leading_face() -> None:
 def test_rows_without_a_part_do_not_matter() -> None:
     torch.manual_seed(0)
     boxes, (evidence, _) = Boxes(3), wall_and_box()
-    padded = evidence.padded(3)
+    padded = evidence.pad(3)
     dirty = replace(padded, center=padded.center.clone(), candidates=padded.candidates.clone())
     dirty.center[:, 1:], dirty.candidates[:, 1:] = 7.0, 1.0
     for clean_values, dirty_values in zip(boxes(padded), boxes(dirty), strict=True):
