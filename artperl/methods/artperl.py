@@ -7,37 +7,32 @@ constraints (4.4). The 9D poses of the parts follow from the joint states (4.1).
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 from torch import Tensor, nn
 
 from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import StatePolicy
 from artperl.agent.start import MeanView, mean_start
+from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
-from artperl.core.estimate import Calibration, Estimate, visibility
-from artperl.core.pose import KINDS, Theta, joint_axes, joint_states, pose_parts, reach
+from artperl.core.estimate import Calibration, Estimate, estimate_of_fit
+from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.paper_energy import refine_by_gradient
 from artperl.perception.cloud_checks import cloud_warnings
-from artperl.perception.preprocess import as_cloud, clean, draw
+from artperl.perception.preprocess import Cloud
 from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import POINTS, Siamese
 from artsim.common.json_records import from_json_values
 from artsim.model.objects import MAX_PARTS
-
-Array = NDArray[np.float64]
 
 _MAX_WIDTH = 2048
 
@@ -134,12 +129,9 @@ class ArtPERL:
         ArtsimError
             When there is no object to be seen in the cloud.
         """
-        clock = _Clock()
-        cloud = as_cloud(points)
-        good = clean(cloud)
-        warnings = cloud_warnings(cloud, good)
-        chosen = draw(len(good), self.options.num_points, np.random.default_rng(0))
-        sampled = torch.from_numpy(cloud[good[chosen]].astype(np.float32))[None].to(self.device)
+        clock = Clock()
+        cloud = Cloud.of(points, self.options.num_points)
+        warnings, sampled = cloud_warnings(cloud.points, cloud.good), cloud.tensor(self.device)
         with clock("segmentation"):
             part = self.segment(sampled)
         with clock("retrieval"):
@@ -153,10 +145,8 @@ class ArtPERL:
             refined = refine_by_gradient(
                 reference, few, path[-1], self.options.refine_iterations, self.options.refine_rate
             )
-        labels = np.full(len(cloud), -1)
         observed, reference = observed.to("cpu"), reference.to("cpu")
-        near = cKDTree(observed.points[0].numpy()).query(cloud[good], workers=1)[1]
-        labels[good] = observed.part[0].numpy()[near]
+        labels = cloud.for_every_point(observed.part[0].numpy(), -1)
         steps = [theta.to("cpu") for theta in (*path, refined.theta)]
         return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
 
@@ -203,60 +193,18 @@ class ArtPERL:
         warnings: tuple[str, ...], milliseconds: dict[str, float],
     ) -> Estimate:  # fmt: skip
         """The 9D poses that Theta stands for, section 4.1, and what goes with them."""
-        trees, theta, K = reference.trees, path[-1], int(reference.trees.valid[0].sum())
-        posed = pose_parts(trees, theta, reference.box_center)
-        axis, origin = joint_axes(trees, posed)
-        limits = torch.stack([trees.lower, trees.upper], dim=-1)
-        limits = torch.where((trees.turn == 0)[..., None], limits * reach(trees, theta.log_scale)[..., None], limits)
-        poses = np.stack([_transforms(reference, step)[:K] for step in path])
+        theta = path[-1]
+        posed = pose_parts(reference.trees, theta, reference.box_center)
         surface = posed.points(reference.points, reference.box_center)[0][reference.has_surface[0]].flatten(0, 1)
         unit = float(reference.diagonal[0] * theta.log_scale[0].mean().exp())
         residual = float(torch.cdist(observed.points[0], surface).amin(1).square().mean().sqrt()) / unit
-        return Estimate(
-            rotation=_numpy(posed.rotation)[:K],
-            translation=_numpy(posed.center)[:K],
-            size=_numpy(reference.box_size * posed.scale)[:K],
-            T_camera_part=poses[-1],
-            state=_numpy(joint_states(trees, theta))[:K],
-            joint_type=tuple(KINDS[k] for k in trees.kind[0, :K].tolist()),
-            joint_parent=np.where(np.arange(K) == 0, -1, trees.parent[0, :K].numpy()),
-            joint_axis=_numpy(axis)[:K],
-            joint_origin=_numpy(origin)[:K],
-            part=labels,
-            reference=f"{self.base.categories[row]}:{self.base.object_ids[row]}",
+        return replace(
+            estimate_of_fit(reference, observed, path, labels),
+            reference=self.base.name(row),
             residual=residual,
             disagreement=0.0,
-            visibility=visibility(reference, observed, posed)[:K],
             confidence=Calibration()(residual, 0.0, 0.0),
-            trajectory=poses,
             milliseconds=milliseconds,
             part_names=part_names(self.base, row, reference),
-            joint_limits=_numpy(limits)[:K],
             warnings=warnings,
         )
-
-
-class _Clock:
-    """Milliseconds by stage."""
-
-    def __init__(self) -> None:
-        self.milliseconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.milliseconds[stage] = 1e3 * (time.perf_counter() - begun)
-
-
-def _transforms(shapes: Shapes, theta: Theta) -> Array:
-    """(P, 4, 4) ``T_camera_part``."""
-    posed = pose_parts(shapes.trees, theta, shapes.box_center)
-    transforms = np.tile(np.eye(4), (posed.rotation.shape[1], 1, 1))
-    transforms[:, :3, :3], transforms[:, :3, 3] = _numpy(posed.rotation), _numpy(posed.translation)
-    return transforms
-
-
-def _numpy(values: Tensor) -> Array:
-    """The first row, in double precision."""
-    return values[0].double().numpy()
