@@ -28,6 +28,7 @@ from artperl.methods.protocol import Untrained
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.retrieval.shape_base_file import read_shape_base, write_shape_base
 from artsim.common.files import read_bounded, read_json, write_atomic
 from artsim.common.json_records import from_json_values
 from artsim.common.names import printable
@@ -89,7 +90,7 @@ def _write(
 ) -> None:  # fmt: skip
     tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
     write_tensors(tensors, folder / _TENSORS)
-    base.save(folder / _BASE)
+    write_shape_base(base, folder / _BASE)
     told = {"format": _FORMAT, **settings, "about": dict(about)}
     write_atomic(folder / _SETTINGS, (json.dumps(told) + "\n").encode())
 
@@ -165,7 +166,7 @@ def load_estimator(
     for key, network in networks.items():
         network.load_state_dict(_under(tensors, f"{key}."))
         network.to(device)
-    base = ShapeBase.load(folder / _BASE)
+    base = read_shape_base(folder / _BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
         raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
     perception, agent, boxes = networks["perception"], networks.get("agent"), networks.get("boxes")
@@ -188,7 +189,7 @@ def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, "artperl", folder)
-    base, tensors = ShapeBase.load(folder / _BASE), read_tensors(folder / _TENSORS)
+    base, tensors = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS)
     try:
         with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
             networks = ArtPERL.of_settings(settings, base).networks()

@@ -30,9 +30,9 @@ def view(path: Path) -> str:
 
 
 def base(path: Path) -> str:
-    from artperl.retrieval.shape_base import ShapeBase
+    from artperl.retrieval.shape_base_file import read_shape_base
 
-    return f"{len(ShapeBase.load(path))} objects"
+    return f"{len(read_shape_base(path))} objects"
 
 
 def estimator(path: Path) -> str:

@@ -15,7 +15,7 @@ the reference's own units and grow with ``exp(log_scale)`` along the axis: see :
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -106,11 +106,6 @@ class Trees(Batch):
         rows = [_tree_rows(tree, num_rows) for tree in trees]
         arrays = {name: torch.from_numpy(np.stack([row[name] for row in rows])) for name in rows[0]}
         return Trees(**arrays).to(dtype)
-
-    def trim(self, num_rows: int) -> Trees:
-        """The first rows alone; the others must be padding."""
-        first = self.map(lambda tensor: tensor[:, :num_rows])
-        return replace(first, carries=first.carries[..., :num_rows])
 
 
 def _tree_rows(tree: KinematicTree, num_rows: int) -> dict[str, np.ndarray]:

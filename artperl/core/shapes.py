@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -89,14 +89,6 @@ class Shapes(Batch):
         fields = ("box_center", "box_size", "points", "normals", "spacing")
         own = {name: getattr(self, name)[:, row : row + 1] for name in fields}
         return Shapes(trees=alone.to(self.points.device), diagonal=self.diagonal, **own)
-
-    def trim(self) -> Shapes:
-        """Without rows for parts that no object of the batch has."""
-        count = max(1, int(self.trees.valid.sum(1).max()))
-        cut = {
-            name: getattr(self, name)[:, :count] for name in ("box_center", "box_size", "points", "normals", "spacing")
-        }
-        return replace(self, trees=self.trees.trim(count), **cut)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ from artperl.core.shapes import Shapes
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import PerceivedTree
 from artperl.retrieval.box_embedding import box_embedding
-from artperl.retrieval.shape_base import ShapeBase, joint_features, motion, same_axes
+from artperl.retrieval.composition import compose, joint_features, motion, same_axes
+from artperl.retrieval.shape_base import ShapeBase
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ def _references_of_tree(base: ShapeBase, perceived: PerceivedTree, query: Tensor
     alike = (tree & joint).all(1)
     further = torch.linalg.vector_norm(joint_features(base.joints) - joint_features(perceived.joint), dim=(1, 2))
     part = perceived.box_center[0, :K], perceived.box_size[0, :K], perceived.joint[0, :K], perceived.parent[0, :K]
-    row, own = base.compose(*part)
+    row, own = compose(base, *part)
     rows = torch.tensor([row], device=query.device)
     if not bool(alike.any()):
         return rows, own

@@ -43,10 +43,9 @@ def _object(folder: Path) -> None:
 
 
 def _base(folder: Path) -> None:
-    from artperl.retrieval.shape_base import ShapeBase
+    from artperl.retrieval.shape_base_file import read_shape_base
 
-    base = ShapeBase.load(folder / "base.npz")
-    base.references(base.kind[:1])
+    read_shape_base(folder / "base.npz").axis_prior(0)
 
 
 def _estimator(folder: Path) -> None:

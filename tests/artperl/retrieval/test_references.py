@@ -9,8 +9,9 @@ from artperl.data.categories import objects_of
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import PerceivedTree
 from artperl.retrieval.box_embedding import by_boxes
+from artperl.retrieval.composition import motion
 from artperl.retrieval.references import retrieve_references
-from artperl.retrieval.shape_base import ShapeBase, motion
+from artperl.retrieval.shape_base import ShapeBase
 
 
 def _perceived(base: ShapeBase, row: int) -> Perceived:
