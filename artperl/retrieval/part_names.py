@@ -9,12 +9,11 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-import artsim
 from artperl.core.pose import KINDS
 from artperl.core.shapes import Shapes
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ArtsimError
-from artsim.families import FAMILIES
+from artsim.families import FAMILIES, make
 from artsim.model.kinematics import Joint
 
 _FITTED = 0.25
@@ -73,7 +72,7 @@ def root_name(category: str) -> str:
     if category not in FAMILIES:
         return _ROOT
     try:
-        return artsim.make(category, seed=0).parts[0].name
+        return make(category).parts[0].name
     except ArtsimError:
         return _ROOT
 
