@@ -132,7 +132,7 @@ class Generator(Protocol):
     def __call__(self, context: Context, best: Best | None) -> Hypotheses | None: ...
 
 
-def perceived_pose(context: Context, best: Best | None) -> Hypotheses | None:
+def perceived_pose(context: Context, best: Best | None) -> Hypotheses:
     """References where perception places the points in the rest frame."""
     shapes, theta = context.start
     return Hypotheses.of(shapes, theta, context.references.row.tolist())

@@ -41,8 +41,9 @@ perception does not agree with that."""
 _CLEARLY = 0.8
 """Share of the best score below which a hypothesis that perception did not propose wins: most others that fit are
 wrong."""
-_NEVER = 1e6
-"""Score of an object that would be seen from where the camera is not, besides what else it has."""
+_NEVER = 100.0
+"""Added to the score of an object that would be seen from where the camera is not. It is far above any residual. It is
+low enough for single precision to tell residuals apart where all hypotheses have it."""
 _CAMERA_ARC = np.deg2rad(15.0)
 """Arc that a camera may be away from where it is known to be: an estimate need not have it to the degree."""
 _BELOW = np.deg2rad(10.0)

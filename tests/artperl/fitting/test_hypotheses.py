@@ -10,7 +10,16 @@ import torch
 from artperl.core.clouds import Clouds
 from artperl.data.categories import objects_of
 from artperl.evaluation.samples import TEST_SEEDS, frozen_samples
-from artperl.fitting.hypotheses import Context, chain_states, part_weights
+from artperl.fitting.hypotheses import (
+    Context,
+    Hypotheses,
+    chain_states,
+    half_turn,
+    hinged_root,
+    part_weights,
+    perceived_pose,
+    views_around,
+)
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import by_boxes
@@ -40,3 +49,21 @@ def test_parts_count_by_the_root_of_their_points_but_no_point_for_more_than_eigh
     assert [weight[0, part[0] == k].sum().item() for k in range(3)] == [1600.0, 800.0, 8.0]
     total = [weight[1, part[1] == k].sum().item() for k in (0, 2)]
     assert total[0] / total[1] == pytest.approx((500 / 1501) ** 0.5)
+
+
+def test_each_generator_proposes_hypotheses_of_its_own_reference(estimator: Estimator, sample: Sample) -> None:
+    cloud = torch.from_numpy(sample.points)[None]
+    clouds = Clouds.of(cloud)
+    perceived = Oracle(sample, 2)(clouds.points)
+    found = retrieve_references(estimator.base, perceived, 3)
+    context = Context(cloud, clouds, perceived, found, None, EstimatorOptions())
+    proposed = perceived_pose(context, None)
+    assert proposed.row == found.row.tolist()
+    around = views_around(context, None)
+    assert around is not None
+    assert around.row == [int(found.row[0])] * len(context.options.azimuths)
+    assert hinged_root(context, None) is None  # the base of the laptop shows
+    assert half_turn(context, None) is None
+    both = Hypotheses.joined([proposed, around])
+    assert len(both.shapes) == len(both.theta) == len(both.path) == len(both.row) == 6
+    assert torch.equal(both.path[4][0].rotation, around.theta.rotation[1:2])

@@ -11,14 +11,17 @@ from hypothesis import strategies as st
 
 import artsim
 from artperl.agent.policy import Agent
+from artperl.core.clock import Clock
+from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta
 from artperl.core.shapes import Shapes
 from artperl.evaluation import metrics
 from artperl.evaluation.metrics import true_poses
-from artperl.fitting.hypotheses import half_turn_about_vertical
+from artperl.fitting.hypotheses import Context, half_turn_about_vertical
 from artperl.fitting.options import EstimatorOptions
-from artperl.fitting.search import outside
+from artperl.fitting.search import find_fit, fits_badly, outside, score
 from artperl.methods.full import Estimator
+from artperl.retrieval.references import retrieve_references
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.model.camera import look_at_transform
 from artsim.observing.sample import Sample
@@ -60,3 +63,22 @@ def test_what_does_not_fit_is_looked_for_again(base: ShapeBase, sample: Sample) 
     assert again.residual <= once.residual
     rotation, _ = true_poses(sample)
     assert metrics.rotation_error(again.rotation, rotation).max() < 3.0
+
+
+def test_no_residual_makes_up_for_a_view_from_where_the_camera_is_not() -> None:
+    assert score(0.3, False, 1.0) < score(0.0, True)
+    residual, elsewhere = torch.tensor([0.001, 0.02, 0.01]), torch.tensor([True, False, False])
+    assert int(score(residual, elsewhere).argmin()) == 2
+    assert int(score(torch.tensor([0.02, 0.01]), torch.tensor([True, True])).argmin()) == 1
+
+
+def test_fits_are_tried_again_where_they_are_bad(base: ShapeBase, sample: Sample) -> None:
+    clouds = Clouds.of(torch.from_numpy(sample.points)[None])
+    perceived = Oracle(sample, 2)(clouds.points)
+    cloud = torch.from_numpy(sample.points)[None]
+    options = EstimatorOptions()
+    fit = find_fit(Context(cloud, clouds, perceived, retrieve_references(base, perceived, 2), None, options), Clock())
+    assert not fits_badly(replace(fit, residual=options.retry_residual), options)
+    assert fits_badly(replace(fit, residual=1.01 * options.retry_residual), options)
+    assert fits_badly(replace(fit, outside=True), options)
+    assert fits_badly(None, options)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
-from artperl.perception.preprocess import clean, draw
+from artperl.perception.preprocess import Cloud, clean, draw
 from artsim.errors import ArtsimError
 
 
@@ -58,3 +59,16 @@ def test_draws_take_every_point_before_any_twice() -> None:
     assert sorted(draw(10, 10, rng)) == list(range(10))
     assert np.bincount(draw(10, 25, rng)).tolist().count(3) == 5
     assert len(set(draw(100, 30, rng))) == 30
+
+
+def test_every_point_has_what_is_said_of_the_nearest_seen_one_and_outliers_have_their_own() -> None:
+    plate = np.random.default_rng(0).uniform(size=(3000, 3)) * [1.0, 1.0, 0.0]
+    far = np.array([[50.0, 0.0, 0.0], [np.nan, 0.0, 0.0]])
+    cloud = Cloud.of(np.concatenate([plate, far]), 200)
+    assert cloud.seen.shape == cloud.tensor(torch.device("cpu"))[0].shape == (200, 3)
+    side = (cloud.seen[:, 0] > 0.5).astype(np.int64)
+    every = cloud.for_every_point(side, -1)
+    nearest = np.linalg.norm(plate[:, None] - cloud.seen[None], axis=-1).argmin(1)
+    assert every.tolist() == [*side[nearest].tolist(), -1, -1]
+    assert set(cloud.some(100).tolist()) < set(cloud.good.tolist())
+    assert len(cloud.some(10_000)) == 3000
