@@ -100,7 +100,7 @@ class Hypotheses:
         return Hypotheses(shapes, theta, row, [[theta[i : i + 1]] for i in range(len(theta))])
 
     @staticmethod
-    def joined(several: Sequence[Hypotheses]) -> Hypotheses:
+    def join(several: Sequence[Hypotheses]) -> Hypotheses:
         """All of several sets, in their order."""
         return Hypotheses(
             concatenate([h.shapes for h in several]), concatenate([h.theta for h in several]),
@@ -187,7 +187,7 @@ def views_around(context: Context, best: Best | None) -> Hypotheses | None:
     few = context.observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
     steps = [theta, *agent_steps(context.agent, shapes, few, theta, options.agent_steps)]
     paths = [[step[i : i + 1] for step in steps] for i in range(len(shapes))]
-    return Hypotheses.joined([starts, Hypotheses(shapes, steps[-1], starts.row, paths)])
+    return Hypotheses.join([starts, Hypotheses(shapes, steps[-1], starts.row, paths)])
 
 
 def _of_first(context: Context, shapes: Shapes, states: Theta) -> Hypotheses:

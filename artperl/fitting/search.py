@@ -156,7 +156,7 @@ def find_fit(context: Context, clock: Clock) -> Fit:
                 hypotheses = generate(context, best)
             some += [] if hypotheses is None else [hypotheses]
         if some:
-            fit = settle(Hypotheses.joined(some), context, clock)
+            fit = settle(Hypotheses.join(some), context, clock)
             if best is None or stage.score(fit) < stage.share * stage.score(best):
                 best = fit
     assert best is not None  # the gate runs the last round where there is none

@@ -64,6 +64,6 @@ def test_each_generator_proposes_hypotheses_of_its_own_reference(estimator: Esti
     assert around.row == [int(found.row[0])] * len(context.options.azimuths)
     assert hinged_root(context, None) is None  # the base of the laptop shows
     assert half_turn(context, None) is None
-    both = Hypotheses.joined([proposed, around])
+    both = Hypotheses.join([proposed, around])
     assert len(both.shapes) == len(both.theta) == len(both.path) == len(both.row) == 6
     assert torch.equal(both.path[4][0].rotation, around.theta.rotation[1:2])
