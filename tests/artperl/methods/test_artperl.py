@@ -10,6 +10,7 @@ import pytest
 import torch
 
 import artsim
+from artperl.agent.actions import NOTHING, NUM_AXES, NUM_BINS, SCALE
 from artperl.agent.start import MeanView
 from artperl.data.fitting_problems import part_truth
 from artperl.estimator import load_estimator, save_estimator
@@ -81,11 +82,13 @@ def test_its_own_object_is_fitted_from_a_near_start() -> None:
 
 def test_the_root_scales_and_its_scale_reaches_the_boxes(base: ShapeBase) -> None:
     method = untrained(base)
+    with torch.no_grad():  # of a free joint, the first scale axis, one step of 0.09 in each of 12 rounds
+        method.policy.heads.bias.view(-1, NUM_AXES, NUM_BINS)[0, SCALE.start, NOTHING + 4] = 50.0
     estimate = method(view(artsim.make("laptop", 7), 1).points)
     row = method.base.object_ids.index(estimate.reference.split(":")[1])
     ratio = estimate.size / base.shapes.box_size[row, :2].numpy()
     np.testing.assert_allclose(ratio[0], ratio[1], rtol=1e-4)  # one scale of all parts, by Theta
-    assert np.ptp(ratio[0]) > 1e-3  # along each axis its own: the untrained policy has scaled
+    np.testing.assert_allclose(ratio[0, 0] / ratio[0, 1:], np.exp(12 * 0.09), rtol=1e-3)
 
 
 def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path: Path) -> None:
