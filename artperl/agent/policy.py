@@ -21,6 +21,9 @@ _HEADS = {"free": 0, "revolute": 1, "continuous": 1, "prismatic": 2, "screw": 1,
 _OF_JOINT = 6 + 2 + 1
 """Numbers that tell a joint: axis and anchor, place in its range and the range; and the part's share of the points."""
 
+_DIFFERENCE = 4.0
+"""A turn of ten degrees changes features by about a quarter of their size."""
+
 
 class Policy(nn.Module):
     """Policy and value, from a description of each part.
@@ -68,6 +71,8 @@ class Policy(nn.Module):
 class StatePolicy(Policy):
     """The paper's policy: the state is the observed cloud's features beside the reference's, by one encoder.
 
+    What is to be done stands in the difference of both, which is small beside either: it is told apart, and enlarged.
+
     Parameters
     ----------
     width : int
@@ -75,7 +80,7 @@ class StatePolicy(Policy):
 
     def __init__(self, width: int = 64):
         features = 2 * width
-        super().__init__(width, 4 * features)
+        super().__init__(width, 6 * features)
         self.encoder = nn.Sequential(_encoder(3, width, features), nn.Linear(features, features), nn.ReLU())
 
     def describe(self, view: View) -> tuple[list[Tensor], Tensor, list[Tensor]]:
@@ -85,7 +90,8 @@ class StatePolicy(Policy):
         count = shown.sum(2).clamp(min=1)
         # Features are not negative, so that 0 stands for points that do not count.
         have = have * shown
-        return [mean, top, have.sum(2) / count, have.amax(2)], share, []
+        observed, reference = torch.cat([mean, top], -1), torch.cat([have.sum(2) / count, have.amax(2)], -1)
+        return [observed, reference, _DIFFERENCE * (observed - reference)], share, []
 
 
 class Agent(Policy):

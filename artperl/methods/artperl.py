@@ -52,7 +52,9 @@ class ArtPERLOptions:
     start: MeanView = field(default_factory=MeanView)
     """View that the reference is turned to before the agent's first step."""
     fitting: FittingOptions = field(
-        default_factory=lambda: FittingOptions(steps=12, distance="both", facing=True, order="root first")
+        default_factory=lambda: FittingOptions(
+            steps=12, observed_points=128, reference_points=48, distance="both", facing=True, order="root first"
+        )
     )
     """The decision process of the agent."""
 

@@ -205,7 +205,8 @@ same on a GPU, never measured; joint: one estimator for many categories, with an
 PAPER_PRESETS = {
     "quick": TrainOptions(
         method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=120, batch_size=16,
-        num_points=768, retrieval_steps=60, agent_rollouts=60, episodes=48, test_objects=20, test_views=2,
+        num_points=768, retrieval_steps=60, agent_rollouts=110, episodes=24, agent_rate=3e-3, cloning_share=0.7,
+        test_objects=20, test_views=2, ppo=PPOOptions(epochs=2),
     ),
     "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=1500, episodes=64),
 }  # fmt: skip

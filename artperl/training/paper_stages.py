@@ -5,15 +5,16 @@ Each goes on where it stopped: its batches, rates and actions are functions of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from artperl.agent.actions import expected_action, rotation_vector
 from artperl.agent.decision_process import Fitting
-from artperl.agent.ppo import algorithm_1
+from artperl.agent.ppo import CLONING, Phase, algorithm_1
 from artperl.agent.start import mean_start
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
@@ -33,6 +34,11 @@ _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
 _SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
 """Steps and rollouts after which a run is saved, against a stop that nobody asked for."""
+_GUIDED_CLONING, _GUIDED_JOINT = 0.7, 0.5
+"""Shares of the steps that the expert takes. Actions on nine axes that are drawn apart stray in a few steps to where
+nothing can be learnt; quick runs that drew all actions of the second phase ended worse than they began."""
+_ALONE_EVERY, _ALONE = 10, 48
+"""Rollouts between tests of the agent without an expert, and episodes of such a test, always the same ones."""
 _CHOICES = 4
 """Nearest references among which the agent's is drawn: at test time, too, it is seldom the best one."""
 
@@ -133,18 +139,25 @@ class AgentStage:
         if first >= total:
             return
         method = paper_estimator(context)
-        samples = _source(context, method.options.num_points, options.seed + 2, _VIEWS)
+        samples, unseen = (_source(context, POINTS, options.seed + seed, _VIEWS) for seed in (2, 3))
 
         def episodes(n: int) -> tuple[Fitting, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             return fitting_episodes(method, samples, options.episodes, options.seed, n)
 
-        rounds = algorithm_1(method.policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
+        def phase(n: int) -> Phase:
+            own = options.phase(n)
+            return replace(own, guided=_GUIDED_CLONING if own is CLONING else _GUIDED_JOINT)
+
+        rounds = algorithm_1(method.policy, optimizer, episodes, phase, options.ppo, options.seed, first, total)
         bar = track(self.name, total=total, initial=first, smoothing=0.1, shown=context.progress)
         policy.train()
         for n, figures in enumerate(rounds, first):
             context.report(self.name, figures, n)
-            bar.set_postfix_str(f"reward {figures['reward']:.3f}, chamfer {figures['chamfer_end']:.3f}")
+            if n % _ALONE_EVERY == 0 or n + 1 == total:
+                alone = agent_alone(method, *fitting_episodes(method, unseen, _ALONE, options.seed, 0))
+                context.report("agent_alone", alone, n)
+                bar.set_postfix_str(f"alone: reward {alone['reward']:.3f}, chamfer {alone['chamfer_end']:.3f}")
             bar.update()
             _count(context, self.name, n + 1, _SAVE_ROLLOUTS)
         bar.close()
@@ -198,6 +211,21 @@ def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n:
     start = mean_start(reference, points, method.options.start)
     fitting = Fitting(reference, Observed.of(points, part), start, method.options.fitting)
     return fitting, goal
+
+
+@torch.no_grad()
+def agent_alone(method: ArtPERL, fitting: Fitting, goal: Theta) -> dict[str, float]:
+    """Mean reward of a step, chamfer distances, and the root's rotation from the goal, when nobody guides the agent."""
+    start, rewards = fitting.distance, []
+    while not fitting.done:
+        rewards.append(fitting.step(expected_action(method.policy(fitting.view())[0])))
+    off = rotation_vector(goal.rotation @ fitting.theta.rotation.mT)
+    return {
+        "reward": torch.stack(rewards).mean().item(),
+        "chamfer_start": start.mean().item(),
+        "chamfer_end": fitting.distance.mean().item(),
+        "rotation_deg": torch.linalg.vector_norm(off, dim=-1).rad2deg().median().item(),
+    }
 
 
 def _source(context: Context, num_points: int, seed: int, views: int) -> Source:

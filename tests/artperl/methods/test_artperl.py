@@ -10,6 +10,7 @@ import pytest
 import torch
 
 import artsim
+from artperl.agent.actions import NOTHING, NUM_AXES, NUM_BINS, SCALE
 from artperl.agent.start import MeanView
 from artperl.data.fitting_problems import part_truth
 from artperl.estimator import load_estimator, save_estimator
@@ -81,11 +82,13 @@ def test_its_own_object_is_fitted_from_a_near_start() -> None:
 
 def test_the_root_scales_and_its_scale_reaches_the_boxes(base: ShapeBase) -> None:
     method = untrained(base)
+    with torch.no_grad():  # of a free joint, the first scale axis, one step of 0.09 in each of 12 rounds
+        method.policy.heads.bias.view(-1, NUM_AXES, NUM_BINS)[0, SCALE.start, NOTHING + 4] = 50.0
     estimate = method(view(artsim.make("laptop", 7), 1).points)
     row = method.base.object_ids.index(estimate.reference.split(":")[1])
     ratio = estimate.size / base.shapes.box_size[row, :2].numpy()
     np.testing.assert_allclose(ratio[0], ratio[1], rtol=1e-4)  # one scale of all parts, by Theta
-    assert np.ptp(ratio[0]) > 1e-3  # along each axis its own: the untrained policy has scaled
+    np.testing.assert_allclose(ratio[0, 0] / ratio[0, 1:], np.exp(12 * 0.09), rtol=1e-3)
 
 
 def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path: Path) -> None:
@@ -147,7 +150,9 @@ def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path
     networks = training.context.state.networks
     before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
     training.run()
-    assert {name: len(figures) for name, figures in heard.items()} == {"segmentation": 3, "retrieval": 2, "agent": 2}
+    assert {name: len(figures) for name, figures in heard.items()} == {
+        "segmentation": 3, "retrieval": 2, "agent": 2, "agent_alone": 2,
+    }  # fmt: skip
     for name, network in networks.items():
         assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
     method = load_estimator(tmp_path / "best", method="artperl")
