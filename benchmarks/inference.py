@@ -16,7 +16,7 @@ import numpy as np
 import tyro
 
 from artperl.data.categories import ARTIMAGE
-from artperl.evaluation.artimage import row_samples
+from artperl.evaluation.artimage import row_objects, row_samples
 from artperl.evaluation.benchmark import find_estimator
 
 WARM_UP = 5
@@ -51,7 +51,8 @@ def main(options: Options) -> None:
 def milliseconds(category: str, options: Options) -> list[dict[str, float]]:
     """Of each stage, for each instance."""
     estimator = find_estimator(options.weights, category)
-    samples = row_samples("procedural", category, objects=min(20, options.instances), views=options.instances)
+    tested = row_objects("procedural", category, objects=min(20, options.instances))
+    samples = row_samples("procedural", tested, options.instances)
     for sample in samples[:WARM_UP]:
         estimator(sample.points)
     return [estimator(sample.points).milliseconds for sample in samples]

@@ -19,7 +19,7 @@ import numpy as np
 import tyro
 
 from artperl.data.categories import ARTIMAGE
-from artperl.evaluation.artimage import OBJECTS, Row, row_samples
+from artperl.evaluation.artimage import Row, row_objects, row_samples
 from artperl.evaluation.benchmark import find_estimator
 from artperl.evaluation.box_overlap import iou_omad_legacy
 from artperl.evaluation.metrics import iou_rest_exact, rest_centers
@@ -55,10 +55,11 @@ def main(options: Options) -> None:
     folder = os.environ.get("ARTSIM_PARTNET_DIR")
     result = {}
     for category in options.categories:
-        samples = row_samples(options.row, category, Path(folder) if folder else None, OBJECTS, options.views)
-        if not samples:
+        tested = row_objects(options.row, category, Path(folder) if folder else None)
+        if not tested:
             print(f"{category}: no object")
             continue
+        samples = row_samples(options.row, tested, options.views)
         result[category] = overlaps(find_estimator(options.weights, category), samples)
         published = PUBLISHED[category]["iou_omad_legacy"]
         print(f"{category}: {len(samples)} views, mean overlap of each part, %")

@@ -98,7 +98,7 @@ def quality(category: str, estimator: Estimator, network: Siamese, objects: int)
     base, perception = estimator.base, estimator.perception
     P = base.shapes.trees.num_rows
     tested = objects_of([category], objects, TEST_SEEDS)
-    samples = row_samples("procedural", category, objects=objects, views=2 * objects)
+    samples = row_samples("procedural", tested, 2 * objects)
     true = Shapes.from_objects([obj.with_diagonal(1.0) for obj in tested], base.shapes.points.shape[2], P)
     generator = torch.Generator().manual_seed(1)
     vectors = network(*canonical_clouds(base.shapes, generator, POINTS))

@@ -119,10 +119,11 @@ class Evaluate:
         )  # fmt: skip
 
     def _single(self) -> dict[str, Any]:
+        from artperl.data.categories import objects_of
         from artperl.estimator import folder_of, load_estimator, read_settings
         from artperl.evaluation.artimage import match_category
-        from artperl.evaluation.samples import frozen_samples, samples_of
-        from artperl.evaluation.scoring import evaluate
+        from artperl.evaluation.samples import TEST_SEEDS, frozen_samples, samples_of
+        from artperl.evaluation.scoring import evaluate, object_symmetries
         from artperl.evaluation.tables import summary, table
         from artperl.methods import STORED_METHODS
         from artsim.loading.sources import find_sources
@@ -140,13 +141,14 @@ class Evaluate:
         categories = self.category or tuple(learnt.get("categories", estimator.categories))
         if self.files:
             sources = find_sources(self.files, self.package_root)
-            objects = (match_category(source.load(), categories, parts) for source in sources)
+            objects = [match_category(source.load(), categories, parts) for source in sources]
             samples = samples_of(objects, views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")
         else:
+            objects = objects_of(categories, self.objects, TEST_SEEDS, parts)
             samples = frozen_samples(categories, self.objects, views, options, parts=parts)
-        figures = summary(evaluate(estimator, samples, progress=True))
+        figures = summary(evaluate(estimator, samples, True, object_symmetries(objects)))
         print(table(figures))
         return figures
 

@@ -42,11 +42,10 @@ OBJECTS, VIEWS = 40, 500
 """Procedural objects of each category; and the least number of views of a row."""
 
 
-def row_samples(
-    row: Row, category: str, partnet: Path | None = None, objects: int = OBJECTS, views: int = VIEWS,
-    num_points: int = NUM_POINTS,
-) -> list[Sample]:  # fmt: skip
-    """Test samples of one category: always the same ones. Empty where there is no real object.
+def row_objects(
+    row: Row, category: str, partnet: Path | None = None, objects: int = OBJECTS
+) -> list[ArticulatedObject]:
+    """Test objects of one category: always the same ones. Empty where there is no real object.
 
     Parameters
     ----------
@@ -57,18 +56,28 @@ def row_samples(
         Folder of real objects, for the rows that need them.
     objects : int
         Procedural ones.
+    """
+    if row.startswith("procedural"):
+        return objects_of([category], objects, TEST_SEEDS)
+    return real_objects(category, "test", partnet)
+
+
+def row_samples(
+    row: Row, tested: Sequence[ArticulatedObject], views: int = VIEWS, num_points: int = NUM_POINTS
+) -> list[Sample]:
+    """Views of a row's objects: always the same ones.
+
+    Parameters
+    ----------
+    row : Row
+    tested : sequence of ArticulatedObject
+        As :func:`row_objects` gives them.
     views : int
         In all, at least.
     num_points : int
         Of a cloud: pixels of the object, drawn at random.
     """
     preset: ViewPreset = "sphere" if row.endswith("_sphere") else "artimage"
-    if row.startswith("procedural"):
-        tested = objects_of([category], objects, TEST_SEEDS)
-    else:
-        tested = real_objects(category, "test", partnet)
-    if not tested:
-        return []
     options = SampleOptions(num_points=num_points, views=ViewOptions(preset=preset))
     return samples_of(tested, -(-views // len(tested)), options)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from artperl.estimator import WEIGHTS, load_estimator
-from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_train_half, row_samples
+from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_train_half, row_objects, row_samples
 from artperl.evaluation.samples import NUM_POINTS
-from artperl.evaluation.scoring import evaluate
+from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.evaluation.tables import against_published, summary, table
 from artperl.methods.full import Estimator
 
@@ -46,7 +46,7 @@ def run_benchmark(
     partnet : Path, optional
         Folder of real objects.
     objects, views, num_points : int
-        As in :func:`artperl.evaluation.artimage.row_samples`.
+        As in :func:`artperl.evaluation.artimage.row_objects` and :func:`artperl.evaluation.artimage.row_samples`.
     progress : bool
     say : callable
         Gets the lines.
@@ -68,14 +68,15 @@ def run_benchmark(
             if row == "real_trained" and not has_train_half(category):
                 say(f"{category}: no real object to learn from")
                 continue
-            samples = row_samples(row, category, partnet, objects, views, num_points)
-            if not samples:
+            tested = row_objects(row, category, partnet, objects)
+            if not tested:
                 say(f"{category}: no object")
                 continue
             folder = real_weights if row == "real_trained" else weights
             estimator = find_estimator(folder, category, seen_from=seen_from)
-            figures = summary(evaluate(estimator, samples, progress))
-            figures[category]["objects"] = len({sample.object_id for sample in samples})
+            samples = row_samples(row, tested, views, num_points)
+            figures = summary(evaluate(estimator, samples, progress, object_symmetries(tested)))
+            figures[category]["objects"] = len(tested)
             result[row] |= figures
             say(f"{table(figures)}\n{against_published(category, figures[category])}")
     return result

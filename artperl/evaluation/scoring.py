@@ -6,7 +6,7 @@ A failed estimate counts with the worst values of :data:`artperl.evaluation.metr
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,8 +16,10 @@ from scipy.optimize import linear_sum_assignment
 
 from artperl.core.estimate import Estimate
 from artperl.evaluation.metrics import METRICS, rotation_error, translation_error, true_poses
+from artsim.checks.symmetry import Symmetry, equivalent_sample, symmetries
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
 Array = NDArray[np.float64]
@@ -49,6 +51,8 @@ class Scored:
     visibility : float
         Of the part that shows least.
     milliseconds : float
+    symmetric_errors : dict of (K,) float, or None
+        Errors against the nearest of the truths that look the same; None where the object has no symmetry.
     """
 
     category: str
@@ -61,6 +65,12 @@ class Scored:
     confidence: float
     visibility: float
     milliseconds: float
+    symmetric_errors: dict[str, Array] | None = None
+
+    @property
+    def up_to_symmetry(self) -> Scored:
+        """The same estimate, judged by the nearest of the truths that look the same."""
+        return self if self.symmetric_errors is None else replace(self, errors=self.symmetric_errors)
 
     @property
     def rotation(self) -> Array:
@@ -78,10 +88,23 @@ class Scored:
         return bool((self.rotation <= _RIGHT[0]).all() and (self.translation <= _RIGHT[1]).all())
 
 
-def evaluate(estimator: Estimating, samples: Iterable[Sample], progress: bool = False) -> list[Scored]:
-    """Score an estimator on samples, one at a time."""
+Symmetries = Mapping[str, Sequence[Symmetry]]
+"""SHA-256 of an object -> the ways in which it looks the same."""
+
+
+def evaluate(
+    estimator: Estimating, samples: Iterable[Sample], progress: bool = False, symmetric: Symmetries | None = None
+) -> list[Scored]:
+    """Score an estimator on samples, one at a time; where symmetries are given, up to these as well."""
     views = track("evaluating", samples, unit="view", leave=False, shown=progress)
-    return [score(estimator, sample) for sample in views]
+    known = symmetric or {}
+    return [score(estimator, sample, known.get(sample.object_sha256, ())) for sample in views]
+
+
+def object_symmetries(objects: Iterable[ArticulatedObject]) -> dict[str, tuple[Symmetry, ...]]:
+    """Symmetries of those objects that have any, by the objects' SHA-256."""
+    found = {obj.sha256: symmetries(obj) for obj in objects}
+    return {digest: some for digest, some in found.items() if some}
 
 
 def evaluate_foreign(estimator: Estimating, samples: Iterable[Sample]) -> list[Scored]:
@@ -90,8 +113,8 @@ def evaluate_foreign(estimator: Estimating, samples: Iterable[Sample]) -> list[S
     return [_mismatch(sample, estimate, sum(estimate.milliseconds.values())) for sample, estimate in estimates]
 
 
-def score(estimator: Estimating, sample: Sample) -> Scored:
-    """Errors of the estimate of one sample."""
+def score(estimator: Estimating, sample: Sample, symmetric: Sequence[Symmetry] = ()) -> Scored:
+    """Errors of the estimate of one sample, whose object has these symmetries."""
     begun = time.perf_counter()
     try:
         estimate = estimator(sample.points)
@@ -100,14 +123,21 @@ def score(estimator: Estimating, sample: Sample) -> Scored:
     milliseconds = 1e3 * (time.perf_counter() - begun)
     if len(estimate.state) != len(sample.joint_type):
         return _mismatch(sample, estimate, milliseconds)
-    return compare(estimate, sample, milliseconds)
+    return compare(estimate, sample, milliseconds, symmetric)
 
 
-def compare(estimate: Estimate, sample: Sample, milliseconds: float) -> Scored:
-    """Errors of an estimate that has as many parts as the sample."""
+def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: Sequence[Symmetry] = ()) -> Scored:
+    """Errors of an estimate that has as many parts as the sample.
+
+    Of the truths that look the same, the nearest is that of the least mean error in rotation.
+    """
+    errors = _errors(estimate, sample)
+    others = [_errors(estimate, equivalent_sample(sample, symmetry)) for symmetry in symmetric]
+    nearest = min([errors, *others], key=lambda found: float(found["rotation_deg"].mean())) if others else None
     return Scored(
         category=sample.category,
-        errors={name: metric.errors(estimate, sample) for name, metric in METRICS.items()},
+        errors=errors,
+        symmetric_errors=nearest,
         parts_found=match_share(estimate, sample),
         segmentation=float((estimate.part == sample.part).mean()),
         failed=False,
@@ -117,6 +147,10 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float) -> Scored:
         visibility=float(estimate.visibility.min()),
         milliseconds=milliseconds,
     )
+
+
+def _errors(estimate: Estimate, sample: Sample) -> dict[str, Array]:
+    return {name: metric.errors(estimate, sample) for name, metric in METRICS.items()}
 
 
 def match_share(estimate: Estimate, sample: Sample) -> float:

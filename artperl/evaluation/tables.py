@@ -45,7 +45,8 @@ def summary(scored: Sequence[Scored]) -> dict[str, Any]:
     -------
     dict
         ``{category: {"parts": [{metric: {"median": x, "mean": x}}], "failures": n, "instances": n,
-        "ms_per_instance": median, ...}}``, without the metrics that do not apply.
+        "ms_per_instance": median, ...}}``, without the metrics that do not apply; and ``"up_to_symmetry"`` for
+        categories with objects that look the same turned round.
     """
     return {category: _category_summary(scored, category) for category in dict.fromkeys(s.category for s in scored)}
 
@@ -64,7 +65,19 @@ def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]
         "confidence_of_wrong": _median(confidence[~right]),
         "confidence_auroc": auroc(confidence, right),
         "ms_per_instance": float(np.median([s.milliseconds for s in own])),
+        **_symmetric_summary(own),
     }
+
+
+def _symmetric_summary(own: Sequence[Scored]) -> dict[str, Any]:
+    """Figures up to symmetry, of all views: those of objects without a symmetry count as they are."""
+    share = float(np.mean([s.symmetric_errors is not None for s in own]))
+    if share == 0.0:
+        return {}
+    judged = [s.up_to_symmetry for s in own]
+    parts = [_part_summary(judged, k) for k in range(max(len(s.rotation) for s in own))]
+    right = float(np.mean([s.right for s in judged]))
+    return {"up_to_symmetry": {"views_of_symmetric_objects": share, "right": right, "parts": parts}}
 
 
 def _part_summary(scored: Sequence[Scored], k: int) -> dict[str, dict[str, float]]:
@@ -102,12 +115,22 @@ def table(figures: dict[str, Any]) -> str:
             f"{100 * figure['segmentation']:.1f} % of points right, "
             f"{figure['ms_per_instance']:.0f} ms"
         )
+        if "up_to_symmetry" in figure:
+            lines.append(" " * _NAME + _symmetric_line(figure["up_to_symmetry"]))
         if figure["confidence_auroc"] is not None:
             lines.append(
                 f"{'':{_NAME}s}confidence of right ones {100 * figure['confidence_of_right']:.0f} %, of wrong ones "
                 f"{100 * figure['confidence_of_wrong']:.0f} % in the median, AUROC {figure['confidence_auroc']:.2f}"
             )
     return "\n".join(lines)
+
+
+def _symmetric_line(figure: dict[str, Any]) -> str:
+    rotation = " ".join(f"{part['rotation_deg']['mean']:.2f}" for part in figure["parts"])
+    return (
+        f"up to symmetry (in {100 * figure['views_of_symmetric_objects']:.0f} % of views): "
+        f"{100 * figure['right']:.0f} % right, mean rotation deg {rotation}"
+    )
 
 
 def _cell(part: dict[str, dict[str, float]], name: str) -> str:

@@ -11,7 +11,15 @@ import pytest
 import artsim
 from artperl.core.part_order import in_reading_order
 from artperl.data.categories import ARTIMAGE, has_parts, objects_of
-from artperl.evaluation.artimage import SPLIT, half_turn, match_category, real_objects, restrict_joints, row_samples
+from artperl.evaluation.artimage import (
+    SPLIT,
+    half_turn,
+    match_category,
+    real_objects,
+    restrict_joints,
+    row_objects,
+    row_samples,
+)
 from artperl.evaluation.samples import TEST_SEEDS
 from artsim.errors import AssetError
 
@@ -82,11 +90,11 @@ def test_drawers_as_artimage_has_them_open_to_the_front() -> None:
 
 
 def test_rows_are_always_the_same_and_large_enough() -> None:
-    one, other = (row_samples("procedural", "drawer", objects=3, views=8) for _ in range(2))
+    one, other = (row_samples("procedural", row_objects("procedural", "drawer", objects=3), 8) for _ in range(2))
     assert len(one) == 9
     assert all(np.array_equal(a.points, b.points) for a, b in zip(one, other, strict=True))
     assert min(int(s.object_id) for s in one) >= TEST_SEEDS
-    around = row_samples("procedural_sphere", "drawer", objects=3, views=8)
+    around = row_samples("procedural_sphere", row_objects("procedural_sphere", "drawer", objects=3), 8)
     assert not np.array_equal(one[0].points, around[0].points)
 
 

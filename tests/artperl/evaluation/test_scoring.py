@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from artperl.evaluation.metrics import METRICS, true_poses
-from artperl.evaluation.samples import frozen_samples
-from artperl.evaluation.scoring import compare, evaluate, evaluate_foreign, headline, match_share
+from artperl.evaluation.samples import frozen_samples, samples_of
+from artperl.evaluation.scoring import compare, evaluate, evaluate_foreign, headline, match_share, object_symmetries
 from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
+from artsim.checks.symmetry import equivalent_sample
 from artsim.errors import ArtsimError
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.solids import box
 from artsim.observing.sample import Sample
 
 
@@ -74,3 +77,31 @@ def test_whatever_is_said_of_another_category_is_wrong(estimator: Estimator) -> 
     (scored,) = evaluate_foreign(estimator, frozen_samples(["bucket"], 1, 1))
     assert not scored.right
     assert np.isfinite([scored.residual, scored.disagreement]).all()
+
+
+def test_an_estimate_with_equal_parts_exchanged_is_right_up_to_symmetry(estimator: Estimator) -> None:
+    assembly = Assembly()
+    assembly.add("lower", box((-0.02, -0.2, 0.0), (0.02, 0.1, 0.01)), density=500.0)
+    joint = revolute("lower", (0, 0, 1), (0, 0, 0.01), 0.0, 1.0)
+    assembly.add("upper", box((-0.02, -0.2, 0.011), (0.02, 0.1, 0.021)), joint, density=500.0)
+    (sample,) = samples_of([assembly.build("scissors", "0")], 1)
+    known = object_symmetries([assembly.build("scissors", "0")])
+    (symmetry,) = known[sample.object_sha256]
+    other = equivalent_sample(sample, symmetry)
+    rotation, center = true_poses(other)
+    exchanged = replace(
+        estimator(sample.points), rotation=rotation, translation=center, size=other.box_size,
+        T_camera_part=other.T_camera_part, state=other.joint_state, joint_axis=other.joint_axis_camera,
+        part=other.part.astype(np.int64),
+    )  # fmt: skip
+    scored = compare(exchanged, sample, 1.0, [symmetry])
+    assert not scored.right
+    assert scored.rotation.max() > 90.0
+    judged = scored.up_to_symmetry
+    assert judged.right
+    np.testing.assert_allclose(judged.errors["iou_exact"], 1.0, atol=1e-6)
+    figures = summary([scored])["scissors"]
+    assert figures["right"] == 0.0
+    assert figures["up_to_symmetry"]["right"] == 1.0
+    assert "up to symmetry (in 100 % of views): 100 % right" in table(summary([scored]))
+    assert "up_to_symmetry" not in summary([compare(exchanged, sample, 1.0)])["scissors"]
