@@ -1,7 +1,7 @@
 """Buckets and pails: a vessel with a bail on two pins.
 
-Round or oval, tapered, straight or bulging; rims, hoops, ribs, feet and spouts, round or D-shaped bails with or without
-a grip, and how far the bail swings vary. The bail stands upright at rest.
+Round or oval, flat to deep, tapered, straight or bulging; rims, hoops, feet, round or D-shaped bails of wire or straps,
+with or without a grip, where the pins are, and how far the bail swings vary. The bail stands upright at rest.
 """
 
 from __future__ import annotations
@@ -19,35 +19,78 @@ SIDES = 20
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """A bucket whose bail swings to both sides."""
+    """A bucket whose bail stands up at rest and swings to both sides."""
     top = rng.uniform(0.09, 0.18)
-    height = top * rng.uniform(1.2, 2.4)
+    height = top * rng.uniform(0.85, 3.6)
     wall = rng.uniform(0.0018, 0.004)
     profile = _profile(rng, top, height)
     body = vessel(profile, wall, sections=SIDES) + _rim(rng, top, height, wall, profile)
-    oval = rng.uniform(0.7, 0.95) if rng.random() < 0.15 else 1.0  # narrower from front to back
+    oval = rng.uniform(0.7, 0.98) if rng.random() < 0.25 else 1.0  # narrower from front to back
     body = body.scaled((oval, 1.0, 1.0))
     rim_z = height + 0.004
 
-    pin = rng.uniform(0.003, 0.005)
-    pivot = height * rng.uniform(0.88, 0.95)
-    wire = rng.uniform(0.0022, 0.0045)
+    pin = rng.uniform(0.0022, 0.005)
+    # Pins lie near the rim: a bail bends inwards as it rises, and has to pass the rim outside.
+    pivot = height - top * rng.uniform(0.06, 0.22)
+    ahead = top * rng.uniform(-0.32, 0.32) if rng.random() < 0.3 else 0.0  # of the pins from the middle
+    wire = rng.uniform(0.0012, 0.0045)
     outer = top + 0.012  # beyond the rim
     bail_y = outer + 0.0015 + max(wire, 0.0025)
-    wall_y = float(np.interp(pivot, profile[:, 1], profile[:, 0])) - 0.7 * wall
+    across = float(np.sqrt(1.0 - (ahead / (oval * top)) ** 2))
+    wall_y = across * float(np.interp(pivot, profile[:, 1], profile[:, 0])) - 0.7 * wall
     half, boxy = rng.uniform(0.008, 0.016), rng.random() < 0.5
     for side in (-1.0, 1.0):
-        body += _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
-    # In every position a point of a round bail lies this far from the middle of the pins; the rim keeps within.
-    reach = hypot(outer, rim_z - pivot) + 2 * wire + 0.006
-    bail = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
+        ear = _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
+        body += ear.moved((ahead, 0, 0))
+    # Up to the level, a point of a round bail lies this far from the middle of the pins; the rim keeps within.
+    reach = hypot(outer + abs(ahead), rim_z - pivot) + 2 * wire + 0.006
+    bail, path, thick = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
 
-    narrowing = profile[0, 0] < 0.85 * profile[-1, 0]  # so that the bail may hang below the rim
-    limit = np.deg2rad(rng.choice([80.0, 90.0, 103.0 if narrowing else 85.0]))
+    ends = [_swing(side, path, thick, profile, outer + 0.5 * wire, pivot, ahead) for side in (-1.0, 1.0)]
+    shares = rng.uniform(0.6, 1.0, 2)
+    if rng.random() < 0.5:  # as far to both sides
+        ends, shares = [min(ends)] * 2, np.repeat(shares[0], 2)
+    low, high = (float(share * end) for share, end in zip(shares, ends, strict=True))
+    joint = revolute("body", (0, 1, 0), (ahead, 0, pivot), -low, high)
+    bail = bail.moved((ahead, 0, 0))
+    if oval == 1.0 and rng.random() < 0.3:  # pins not quite at the sides
+        turn = rng.uniform(-0.2, 0.2)
+        body, bail = (solid.turned((0, 0, 1), turn) for solid in (body, bail))
+        origin = (ahead * cos(turn), ahead * sin(turn), pivot)
+        joint = revolute("body", (-sin(turn), cos(turn), 0), origin, -low, high)
     bucket = Assembly()
     bucket.add("body", body, density=1500.0)
-    bucket.add("handle", bail, revolute("body", (0, 1, 0), (0, 0, pivot), -limit, limit), density=3000.0)
+    bucket.add("handle", bail, joint, density=3000.0)
     return bucket
+
+
+def _swing(
+    side: float, path: Array, thick: Array, profile: Array, outer: float, pivot: float, ahead: float
+) -> float:
+    """Angle from upright, up to which a bail clears the bucket and the ground as it swings to the back or the front.
+
+    Parameters
+    ----------
+    side : float
+        1 towards +X, -1 towards -X.
+    path : (N, 3) float
+        Middle line of the bail, upright over the pins.
+    thick : (N,) float
+        Its radius.
+    profile : (M, 2) float
+        Outer radius and height of the bucket.
+    outer : float
+        Distance from the middle plane beyond which there are only the ends of the pins.
+    """
+    angles = np.deg2rad(np.arange(60.0, 151.0, 2.0))[:, None]
+    arm = path[:, 2] - pivot
+    x, z = ahead + side * sin(angles) * arm, pivot + cos(angles) * arm
+    wide = np.interp(z, profile[:, 1], profile[:, 0]) + 0.009 + thick  # beyond hoops and the rim
+    beside = (np.abs(path[:, 1]) >= outer) | (hypot(x, path[:, 1]) >= wide)
+    above = z >= profile[-1, 1] + 0.006 + thick
+    clear = (above | (beside & (z >= thick))).all(axis=1)
+    first = len(angles) if clear.all() else int(np.argmin(clear))
+    return float(angles[max(first - 1, 0), 0])
 
 
 def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
@@ -95,10 +138,12 @@ def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float
     return solid + cylinder((0, tip, pivot), (0, tip + side * 0.002, pivot), 1.6 * pin, sections=12)
 
 
-def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin: float, wire: float) -> Solid:
-    """Wire from eye to eye over the opening, with a grip in the middle."""
+def _bail(
+    rng: np.random.Generator, half: float, reach: float, pivot: float, pin: float, wire: float
+) -> tuple[Solid, Array, Array]:
+    """Wire or strap from eye to eye over the opening, with a grip in the middle; its middle line and its radius."""
     curved = rng.random() < 0.85
-    height = reach * rng.uniform(1.0, 1.35)
+    height = reach * (rng.uniform(1.0, 1.3) if rng.random() < 0.6 else rng.uniform(1.2, 1.7))
     if curved:  # from a half circle to a rounded rectangle
         angles = np.linspace(0.0, np.pi, 17)
         cosine, sine, bend = cos(angles), sin(angles), rng.choice([0.95, rng.uniform(0.5, 0.95)])
@@ -109,14 +154,20 @@ def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin
         straight, flat = 0.55 * height, rng.uniform(0.4, 0.8)
         side = [(0.0, half, pivot), (0.0, half, pivot + straight), (0.0, flat * half, pivot + height)]
         path = np.array(side + [(0.0, -y, z) for _, y, z in side[::-1]])
-    lift = (2.2 * pin) / norm(path[1] - path[0])
+    lift = (2.2 * pin + 0.6 * wire) / norm(path[1] - path[0])
     path[0] += (path[1] - path[0]) * lift
     path[-1] += (path[-2] - path[-1]) * lift
-    solid = tube(path, wire, 8)
+    solid, radius = tube(path, wire, 8), wire
+    if rng.random() < 0.25:  # a strap, wide along X
+        wide = rng.uniform(1.5, 5.0)
+        solid, radius = solid.scaled((wide, 1.0, 1.0)), wide * wire
     for side_y in (-half, half):
         solid += ring((0, side_y, pivot), (0, 1, 0), 1.1 * pin, 2.0 * pin + wire, 0.004, 10)
     if rng.random() < 0.6:
         z = path[:, 2].max()
-        radius, length = rng.uniform(0.007, 0.013), 0.35 * half
-        solid += cylinder((0, -length, z), (0, length, z), radius, sections=16)
-    return solid
+        grip, length = rng.uniform(0.007, 0.013), 0.35 * half
+        solid += cylinder((0, -length, z), (0, length, z), grip, sections=16)
+        radius = max(radius, grip)
+    steps = np.linspace(0.0, len(path) - 1.0, 8 * len(path))
+    line = np.column_stack([np.interp(steps, np.arange(len(path)), column) for column in path.T])
+    return solid, line, np.full(len(line), radius)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.common.elementary import cos, hypot, sin
+from artsim.common.elementary import cos, hypot, power, sin
 from artsim.families.details import bow_handle, knob
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
@@ -52,7 +52,8 @@ def build(rng: np.random.Generator) -> Assembly:
         joint = revolute("pot", (0, 1, 0), (x, 0, z), 0.0, np.deg2rad(rng.uniform(80, 105)))
     else:
         assembly.add("pot", pot, density=STEEL)
-        joint = prismatic("pot", (0, 0, 1), 0.0, rng.uniform(0.3, 1.2) * radius, (0, 0, top))
+        rise = radius * power(150.0, rng.uniform(-1.0, 0.03))  # files lift lids by hardly anything
+        joint = prismatic("pot", (0, 0, 1), 0.0, rise, (0, 0, top))
     assembly.add("lid", lid, joint, density=STEEL)
     return assembly
 

@@ -1,4 +1,6 @@
-"""The rest state of each category: laptops, boxes, knives and the like closed, everything else at its file's zero.
+"""The rest state of each category: laptops, boxes, knives and the like closed, buckets with their handles up.
+
+Everything else is at its file's zero.
 
 The zero of a PartNet-Mobility joint differs between instances: a laptop's may stand at any opening angle. Where the
 file's zero cannot be trusted, the closed state is found from geometry and limits, so that it is the same for every
@@ -55,7 +57,7 @@ def rest_state(tree: KinematicTree, parts: Sequence[Part], category: str) -> tup
                 found = rule(shape, int(k))
                 if found is not None:
                     rest[k] = found
-                    reasons[int(k)] = f"a {category.replace('_', ' ')} is closed there"
+                    reasons[int(k)] = _REASONS.get(category, f"a {category.replace('_', ' ')} is closed there")
     return rest, [
         Repair(
             f"joint {tree.joints[k].name!r}", f"rest state {_value(tree, k, rest[k])} instead of 0: {reason}", note=True
@@ -178,12 +180,29 @@ def _arms_together(shape: _Shape, k: int) -> float | None:
     return float(min(good, key=abs))
 
 
+def _upright_bail(shape: _Shape, k: int) -> float | None:
+    """A bucket's handle: straight up over its pins; files have it up, hanging down or half-way at their zero."""
+    if shape.tree.types[k] not in ("revolute", "continuous") or len(shape.corners[k]) == 0:
+        return None
+
+    def depth(state: float) -> float:
+        return -float(shape.posed(k, state)[k][:, 2].mean())
+
+    states = shape.states(k)
+    best = states[np.argmin([depth(state) for state in states])]
+    return shape.refined(depth, k, float(best), float(states[1] - states[0]))
+
+
 _RULES: dict[str, Callable[[_Shape, int], float | None]] = {
     "laptop": _shut_lid,
     "box": _covering_flap,
+    "bucket": _upright_bail,
     "stapler": _arms_together,
     "scissors": _arms_together,
     "knife": _folded,
     "cutter": _folded,
     "suitcase": _shut_case,
 }
+
+_REASONS = {"bucket": "a bucket's handle is up there"}
+"""What is said of rest states that are not closed ones."""
