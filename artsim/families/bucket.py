@@ -64,9 +64,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return bucket
 
 
-def _swing(
-    side: float, path: Array, thick: Array, profile: Array, outer: float, pivot: float, ahead: float
-) -> float:
+def _swing(side: float, path: Array, thick: Array, profile: Array, outer: float, pivot: float, ahead: float) -> float:
     """Angle from upright, up to which a bail clears the bucket and the ground as it swings to the back or the front.
 
     Parameters

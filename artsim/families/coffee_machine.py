@@ -1,4 +1,4 @@
-"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever.
+"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever, urns.
 
 Drip trays slide out; portafilters, levers, lids and steam wands turn; knobs turn freely; buttons travel; carafes and
 water tanks come out. Sizes, round or square bodies, and which of these there are vary.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from artsim.common.elementary import power
 from artsim.families.details import dial
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import (
@@ -15,6 +16,7 @@ from artsim.making.solids import (
     box,
     cylinder,
     hull,
+    hull_of,
     ring,
     rounded_box,
     rounded_rectangle,
@@ -29,8 +31,8 @@ OUT = (-1.0, 0.0, 0.0)
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """An espresso, a drip or a pod machine."""
-    return (_espresso, _drip, _pod)[int(rng.choice(3, p=[0.4, 0.4, 0.2]))](rng)
+    """An espresso, a drip, a pod or an urn-like machine."""
+    return (_espresso, _drip, _pod, _urn)[int(rng.choice(4, p=[0.3, 0.3, 0.15, 0.25]))](rng)
 
 
 def _drip_tray(
@@ -259,4 +261,61 @@ def _pod(rng: np.random.Generator) -> Assembly:
         (tank_x + GAP + 0.001, -0.85 * y, top - 0.001), (x - 0.001, 0.85 * y, top + 0.006), 0.012, axis=2
     )
     machine.add("water_tank", tank, prismatic("body", (0, 0, 1), 0.0, 0.8 * (top - base), (x, 0, base)), density=900.0)
+    return machine
+
+
+def _urn(rng: np.random.Generator) -> Assembly:
+    """A tall body, round or square, with a lid on top that lifts off or swings up; a niche for a cup, or a tap."""
+    x = rng.uniform(0.07, 0.15)
+    y = x * (1.0 if rng.random() < 0.5 else rng.uniform(0.7, 1.35))
+    height = 2 * x * rng.uniform(1.1, 2.9)
+    radius = min(x, y) * rng.choice([0.999, rng.uniform(0.1, 0.6)])
+    niche = rng.random() < 0.5
+    if niche:  # a foot, a column at the back, and a head
+        foot, head = 0.09 * height, rng.uniform(0.35, 0.6) * height
+        back = x * rng.uniform(-0.2, 0.4)
+        body = rounded_box((-x, -y, 0), (x, y, foot), radius, axis=2, steps=5)
+        body += rounded_box((back, -0.85 * y, 0.5 * foot), (0.95 * x, 0.85 * y, height - 0.5 * head), 0.02, axis=2)
+        body += rounded_box((-x, -y, height - head), (x, y, height), radius, axis=2, steps=5)
+        spout = (0.5 * (back - x), 0.0, height - head)
+        body += cylinder((spout[0], 0, spout[2] - 0.02), (spout[0], 0, spout[2] + 0.002), 0.01, 0.015, 14)
+    else:
+        waist = rng.uniform(0.75, 1.0)
+        low = rounded_box((-x, -y, 0), (x, y, 0.12 * height), radius, axis=2, steps=5)
+        body = low + hull_of(
+            rounded_box((-x * waist, -y * waist, 0.11 * height), (x * waist, y * waist, 0.13 * height),
+                        waist * radius, axis=2, steps=5),
+            rounded_box((-x, -y, height - 0.02), (x, y, height), radius, axis=2, steps=5),
+        )  # fmt: skip
+        tap = (-0.9 * waist * x, 0.0, 0.22 * height)
+        body += tube([tap, (tap[0] - 0.3 * x, 0, tap[2]), (tap[0] - 0.34 * x, 0, tap[2] - 0.12 * x)], 0.09 * x, 10)
+    if rng.random() < 0.6:  # a handle at the back
+        body += tube([(0.9 * x, 0, 0.8 * height), (x + 0.35 * x, 0, 0.75 * height), (x + 0.35 * x, 0, 0.4 * height),
+                      (0.7 * x, 0, 0.35 * height)], 0.007, 10)  # fmt: skip
+    machine = Assembly()
+    machine.add("body", body, density=700.0)
+
+    share, seam = rng.uniform(0.6, 1.0), height + GAP
+    rise = x * rng.uniform(0.08, 0.45)
+    side_x, side_y = share * x, share * y
+    lid = hull_of(
+        rounded_box((-side_x, -side_y, seam), (side_x, side_y, seam + 0.3 * rise), share * radius, axis=2, steps=5),
+        rounded_box((-0.7 * side_x, -0.7 * side_y, seam), (0.7 * side_x, 0.7 * side_y, seam + rise),
+                    0.7 * share * radius, axis=2, steps=5),
+    )  # fmt: skip
+    if rng.random() < 0.75:
+        grip = x * rng.uniform(0.08, 0.16)
+        top = seam + rise
+        lid += cylinder((0, 0, top - 0.002), (0, 0, top + grip), 0.6 * grip, sections=14)
+        lid += cylinder((0, 0, top + 0.9 * grip), (0, 0, top + 1.8 * grip), 1.3 * grip, grip, 18)
+    if rng.random() < 0.65:
+        joint = prismatic("body", (0, 0, 1), 0.0, height * power(12.0, rng.uniform(-1.0, -0.1)), (0, 0, seam))
+    else:
+        hinge, half = (side_x + 0.006, 0.0, seam + 0.002), 0.3 * side_y
+        lid += box((side_x - 0.3 * x, -half, seam), (hinge[0], half, seam + 0.004))
+        lid += cylinder((hinge[0], -half, hinge[2]), (hinge[0], half, hinge[2]), 0.002, sections=10)
+        joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
+    machine.add("lid", lid, joint, density=700.0)
+    if niche and rng.random() < 0.6:
+        _controls(rng, machine, -x, 0.5 * (y - radius) if radius < 0.7 * y else 0.001, height - head, height)
     return machine

@@ -1,8 +1,9 @@
 """Suitcases: trolleys, briefcases and bags; upright, closed at rest.
 
 Trolleys have a shell that opens at one side, a telescopic handle of one or two stages (the second follows the first),
-and two wheels or four casters that also swivel. Briefcases open downward to the front and have a handle that folds.
-Bags have one or two bails. Sizes, corners, ribs, where the shells meet and how far they open vary.
+and two wheels or four casters that also swivel. Briefcases open downward to the front and have a handle that folds or
+stands. Bags have one or two bails, on top or on their faces. Sizes, corners, ribs, where the shells meet and how far
+they open vary.
 """
 
 from __future__ import annotations
@@ -183,9 +184,12 @@ def _briefcase(rng: np.random.Generator) -> Assembly:
             cylinder((0.6 * x, s * 0.8 * y, -0.008), (0.6 * x, s * 0.8 * y, 0.003), 0.008, 0.01, 12) for s in (-1, 1)
         )
     case = Assembly()
-    case.add("body", back + lugs, density=300.0)
-    limit = np.deg2rad(rng.choice([80.0, 110.0, 175.0]))
+    folds = rng.random() < 0.65  # the handle, or else it stands
+    case.add("body", back + lugs if folds else back + lugs + handle, density=300.0)
+    limit = np.deg2rad(rng.choice([80.0, 110.0, rng.uniform(90.0, 178.0)]))
     case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, -barrel - 0.001), 0.0, limit), density=300.0)
+    if not folds:
+        return case
     case.add("handle", handle, revolute("body", (0, 1, 0), (middle, 0, z + 0.0085), -1.35, 1.35), density=900.0)
     return case
 
@@ -220,7 +224,7 @@ def _bail(
 def _bag(rng: np.random.Generator) -> Assembly:
     """Bag with a closed body and one or two bails."""
     y = rng.uniform(0.13, 0.26)
-    z, x = y * rng.uniform(1.1, 1.6), y * rng.uniform(0.4, 0.6)
+    z, x = y * rng.uniform(0.8, 2.0), y * rng.uniform(0.25, 0.65)
     kind = int(rng.integers(3))
     top = rng.uniform(0.25, 0.7) if kind == 0 else 1.0
     flare = rng.uniform(0.75, 1.0)
@@ -243,24 +247,29 @@ def _bag(rng: np.random.Generator) -> Assembly:
     two = rng.random() < 0.6 and kind != 2
     wire = rng.uniform(0.004, 0.007)
     half = rng.uniform(0.35, 0.6) * y
-    height = rng.uniform(0.6, 1.4) * half
+    height = rng.uniform(0.6, 2.6) * half
     if kind == 2 or not two:
         crown = body.bounds()[1, 2]
         handle, lugs = _bail((0.0, 0.0, crown + wire + 0.004), half, height, wire, (0, 0, -1), wire + 0.02)
         bag.add("body", body + lugs, density=150.0)
-        bag.add("handle", handle, revolute("body", (0, 1, 0), (0, 0, crown + wire + 0.004), -1.3, 1.3), density=500.0)
+        limit = rng.uniform(1.2, 1.57)
+        bag.add(
+            "handle", handle, revolute("body", (0, 1, 0), (0, 0, crown + wire + 0.004), -limit, limit), density=500.0
+        )
         return bag
     pivot = 0.8 * z
     face = x * (1.0 + (top - 1.0) * (0.8 - 0.12) / 0.88)
     solids = []
-    for s in (-1.0, 1.0):
+    for s in (-1.0, 1.0) if rng.random() < 0.7 else (1.0,):
         place = (s * (face + wire + 0.004), 0.0, pivot)
         handle, lugs = _bail(place, half, height, wire, (-s, 0, 0), wire + 0.02)
         body += lugs
         solids.append((handle, place, s))
     bag.add("body", body, density=150.0)
+    # Along upright faces a bail may hang straight down; faces that lean stand in its way.
+    limit = rng.uniform(2.0, 2.6) if top < 1.0 else rng.uniform(2.4, 3.05)
     for number, (handle, place, s) in enumerate(solids):
-        bag.add(f"handle_{number}", handle, revolute("body", (0, s, 0), place, 0.0, 2.6), density=500.0)
+        bag.add(f"handle_{number}", handle, revolute("body", (0, s, 0), place, 0.0, limit), density=500.0)
     return bag
 
 

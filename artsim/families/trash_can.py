@@ -56,7 +56,7 @@ def _size(rng: np.random.Generator) -> Bin:
     return Bin(
         x=x,
         y=y,
-        height=min(rng.uniform(1.5, 3.6) * max(x, y), 0.75),
+        height=min(rng.uniform(1.2, 5.0) * max(x, y), 0.9),
         radius=radius,
         taper=float(rng.choice([0.0, rng.uniform(0.02, 0.16)])) * min(x, y),
         foot=rng.uniform(0.02, 0.05),
@@ -94,7 +94,8 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
         body += box(
             (x - 0.006 - size.taper, -0.8 * half, size.height - 0.14), (x + 0.014, 0.8 * half, size.height - 0.02)
         )
-    limit = np.deg2rad(rng.uniform(70.0, 100.0))
+    # The hinge stands off the back, so that a lid may fall over until it hangs behind the bin.
+    limit = np.deg2rad(rng.uniform(70.0, 100.0) if rng.random() < 0.65 else rng.uniform(100.0, 180.0))
     joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
     if rng.random() < 0.25:  # a lip to lift it by, instead of a pedal
         lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
