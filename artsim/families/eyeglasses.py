@@ -22,8 +22,10 @@ GAP = 0.0006
 MM = 0.001
 STEEPEST = np.deg2rad(8.5)
 """Largest tilt of the hinges from the vertical."""
-SLIM = 0.3
+SLIM = 0.4
 """Share of the glasses whose temples are slim."""
+APART = 0.25
+"""Share of the glasses whose temples stay each on its own side: their hinges are upright, and their ends may hang."""
 
 
 @dataclass(frozen=True)
@@ -76,30 +78,41 @@ def build(rng: np.random.Generator) -> Assembly:
     depth = max(rim * rng.uniform(0.8, 1.2), 2.2 * MM)
     others = rng.spawn(1)[0]  # so that glasses without slim temples do not depend on how these are drawn
     slim = others.random() < SLIM
-    sheet = slim and others.random() < 0.4
+    sheet = slim and others.random() < 0.6
     if slim:
         front = replace(front, thickness=others.uniform(0.9, 2.2) * MM, barrel=0.0)
-    if sheet:
-        front = replace(front, wrap=0.0, ahead=depth + others.uniform(0.9, 1.5) * MM)
+    if sheet:  # as thin as real frames that were modelled as plates
+        depth = others.uniform(0.7, 3.2) * MM
+        front = replace(front, wrap=0.0, ahead=0.5 * depth + GAP)
     frame = _glass(rng, style, outline, front, rim, depth)
     if style != "shield":
         frame += _bridge(rng, style, outline, front, rim)
-    if not sheet:
+    if sheet:
+        low, high = frame.bounds()
+        frame = frame.moved((front.ahead, 0, 0)).scaled((depth / (high - low)[0], 1, 1)).moved((-front.ahead, 0, 0))
+    else:
         frame += _nose_pads(rng, style, outline, front, rim)
 
     # The temples sweep two parallel planes: hinges tilted sideways by one angle keep one above the other however far
     # each is folded, as real ones lie across one another. The tilt bounds how far their ends may bend down.
     bend = float(min(rng.uniform(3.0, 26.0) * MM, 2 * front.half * sin(STEEPEST) - front.height - 2.5 * MM))
+    apart = others.random() < APART
+    if apart:
+        bend = float(others.uniform(0.02, 0.62)) * 2 * front.half
     temple = _temple(rng, front, max(bend, 0.0), flat)
     rise = float(np.ptp(temple.bounds()[:, 2])) + 2.0 * MM
-    tilt = float(rng.choice([-1, 1]) * arcsin(rise / (2 * front.half)))
+    tilt = float(rng.choice([-1, 1]) * arcsin(min(rise / (2 * front.half), 1.0)))
     limit = np.deg2rad(rng.uniform(77.0, 87.0))
+    if apart:  # no temple passes the middle
+        tilt, reach = 0.0, float(temple.bounds()[1, 0])
+        limit = min(limit, arcsin(min((front.half - front.thickness - 1.0 * MM) / reach, 1.0)))
     hinge = _hinge(front)
     parts = {}
     for name, side in (("temple_left", -1), ("temple_right", 1)):
         place = np.array([0.0, side * front.half, front.hinge_z])
         fixed, moving = (half if side > 0 else half.mirrored(1) for half in hinge)
-        frame += fixed.turned((1, 0, 0), -tilt).moved(place) + _endpiece(front, outline, depth, side)
+        corner = _plate_corner if sheet else _endpiece
+        frame += fixed.turned((1, 0, 0), -tilt).moved(place) + corner(front, outline, depth, side)
         arm = temple if side > 0 else temple.mirrored(1)
         axis = (0.0, -side * sin(tilt), -side * cos(tilt))
         solid = arm.moved(place) + moving.turned((1, 0, 0), -tilt).moved(place)
@@ -274,6 +287,16 @@ def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
     return solid if side > 0 else solid.mirrored(1)
 
 
+def _plate_corner(front: Front, outline: Array, depth: float, side: int) -> Solid:
+    """Corner of a frame that is a plate, from the lens out to the hinge within the plate."""
+    right = outline[outline[:, 0] > np.median(outline[:, 0])]
+    right = right[np.argsort(right[:, 1], kind="stable")]
+    h, z = 0.5 * front.height, front.hinge_z
+    y = float(np.interp(z, right[:, 1], right[:, 0]))
+    solid = box((-depth - GAP, y - 1.2 * MM, z - h), (-GAP, front.half + front.thickness, z + h))
+    return solid if side > 0 else solid.mirrored(1)
+
+
 def _hinge(front: Front) -> tuple[Solid, Solid]:
     """Knuckles on the axis of the hinge at +y: the frame's, above and below, and the temple's between them."""
     if front.slim:
@@ -291,7 +314,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 
 def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
-    length = 2 * front.half * (rng.uniform(0.92, 1.06) if rng.random() < 0.75 else rng.uniform(0.62, 0.92))
+    length = 2 * front.half * (rng.uniform(0.92, 1.06) if rng.random() < 0.75 else rng.uniform(0.42, 0.92))
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - rng.uniform(0.66, 0.74), 0, 1)
     z = -bend * power(share / share[-1], rng.uniform(1.2, 1.8))

@@ -95,7 +95,7 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
             (x - 0.006 - size.taper, -0.8 * half, size.height - 0.14), (x + 0.014, 0.8 * half, size.height - 0.02)
         )
     # The hinge stands off the back, so that a lid may fall over until it hangs behind the bin.
-    limit = np.deg2rad(rng.uniform(70.0, 100.0) if rng.random() < 0.65 else rng.uniform(100.0, 180.0))
+    limit = np.deg2rad(rng.choice([rng.uniform(70.0, 100.0), rng.uniform(100.0, 180.0), 180.0], p=[0.65, 0.2, 0.15]))
     joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
     if rng.random() < 0.25:  # a lip to lift it by, instead of a pedal
         lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
