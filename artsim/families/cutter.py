@@ -18,8 +18,8 @@ GAP = 0.0005
 def build(rng: np.random.Generator) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
     length = rng.uniform(0.07, 0.3)
-    half = 0.5 * length * rng.uniform(0.09, 0.22)
-    height = max(2 * half * rng.uniform(0.35, 0.9), 0.009)
+    half = 0.5 * length * rng.uniform(0.08, 0.4)
+    height = max(2 * half * rng.uniform(0.22, 1.0), 0.009)
     wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
     blade_half = (half - wall - GAP) * rng.uniform(0.8, 1.0)
     slot = blade_half * rng.uniform(0.3, 0.5)
@@ -81,7 +81,7 @@ def _body(
     mouth = nose * rng.uniform(0.0, 0.4)  # one side of the channel begins further back
     narrow = inner + 0.3 * (half - inner)
     outer = np.array([(front, narrow), (front + nose, half), (back, half)])
-    bulge = half * rng.uniform(0.0, 0.15) * (rng.random() < 0.5)
+    bulge = half * rng.uniform(0.0, 0.6) * (rng.random() < 0.5)
     solid = prism(np.concatenate([outer, outer * (1, -1)]), 0.12 * height, floor)
     solid += prism(np.concatenate([outer, outer * (1, -1)]) * (0.99, 0.86), 0.0, 0.2 * height)
     for side in (-1, 1):

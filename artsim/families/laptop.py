@@ -51,21 +51,26 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _shape(rng: np.random.Generator) -> _Shape:
     width = rng.uniform(0.18, 0.48)
-    depth = width * rng.triangular(0.54, 0.67, 0.9)
-    height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
-    lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
+    if rng.random() < 0.5:
+        depth = width * rng.triangular(0.54, 0.67, 0.9)
+        height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
+        lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
+    else:  # netbooks, tablets with a keyboard, thick old ones, square and very wide ones
+        depth = width * rng.uniform(0.45, 1.05)
+        height = max(width * rng.uniform(0.01, 0.15), 0.006)
+        lid = max(width * rng.uniform(0.008, 0.08), 0.004)
     # The lid turns about a barrel between the two shells, in notches behind both.
     radius = rng.uniform(0.3, 0.45) * min(height, lid, 0.009)
     hinge_x = depth / 2 + radius * rng.uniform(-0.4, 0.9)
     back = min(depth / 2, hinge_x - radius - 0.0008)
     front = base_front = -depth / 2
     tilt, odd = 0.0, rng.random()
-    if odd < 0.07:  # a flat keyboard dock, propped up by a thick bar at the back
-        height, tilt = max(width * rng.uniform(0.012, 0.03), 0.005), rng.uniform(0.04, 0.11)
+    if odd < 0.1:  # a flat keyboard dock, propped up by a thick bar at the back
+        height, tilt = max(width * rng.uniform(0.012, 0.03), 0.005), rng.uniform(0.03, 0.2)
         base_front += rng.uniform(0.05, 0.22) * depth
-    elif odd < 0.13:
+    elif odd < 0.16:
         base_front += rng.uniform(0.01, 0.2) * depth
-    elif odd < 0.27:
+    elif odd < 0.3:
         front += rng.uniform(0.005, 0.06) * depth
     corner = depth * rng.choice([rng.uniform(0.005, 0.03), rng.uniform(0.03, 0.13)])
     return _Shape(width, depth, height, lid, front, base_front, back, corner,

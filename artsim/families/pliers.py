@@ -21,8 +21,8 @@ def build(rng: np.random.Generator) -> Assembly:
     """Pliers, closed at rest. One lever turns about the vertical rivet."""
     length = rng.uniform(0.09, 0.38)
     kind = str(rng.choice(["combination", "nose", "flat", "cutting", "hollow"]))
-    jaw = length * {"nose": 0.34, "cutting": 0.13, "flat": 0.26}.get(kind, 0.22) * rng.uniform(0.85, 1.15)
-    thick = length * rng.uniform(0.045, 0.07)
+    jaw = length * {"nose": 0.36, "cutting": 0.13, "flat": 0.26}.get(kind, 0.22) * rng.uniform(0.75, 1.3)
+    thick = length * rng.uniform(0.035, 0.11)
     disc = length * rng.uniform(0.05, 0.075)
     jaws = _jaw(rng, kind, jaw, disc)
     path, radii = _grip(rng, length - jaw, disc, length)
@@ -83,10 +83,10 @@ def _jaw(rng: np.random.Generator, kind: str, length: float, disc: float) -> lis
 
 def _grip(rng: np.random.Generator, reach: float, disc: float, length: float) -> tuple[Array, Array]:
     """(N, 2) middle line of the handle at +Y and (N,) its half width."""
-    half = length * rng.uniform(0.018, 0.026)
+    half = length * rng.uniform(0.014, 0.034)
     share = np.linspace(0.0, 1.0, 12)
     first = half + disc * rng.uniform(0.25, 0.5)
-    widest, last = length * rng.uniform(0.09, 0.14), length * rng.uniform(0.06, 0.12)
+    widest, last = length * rng.uniform(0.08, 0.22), length * rng.uniform(0.05, 0.2)
     middle = rng.uniform(0.45, 0.65)
     y = np.where(
         share < middle,
