@@ -20,10 +20,12 @@ def build(rng: np.random.Generator) -> Assembly:
     length = rng.uniform(0.07, 0.3)
     half = 0.5 * length * rng.uniform(0.08, 0.4)
     height = max(2 * half * rng.uniform(0.22, 1.0), 0.009)
+    if rng.random() < 0.2:  # a slim cutter of sheet steel
+        height = max(length * rng.uniform(0.02, 0.05), 0.0065)
     wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
     blade_half = (half - wall - GAP) * rng.uniform(0.8, 1.0)
     slot = blade_half * rng.uniform(0.3, 0.5)
-    nose = length * rng.uniform(0.06, 0.16)
+    nose = length * rng.uniform(0.02, 0.16)
     capped = rng.random() < 0.45
     front, back = -0.5 * length, 0.5 * length
     cap = rng.uniform(0.008, 0.018) if capped else 0.0
@@ -37,10 +39,10 @@ def build(rng: np.random.Generator) -> Assembly:
     body = _body(rng, front, end, half, height, inner, slot + GAP, channel - GAP, roof, nose, wall, capped)
     cutter.add("body", body, density=1100.0)
 
-    blade_end = end - wall - 0.002 - length * rng.uniform(0.02, 0.1)
+    blade_end = end - wall - 0.002 - length * rng.uniform(0.0, 0.1)
     blade = _blade(rng, front + rng.uniform(0.0005, 0.003), blade_end, blade_half, channel, sheet)
-    button = min(length * rng.uniform(0.1, 0.2), 0.03)
-    button_end = blade_end - rng.uniform(0.0, 0.2) * length
+    button = min(length * rng.uniform(0.05, 0.2), 0.03)
+    button_end = blade_end - rng.choice([0.0, rng.uniform(0.0, 0.2)]) * length
     top = height + rng.uniform(0.002, 0.006)
     blade += _button(rng, button_end - button, button_end, slot, roof - GAP, height, top, half)
     # The button stops before the bridge over the slot at the nose.

@@ -20,13 +20,13 @@ RING = 16
 
 def build(rng: np.random.Generator) -> Assembly:
     """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
-    length = rng.uniform(0.06, 0.2)
+    length = rng.uniform(0.06, 0.26)
     half = 0.5 * length * rng.uniform(0.11, 0.42)
     many = rng.random() < 0.4
     layers = int(rng.integers(2, 5)) if many else 1
-    sheet = rng.uniform(0.0018, 0.0028)
+    sheet = rng.uniform(0.0012, 0.0028)
     liner = 0.0016
-    scale = length * rng.uniform(0.012, 0.03 if many else 0.09)
+    scale = length * rng.uniform(0.008, 0.03 if many else 0.06)
     pin = rng.uniform(0.55, 0.75) * half  # radius of the blades' tangs
     pitch = sheet + 2 * GAP + liner
     ends = np.array([-0.5 * length + half, 0.5 * length - half])

@@ -42,7 +42,7 @@ def build(rng: np.random.Generator) -> Assembly:
     shape = _shape(rng)
     laptop = Assembly()
     laptop.add("base", _propped(rng, shape) if shape.tilt else _base(rng, shape), density=1400.0)
-    opening = np.deg2rad(rng.uniform(88.0, 178.0))
+    opening = np.deg2rad(rng.uniform(88.0, 180.0) if rng.random() < 0.9 else rng.uniform(42.0, 88.0))
     hinge = (shape.hinge_x, 0, shape.hinge_z)
     lid = _lid(rng, shape) + _hinges(rng, shape)
     laptop.add("lid", lid, revolute("base", (0, 1, 0), hinge, 0.0, opening), density=1400.0)
@@ -55,6 +55,10 @@ def _shape(rng: np.random.Generator) -> _Shape:
         depth = width * rng.triangular(0.54, 0.67, 0.9)
         height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
         lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
+    elif rng.random() < 0.25:  # as thin as tablets
+        depth = width * rng.uniform(0.5, 0.95)
+        height = max(width * rng.uniform(0.009, 0.025), 0.004)
+        lid = max(width * rng.uniform(0.007, 0.018), 0.0028)
     else:  # netbooks, tablets with a keyboard, thick old ones, square and very wide ones
         depth = width * rng.uniform(0.45, 1.05)
         height = max(width * rng.uniform(0.01, 0.15), 0.006)
@@ -114,7 +118,7 @@ def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
     # Behind the hinge the base is low enough for the lid to swing past it.
     room = shape.hinge_z - max(shape.hinge_radius, shape.lid + GAP) - 0.0015
     if room > 0.004 and rng.random() < 0.6:
-        reach = shape.hinge_x + rng.uniform(0.0, 0.07) * shape.depth
+        reach = shape.hinge_x + rng.uniform(0.0, 0.07 if rng.random() < 0.6 else 0.2) * shape.depth
         half = width / 2 - rng.choice([0.0, rng.uniform(0.0, 0.2) * width]) - 0.5 * shape.corner
         solid += rounded_box((back - 0.02, -half, 0.15 * room), (reach, half, room), 0.3 * room)
     if rng.random() < 0.7:

@@ -60,9 +60,9 @@ class Layout:
 
 def build(rng: np.random.Generator) -> Assembly:
     """A stapler, closed at rest; what turns about the hinge opens upwards."""
-    length = rng.uniform(0.065, 0.21)
-    width = rng.uniform(0.011, 0.016)
-    base = rng.uniform(0.005, 0.011)
+    length = rng.uniform(0.065, 0.25)
+    width = rng.uniform(0.009, 0.018)
+    base = rng.uniform(0.004, 0.011) if rng.random() < 0.75 else length * rng.uniform(0.06, 0.16)
     tail = rng.uniform(0.0065, 0.01)
     hinge = base + tail + rng.uniform(0.001, 0.004)
     lay = Layout(
@@ -74,16 +74,16 @@ def build(rng: np.random.Generator) -> Assembly:
         magazine=hinge + rng.uniform(0.3, 0.6) * tail,
         inside=0.5 * width + SKIRT + 2 * GAP,
         run=rng.uniform(1.2, 2.5) * tail,
-        back=tail * (rng.uniform(0.5, 0.8) if rng.random() < 0.5 else rng.uniform(1.0, 2.2)),
+        back=_back(rng, length, tail),
     )
-    arm_width = max(width * rng.uniform(1.25, 1.9), 2 * lay.inside)
+    arm_width = max(width * rng.uniform(1.25, 2.6), 2 * lay.inside)
     if rng.random() < 0.15:  # short and wide, like those for a schoolbag
         arm_width = min(arm_width * rng.uniform(1.4, 2.1), 0.5 * length)
     stapler = Assembly()
     stapler.add("base", _base(rng, lay, arm_width), density=2500.0)
     magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
     widest = _opening(arm, lay)
-    wide = min(np.deg2rad(rng.uniform(80, 125) if rng.random() < 0.6 else rng.uniform(125, 170)), widest)
+    wide = min(np.deg2rad(rng.uniform(80, 125) if rng.random() < 0.6 else rng.uniform(125, 204)), widest)
     axis, origin = (0, 1, 0), (0, 0, hinge)
     if rng.random() < 0.55:
         lift = min(np.deg2rad(rng.uniform(12, 50)), 0.5 * wide)
@@ -95,12 +95,20 @@ def build(rng: np.random.Generator) -> Assembly:
     return stapler
 
 
+def _back(rng: np.random.Generator, length: float, tail: float) -> float:
+    """How far the base reaches behind the hinge: hardly, a little, or as a long plate."""
+    kind = rng.random()
+    if kind < 0.45:
+        return float(tail * rng.uniform(0.5, 0.8))
+    return float(tail * rng.uniform(1.0, 2.2) if kind < 0.8 else length * rng.uniform(0.1, 0.95))
+
+
 def _opening(solid: Solid, lay: Layout) -> float:
     """Angle up to which what turns stays above the base, or behind it."""
     corners = np.concatenate([vertices[faces] for vertices, faces in solid.piece_meshes()])
     points = np.concatenate([corners + t * (np.roll(corners, 1, axis=1) - corners) for t in (0.0, 0.25, 0.5, 0.75)])
     points = points.reshape(-1, 3)
-    angles = np.deg2rad(np.arange(0.0, 171.0, 2.0))
+    angles = np.deg2rad(np.arange(0.0, 205.0, 2.0))
     heights = lay.hinge + (points[:, 2] - lay.hinge) * cos(angles)[:, None] - points[:, 0] * sin(angles)[:, None]
     forward = points[:, 0] * cos(angles)[:, None] + (points[:, 2] - lay.hinge) * sin(angles)[:, None]
     low = ((heights < lay.base + 2 * GAP) & (forward < lay.back + 2 * GAP)).any(axis=1)
@@ -163,7 +171,7 @@ def _magazine(rng: np.random.Generator, lay: Layout) -> Solid:
 def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
     """Shell above the magazine, with skirts that reach down beside it; narrow between the cheeks."""
     low = lay.magazine + GAP
-    tall = lay.length * rng.uniform(0.1, 0.17)
+    tall = lay.length * rng.uniform(0.06, 0.28)
     narrow = lay.inside - GAP
     front = -lay.length - rng.uniform(0.0, 0.006)
     neck = -lay.run - 0.001
