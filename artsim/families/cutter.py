@@ -18,10 +18,10 @@ GAP = 0.0005
 def build(rng: np.random.Generator) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
     length = rng.uniform(0.07, 0.3)
-    half = 0.5 * length * rng.uniform(0.08, 0.4)
+    half = 0.5 * length * rng.uniform(0.075, 0.45)
     height = max(2 * half * rng.uniform(0.22, 1.0), 0.009)
-    if rng.random() < 0.2:  # a slim cutter of sheet steel
-        height = max(length * rng.uniform(0.02, 0.05), 0.0065)
+    if rng.random() < 0.15:  # a slim cutter of sheet steel
+        height = max(length * rng.uniform(0.02, 0.05), 0.006)
     wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
     blade_half = (half - wall - GAP) * rng.uniform(0.8, 1.0)
     slot = blade_half * rng.uniform(0.3, 0.5)
@@ -39,11 +39,11 @@ def build(rng: np.random.Generator) -> Assembly:
     body = _body(rng, front, end, half, height, inner, slot + GAP, channel - GAP, roof, nose, wall, capped)
     cutter.add("body", body, density=1100.0)
 
-    blade_end = end - wall - 0.002 - length * rng.uniform(0.0, 0.1)
+    blade_end = end - max(wall + 0.002, 0.005) - length * rng.uniform(0.0, 0.1)
     blade = _blade(rng, front + rng.uniform(0.0005, 0.003), blade_end, blade_half, channel, sheet)
     button = min(length * rng.uniform(0.05, 0.2), 0.03)
     button_end = blade_end - rng.choice([0.0, rng.uniform(0.0, 0.2)]) * length
-    top = height + rng.uniform(0.002, 0.006)
+    top = height + (rng.uniform(0.002, 0.006) if height > 0.009 else rng.uniform(0.0012, 0.003))
     blade += _button(rng, button_end - button, button_end, slot, roof - GAP, height, top, half)
     # The button stops before the bridge over the slot at the nose.
     travel = (button_end - button) - (front + nose) - 0.004
@@ -104,8 +104,8 @@ def _body(
     for x in np.linspace(0.15, 0.15 + 0.04 * rng.integers(0, 7), int(rng.integers(0, 6))):
         at = front + nose + x * (back - front)
         for side in (-1, 1):
-            solid += cylinder((at, side * (half - 0.0008), 0.2 * height), (at, side * (half - 0.0008), 0.8 * height),
-                              0.0016, sections=8)  # fmt: skip
+            rib = (at, side * half)  # no deeper than the wall
+            solid += cylinder((*rib, 0.2 * height), (*rib, 0.8 * height), min(0.0014, 0.8 * wall), sections=8)
     if bulge > 0:
         start, stop = front + nose + 0.3 * (back - front), back - 0.005
         for side in (-1, 1):

@@ -21,19 +21,19 @@ RING = 16
 def build(rng: np.random.Generator) -> Assembly:
     """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
     length = rng.uniform(0.06, 0.26)
-    half = 0.5 * length * rng.uniform(0.11, 0.42)
+    half = 0.5 * length * (rng.uniform(0.11, 0.42) if rng.random() < 0.9 else rng.uniform(0.42, 0.54))
     many = rng.random() < 0.4
     layers = int(rng.integers(2, 5)) if many else 1
     sheet = rng.uniform(0.0012, 0.0028)
     liner = 0.0016
-    scale = length * rng.uniform(0.008, 0.03 if many else 0.06)
+    scale = length * (rng.uniform(0.012, 0.045 if many else 0.09) if rng.random() < 0.85 else rng.uniform(0.007, 0.012))
     pin = rng.uniform(0.55, 0.75) * half  # radius of the blades' tangs
     pitch = sheet + 2 * GAP + liner
     ends = np.array([-0.5 * length + half, 0.5 * length - half])
 
     knife = Assembly()
     handle = Solid()
-    bow = 0.0 if many else half * rng.uniform(-0.5, 0.8)
+    bow = 0.0 if many else half * rng.uniform(-0.8, 1.0)
     swell = rng.uniform(0.0, 0.3)
     outline = _outline(length, half, bow, swell)
     low = scale + liner

@@ -51,16 +51,16 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _shape(rng: np.random.Generator) -> _Shape:
     width = rng.uniform(0.18, 0.48)
-    if rng.random() < 0.5:
+    if rng.random() < 0.4:
         depth = width * rng.triangular(0.54, 0.67, 0.9)
         height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
         lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
-    elif rng.random() < 0.25:  # as thin as tablets
-        depth = width * rng.uniform(0.5, 0.95)
+    elif rng.random() < 0.16:  # as thin as tablets
+        depth = width * rng.uniform(0.42, 1.12)
         height = max(width * rng.uniform(0.009, 0.025), 0.004)
         lid = max(width * rng.uniform(0.007, 0.018), 0.0028)
     else:  # netbooks, tablets with a keyboard, thick old ones, square and very wide ones
-        depth = width * rng.uniform(0.45, 1.05)
+        depth = width * rng.uniform(0.42, 1.12)
         height = max(width * rng.uniform(0.01, 0.15), 0.006)
         lid = max(width * rng.uniform(0.008, 0.08), 0.004)
     # The lid turns about a barrel between the two shells, in notches behind both.

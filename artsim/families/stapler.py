@@ -178,12 +178,13 @@ def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
     x = np.array(
         [front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, rng.uniform(0.3, 0.6) * lay.tail]
     )
-    kind = str(rng.choice(["straight", "arched", "nosed", "wedge"]))
+    kind = str(rng.choice(["straight", "arched", "nosed", "wedge", "tapered"]))
     heights: Array = {
         "straight": np.array([0.85, 0.95, 1.0, 1.0, 0.9, 0.8, 0.5]),
         "arched": np.array([0.5, 0.8, 1.05, 1.05, 0.85, 0.7, 0.4]),
         "nosed": np.array([1.0, 1.1, 0.85, 0.75, 0.7, 0.65, 0.45]),
         "wedge": np.array([1.15, 1.1, 0.95, 0.8, 0.7, 0.6, 0.45]),
+        "tapered": np.array([1.0, 1.05, 0.95, 0.6, 0.25, 0.15, 0.1]),  # low at the hinge: turns over to lie behind
     }[kind]
     top = low + np.maximum(tall * heights, 0.004)
     waist = rng.uniform(0.75, 1.0)
