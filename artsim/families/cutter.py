@@ -1,6 +1,6 @@
 """Cutters (slide knives): a handle with a channel, a blade that slides out to -X by a button, and some end caps.
 
-Varied: size, nose of the handle, angle of the blade's point, button, grooves and bulges of the
+Varied: size (slim ones of sheet steel to wide box cutters), nose of the handle, angle of the blade's point, button, grooves and bulges of the
 handle, a cap at the back that pulls out, and a locking wheel on the blade's button.
 """
 
@@ -19,7 +19,7 @@ def build(rng: np.random.Generator) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
     length = rng.uniform(0.07, 0.3)
     half = 0.5 * length * rng.uniform(0.075, 0.45)
-    height = max(2 * half * rng.uniform(0.22, 1.0), 0.009)
+    height = max(min(2 * half * rng.uniform(0.2, 1.0), 0.26 * length), 0.009)
     if rng.random() < 0.15:  # a slim cutter of sheet steel
         height = max(length * rng.uniform(0.02, 0.05), 0.006)
     wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
