@@ -1,7 +1,7 @@
 """Cutters (slide knives): a handle with a channel, a blade that slides out to -X by a button, and some end caps.
 
-Varied: size (slim ones of sheet steel to wide box cutters), nose of the handle, angle of the blade's point, button, grooves and bulges of the
-handle, a cap at the back that pulls out, and a locking wheel on the blade's button.
+Varied: size (slim ones of sheet steel to wide box cutters), nose of the handle, angle of the blade's point, button,
+grooves and bulges of the handle, a cap at the back that pulls out, and a locking wheel on the blade's button.
 """
 
 from __future__ import annotations

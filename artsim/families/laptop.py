@@ -1,8 +1,8 @@
 """Laptops: a base with keyboard and touchpad, and a lid with a screen on a hinge at the back.
 
-What varies: proportions, thickness (from tablets with a keyboard to thick old ones), round or bevelled shells, a base that is shorter than the lid or reaches behind
-the hinge, one long hinge or two short ones, keyboard with or without number block, touchpad and its buttons, the
-screen's frame, badges, feet, how far the lid opens.
+What varies: proportions, thickness (from tablets with a keyboard to thick old ones), round or bevelled shells, a base
+that is shorter than the lid or reaches behind the hinge, one long hinge or two short ones, keyboard with or without
+number block, touchpad and its buttons, the screen's frame, badges, feet, how far the lid opens.
 """
 
 from __future__ import annotations

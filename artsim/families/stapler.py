@@ -1,8 +1,8 @@
 """Staplers: a base with an anvil, a magazine and a pressing arm on one hinge at the back; the arm closed at rest.
 
-Varied: length and slenderness, a low or thick desk base, a wide round base or a long plate behind the hinge, magazine apart from the arm or
-one part with it, the profile of the arm (straight, arched, with a nose, stepped), its plan, cheeks at the hinge, a
-rubber pad, and how far each opens.
+Varied: length and slenderness, a low or thick desk base, a wide round base or a long plate behind the hinge, magazine
+apart from the arm or one part with it, the profile of the arm (straight, arched, with a nose, stepped), its plan,
+cheeks at the hinge, a rubber pad, and how far each opens.
 """
 
 from __future__ import annotations
