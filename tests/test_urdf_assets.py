@@ -183,7 +183,7 @@ def test_demo_objects_have_real_sizes() -> None:
         "cabinet": (0.47, 0.50, 0.76),
         "eyeglasses": (0.14, 0.14, 0.05),
         "dishwasher": (0.65, 0.60, 0.82),
-        "scissors": (0.20, 0.09, 0.01),
+        "scissors": (0.09, 0.20, 0.01),
     }
     for folder in DEMO:
         np.testing.assert_allclose(np.ptp(load(folder).bounds, axis=0), sizes[folder.name], atol=0.006)
@@ -262,13 +262,14 @@ def test_the_legs_of_the_eyeglasses_point_backwards_and_fold_inwards() -> None:
         assert folded[:, 1].min() < -0.02 < 0.02 < folded[:, 1].max(), "folded, a leg reaches past the middle"
 
 
-def test_the_scissors_lie_flat_with_their_blades_in_front() -> None:
+def test_the_scissors_lie_flat_with_their_points_at_y_and_the_ring_of_the_root_towards_minus_x() -> None:
     obj = load(ASSETS / "scissors")
     points = np.concatenate([part.vertices for part in obj.parts])
-    width_in_front = np.ptp(points[points[:, 0] < -0.02, 1])
-    width_behind = np.ptp(points[points[:, 0] > 0.02, 1])
-    assert width_behind > 4 * width_in_front
-    assert np.ptp(opened(obj, 1)[:, 1]) > 0.06
+    width_of_points = np.ptp(points[points[:, 1] > 0.02, 0])
+    width_of_rings = np.ptp(points[points[:, 1] < -0.02, 0])
+    assert width_of_rings > 4 * width_of_points
+    assert obj.box_center[0, 0] < 0 < obj.box_center[1, 0]
+    assert np.ptp(opened(obj, 1)[:, 0]) > 0.06
 
 
 def states(obj: ArticulatedObject) -> list[Array]:

@@ -370,11 +370,14 @@ def cutlery_basket(corner: Vector, size: Vector, wall: float = 0.002) -> Mesh:
 
 
 def scissors() -> Model:
-    """Two halves that cross at the pivot, lying flat with the blades to the front; zero is closed."""
+    """Two halves that cross at the pivot, lying flat with their points at +Y; zero is closed.
+
+    As in PartNet-Mobility, the root's ring is the one towards -X.
+    """
 
     def half(side: int, low: float, high: float, pivot_hole: float) -> list[tuple[str, Mesh]]:
         def mirrored(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-            return [(x, side * y) for x, y in points]
+            return [(side * y, -x) for x, y in points]
 
         blade = Polygon(
             mirrored([(-0.098, 0.0006), (-0.012, 0.0022), (0.004, 0.007), (0.008, 0), (0, -0.0082), (-0.02, -0.0088)])
@@ -383,8 +386,8 @@ def scissors() -> Model:
         steel = unary_union([blade.buffer(0.0004), shank])
         if pivot_hole:
             steel = steel.difference(Point(0, 0).buffer(pivot_hole))
-        center = (0.064, side * 0.0265)
-        eye = ellipse(center, 0.034, 0.0195).difference(ellipse(center, 0.0275, 0.0130))
+        center = (side * 0.0265, -0.064)
+        eye = ellipse(center, 0.0195, 0.034).difference(ellipse(center, 0.0130, 0.0275))
         return [("blade", plate(steel, low, high)), ("handle", plate(eye, low - 0.002, high + 0.002))]
 
     lower = half(1, 0.0, 0.0024, 0.0)
@@ -394,8 +397,8 @@ def scissors() -> Model:
     ]
     upper = half(-1, 0.0028, 0.0052, 0.0038)
     links = [
-        Link("link_0", "blade", lower),
-        Link("link_1", "blade", upper, "link_0", "revolute", (0, 0, 0), (0, 0, -1), (0, 0.9)),
+        Link("link_0", "blade", upper),
+        Link("link_1", "blade", lower, "link_0", "revolute", (0, 0, 0), (0, 0, 1), (0, 0.9)),
     ]
     return Model("Scissors", links)
 

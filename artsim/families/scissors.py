@@ -1,4 +1,7 @@
-"""Scissors: two blades with ring handles that cross at a pivot, closed at rest, lying flat with the points at -X.
+"""Scissors: two blades with ring handles that cross at a pivot, closed at rest, lying flat with the points at +Y.
+
+The frame is that of PartNet-Mobility's scissors: rings at -Y, the root's towards -X, and the other blade opens about
++Z. Both blades are built with their points at -X, and turned in the end.
 
 Varied: length, the share of the blades, their width, points and backs, handles of metal rods or thick plastic, rings
 round or long, alike or one longer than the other, offset to one side, open finger rests, and the pivot.
@@ -17,6 +20,8 @@ from artsim.making.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
+_POINTS_TO_Y = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Quarter turn that takes -X, where blades are built with their points, to +Y, and rings at -Y to -X."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +65,9 @@ def build(rng: np.random.Generator) -> Assembly:
     button = sheet * rng.uniform(0.4, 1.0)
 
     opening = np.deg2rad(rng.uniform(45.0, 100.0))
-    scissors = Assembly()
     middle = sheet + GAP / 2
-    for k, name in enumerate(("blade_1", "blade_2")):
+    blades = []
+    for k in range(2):
         # The second blade lies on the first; each handle is as thick as both, on its own side of the middle.
         low = k * (sheet + GAP)
         side = 1.0 if k == 0 else -1.0
@@ -77,8 +82,12 @@ def build(rng: np.random.Generator) -> Assembly:
         solid += cylinder(
             (0, 0, face - 0.5 * outward * sheet), (0, 0, face + outward * button), pivot, 0.85 * pivot, 20
         )
-        joint = None if k == 0 else revolute("blade_1", (0, 0, -1), (0, 0, middle), 0.0, opening)
-        scissors.add(name, solid, joint, label="blade", density=4500.0)
+        blades.append(solid.rotated(_POINTS_TO_Y))
+    scissors = Assembly()
+    # The upper blade is the root: its ring is the one towards -X.
+    scissors.add("blade_1", blades[1], label="blade", density=4500.0)
+    joint = revolute("blade_1", (0, 0, 1), (0, 0, middle), 0.0, opening)
+    scissors.add("blade_2", blades[0], joint, label="blade", density=4500.0)
     return scissors
 
 

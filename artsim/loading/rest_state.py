@@ -1,4 +1,4 @@
-"""The rest state of each category: laptops, boxes, knives and the like closed, buckets with their handles up.
+"""The rest state of each category: laptops, boxes, knives and the like closed, handles of buckets upright.
 
 Everything else is at its file's zero.
 
@@ -20,6 +20,8 @@ from artsim.model.objects import Part, Repair
 
 _STATES = 61  # of a joint's range that are looked at before refining
 _HINGED_SHUT = np.deg2rad(15.0)  # a lid's limit may lie this far beyond the state in which it is shut
+_AS_SMALL = 1.01  # volumes that differ by less are alike: rings and blades hide a little angle
+_UPRIGHT = np.deg2rad(3.0)  # a handle that leans by less stands upright
 
 
 def canonical_category(name: str) -> str:
@@ -168,41 +170,52 @@ def _shut_case(shape: _Shape, k: int) -> float | None:
 
 
 def _arms_together(shape: _Shape, k: int) -> float | None:
-    """Staplers and scissors: arms together; of nearly equal states, the one nearest the file's zero."""
+    """Staplers: arms together; of nearly equal states, the one nearest the file's zero."""
     if shape.tree.types[k] != "revolute":
         return None
     states = shape.states(k)
     volumes = np.array([shape.hull_volume(k, state) for state in states])
     least = shape.refined(lambda q: shape.hull_volume(k, q), k, float(states[volumes.argmin()]), states[1] - states[0])
-    limit = 1.01 * min(shape.hull_volume(k, least), volumes.min())
+    limit = _AS_SMALL * min(shape.hull_volume(k, least), volumes.min())
     candidates = np.array([least, shape.rest[k], *states[volumes <= limit]])
     good = [state for state in candidates if shape.hull_volume(k, state) <= limit]
     return float(min(good, key=abs))
 
 
-def _upright_bail(shape: _Shape, k: int) -> float | None:
-    """A bucket's handle: straight up over its pins; files have it up, hanging down or half-way at their zero."""
-    if shape.tree.types[k] not in ("revolute", "continuous") or len(shape.corners[k]) == 0:
+def _blades_together(shape: _Shape, k: int) -> float | None:
+    """Scissors: shut as far as they go, unless the range goes beyond the state in which blades lie on each other."""
+    together = _arms_together(shape, k)
+    if together is None:
+        return None
+    end = _closing_end(shape, k)
+    return end if shape.hull_volume(k, end) <= _AS_SMALL * shape.hull_volume(k, together) else together
+
+
+def _upright_handle(shape: _Shape, k: int) -> float | None:
+    """A bucket's handle: upright, as far as it goes; files have it anywhere from one rim to the other."""
+    if shape.tree.types[k] != "revolute" or "handle" not in shape.labels[k] or len(shape.corners[k]) == 0:
         return None
 
-    def depth(state: float) -> float:
+    def cost(state: float) -> float:
         return -float(shape.posed(k, state)[k][:, 2].mean())
 
     states = shape.states(k)
-    best = states[np.argmin([depth(state) for state in states])]
-    return shape.refined(depth, k, float(best), float(states[1] - states[0]))
+    best = states[np.argmin([cost(state) for state in states])]
+    upright = shape.refined(cost, k, float(best), float(states[1] - states[0]))
+    zero = float(shape.rest[k])
+    return zero if abs(upright - zero) < _UPRIGHT else upright
 
+
+_REASONS = {"bucket": "its handle is upright there"}
+"""Of rules that do not close what they are for."""
 
 _RULES: dict[str, Callable[[_Shape, int], float | None]] = {
     "laptop": _shut_lid,
     "box": _covering_flap,
-    "bucket": _upright_bail,
     "stapler": _arms_together,
-    "scissors": _arms_together,
+    "scissors": _blades_together,
+    "bucket": _upright_handle,
     "knife": _folded,
     "cutter": _folded,
     "suitcase": _shut_case,
 }
-
-_REASONS = {"bucket": "a bucket's handle is up there"}
-"""What is said of rest states that are not closed ones."""

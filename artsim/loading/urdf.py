@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.common.files import read_bounded
-from artsim.common.products import matmul, norm, unit
+from artsim.common.products import apply, matmul, norm, unit
 from artsim.errors import AssetError
 from artsim.loading.bodies import (
     RigidBody,
@@ -27,6 +27,7 @@ from artsim.loading.bodies import (
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_shapes, merge_shapes
 from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
+from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.urdf_xml import parse_robot
@@ -57,7 +58,8 @@ def load(
         A URDF file, a folder that holds one (such as a PartNet-Mobility folder), or an ``.npz`` object file
         out of a generated dataset.
     category : str, optional
-        Category whose rest state is wanted; by default what the side files say, else "unknown".
+        Category whose rest state and rest frame are wanted; by default what the side files say, else "unknown", for
+        which both are as the file has them.
     package_roots : mapping, optional
         Folders of ``package://`` names. Meshes outside these and the asset's own folder are refused.
     limits : LoadLimits, optional
@@ -98,9 +100,11 @@ def load(
             Repair("file", f"moves {len(tree) - 1} parts where its annotation lists {side.num_movable}: taken as it is")
         )
     # No rule holds for a category that nothing is known of: the zero of a file of our own needs no aligning.
-    rest, reasons = rest_state(tree, parts, "unknown" if exported else category)
+    known = "unknown" if exported else category
+    rest, reasons = rest_state(tree, parts, known)
     repairs += reasons
-    tree, parts, T_base_rest = _to_rest_frame(tree, parts, rest)
+    tree, parts, T_base_rest, reasons = _to_rest_frame(tree, parts, rest, known)
+    repairs += reasons
     repairs += _far_slides(tree, parts)
     return ArticulatedObject(
         object_id=_object_id(file, side.object_id),
@@ -339,22 +343,33 @@ def _mimic(joint: UrdfJoint, index: Mapping[str, int], file: Path) -> Mimic | No
     return Mimic(source, joint.mimic.multiplier, joint.mimic.offset)
 
 
-def _to_rest_frame(tree: KinematicTree, parts: list[Part], rest: Array) -> tuple[KinematicTree, list[Part], Array]:
-    """Pose everything at the rest state and move the origin to the centre of the whole object's box.
+def _to_rest_frame(
+    tree: KinematicTree, parts: list[Part], rest: Array, category: str
+) -> tuple[KinematicTree, list[Part], Array, list[Repair]]:
+    """Pose everything at the rest state, turn it as its category lies, and move the origin to the centre of its box.
 
-    Returns the tree, the parts and ``T_base_rest``.
+    Returns the tree, the parts, ``T_base_rest`` and the reason for a turn.
     """
     rest = tree.complete_state(rest)
     T_base_part = tree.forward_kinematics(rest)
     axes, origins = tree.posed_joints(T_base_part)
     posed = [replace(p, vertices=transform_points(T, p.vertices)) for p, T in zip(parts, T_base_part, strict=True)]
-    bounds = np.stack([p.bounds for p in posed if len(p.faces)])
-    center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
     joints = [
-        replace(joint, axis=_triple(a), origin=_triple(o - center), rest=float(r))
+        replace(joint, axis=_triple(a), origin=_triple(o), rest=float(r))
         for joint, a, o, r in zip(tree.joints, unit(axes), origins, rest, strict=True)
     ]
-    joints[0] = replace(joints[0], origin=(0.0, 0.0, 0.0))
+    turn, reasons = rest_rotation(KinematicTree(joints), posed, rest, category)
     T_base_rest = np.eye(4)
-    T_base_rest[:3, 3] = center
-    return KinematicTree(joints), [replace(p, vertices=p.vertices - center) for p in posed], T_base_rest
+    if turn is not None:
+        T_base_rest[:3, :3] = turn.T
+        posed = [replace(p, vertices=apply(turn, p.vertices)) for p in posed]
+        joints = [
+            replace(joint, axis=_triple(apply(turn, joint.axis)), origin=_triple(apply(turn, joint.origin)))
+            for joint in joints
+        ]
+    bounds = np.stack([p.bounds for p in posed if len(p.faces)])
+    center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
+    joints = [replace(joint, origin=_triple(np.asarray(joint.origin) - center)) for joint in joints]
+    joints[0] = replace(joints[0], origin=(0.0, 0.0, 0.0))
+    T_base_rest[:3, 3] = apply(T_base_rest[:3, :3], center)
+    return KinematicTree(joints), [replace(p, vertices=p.vertices - center) for p in posed], T_base_rest, reasons

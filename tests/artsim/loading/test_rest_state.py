@@ -91,6 +91,20 @@ def test_a_closed_knife_is_short(partnet_dir: Path) -> None:
         assert obj.diagonal < 1.02 * min(lengths), obj.object_id
 
 
+def test_a_buckets_handle_is_upright_whatever_its_files_zero_is(partnet_dir: Path) -> None:
+    turned = 0
+    for obj in real(partnet_dir, "Bucket"):
+        for k in obj.tree.free_joints:
+            rim = obj.part_bounds[0, 1, 2]
+            handle = obj.parts[k].vertices - np.array(obj.tree.joints[k].origin)
+            across = handle - np.outer(handle @ obj.tree.axes[k], obj.tree.axes[k])
+            top = across[np.argmax(np.linalg.norm(across, axis=1))]
+            assert top[2] > 0.97 * np.linalg.norm(top), obj.object_id
+            assert obj.part_bounds[k, 1, 2] > rim, obj.object_id
+            turned += any("its handle is upright there" in repair.what for repair in obj.repairs)
+    assert turned >= 6
+
+
 @pytest.mark.slow
 def test_rest_states_lie_within_the_limits(partnet_dir: Path) -> None:
     for category in ("Laptop", "Box", "Stapler", "Suitcase", "Knife", "Bucket"):
