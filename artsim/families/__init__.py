@@ -21,6 +21,7 @@ Family = Callable[[np.random.Generator], Assembly]
 
 CATEGORIES = (
     "box",
+    "bottle",
     "bucket",
     "coffee_machine",
     "cutter",
@@ -33,6 +34,7 @@ CATEGORIES = (
     "faucet",
     "folding_knife",
     "globe",
+    "kettle",
     "kitchen_pot",
     "laptop",
     "microwave",
