@@ -2,8 +2,8 @@
 
 What varies: the outline from the side (cone, drum, belly, ball, squat) and from above, the spout (beak, straight,
 gooseneck), the lid, which lifts off, turns, screws or swings about a hinge, its knob, the handle (a bow over the lid that
-swings down or that stands fast, or a grip at the back), a cover of the spout, a switch, a button of the lid, and the
-stand below, on which electric kettles turn. One to four parts move.
+swings down or that stands fast, or a grip at the back), a cover of the spout, a switch or a button, and the stand below,
+on which electric kettles turn or from which they lift. One to three parts move.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -44,10 +45,12 @@ def build(rng: np.random.Generator) -> Assembly:
     pot = _pot(rng, kind, 0.022 if standing else 0.0)
     outline = cross_section(str(rng.choice(["round", "round", "round", "octagon", "square"])), rng.uniform(0.0, 0.4))
     body = moulded(pot.levels, outline)
-    body += _spout(rng, kind, pot)
+    spout, mouth = _spout(rng, kind, pot)
+    body += spout
     kettle = Assembly()
     bow = kind != "electric" and rng.random() < (0.75 if kind == "stove" else 0.25)
     swinging = bow and rng.random() < 0.6
+    over = np.inf
     room = pot.top + pot.mouth * rng.uniform(1.1, 1.6)  # below the bow
     lid_joint = str(rng.choice(["lift", "hinge", "turn", "screw"], p=[0.45, 0.3, 0.1, 0.15]))
     if kind == "electric" and rng.random() < 0.6:
@@ -55,20 +58,34 @@ def build(rng: np.random.Generator) -> Assembly:
     if bow and lid_joint == "hinge":
         lid_joint = "lift"
     if bow and not swinging:
-        body += _bow(rng, pot, room, 0.0)
+        arch, over = _bow(rng, pot, room)
+        body += arch
     if not bow:
         body += _back_grip(rng, pot, lid_joint == "hinge", kind)
     lid, knob_top = _lid(rng, pot, lid_joint, bow)
     if lid_joint == "hinge":
         body += _lugs(pot)
-    kettle.add("body", body, density=DENSITY)
-    kettle.add("lid", lid, _lid_joint(rng, lid_joint, pot, room - knob_top if bow else np.inf), density=DENSITY)
+    pins = _pins(rng, pot, max(room, knob_top + 0.012))
     if swinging:
-        _swinging_bow(rng, kettle, pot, max(room, knob_top + 0.02))
+        body += union(
+            hull_of(cylinder((0, s * 0.6 * pins.reach, pins.z), (0, s * (pins.reach - pins.rod - GAP), pins.z), r))
+            for s in (-1.0, 1.0)
+            for r in (1.6 * pins.rod,)
+        )
+    switch = _switch(rng, pot) if kind == "electric" else None
+    if switch is not None:
+        body += switch[0]
+    kettle.add("body", body, density=DENSITY)
+    free = min(room - knob_top, over - pot.top - 0.02) if bow else np.inf
+    kettle.add("lid", lid, _lid_joint(rng, lid_joint, pot, free), density=DENSITY)
+    if swinging:
+        _swinging_bow(rng, kettle, pins, pot)
+    if mouth is not None and kind == "stove" and rng.random() < 0.6:
+        _whistle(rng, kettle, mouth)
     if standing:
         _base(rng, kettle, pot)
-    if kind == "electric":
-        _switch(rng, kettle, pot)
+    if switch is not None:
+        kettle.add(switch[1], switch[2], switch[3], density=900.0)
     return kettle
 
 
@@ -104,37 +121,53 @@ def _pot(rng: np.random.Generator, kind: str, foot: float) -> Pot:
     return Pot(levels, mouth * wide, foot, foot + height)
 
 
-def _spout(rng: np.random.Generator, kind: str, pot: Pot) -> Solid:
-    """Beak at the rim, or a tube from the belly, which ends below the rim or a little above."""
+def _spout(
+    rng: np.random.Generator, kind: str, pot: Pot
+) -> tuple[Solid, tuple[Array, Array, float] | None]:
+    """Beak at the rim, or a tube from the belly; the mouth of a straight one: its middle, direction and radius."""
     height = pot.top - pot.foot
     choice = str(rng.choice(["tube", "goose", "beak"], p=[0.55, 0.3, 0.15]))
     if kind == "electric":
         choice = str(rng.choice(["beak", "goose", "tube"], p=[0.75, 0.15, 0.1]))
     if choice == "beak":
-        z0, z1 = pot.top - height * rng.uniform(0.25, 0.6), pot.top - 0.004
-        reach = pot.radius(z1) + rng.uniform(0.012, 0.035)
-        half = pot.mouth * rng.uniform(0.25, 0.5)
-        inner = 0.8 * pot.radius(z1)
-        return hull_of(box((-inner, -half, z0 + 0.3 * (z1 - z0)), (-inner + 0.004, half, z1)),
-                       box((-pot.radius(z0), -0.3 * half, z0), (-0.8 * pot.radius(z0), 0.3 * half, z0 + 0.004)),
-                       box((-reach, -0.2 * half, z1 - 0.006), (-reach + 0.003, 0.2 * half, z1)))  # fmt: skip
-    start = pot.foot + height * rng.uniform(0.2, 0.55)
-    r = pot.mouth * rng.uniform(0.16, 0.3) if choice == "tube" else pot.mouth * rng.uniform(0.1, 0.16)
+        z0, z1 = pot.top - height * rng.uniform(0.2, 0.6), pot.top - rng.uniform(0.001, 0.03) * height
+        reach = pot.radius(z1) + pot.mouth * rng.uniform(0.2, 0.55)
+        half = pot.mouth * rng.uniform(0.35, 0.75)
+        root = np.array([(-pot.radius(z) * c, y, z) for z in (z0, z1) for y, c in ((-half, 0.6), (half, 0.6))])
+        root[:2, 1] *= 0.25
+        tip = [(-reach, y, z) for y in (-0.12 * half, 0.12 * half) for z in (z1 - 0.06 * height, z1 + 0.02 * height)]
+        return hull(np.concatenate([root, [(-0.3 * pot.radius(z1), 0.0, z1 - 0.002)], tip])), None
+    start = pot.foot + height * rng.uniform(0.2, 0.5)
+    wide = pot.mouth * (rng.uniform(0.2, 0.36) if choice == "tube" else rng.uniform(0.12, 0.2))
     root = pot.radius(start)
     end = pot.foot + height * rng.uniform(0.85, 1.1)
-    reach = root + height * rng.uniform(0.3, 0.7)
+    reach = max(root, pot.radius(end - 0.15 * height)) + height * rng.uniform(0.25, 0.6)
     if choice == "tube":
         tip = np.array([-reach, 0.0, end])
-        path = [(-0.7 * root, 0.0, start), (-root - 0.2 * (reach - root), 0.0, start + 0.25 * (end - start)), tip]
-        solid = tube(path, [1.5 * r, 1.2 * r, 0.7 * r], 14)
-        if rng.random() < 0.5:
-            solid += tube([tip, tip + (-0.012, 0, 0)], [0.7 * r, 0.75 * r], 12)
-        return solid
-    bend = root + 0.35 * (reach - root)
-    path = [(-0.8 * root, 0.0, start), (-bend, 0.0, start + 0.05 * height), (-bend - 0.12 * (reach - root), 0.0,
-             start + 0.4 * (end - start)), (-bend - 0.3 * (reach - root), 0.0, start + 0.85 * (end - start)),
-            (-reach + 0.2 * (reach - root), 0.0, end), (-reach, 0.0, end - 0.1 * height)]  # fmt: skip
-    return tube(path, [1.5 * r, 1.3 * r, r, 0.85 * r, 0.8 * r, 0.7 * r], 12)
+        bend = np.array([-root - 0.3 * (reach - root), 0.0, start + 0.3 * (end - start)])
+        solid = tube([(-0.6 * root, 0.0, start - 0.05 * height), bend, tip], [1.5 * wide, wide, 0.6 * wide], 14)
+        return solid, (tip, unit(tip - bend), 0.6 * wide)
+    # An S: out of the belly, up, and over to the front.
+    s = np.linspace(0.0, 1.0, 10)
+    swing = 0.5 - 0.5 * cos(np.pi * s)
+    x = -0.6 * root - (reach - 0.6 * root) * (0.35 * s + 0.65 * s * s * s)
+    path = np.stack([x, 0.0 * s, start + (end - start) * (1.25 * swing - 0.25 * s * s * s)], axis=1)
+    return tube(path, (np.linspace(1.5, 0.65, 10) * wide).tolist(), 12), None
+
+
+def _whistle(rng: np.random.Generator, kettle: Assembly, mouth: tuple[Array, Array, float]) -> None:
+    """A cover of the spout that turns up."""
+    tip, ahead, radius = mouth
+    up = np.array([ahead[2], 0.0, -ahead[0]])  # across the spout, away from the pot's foot
+    near = tip + GAP * ahead
+    cover = cylinder(near, near + 0.35 * radius * ahead, 1.15 * radius, radius, 14)
+    if rng.random() < 0.5:
+        cover += cylinder(near, near + 0.9 * radius * ahead, 0.5 * radius, 0.3 * radius, 10)
+    pivot = near + 1.15 * radius * up
+    lift = tube([near + 0.9 * radius * up + 0.15 * radius * ahead, pivot + radius * (0.8 * up + 0.3 * ahead)],
+                0.18 * radius, 8)  # fmt: skip
+    turn = revolute("body", (0, 1, 0), pivot, 0.0, rng.uniform(0.6, 1.5))
+    kettle.add("whistle", cover + lift, turn, density=1500.0)
 
 
 def _lid(rng: np.random.Generator, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
@@ -199,7 +232,9 @@ def _lugs(pot: Pot) -> Solid:
 
 def _lid_joint(rng: np.random.Generator, kind: str, pot: Pot, room: float) -> JointSpec:
     at = np.array([0.0, 0.0, pot.top])
-    travel = min(pot.mouth * rng.uniform(0.3, 1.5), 0.8 * room - 0.012)
+    travel = min(pot.mouth * rng.uniform(0.3, 1.5), 0.8 * room)
+    if travel < 0.004:  # the bow holds it down
+        kind = "turn"
     if kind == "hinge":
         x, _, r = _hinge(pot)
         return revolute("body", (0, 1, 0), (x, 0, pot.top + GAP + r), 0.0, np.deg2rad(rng.uniform(60, 88)))
@@ -211,8 +246,8 @@ def _lid_joint(rng: np.random.Generator, kind: str, pot: Pot, room: float) -> Jo
     return prismatic("body", UP, 0.0, travel, at)
 
 
-def _bow_path(pot: Pot, room: float, reach: float, lift: float, square: bool) -> list[tuple[float, float]]:
-    """Y or X and Z of a bow between two feet at ``reach``, as high as ``room``."""
+def _bow_path(room: float, reach: float, lift: float, square: bool) -> list[tuple[float, float]]:
+    """X and Z of a bow between two feet at ``reach``, as high as ``room``."""
     if square:
         edge = 0.75 * reach
         return [(-reach, lift), (-edge, room), (edge, room), (reach, lift)]
@@ -220,39 +255,53 @@ def _bow_path(pot: Pot, room: float, reach: float, lift: float, square: bool) ->
     return [(reach * cos(a), lift + (room - lift) * sin(a)) for a in angles.tolist()]
 
 
-def _bow(rng: np.random.Generator, pot: Pot, room: float, turn: float) -> Solid:
-    """A fixed bow from front to back over the lid."""
+def _bow(rng: np.random.Generator, pot: Pot, room: float) -> tuple[Solid, float]:
+    """A fixed bow from front to back over the lid, and how high it is above the lid's edge."""
     z = pot.foot + 0.8 * (pot.top - pot.foot)
-    reach = max(pot.radius(z), pot.mouth + 0.012)
+    reach = pot.radius(z)
     room += 0.02
-    path = [(x, 0.0, h) for x, h in _bow_path(pot, room, reach, z, rng.random() < 0.4)]
+    path = [(x, 0.0, h) for x, h in _bow_path(room, reach, z - 0.004, rng.random() < 0.4)]
     r = rng.uniform(0.004, 0.007)
-    inside = 0.8 * pot.radius(z)
-    solid = tube([(-inside, 0, z), *path, (inside, 0, z)], r, 10)
+    solid = tube(path, r, 10)
     if rng.random() < 0.7:
         solid += tube([(-0.45 * reach, 0, room), (0.45 * reach, 0, room)], 2.0 * r, 14)
-    return solid.turned(UP, turn)
+    x, _, z = np.array(path).T
+    return solid, float(np.interp(-1.05 * pot.mouth, x, z)) - 2.0 * r
 
 
-def _swinging_bow(rng: np.random.Generator, kettle: Assembly, pot: Pot, room: float) -> None:
-    """A bow that hangs on two pins at the sides, upright at rest, and swings down to the back or to both sides."""
-    z = pot.foot + rng.uniform(0.75, 0.92) * (pot.top - pot.foot)
+@dataclass(frozen=True)
+class Pins:
+    """Where a swinging bow hangs: half distance and height of the pins, height of the bow, radius of its rod."""
+
+    reach: float
+    z: float
+    top: float
+    rod: float
+
+
+def _pins(rng: np.random.Generator, pot: Pot, room: float) -> Pins:
+    z = pot.foot + rng.uniform(0.6, 0.9) * (pot.top - pot.foot)
     widest = max(level[2] for level in pot.levels)
-    r = rng.uniform(0.003, 0.006)
-    reach = widest + r + 0.003  # outside of the body and of its lid wherever it stands
-    square = rng.random() < 0.4
-    height = room + 0.02
-    path = [(0.0, y, h) for y, h in _bow_path(pot, height, reach, z, square)]
-    if square:
-        path = [(0.0, -reach, z), (0.0, -reach, z + 0.6 * (height - z)), (0.0, -0.75 * reach, height),
-                (0.0, 0.75 * reach, height), (0.0, reach, z + 0.6 * (height - z)), (0.0, reach, z)]  # fmt: skip
+    rod = rng.uniform(0.003, 0.006)
+    # So wide and so high that it passes around the body wherever it stands.
+    return Pins(widest + rod + 0.004, z, max(room + 2.4 * rod, z + 1.2 * widest + 2.4 * rod) + 0.01, rod)
+
+
+def _swinging_bow(rng: np.random.Generator, kettle: Assembly, pins: Pins, pot: Pot) -> None:
+    """A bow that hangs on two pins at the sides, upright at rest, and swings down to the back."""
+    rise, r = pins.top - pins.z, pins.rod
+    if rng.random() < 0.4:
+        path = [(0.0, s * y * pins.reach, pins.z + h * rise) for s, y, h in
+                ((-1, 1, 0), (-1, 1, 0.65), (-1, 0.75, 1), (1, 0.75, 1), (1, 1, 0.65), (1, 1, 0))]  # fmt: skip
+    else:
+        angles = np.linspace(np.pi, 0.0, 13)
+        path = [(0.0, pins.reach * cos(a), pins.z + rise * sin(a)) for a in angles.tolist()]
     bow = tube(path, r, 10)
     if rng.random() < 0.75:
-        bow += tube([(0, -0.4 * reach, height), (0, 0.4 * reach, height)], r * rng.uniform(1.5, 2.4), 14)
-    # The bow goes no lower than where its arms still pass beside the lid.
-    limit = np.deg2rad(rng.uniform(15, 40))
-    low = -limit if rng.random() < 0.5 else 0.0
-    kettle.add("handle", bow, revolute("body", (0, 1, 0), (0, 0, z), low, limit), density=1500.0)
+        bow += tube([(0, -0.4 * pins.reach, pins.top), (0, 0.4 * pins.reach, pins.top)], r * rng.uniform(1.5, 2.4), 14)
+    limit = np.deg2rad(rng.uniform(20, 85))
+    low = -np.deg2rad(rng.uniform(5, 20)) if rng.random() < 0.4 else 0.0
+    kettle.add("handle", bow, revolute("body", (0, 1, 0), (0, 0, pins.z), low, limit), density=1500.0)
 
 
 def _back_grip(rng: np.random.Generator, pot: Pot, hinged: bool, kind: str) -> Solid:
@@ -292,18 +341,21 @@ def _base(rng: np.random.Generator, kettle: Assembly, pot: Pot) -> None:
     kettle.add("base", base, joint, density=DENSITY)
 
 
-def _switch(rng: np.random.Generator, kettle: Assembly, pot: Pot) -> None:
-    """A rocker at the side of the foot, or a button."""
-    z = pot.foot + 0.12 * (pot.top - pot.foot) + 0.01
+def _switch(rng: np.random.Generator, pot: Pot) -> tuple[Solid, str, Solid, JointSpec]:
+    """A rocker or a button at the side of the foot: its mount on the body, its name, solid and joint."""
+    z = pot.foot + rng.uniform(0.1, 0.25) * (pot.top - pot.foot)
     side = float(rng.choice([-1.0, 1.0]))
-    y = max(level[2] for level in pot.levels) + 0.004
+    y = pot.radius(z) + 0.003
     half = rng.uniform(0.006, 0.012)
+
+    def between(near: float, far: float, x: float, high: float, low: float) -> Solid:
+        y0, y1 = sorted((side * near, side * far))
+        return rounded_box((-x, y0, z - low), (x, y1, z + high), 0.002)
+
+    mount = between(0.6 * y, y, 1.5 * half, half + 0.004, half + 0.004)
     if rng.random() < 0.5:
-        near, far = sorted((side * y, side * (y + 0.006)))
-        button = rounded_box((-half, near, z - 0.7 * half), (half, far, z + 0.7 * half), 0.002)
-        kettle.add("button", button, prismatic("body", (0, -side, 0), 0.0, 0.002, (0, side * y, z)), density=900.0)
-        return
-    near, far = sorted((side * y, side * (y + 0.014)))
-    lever = rounded_box((-0.4 * half, near, z - 0.004), (0.4 * half, far, z + 0.004), 0.002)
+        button = between(y + 0.0025, y + 0.008, half, 0.7 * half, 0.7 * half)
+        return mount, "button", button, prismatic("body", (0, -side, 0), 0.0, 0.0018, (0, side * y, z))
+    lever = between(y + GAP, y + 0.016, 0.4 * half, 0.004, 0.004)
     limit = rng.uniform(0.2, 0.5)
-    kettle.add("switch", lever, revolute("body", (side, 0, 0), (0, side * y, z), -limit, limit), density=900.0)
+    return mount, "switch", lever, revolute("body", (0, side, 0), (0, side * y, z), -limit, limit)
