@@ -27,6 +27,7 @@ CATEGORIES = (
     "cutter",
     "desk_lamp",
     "dishwasher",
+    "dispenser",
     "door",
     "drawer",
     "eyeglasses",
