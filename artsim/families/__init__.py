@@ -23,6 +23,7 @@ CATEGORIES = (
     "box",
     "bottle",
     "bucket",
+    "clock",
     "coffee_machine",
     "cutter",
     "desk_lamp",
