@@ -23,6 +23,7 @@ CATEGORIES = (
     "box",
     "bottle",
     "bucket",
+    "camera",
     "clock",
     "coffee_machine",
     "cutter",

@@ -1,0 +1,437 @@
+"""Cameras: compact, single-lens reflex, rangefinder, instant, camcorder, and cameras on a swivel.
+
+What varies: the kind, the proportions of the body, grip, prism and viewfinder, the lens (rings that turn, one to three
+tubes that slide out of each other, a cap), dials and buttons on top and at the back, a film lever, a flash that pops up, a
+screen that swings out at the back or at the side, a door for the battery, a flap before the lens. One to ten parts move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.common.elementary import cos, sin
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rounded_box, tube
+from artsim.model.kinematics import Array
+
+GAP = 0.0005
+UP = np.array([0.0, 0.0, 1.0])
+FRONT = np.array([-1.0, 0.0, 0.0])
+DENSITY = 900.0
+
+
+@dataclass(frozen=True)
+class Shell:
+    """Half width, depth and height of a body whose front is the plane x = 0; place of the lens and its largest radius."""
+
+    half: float
+    depth: float
+    height: float
+    lens_y: float
+    lens_z: float
+    lens_radius: float
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A camera; its lens looks towards -X and is drawn in at rest, all covers are shut."""
+    kind = str(rng.choice(["compact", "reflex", "rangefinder", "instant", "camcorder", "swivel"],
+                          p=[0.26, 0.27, 0.17, 0.1, 0.12, 0.08]))  # fmt: skip
+    if kind == "camcorder":
+        return _camcorder(rng)
+    if kind == "swivel":
+        return _swivel(rng)
+    shell = _shell(rng, kind)
+    camera = Assembly()
+    body, top = _body(rng, shell, kind)
+    lens = Lens(rng, shell, kind)
+    camera.add("body", body + lens.fixed, density=DENSITY)
+    lens.add_to(camera)
+    _top_controls(rng, camera, shell, top, kind)
+    _back(rng, camera, shell)
+    if kind != "compact" and top[1] - top[0] > 0.01 and rng.random() < 0.5:
+        _flash(rng, camera, shell, top)
+    return camera
+
+
+def _shell(rng: np.random.Generator, kind: str) -> Shell:
+    half = {"compact": rng.uniform(0.042, 0.06), "reflex": rng.uniform(0.055, 0.08),
+            "rangefinder": rng.uniform(0.055, 0.075), "instant": rng.uniform(0.05, 0.075)}[kind]  # fmt: skip
+    tall = {"compact": (1.05, 1.45), "reflex": (1.15, 1.6), "rangefinder": (1.0, 1.35), "instant": (1.3, 2.1)}[kind]
+    height = half * rng.uniform(*tall)
+    share = {"compact": (0.35, 0.75), "reflex": (0.5, 0.95), "rangefinder": (0.4, 0.65), "instant": (0.6, 1.3)}[kind]
+    depth = half * rng.uniform(*share)
+    radius = height * (rng.uniform(0.24, 0.4) if kind != "instant" else rng.uniform(0.18, 0.3))
+    y = half * rng.choice([0.0, rng.uniform(-0.35, 0.1)])
+    y = float(np.clip(y, -half + radius + 0.004, half - radius - 0.014))
+    z = height * rng.uniform(0.42, 0.52)
+    return Shell(half, depth, height, y, z, min(radius, z - 0.002))
+
+
+def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float, float]]:
+    """The body; the span along Y and the height of what stands on its middle, for a flash."""
+    half, depth, height = shell.half, shell.depth, shell.height
+    r = min(rng.uniform(0.05, 0.45) * depth, 0.4 * height)
+    axis = [None, 2, 1, 0][int(rng.integers(4))]
+    body = rounded_box((0, -half, 0), (depth, half, height), r, axis=axis)
+    if rng.random() < 0.4:  # covering between two metal plates
+        body += rounded_box((-0.001, -half - 0.0005, 0.16 * height), (depth + 0.001, half + 0.0005, 0.8 * height), r, axis=2)
+    if kind in ("reflex", "compact") and rng.random() < (0.85 if kind == "reflex" else 0.4):  # grip of the right hand
+        deep = depth * (rng.uniform(0.2, 0.6) if kind == "reflex" else rng.uniform(0.05, 0.2))
+        room = max(half - shell.lens_y - shell.lens_radius - 0.004, 0.008)
+        wide = min(rng.uniform(0.25, 0.5) * half, room)
+        body += rounded_box((-deep, half - wide, 0.02 * height), (0.6 * depth, half, 0.97 * height), 0.45 * wide, axis=2)
+    span = (0.0, 0.0, height)
+    if kind == "reflex":
+        wide = half * rng.uniform(0.28, 0.42)
+        rise = height * rng.uniform(0.14, 0.32)
+        y = float(np.clip(shell.lens_y, -half + wide, half - wide))
+        low = [(y - wide, height - 0.002), (y + wide, height - 0.002)]
+        crest = [(y + wide * rng.uniform(0.4, 0.85), height + rise), (y - wide * rng.uniform(0.4, 0.85), height + rise)]
+        body += prism(low + crest, rng.uniform(-0.15, 0.2) * depth, rng.uniform(0.8, 1.1) * depth, 0)
+        body += rounded_box((depth - 0.004, y - 0.5 * wide, height - 0.2 * rise), (1.15 * depth, y + 0.5 * wide,
+                                                                                height + 0.7 * rise), 0.004)  # fmt: skip
+        span = (y - 0.4 * wide, y + 0.4 * wide, height + rise)
+    elif kind == "rangefinder":
+        if rng.random() < 0.6:  # a raised deck
+            y0, y1 = sorted(rng.uniform(-0.95, 0.95, 2) * half)
+            body += rounded_box((0.05 * depth, y0, height - 0.003), (0.95 * depth, y1, height + 0.06 * height), 0.002)
+        for y, size in ((-0.75, 0.1), (0.3, 0.07)):  # windows
+            body += box((-0.0012, (y - size) * half, 0.8 * height), (0.002, (y + size) * half, 0.93 * height))
+    elif kind == "instant":
+        rise = height * rng.uniform(0.1, 0.35)
+        wide = half * rng.uniform(0.3, 0.98)
+        body += hull_of(box((0.2 * depth, -wide, height - 0.002), (depth, wide, height)),
+                        box((0.4 * depth, -0.9 * wide, height + rise - 0.002), (depth, 0.9 * wide, height + rise)))  # fmt: skip
+        slot = min(0.18 * height, shell.lens_z - shell.lens_radius - 0.002)  # where pictures come out
+        body += rounded_box((-0.3 * depth, -half, 0), (0.1 * depth, half, slot), 0.004)
+        span = (-0.6 * wide, 0.6 * wide, height + rise)
+    if kind in ("compact", "instant"):
+        y = half * rng.uniform(0.3, 0.7) * rng.choice([-1.0, 1.0])
+        body += rounded_box((-0.0012, y - 0.14 * half, 0.8 * height), (0.003, y + 0.14 * half, 0.93 * height), 0.002, axis=0)
+    if kind in ("reflex", "rangefinder") and rng.random() < 0.4:  # lugs for a strap
+        for s in (-1.0, 1.0):
+            body += ring((0.5 * depth, s * (half + 0.002), 0.85 * height), (1, 0, 0), 0.0018, 0.004, 0.0018, 12)
+    return body, span
+
+
+class Lens:
+    """A lens in the plane x = 0: what is fixed to the body, and the parts that turn or slide, in a row."""
+
+    def __init__(self, rng: np.random.Generator, shell: Shell, kind: str):
+        self.center = np.array([0.0, shell.lens_y, shell.lens_z])
+        self.fixed = Solid()
+        self.parts: list[tuple[str, Solid, JointSpec]] = []
+        radius = shell.lens_radius
+        style = str(rng.choice(["tubes", "prime", "zoom"], p=[0.3, 0.3, 0.4]))
+        if kind == "compact":
+            style = "tubes"
+        elif kind == "instant":
+            style = str(rng.choice(["tubes", "prime"]))
+        if style == "tubes":
+            long = radius * rng.uniform(0.25, 0.8)
+            count = int(rng.integers(1, 4))
+            self._tubes(rng, radius, 0.0, long, count)
+            return
+        long = radius * (rng.uniform(0.5, 1.4) if style == "prime" else rng.uniform(1.0, 3.0))
+        radius *= rng.uniform(0.75, 1.0)
+        core = 0.86 * radius
+        self.fixed += cylinder(self.center + (0.001, 0, 0), self.center - (0.12 * long, 0, 0), radius, sections=28)
+        slots = [(0.18, 0.4), (0.5, 0.8)] if rng.random() < 0.6 else [(0.3, 0.75)]
+        hollow = style == "zoom"
+        bore = 0.72 * radius
+        if hollow:
+            self._pipe(core, bore, 0.0, long)
+        else:
+            self.fixed += cylinder(self.center, self.center - (long, 0, 0), core, sections=28)
+            self._glass(core, long)
+        self.fixed += ring(self.center - (0.95 * long, 0, 0), FRONT, bore if hollow else 0.5 * core, radius, 0.1 * long, 24)
+        if len(slots) == 2:
+            self.fixed += ring(self.center - (0.45 * long, 0, 0), FRONT, bore if hollow else 0.5 * core, radius,
+                               0.06 * long, 24)  # fmt: skip
+        for number, (a, b) in enumerate(slots):
+            wall = radius * rng.uniform(1.0, 1.08)
+            grip = ring(self.center - (0.5 * (a + b) * long, 0, 0), FRONT, 1.004 * core + 0.0006, wall, (b - a) * long, 20)
+            grip += self._ribs(rng, wall, a * long, b * long)
+            turn = continuous("body", FRONT, self.center)
+            if rng.random() < 0.5:
+                turn = revolute("body", FRONT, self.center, 0.0, rng.uniform(0.8, 4.5))
+            name = "focus_ring" if number == len(slots) - 1 else "zoom_ring"
+            self.parts.append((name, grip, turn))
+        if hollow:
+            self._sliding(rng, bore - 0.0008, 0.12 * long, long, int(rng.integers(1, 3)))
+
+    def _ribs(self, rng: np.random.Generator, radius: float, near: float, far: float) -> Solid:
+        solid = Solid()
+        count = int(rng.choice([0, 6, 10]))
+        for k in range(count):
+            a = 2.0 * np.pi * k / count
+            out = self.center + (0, radius * cos(a), radius * sin(a))
+            inset = 0.15 * (far - near)
+            solid += cylinder(out - (near + inset, 0, 0), out - (far - inset, 0, 0), 0.06 * radius, sections=4)
+        return solid
+
+    def _pipe(self, radius: float, bore: float, near: float, far: float) -> None:
+        self.fixed += ring(self.center - (0.5 * (near + far), 0, 0), FRONT, bore, radius, far - near, 24)
+
+    def _glass(self, radius: float, front: float) -> None:
+        """The rim of the front glass, whose dome stands a little out."""
+        self.fixed += ring(self.center - (front + 0.03 * radius, 0, 0), FRONT, 0.8 * radius, radius, 0.08 * radius, 24)
+        self.fixed += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.7 * radius, 0.7 * radius), 16)
+
+    def _tubes(self, rng: np.random.Generator, radius: float, near: float, long: float, count: int) -> None:
+        wall = 0.1 * radius
+        self._pipe(radius, radius - wall, near, long)
+        if rng.random() < 0.6:
+            self._pipe(1.15 * radius if radius < 0.02 else radius * 1.05, radius - wall, near - 0.001, 0.35 * long)
+        self._sliding(rng, radius - wall - 0.0006, 0.0, long, count)
+
+    def _sliding(self, rng: np.random.Generator, radius: float, near: float, long: float, count: int) -> None:
+        """Tubes in each other, the first in a bore from ``near`` to ``long`` before the body's front."""
+        parent, outer = "body", long
+        for k in range(count):
+            last = k == count - 1
+            start, front = near + 0.0015 + 0.0008 * k, outer + rng.uniform(-0.05, 0.25) * long
+            wall = 0.12 * radius
+            if last:
+                solid = cylinder(self.center - (start, 0, 0), self.center - (front, 0, 0), radius, sections=24)
+                solid += ring(self.center - (front + 0.02 * radius, 0, 0), FRONT, 0.75 * radius, 0.97 * radius,
+                              0.06 * radius, 20)  # fmt: skip
+                solid += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.6 * radius, 0.6 * radius), 14)
+            else:
+                solid = ring(self.center - (0.5 * (start + front), 0, 0), FRONT, radius - wall, radius, front - start, 22)
+            travel = (min(front, outer) - start) * rng.uniform(0.5, 0.9)
+            at = self.center - (front, 0, 0)
+            turning = last and k > 0 and rng.random() < 0.25
+            joint = continuous(parent, FRONT, at) if turning else prismatic(parent, FRONT, 0.0, travel, at)
+            part = "lens" if k == 0 else f"lens_{k}"
+            self.parts.append((part, solid, joint))
+            if last and rng.random() < 0.25:
+                self._cap(rng, part, radius, front + 0.06 * radius)
+            parent, outer, radius = part, front, radius - wall - 0.0006
+
+    def _cap(self, rng: np.random.Generator, parent: str, radius: float, front: float) -> None:
+        """A lid before the glass: it pulls off, or swings aside."""
+        thick = 0.12 * radius
+        near = self.center - (front + 0.0006, 0, 0)
+        lid = cylinder(near, near - (thick, 0, 0), 0.98 * radius, 0.9 * radius, 22)
+        if rng.random() < 0.5:
+            joint = prismatic(parent, FRONT, 0.0, radius * rng.uniform(0.3, 1.5), near)
+        else:
+            pivot = near + (-thick, 0, 1.02 * radius)
+            lid += cylinder(pivot - (0, 0.2 * radius, 0), pivot + (0, 0.2 * radius, 0), 0.5 * thick, sections=10)
+            lid += box(near + (-thick, -0.2 * radius, 0.7 * radius), near + (0, 0.2 * radius, 1.02 * radius))
+            joint = revolute(parent, (0, 1, 0), pivot, 0.0, rng.uniform(1.0, 1.9))
+        self.parts.append(("cap", lid, joint))
+
+    def add_to(self, camera: Assembly) -> None:
+        """Add the moving parts."""
+        for name, solid, joint in self.parts:
+            camera.add(name, solid, joint, label="lens" if name.startswith("lens") else name, density=DENSITY)
+
+
+def _top_controls(
+    rng: np.random.Generator, camera: Assembly, shell: Shell, middle: tuple[float, float, float], kind: str
+) -> None:
+    """Shutter button, dials and a film lever on the deck, beside what stands on its middle."""
+    half, depth = shell.half, shell.depth
+    raised = kind == "rangefinder"
+    z = shell.height * (1.06 if raised else 1.0) + GAP
+    right = max(middle[1] * 1.8 if kind == "reflex" else 0.0, 0.35 * half if kind != "instant" else middle[1] / 0.6)
+    left = min(middle[0] * 1.8 if kind == "reflex" else 0.0, -0.35 * half if kind != "instant" else middle[0] / 0.6)
+    size = min(0.3 * depth, 0.18 * (half - right), 0.011)
+    if size > 0.0015:
+        spots = np.linspace(right + 1.3 * size, half - 1.5 * size, 2 if half - right < 7.8 * size else 3).tolist()
+        r = size * rng.uniform(0.6, 0.9)
+        y = spots.pop()
+        x = depth * rng.uniform(0.3, 0.6)
+        button = cylinder((x, y, z + 0.0016), (x, y, z + 0.0016 + 0.5 * r), r, 0.9 * r, 18)
+        press = prismatic("body", -UP, 0.0, 0.0015, (x, y, z))
+        camera.add("shutter_button", button, press, label="button", density=DENSITY)
+        for number, y in enumerate(spots):
+            if rng.random() < 0.75:
+                at = np.array([rng.uniform(0.4, 0.6) * depth, y, z])
+                camera.add(f"dial_{number}", _dial(rng, at, size), continuous("body", UP, at), density=DENSITY)
+    room = abs(-half - left)
+    if kind in ("reflex", "rangefinder") and room > 0.012 and rng.random() < 0.65:
+        size = min(0.3 * depth, 0.4 * room, 0.012)
+        y = 0.5 * (left - half)
+        crank = _dial(rng, np.array([0.5 * depth, y, z]), size)
+        if rng.random() < 0.4:
+            crank += rounded_box((0.5 * depth - 0.15 * size, y - 0.9 * size, z + 0.8 * size),
+                                 (0.5 * depth + 0.15 * size, y + 0.9 * size, z + 1.2 * size), 0.1 * size)  # fmt: skip
+        camera.add("knob", crank, continuous("body", UP, (0.5 * depth, y, z)), density=DENSITY)
+
+
+def _dial(rng: np.random.Generator, foot: Array, radius: float) -> Solid:
+    """A flat dial, knurled by chance."""
+    tall = radius * rng.uniform(0.4, 1.1)
+    solid = cylinder(foot, foot + tall * UP, radius, radius * rng.uniform(0.9, 1.0), 20)
+    if rng.random() < 0.5:
+        for k in range(10):
+            a = 2.0 * np.pi * k / 10
+            edge = foot + (radius * cos(a), radius * sin(a), 0)
+            solid += cylinder(edge + 0.1 * tall * UP, edge + 0.9 * tall * UP, 0.07 * radius, sections=4)
+    if rng.random() < 0.4:
+        solid += cylinder(foot + 0.9 * tall * UP, foot + 1.3 * tall * UP, 0.4 * radius, sections=12)
+    return solid
+
+
+def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
+    """A screen that swings or tilts, or buttons; and a door for the battery at the side."""
+    half, depth, height = shell.half, shell.depth + 0.001, shell.height
+    kind = str(rng.choice(["fixed", "swing", "tilt", "back", "none"], p=[0.25, 0.25, 0.15, 0.1, 0.25]))
+    y0, y1 = -0.92 * half, half * rng.uniform(0.2, 0.5)
+    z0, z1 = height * rng.uniform(0.08, 0.14), height * rng.uniform(0.68, 0.8)
+    thick = rng.uniform(0.002, 0.006)
+    x = depth + GAP
+    screen = rounded_box((x, y0, z0), (x + thick, y1, z1), 0.003, axis=0)
+    if kind == "swing":
+        joint = revolute("body", -UP, (x + thick, y0, z0), 0.0, rng.uniform(1.2, 3.0))
+        camera.add("screen", screen, joint, density=DENSITY)
+    elif kind == "tilt":
+        upward = rng.random() < 0.5  # about its upper edge
+        joint = revolute("body", (0, -1 if upward else 1, 0), (x + thick, 0, z1 if upward else z0), 0.0,
+                         rng.uniform(0.5, 1.5))  # fmt: skip
+        camera.add("screen", screen, joint, density=DENSITY)
+    elif kind == "back":  # the whole back of a film camera opens
+        leaf = rounded_box((x, -0.97 * half, 0.06 * height), (x + thick, 0.97 * half, 0.92 * height), 0.002, axis=0)
+        camera.add("back", leaf, revolute("body", -UP, (x + thick, -0.97 * half, 0), 0.0, rng.uniform(1.2, 2.2)),
+                   label="door", density=DENSITY)  # fmt: skip
+    if kind in ("fixed", "swing", "tilt", "none"):
+        room = half - y1
+        size = min(0.2 * room, 0.08 * height, 0.006)
+        style = str(rng.choice(["pad", "row", "none"], p=[0.4, 0.35, 0.25]))
+        y = 0.5 * (y1 + half)
+        if style == "pad" and size > 0.001:
+            z = 0.4 * height
+            wheel = ring((x + 0.3 * size, y, z), (1, 0, 0), 1.1 * size, 1.9 * size, 0.6 * size, 16)
+            camera.add("wheel", wheel, continuous("body", (1, 0, 0), (x, y, z)), label="dial", density=DENSITY)
+            button = cylinder((x + 0.0012, y, z), (x + 0.0012 + 0.6 * size, y, z), 0.8 * size, sections=14)
+            camera.add("button", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)), density=DENSITY)
+        elif style == "row" and size > 0.001:
+            for number in range(int(rng.integers(1, 4))):
+                z = height * (0.2 + 0.2 * number)
+                button = cylinder((x + 0.0012, y, z), (x + 0.0012 + 0.5 * size, y, z), size, sections=14)
+                camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)), density=DENSITY)
+    if rng.random() < 0.2:  # a door at the right side
+        y, t = half + 0.001, 0.0025
+        door = rounded_box((0.2 * shell.depth, y, 0.2 * height), (0.8 * shell.depth, y + t, 0.75 * height), 0.002, axis=1)
+        joint = revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2))
+        camera.add("door", door, joint, density=DENSITY)
+
+
+def _flash(rng: np.random.Generator, camera: Assembly, shell: Shell, span: tuple[float, float, float]) -> None:
+    """A flash on the crest: it lies flat and swings up about its back edge, or slides up."""
+    y0, y1, z = span
+    low = z + GAP
+    tall = shell.height * rng.uniform(0.06, 0.2)
+    x0, x1 = 0.42 * shell.depth, 0.78 * shell.depth
+    flash = rounded_box((x0, y0, low), (x1, y1, low + tall), 0.3 * tall)
+    if rng.random() < 0.7:
+        joint = revolute("body", (0, 1, 0), (x1, 0, low), 0.0, rng.uniform(0.5, 1.3))
+    else:
+        joint = prismatic("body", UP, 0.0, tall * rng.uniform(0.5, 1.2), (x1, 0, low))
+    camera.add("flash", flash, joint, density=DENSITY)
+
+
+# --- other kinds -----------------------------------------------------------------------------------------------------
+
+
+def _camcorder(rng: np.random.Generator) -> Assembly:
+    """A long body with a screen at its left side, a strap at its right, and a viewfinder at the back."""
+    half, height = rng.uniform(0.022, 0.045), rng.uniform(0.05, 0.085)
+    depth = rng.uniform(0.09, 0.2)
+    shell = Shell(half, depth, height, 0.0, height * rng.uniform(0.5, 0.62), min(half, 0.38 * height) * 0.92)
+    body = rounded_box((0, -half, 0), (depth, half, height), rng.uniform(0.1, 0.6) * half,
+                       axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
+    lens = Lens(rng, shell, "reflex" if rng.random() < 0.6 else "compact")
+    camera = Assembly()
+    if rng.random() < 0.5:  # a handle on top
+        x0, x1, z = 0.1 * depth, 0.85 * depth, height + rng.uniform(0.02, 0.04)
+        r = rng.uniform(0.004, 0.008)
+        body += tube([(x0, 0, height - 0.004), (x0, 0, z - r), (x0 + r, 0, z), (x1 - r, 0, z), (x1, 0, z - r),
+                      (x1, 0, height - 0.004)], r, 10)  # fmt: skip
+    if rng.random() < 0.6:  # a strap at the right
+        bulge = half + rng.uniform(0.008, 0.02)
+        xs = np.linspace(0.15, 0.85, 5) * depth
+        ys = [half - 0.003, 0.6 * half + 0.4 * bulge, bulge, 0.6 * half + 0.4 * bulge, half - 0.003]
+        wide = rng.uniform(0.2, 0.35) * height
+        for k in range(4):
+            ends = [box((xs[i] - 0.001, ys[i] - 0.001, 0.5 * height - wide), (xs[i] + 0.001, ys[i] + 0.001,
+                                                                           0.5 * height + wide)) for i in (k, k + 1)]  # fmt: skip
+            body += hull_of(*ends)
+    back = rng.random() < 0.5
+    if back:
+        body += rounded_box((depth - 0.004, -0.7 * half, 0.05 * height), (depth + rng.uniform(0.008, 0.03), 0.7 * half,
+                                                                         0.62 * height), 0.004)  # fmt: skip
+    camera.add("body", body + lens.fixed, density=DENSITY)
+    lens.add_to(camera)
+    if rng.random() < 0.85:
+        thick = rng.uniform(0.004, 0.009)
+        y = -half - GAP
+        x0, x1 = depth * rng.uniform(0.06, 0.2), depth * rng.uniform(0.65, 0.95)
+        screen = rounded_box((x0, y - thick, 0.15 * height), (x1, y, 0.88 * height), 0.003, axis=1)
+        joint = revolute("body", -UP, (x0, y - thick, 0), 0.0, rng.uniform(1.2, 2.0))
+        camera.add("screen", screen, joint, density=DENSITY)
+    if rng.random() < 0.5:
+        z = 0.85 * height
+        r = 0.22 * height * rng.uniform(0.6, 1.0)
+        eye = cylinder((depth + 0.001 + r, 0, z), (depth + rng.uniform(0.03, 0.06), 0, z), 0.8 * r, r, 16)
+        eye += cylinder((depth + 0.001 + r, -0.6 * half, z), (depth + 0.001 + r, 0.6 * half, z), r, sections=14)
+        tilt = revolute("body", (0, -1, 0), (depth + 0.001 + r, 0, z), 0.0, rng.uniform(0.4, 1.2))
+        camera.add("viewfinder", eye, tilt, density=DENSITY)
+    for number, x in enumerate((0.3, 0.9)[: int(rng.integers(0, 3))]):
+        size = 0.25 * half
+        at = (x * depth, 0.55 * half, height + GAP)
+        button = rounded_box((at[0] - size, at[1] - 0.6 * size, at[2] + 0.0012), (at[0] + size, at[1] + 0.6 * size,
+                                                                                at[2] + 0.004), 0.001)  # fmt: skip
+        camera.add(f"button_{number}", button, prismatic("body", -UP, 0.0, 0.001, at), density=DENSITY)
+    return camera
+
+
+def _swivel(rng: np.random.Generator) -> Assembly:
+    """A camera that turns and nods in a fork on a foot: for a desk, a wall, a ceiling."""
+    r = rng.uniform(0.02, 0.06)
+    shape = str(rng.choice(["ball", "bullet", "box"]))
+    thick = 0.14 * r
+    reach = r + 0.002
+    if shape == "ball":
+        head, front, low = ellipsoid((0, 0, 0), r, 20), r, 1.2 * r
+    elif shape == "bullet":
+        long = r * rng.uniform(1.4, 2.6)
+        head = cylinder((-long, 0, 0), (0.8 * long, 0, 0), r, sections=22)
+        if rng.random() < 0.6:
+            head += rounded_box((-1.25 * long, -0.9 * r, 0.75 * r), (0.7 * long, 0.9 * r, 1.1 * r), 0.1 * r)
+        front, low = long, 1.3 * long + r
+    else:
+        long = r * rng.uniform(0.9, 2.0)
+        head = rounded_box((-long, -r, -0.8 * r), (long, r, 0.8 * r), 0.2 * r)
+        front, low = long, 1.3 * long + r
+    head += cylinder((-0.8 * front, 0, 0), (-front - 0.12 * r, 0, 0), 0.6 * r, sections=20)
+    head += ring((-front - 0.18 * r, 0, 0), FRONT, 0.45 * r, 0.6 * r, 0.16 * r, 20)
+    sink = low + thick + 0.004
+    fork = tube([(0, -reach - thick, 0), (0, -reach - thick, -0.6 * sink), (0, -0.5 * r, -sink), (0, 0.5 * r, -sink),
+                 (0, reach + thick, -0.6 * sink), (0, reach + thick, 0)], thick, 10)  # fmt: skip
+    neck = 0.3 * r
+    fork += cylinder((0, 0, -sink - thick), (0, 0, -sink), 2.2 * thick, sections=14)
+    foot = -sink - thick - GAP
+    kind = str(rng.choice(["disc", "column", "clip"]))
+    if kind == "clip":
+        base = box((-0.8 * r, -r, foot - 0.01), (0.8 * r, r, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r),
+                                                                        (0.6 * r, 0.7 * r, foot))  # fmt: skip
+    else:
+        tall = r * (rng.uniform(0.2, 0.5) if kind == "disc" else rng.uniform(1.0, 3.0))
+        base = cylinder((0, 0, foot - tall), (0, 0, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
+        base += cylinder((0, 0, foot - tall - 0.2 * r), (0, 0, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
+    camera = Assembly()
+    camera.add("body", base, density=DENSITY)
+    pan = continuous("body", UP, (0, 0, foot))
+    if rng.random() < 0.5:
+        limit = rng.uniform(0.8, 3.0)
+        pan = revolute("body", UP, (0, 0, foot), -limit, limit)
+    camera.add("fork", fork, pan, density=DENSITY)
+    limit = rng.uniform(0.3, 1.2)
+    camera.add("head", head, revolute("fork", (0, 1, 0), (0, 0, 0), -limit, limit), density=DENSITY)
+    return camera
