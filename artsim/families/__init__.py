@@ -24,6 +24,7 @@ CATEGORIES = (
     "bottle",
     "bucket",
     "camera",
+    "cart",
     "clock",
     "coffee_machine",
     "cutter",
