@@ -144,8 +144,14 @@ def _bevelled(levels: list[Level]) -> list[Level]:
 def _jug_handle(rng: np.random.Generator, depth: float, half: float, low: float, high: float) -> Solid:
     reach = depth + rng.uniform(0.02, 0.035)
     root = 0.45 * depth
-    points = [(root, high), (0.85 * reach, high), (reach, high - 0.15 * (high - low)), (reach, low + 0.3 * (high - low)),
-              (0.8 * reach, low), (root, low)]  # fmt: skip
+    points = [
+        (root, high),
+        (0.85 * reach, high),
+        (reach, high - 0.15 * (high - low)),
+        (reach, low + 0.3 * (high - low)),
+        (0.8 * reach, low),
+        (root, low),
+    ]
     return grip_loop(points, min(rng.uniform(0.006, 0.012), 0.5 * half), rng.uniform(0.004, 0.006))
 
 

@@ -1,8 +1,8 @@
 """Cameras: compact, single-lens reflex, rangefinder, instant, camcorder, and cameras on a swivel.
 
-What varies: the kind, the proportions of the body, grip, prism and viewfinder, the lens (rings that turn, one to three
-tubes that slide out of each other, a cap), dials and buttons on top and at the back, a film lever, a flash that pops up, a
-screen that swings out at the back or at the side, a door for the battery, a flap before the lens. One to ten parts move.
+What varies: the kind, the proportions of the body, grip, prism and viewfinder, the lens (rings that turn, one to
+three tubes that slide out of each other, a cap), dials and buttons on top and at the back, a flash that pops up, a
+screen that swings out at the back or at the side, a back that opens, a door at the side. Two to eleven parts move.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.families.lenses import Lens
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rounded_box, tube
 from artsim.model.kinematics import Array
 
@@ -24,7 +25,7 @@ DENSITY = 900.0
 
 @dataclass(frozen=True)
 class Shell:
-    """Half width, depth and height of a body whose front is the plane x = 0; place of the lens and its largest radius."""
+    """Half width, depth and height of a body with its front at x = 0; place and largest radius of the lens; metres."""
 
     half: float
     depth: float
@@ -45,7 +46,9 @@ def build(rng: np.random.Generator) -> Assembly:
     shell = _shell(rng, kind)
     camera = Assembly()
     body, top = _body(rng, shell, kind)
-    lens = Lens(rng, shell, kind)
+    styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
+    style = str(rng.choice(styles.get(kind, ["tubes", "prime", "zoom", "zoom"])))
+    lens = Lens(rng, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
     camera.add("body", body + lens.fixed, density=DENSITY)
     lens.add_to(camera)
     _top_controls(rng, camera, shell, top, kind)
@@ -76,12 +79,16 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
     axis = [None, 2, 1, 0][int(rng.integers(4))]
     body = rounded_box((0, -half, 0), (depth, half, height), r, axis=axis)
     if rng.random() < 0.4:  # covering between two metal plates
-        body += rounded_box((-0.001, -half - 0.0005, 0.16 * height), (depth + 0.001, half + 0.0005, 0.8 * height), r, axis=2)
+        body += rounded_box(
+            (-0.001, -half - 0.0005, 0.16 * height), (depth + 0.001, half + 0.0005, 0.8 * height), r, axis=2
+        )
     if kind in ("reflex", "compact") and rng.random() < (0.85 if kind == "reflex" else 0.4):  # grip of the right hand
         deep = depth * (rng.uniform(0.2, 0.6) if kind == "reflex" else rng.uniform(0.05, 0.2))
         room = max(half - shell.lens_y - shell.lens_radius - 0.004, 0.008)
         wide = min(rng.uniform(0.25, 0.5) * half, room)
-        body += rounded_box((-deep, half - wide, 0.02 * height), (0.6 * depth, half, 0.97 * height), 0.45 * wide, axis=2)
+        body += rounded_box(
+            (-deep, half - wide, 0.02 * height), (0.6 * depth, half, 0.97 * height), 0.45 * wide, axis=2
+        )
     span = (0.0, 0.0, height)
     if kind == "reflex":
         wide = half * rng.uniform(0.28, 0.42)
@@ -90,8 +97,11 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
         low = [(y - wide, height - 0.002), (y + wide, height - 0.002)]
         crest = [(y + wide * rng.uniform(0.4, 0.85), height + rise), (y - wide * rng.uniform(0.4, 0.85), height + rise)]
         body += prism(low + crest, rng.uniform(-0.15, 0.2) * depth, rng.uniform(0.8, 1.1) * depth, 0)
-        body += rounded_box((depth - 0.004, y - 0.5 * wide, height - 0.2 * rise), (1.15 * depth, y + 0.5 * wide,
-                                                                                height + 0.7 * rise), 0.004)  # fmt: skip
+        body += rounded_box(
+            (depth - 0.004, y - 0.5 * wide, height - 0.2 * rise),
+            (1.15 * depth, y + 0.5 * wide, height + 0.7 * rise),
+            0.004,
+        )
         span = (y - 0.4 * wide, y + 0.4 * wide, height + rise)
     elif kind == "rangefinder":
         if rng.random() < 0.6:  # a raised deck
@@ -102,133 +112,22 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
     elif kind == "instant":
         rise = height * rng.uniform(0.1, 0.35)
         wide = half * rng.uniform(0.3, 0.98)
-        body += hull_of(box((0.2 * depth, -wide, height - 0.002), (depth, wide, height)),
-                        box((0.4 * depth, -0.9 * wide, height + rise - 0.002), (depth, 0.9 * wide, height + rise)))  # fmt: skip
+        body += hull_of(
+            box((0.2 * depth, -wide, height - 0.002), (depth, wide, height)),
+            box((0.4 * depth, -0.9 * wide, height + rise - 0.002), (depth, 0.9 * wide, height + rise)),
+        )
         slot = min(0.18 * height, shell.lens_z - shell.lens_radius - 0.002)  # where pictures come out
         body += rounded_box((-0.3 * depth, -half, 0), (0.1 * depth, half, slot), 0.004)
         span = (-0.6 * wide, 0.6 * wide, height + rise)
     if kind in ("compact", "instant"):
         y = half * rng.uniform(0.3, 0.7) * rng.choice([-1.0, 1.0])
-        body += rounded_box((-0.0012, y - 0.14 * half, 0.8 * height), (0.003, y + 0.14 * half, 0.93 * height), 0.002, axis=0)
+        body += rounded_box(
+            (-0.0012, y - 0.14 * half, 0.8 * height), (0.003, y + 0.14 * half, 0.93 * height), 0.002, axis=0
+        )
     if kind in ("reflex", "rangefinder") and rng.random() < 0.4:  # lugs for a strap
         for s in (-1.0, 1.0):
             body += ring((0.5 * depth, s * (half + 0.002), 0.85 * height), (1, 0, 0), 0.0018, 0.004, 0.0018, 12)
     return body, span
-
-
-class Lens:
-    """A lens in the plane x = 0: what is fixed to the body, and the parts that turn or slide, in a row."""
-
-    def __init__(self, rng: np.random.Generator, shell: Shell, kind: str):
-        self.center = np.array([0.0, shell.lens_y, shell.lens_z])
-        self.fixed = Solid()
-        self.parts: list[tuple[str, Solid, JointSpec]] = []
-        radius = shell.lens_radius
-        style = str(rng.choice(["tubes", "prime", "zoom"], p=[0.3, 0.3, 0.4]))
-        if kind == "compact":
-            style = "tubes"
-        elif kind == "instant":
-            style = str(rng.choice(["tubes", "prime"]))
-        if style == "tubes":
-            long = radius * rng.uniform(0.25, 0.8)
-            count = int(rng.integers(1, 4))
-            self._tubes(rng, radius, 0.0, long, count)
-            return
-        long = radius * (rng.uniform(0.5, 1.4) if style == "prime" else rng.uniform(1.0, 3.0))
-        radius *= rng.uniform(0.75, 1.0)
-        core = 0.86 * radius
-        self.fixed += cylinder(self.center + (0.001, 0, 0), self.center - (0.12 * long, 0, 0), radius, sections=28)
-        slots = [(0.18, 0.4), (0.5, 0.8)] if rng.random() < 0.6 else [(0.3, 0.75)]
-        hollow = style == "zoom"
-        bore = 0.72 * radius
-        if hollow:
-            self._pipe(core, bore, 0.0, long)
-        else:
-            self.fixed += cylinder(self.center, self.center - (long, 0, 0), core, sections=28)
-            self._glass(core, long)
-        self.fixed += ring(self.center - (0.95 * long, 0, 0), FRONT, bore if hollow else 0.5 * core, radius, 0.1 * long, 24)
-        if len(slots) == 2:
-            self.fixed += ring(self.center - (0.45 * long, 0, 0), FRONT, bore if hollow else 0.5 * core, radius,
-                               0.06 * long, 24)  # fmt: skip
-        for number, (a, b) in enumerate(slots):
-            wall = radius * rng.uniform(1.0, 1.08)
-            grip = ring(self.center - (0.5 * (a + b) * long, 0, 0), FRONT, 1.004 * core + 0.0006, wall, (b - a) * long, 20)
-            grip += self._ribs(rng, wall, a * long, b * long)
-            turn = continuous("body", FRONT, self.center)
-            if rng.random() < 0.5:
-                turn = revolute("body", FRONT, self.center, 0.0, rng.uniform(0.8, 4.5))
-            name = "focus_ring" if number == len(slots) - 1 else "zoom_ring"
-            self.parts.append((name, grip, turn))
-        if hollow:
-            self._sliding(rng, bore - 0.0008, 0.12 * long, long, int(rng.integers(1, 3)))
-
-    def _ribs(self, rng: np.random.Generator, radius: float, near: float, far: float) -> Solid:
-        solid = Solid()
-        count = int(rng.choice([0, 6, 10]))
-        for k in range(count):
-            a = 2.0 * np.pi * k / count
-            out = self.center + (0, radius * cos(a), radius * sin(a))
-            inset = 0.15 * (far - near)
-            solid += cylinder(out - (near + inset, 0, 0), out - (far - inset, 0, 0), 0.06 * radius, sections=4)
-        return solid
-
-    def _pipe(self, radius: float, bore: float, near: float, far: float) -> None:
-        self.fixed += ring(self.center - (0.5 * (near + far), 0, 0), FRONT, bore, radius, far - near, 24)
-
-    def _glass(self, radius: float, front: float) -> None:
-        """The rim of the front glass, whose dome stands a little out."""
-        self.fixed += ring(self.center - (front + 0.03 * radius, 0, 0), FRONT, 0.8 * radius, radius, 0.08 * radius, 24)
-        self.fixed += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.7 * radius, 0.7 * radius), 16)
-
-    def _tubes(self, rng: np.random.Generator, radius: float, near: float, long: float, count: int) -> None:
-        wall = 0.1 * radius
-        self._pipe(radius, radius - wall, near, long)
-        if rng.random() < 0.6:
-            self._pipe(1.15 * radius if radius < 0.02 else radius * 1.05, radius - wall, near - 0.001, 0.35 * long)
-        self._sliding(rng, radius - wall - 0.0006, 0.0, long, count)
-
-    def _sliding(self, rng: np.random.Generator, radius: float, near: float, long: float, count: int) -> None:
-        """Tubes in each other, the first in a bore from ``near`` to ``long`` before the body's front."""
-        parent, outer = "body", long
-        for k in range(count):
-            last = k == count - 1
-            start, front = near + 0.0015 + 0.0008 * k, outer + rng.uniform(-0.05, 0.25) * long
-            wall = 0.12 * radius
-            if last:
-                solid = cylinder(self.center - (start, 0, 0), self.center - (front, 0, 0), radius, sections=24)
-                solid += ring(self.center - (front + 0.02 * radius, 0, 0), FRONT, 0.75 * radius, 0.97 * radius,
-                              0.06 * radius, 20)  # fmt: skip
-                solid += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.6 * radius, 0.6 * radius), 14)
-            else:
-                solid = ring(self.center - (0.5 * (start + front), 0, 0), FRONT, radius - wall, radius, front - start, 22)
-            travel = (min(front, outer) - start) * rng.uniform(0.5, 0.9)
-            at = self.center - (front, 0, 0)
-            turning = last and k > 0 and rng.random() < 0.25
-            joint = continuous(parent, FRONT, at) if turning else prismatic(parent, FRONT, 0.0, travel, at)
-            part = "lens" if k == 0 else f"lens_{k}"
-            self.parts.append((part, solid, joint))
-            if last and rng.random() < 0.25:
-                self._cap(rng, part, radius, front + 0.06 * radius)
-            parent, outer, radius = part, front, radius - wall - 0.0006
-
-    def _cap(self, rng: np.random.Generator, parent: str, radius: float, front: float) -> None:
-        """A lid before the glass: it pulls off, or swings aside."""
-        thick = 0.12 * radius
-        near = self.center - (front + 0.0006, 0, 0)
-        lid = cylinder(near, near - (thick, 0, 0), 0.98 * radius, 0.9 * radius, 22)
-        if rng.random() < 0.5:
-            joint = prismatic(parent, FRONT, 0.0, radius * rng.uniform(0.3, 1.5), near)
-        else:
-            pivot = near + (-thick, 0, 1.02 * radius)
-            lid += cylinder(pivot - (0, 0.2 * radius, 0), pivot + (0, 0.2 * radius, 0), 0.5 * thick, sections=10)
-            lid += box(near + (-thick, -0.2 * radius, 0.7 * radius), near + (0, 0.2 * radius, 1.02 * radius))
-            joint = revolute(parent, (0, 1, 0), pivot, 0.0, rng.uniform(1.0, 1.9))
-        self.parts.append(("cap", lid, joint))
-
-    def add_to(self, camera: Assembly) -> None:
-        """Add the moving parts."""
-        for name, solid, joint in self.parts:
-            camera.add(name, solid, joint, label="lens" if name.startswith("lens") else name, density=DENSITY)
 
 
 def _top_controls(
@@ -317,7 +216,9 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
                 camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)), density=DENSITY)
     if rng.random() < 0.2:  # a door at the right side
         y, t = half + 0.001, 0.0025
-        door = rounded_box((0.2 * shell.depth, y, 0.2 * height), (0.8 * shell.depth, y + t, 0.75 * height), 0.002, axis=1)
+        door = rounded_box(
+            (0.2 * shell.depth, y, 0.2 * height), (0.8 * shell.depth, y + t, 0.75 * height), 0.002, axis=1
+        )
         joint = revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2))
         camera.add("door", door, joint, density=DENSITY)
 
@@ -346,7 +247,7 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
     shell = Shell(half, depth, height, 0.0, height * rng.uniform(0.5, 0.62), min(half, 0.38 * height) * 0.92)
     body = rounded_box((0, -half, 0), (depth, half, height), rng.uniform(0.1, 0.6) * half,
                        axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
-    lens = Lens(rng, shell, "reflex" if rng.random() < 0.6 else "compact")
+    lens = Lens(rng, (0.0, 0.0, shell.lens_z), shell.lens_radius, str(rng.choice(["tubes", "prime", "zoom"])))
     camera = Assembly()
     if rng.random() < 0.5:  # a handle on top
         x0, x1, z = 0.1 * depth, 0.85 * depth, height + rng.uniform(0.02, 0.04)
@@ -359,8 +260,13 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
         ys = [half - 0.003, 0.6 * half + 0.4 * bulge, bulge, 0.6 * half + 0.4 * bulge, half - 0.003]
         wide = rng.uniform(0.2, 0.35) * height
         for k in range(4):
-            ends = [box((xs[i] - 0.001, ys[i] - 0.001, 0.5 * height - wide), (xs[i] + 0.001, ys[i] + 0.001,
-                                                                           0.5 * height + wide)) for i in (k, k + 1)]  # fmt: skip
+            ends = [
+                box(
+                    (xs[i] - 0.001, ys[i] - 0.001, 0.5 * height - wide),
+                    (xs[i] + 0.001, ys[i] + 0.001, 0.5 * height + wide),
+                )
+                for i in (k, k + 1)
+            ]
             body += hull_of(*ends)
     back = rng.random() < 0.5
     if back:

@@ -1,9 +1,9 @@
 """Clocks: on a wall, on a mantel, longcase clocks, alarm clocks, cuckoo clocks, pocket watches.
 
 What varies: the kind, the outline of the case (round, square, polygon, arch, house, tambour), the rim, the marks of the
-hours, two or three hands of several forms and where they point, a pendulum and its bob, weights on chains, a door before
-the pendulum, doors of a cuckoo, a lid, bells with a hammer, knobs, a stand in which the case tilts. Two to seven parts
-move. Hands turn freely about the middle of the face, clockwise as seen from the front.
+hours, two or three hands of several forms and where they point, a pendulum and its bob, weights on chains, a door
+before the pendulum, doors of a cuckoo, a lid, bells with a hammer, knobs, a fork in which the case tilts. Two to eight
+parts move. Hands turn freely about the middle of the face, clockwise as seen from the front.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from collections.abc import Callable
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.families.clock_faces import CLOCKWISE, FRONT, add_hands, dial_plate, glass_door, outline, pendulum, rim
 from artsim.families.details import side_hinge
+from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
@@ -21,255 +23,24 @@ from artsim.making.solids import (
     cylinder,
     ellipsoid,
     frame,
-    hull,
     hull_of,
     prism,
-    revolved,
     ring,
     rounded_box,
     tube,
     union,
 )
-from artsim.model.kinematics import Array
 
 GAP = 0.001
-FRONT = np.array([-1.0, 0.0, 0.0])
-CLOCKWISE = np.array([1.0, 0.0, 0.0])
-"""Axis of the hands: a turn about it takes the top to someone's right who looks at the face."""
 DENSITY = 500.0
 
 
 def build(rng: np.random.Generator) -> Assembly:
     """A clock; its face looks towards -X and the pendulum hangs straight at rest."""
     kinds: tuple[Callable[[np.random.Generator], Assembly], ...] = (
-        _wall_clock, _pendulum_clock, _mantel_clock, _longcase_clock, _alarm_clock, _cuckoo_clock, _watch
+        wall_clock, pendulum_clock, _mantel_clock, _longcase_clock, _alarm_clock, cuckoo_clock, _watch
     )  # fmt: skip
     return kinds[int(rng.choice(len(kinds), p=[0.24, 0.16, 0.16, 0.13, 0.15, 0.08, 0.08]))](rng)
-
-
-# --- the face --------------------------------------------------------------------------------------------------------
-
-
-def outline(kind: str, half: float, tall: float = 1.0) -> Array:
-    """Points (N, 2) along Y and Z of a case's front, about the middle of the face; ``tall`` stretches it upright."""
-    if kind == "square":
-        return half * np.array([(-1.0, -tall), (1.0, -tall), (1.0, tall), (-1.0, tall)])
-    sides = {"round": 32, "octagon": 8, "hexagon": 6, "dodecagon": 12}[kind]
-    angles = (np.arange(sides) + 0.5) * (2.0 * np.pi / sides)
-    points: Array = half * np.stack([cos(angles), tall * sin(angles)], axis=1)
-    return points
-
-
-def marks(rng: np.random.Generator, x: float, center: Array, radius: float) -> Solid:
-    """Marks of the hours on a face at ``x``: bars, dots, or four large ones."""
-    kind = str(rng.choice(["bars", "dots", "four", "mixed"]))
-    solid = Solid()
-    size = radius * rng.uniform(0.02, 0.04)
-    long = radius * rng.uniform(0.05, 0.11)
-    for hour in range(12):
-        a = 2.0 * np.pi * hour / 12
-        main = hour % 3 == 0
-        if kind == "four" and not main:
-            continue
-        out = np.array([0.0, -sin(a), cos(a)])
-        across = np.array([0.0, cos(a), sin(a)])
-        at = center + 0.86 * radius * out + (x, 0, 0)
-        if kind == "dots":
-            solid += cylinder(at + (0.001, 0, 0), at - (0.0015, 0, 0), size * (1.5 if main else 1.0), sections=8)
-            continue
-        wide = size * (1.4 if main and kind == "mixed" else 1.0)
-        reach = long * (1.6 if main else 1.0)
-        ends = [at + u * wide * across + v * reach * out + (w, 0, 0) for u in (-0.5, 0.5) for v in (-1.0, 0.25)
-                for w in (-0.0012, 0.001)]  # fmt: skip
-        solid += hull(np.array(ends))
-    return solid
-
-
-def add_hands(rng: np.random.Generator, clock: Assembly, x: float, center: Array, radius: float, parent: str) -> float:
-    """Add hour, minute and by chance a second hand before a face at ``x``; returns where they end in front."""
-    kind = str(rng.choice(["bar", "lance", "spade", "dart"]))
-    thick = max(0.012 * radius, 0.0008)
-    gap = max(0.006 * radius, 0.0005)
-    wide = radius * rng.uniform(0.025, 0.06)
-    hub = radius * rng.uniform(0.05, 0.09)
-    names = ["hour_hand", "minute_hand"] + (["second_hand"] if rng.random() < 0.5 else [])
-    lengths = [rng.uniform(0.45, 0.6), rng.uniform(0.7, 0.9), rng.uniform(0.72, 0.92)]
-    for number, name in enumerate(names):
-        thin = number == 2
-        long = lengths[number] * radius
-        w = wide * (0.3 if thin else 1.0 - 0.2 * number)
-        tail = long * rng.choice([0.0, rng.uniform(0.1, 0.3)])
-        low, high = x - gap - thick, x - gap
-        solid = cylinder((low, 0, 0), (high, 0, 0), hub * (1.0 - 0.2 * number), sections=14)
-        solid += _hand("bar" if thin else kind, low, high, w, long, tail)
-        turned = solid.turned(CLOCKWISE, rng.uniform(0.0, 2.0 * np.pi)).moved(center)
-        joint = continuous(parent, CLOCKWISE, center + (low, 0, 0))
-        clock.add(name, turned, joint, label="hand", density=2000.0)
-        x = low
-    return x
-
-
-def _hand(kind: str, low: float, high: float, wide: float, long: float, tail: float) -> Solid:
-    """A hand that points up from the origin."""
-    def plate(points: list[tuple[float, float]]) -> Solid:
-        return prism(np.array(points), low, high, 0)
-
-    back = plate([(-0.5 * wide, -tail), (0.5 * wide, -tail), (0.6 * wide, 0.0), (-0.6 * wide, 0.0)]) if tail else Solid()
-    if kind == "bar":
-        return back + plate([(-0.5 * wide, 0.0), (0.5 * wide, 0.0), (0.4 * wide, long), (-0.4 * wide, long)])
-    if kind == "lance":
-        return back + plate([(-0.35 * wide, 0.0), (0.35 * wide, 0.0), (0.8 * wide, 0.65 * long), (0.0, long),
-                             (-0.8 * wide, 0.65 * long)])  # fmt: skip
-    if kind == "spade":
-        stem = plate([(-0.35 * wide, 0.0), (0.35 * wide, 0.0), (0.35 * wide, 0.8 * long), (-0.35 * wide, 0.8 * long)])
-        leaf = [(0.0, 0.55 * long), (1.5 * wide, 0.68 * long), (0.9 * wide, 0.8 * long), (0.0, long),
-                (-0.9 * wide, 0.8 * long), (-1.5 * wide, 0.68 * long)]  # fmt: skip
-        return back + stem + plate(leaf)
-    return back + plate([(-wide, 0.0), (wide, 0.0), (0.0, long)])
-
-
-def dial_plate(rng: np.random.Generator, x: float, center: Array, radius: float) -> Solid:
-    """A round plate whose front is at ``x``, with the marks of the hours."""
-    solid = cylinder(center + (x, 0, 0), center + (x + 0.004, 0, 0), radius, sections=32)
-    return solid + marks(rng, x, center, radius)
-
-
-def rim(rng: np.random.Generator, x: float, center: Array, radius: float, wide: float, rise: float) -> Solid:
-    """A ring around a face at ``x``, which stands out by ``rise``: bevelled or flat."""
-    inner = rng.uniform(0.3, 1.0) * rise
-    section = [(radius, -0.003), (radius + wide, -0.003), (radius + wide, inner), (radius, rise)]
-    if rng.random() < 0.5:
-        section[2], section[3] = (radius + wide, rise), (radius, inner)
-    return revolved(section, center + (x, 0, 0), FRONT, 28)
-
-
-# --- kinds -----------------------------------------------------------------------------------------------------------
-
-
-def _wall_clock(rng: np.random.Generator) -> Assembly:
-    """A plain case, or a face with rays."""
-    radius = rng.uniform(0.07, 0.25)
-    center = np.zeros(3)
-    deep = radius * rng.uniform(0.1, 0.5)
-    kind = str(rng.choice(["round", "round", "square", "octagon", "dodecagon", "hexagon", "rays"]))
-    tall = 1.0 if kind != "square" or rng.random() < 0.5 else rng.uniform(1.05, 1.5)
-    edge = rng.uniform(1.04, 1.35)
-    body = dial_plate(rng, 0.0, center, radius)
-    if kind == "rays":
-        body += cylinder((0.002, 0, 0), (deep, 0, 0), 1.02 * radius, sections=32)
-        count, reach = int(rng.integers(6, 17)), rng.uniform(1.35, 2.0)
-        r = radius * rng.uniform(0.02, 0.05)
-        for k in range(count):
-            a = 2.0 * np.pi * k / count
-            out = np.array([0.0, cos(a), sin(a)])
-            far = reach * (1.0 if k % 2 else rng.uniform(0.75, 1.0)) * radius
-            body += tube([0.95 * radius * out + (0.5 * deep, 0, 0), far * out + (0.5 * deep, 0, 0)], [r, 0.6 * r], 6)
-            if count < 13 and reach > 1.5:
-                body += ellipsoid(far * out + (0.5 * deep, 0, 0), 1.8 * r, 8)
-    else:
-        around = edge if kind in ("round", "square") else edge / cos(np.pi / 6)
-        body += prism(outline(kind, around * radius, tall), 0.002, deep, 0)
-        if rng.random() < 0.4:
-            body += prism(outline(kind, 1.06 * around * radius, tall), 0.4 * deep, 0.9 * deep, 0)
-    body += rim(rng, 0.003, center, 1.005 * radius, radius * rng.uniform(0.03, min(0.3, edge - 0.99)),
-                0.003 + radius * rng.uniform(0.05, 0.2))  # fmt: skip
-    clock = Assembly()
-    clock.add("body", body, density=DENSITY)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
-    if rng.random() < 0.15 and deep > 0.02:
-        knob = cylinder((0.5 * deep, 0, 0), (0.5 * deep, 0, 0.012), 0.3 * deep, sections=14)
-        lift = max(outline(kind if kind != "rays" else "round", 1.2 * edge * radius, tall)[:, 1]) + GAP
-        if kind != "rays":
-            joint = continuous("body", (0, 0, 1), (0.5 * deep, 0, lift))
-            clock.add("knob", knob.moved((0, 0, lift)), joint, density=DENSITY)
-    return clock
-
-
-def _pendulum(rng: np.random.Generator, x: float, top: float, length: float, room: float) -> tuple[Solid, float]:
-    """A rod with a bob that hangs from height ``top``; and how far it may swing in a case of half width ``room``."""
-    bob = min(length * rng.uniform(0.1, 0.22), 0.55 * room)
-    z = top - length + bob
-    rod = max(0.008 * length, 0.0012)
-    solid = cylinder((x - 0.5 * rod, 0, top), (x - 0.5 * rod, 0, z), rod, sections=8)
-    kind = str(rng.choice(["disc", "lens", "bar", "drop"]))
-    thick = max(0.12 * bob, 0.002)
-    if kind == "disc":
-        solid += cylinder((x - thick, 0, z), (x + thick, 0, z), bob, sections=24)
-    elif kind == "lens":
-        solid += ellipsoid((x, 0, z), (1.5 * thick, bob, bob), 18)
-    elif kind == "bar":
-        solid += cylinder((x, 0, z + bob), (x, 0, z - bob), max(0.35 * bob, rod), sections=14)
-    else:
-        solid += hull_of(ellipsoid((x, 0, z - 0.3 * bob), (1.5 * thick, 0.7 * bob, 0.7 * bob), 14),
-                         box((x - rod, -rod, z), (x + rod, rod, z + bob)))  # fmt: skip
-    swing = min(0.7 * (room - bob) / length, 0.45)
-    return solid, max(swing, 0.03)
-
-
-def _pendulum_clock(rng: np.random.Generator) -> Assembly:
-    """A case on the wall with a box below, in which a pendulum hangs; or the pendulum hangs free."""
-    radius = rng.uniform(0.06, 0.14)
-    center = np.zeros(3)
-    deep = rng.uniform(0.05, 0.11)
-    kind = str(rng.choice(["round", "octagon", "square", "house", "arch"]))
-    half = radius * rng.uniform(1.1, 1.35)
-    body = dial_plate(rng, 0.0, center, radius)
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
-    low = -half
-    if kind in ("house", "arch"):
-        body += box((0.002, -half, -half), (deep, half, half))
-        if kind == "house":
-            body += prism([(-1.15 * half, half), (1.15 * half, half), (0.0, half * rng.uniform(1.4, 1.9))], -0.01, deep, 0)
-        else:
-            body += prism(outline("round", half).clip((-half, 0), (half, half)) + (0, 0.9 * half), 0.002, deep, 0)
-    else:
-        name = "square" if kind == "square" else kind
-        around = half if kind != "octagon" else half / cos(np.pi / 8)
-        body += prism(outline(name, around), 0.002, deep, 0)
-    clock = Assembly()
-    length = radius * rng.uniform(1.4, 3.6)
-    free = rng.random() < 0.35
-    if free:  # in the open below the case
-        solid, swing = _pendulum(rng, 0.4 * deep, low - 0.004, length, half)
-        body += box((0.35 * deep, -0.004, low - 0.0025), (0.45 * deep, 0.004, low + 0.01))
-        clock.add("body", body, density=DENSITY)
-    else:
-        room = half * rng.uniform(0.5, 0.85)
-        bottom = low - length - 0.02
-        body += frame((0.006, -room - 0.01, bottom - 0.012), (deep, room + 0.01, low + 0.01), [0.01] * 4)
-        body += box((deep - 0.008, -room - 0.005, bottom - 0.008), (deep, room + 0.005, low + 0.005))
-        if rng.random() < 0.6:
-            body += prism([(-room - 0.01, bottom - 0.01), (room + 0.01, bottom - 0.01), (0.5 * room, bottom - 0.5 * room),
-                           (-0.5 * room, bottom - 0.5 * room)], 0.006, deep, 0)  # fmt: skip
-        body += box((deep - 0.03, -0.003, low - 0.003), (deep, 0.003, low + 0.01))
-        solid, swing = _pendulum(rng, 0.5 * deep, low - 0.004, length - 0.006, room)
-        clock.add("body", body, density=DENSITY)
-        if rng.random() < 0.6:
-            _glass_door(rng, clock, 0.006, (-room - 0.008, room + 0.008), (bottom - 0.008, low - 0.002))
-    x = 0.4 * deep if free else 0.5 * deep
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
-    clock.add("pendulum", solid, revolute("body", FRONT, (x, 0, low - 0.004), -swing, swing), density=2000.0)
-    return clock
-
-
-def _glass_door(
-    rng: np.random.Generator, clock: Assembly, x: float, across: tuple[float, float], upright: tuple[float, float]
-) -> None:
-    """A frame before an opening at ``x``, hinged at its left or right."""
-    thick = rng.uniform(0.006, 0.012)
-    low, high = (x - GAP - thick, across[0], upright[0]), (x - GAP, across[1], upright[1])
-    bar = rng.uniform(0.1, 0.2) * (across[1] - across[0])
-    door = frame(low, high, [bar] * 4)
-    if rng.random() < 0.3:
-        middle = 0.5 * (upright[0] + upright[1])
-        door += box((low[0] + 0.002, across[0] + 0.5 * bar, middle - 0.3 * bar), (high[0] - 0.002, across[1] - 0.5 * bar,
-                                                                                 middle + 0.3 * bar))  # fmt: skip
-    left = rng.random() < 0.5
-    y = across[0] + 0.5 * bar if left else across[1] - 0.5 * bar
-    spot = np.array([low[0], y, 0.5 * (upright[0] + upright[1])])
-    door += cylinder(spot + (0.001, 0, 0), spot - (0.01, 0, 0), 0.3 * bar, sections=12)
-    edge = across[1] if left else across[0]
-    clock.add("door", door, side_hinge(low[0], edge, rng.uniform(1.0, 2.0), left), density=DENSITY)
 
 
 def _mantel_clock(rng: np.random.Generator) -> Assembly:
@@ -305,7 +76,9 @@ def _mantel_clock(rng: np.random.Generator) -> Assembly:
             body += prism([(-1.1 * half, half), (1.1 * half, half), (0.0, half * rng.uniform(1.3, 1.8))], -0.008,
                           deep + 0.008, 0)  # fmt: skip
         elif rng.random() < 0.6:
-            body += rounded_box((-0.012, -1.12 * half, half - 0.001), (deep + 0.008, 1.12 * half, half + 0.1 * half), 0.004)
+            body += rounded_box(
+                (-0.012, -1.12 * half, half - 0.001), (deep + 0.008, 1.12 * half, half + 0.1 * half), 0.004
+            )
         if rng.random() < 0.4:  # a handle on top
             top = half * (1.1 if kind == "block" else 1.0)
             angles = np.linspace(0.0, np.pi, 8)
@@ -371,8 +144,17 @@ def _longcase_clock(rng: np.random.Generator) -> Assembly:
         body += prism(outline("round", hood).clip((-hood, 0), (hood, hood)) + (0, hood - 0.01), -0.01, deep, 0)
     elif crest == "swan":
         for s in (-1.0, 1.0):
-            body += prism([(s * 1.08 * hood, hood - 0.001), (s * 0.2 * hood, hood - 0.001), (s * 0.2 * hood, 1.45 * hood),
-                           (s * 0.4 * hood, 1.5 * hood)], 0.0, 0.3 * deep, 0)  # fmt: skip
+            body += prism(
+                [
+                    (s * 1.08 * hood, hood - 0.001),
+                    (s * 0.2 * hood, hood - 0.001),
+                    (s * 0.2 * hood, 1.45 * hood),
+                    (s * 0.4 * hood, 1.5 * hood),
+                ],
+                0.0,
+                0.3 * deep,
+                0,
+            )
     body += rounded_box((-0.02, -1.1 * hood, hood - 0.02), (deep, 1.1 * hood, hood + 0.02), 0.01)
     if rng.random() < 0.5:
         for s in (-1.0, 1.0):
@@ -389,10 +171,10 @@ def _longcase_clock(rng: np.random.Generator) -> Assembly:
     clock.add("body", body, density=DENSITY)
     add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
     room = trunk - 0.025
-    solid, swing = _pendulum(rng, 0.6 * deep, top, (top - bottom) * rng.uniform(0.65, 0.9) - 0.02, room)
+    solid, swing = pendulum(rng, 0.6 * deep, top, (top - bottom) * rng.uniform(0.65, 0.9) - 0.02, room)
     clock.add("pendulum", solid, revolute("body", FRONT, (0.6 * deep, 0, top), -swing, swing), density=2000.0)
     if rng.random() < 0.75:
-        _glass_door(rng, clock, 0.01, (-trunk + 0.004, trunk - 0.004), (bottom + 0.008, low - 0.034))
+        glass_door(rng, clock, 0.01, (-trunk + 0.004, trunk - 0.004), (bottom + 0.008, low - 0.034))
     return clock
 
 
@@ -421,9 +203,10 @@ def _alarm_clock(rng: np.random.Generator) -> Assembly:
                 body += prism([(deep - 0.004, -edge), (deep * 1.9, -edge), (deep - 0.004, 0.6 * edge)], -0.8 * half,
                               0.8 * half, 1)  # fmt: skip
             top = edge
+        wide = half * rng.uniform(0.2, 0.55)
+        body += box((0.3 * deep, -0.7 * wide, 0.9 * top), (0.7 * deep, 0.7 * wide, top + 0.0005))
         clock.add("body", body, density=DENSITY)
         add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
-        wide = half * rng.uniform(0.2, 0.55)
         button = rounded_box((0.2 * deep, -wide, top + 0.004), (0.8 * deep, wide, top + 0.01), 0.003)
         clock.add("button", button, prismatic("body", (0, 0, -1), 0.0, 0.003, (middle, 0, top)), density=DENSITY)
         if kind != "wedge":
@@ -462,56 +245,6 @@ def _alarm_clock(rng: np.random.Generator) -> Assembly:
         limit = max(0.3 * (room - head) / (tip - z), 0.02)
         clock.add("hammer", hammer, revolute("body", FRONT, (middle, 0, z), -limit, limit), density=3000.0)
     _knobs(rng, clock, deep, 0.5 * radius)
-    return clock
-
-
-def _cuckoo_clock(rng: np.random.Generator) -> Assembly:
-    """A house with a steep roof, a small door for the bird, a leaf as a pendulum, and cones on chains."""
-    radius = rng.uniform(0.035, 0.06)
-    deep, half = rng.uniform(0.06, 0.1), radius * rng.uniform(1.4, 2.0)
-    center = np.zeros(3)
-    low, eaves = -radius * rng.uniform(1.25, 1.6), radius * rng.uniform(1.6, 2.2)
-    ridge = eaves + half * rng.uniform(0.7, 1.2)
-    body = dial_plate(rng, 0.0, center, radius) + box((0.002, -half, low), (deep, half, eaves))
-    body += prism([(-half, eaves - 0.001), (half, eaves - 0.001), (0, ridge)], 0.002, deep, 0)
-    thick, over = 0.08 * half, 1.25
-    slope = (ridge - eaves) / half
-    for s in (-1.0, 1.0):
-        edge = eaves - (over - 1.0) * half * slope
-        body += prism([(0, ridge), (0, ridge + 1.5 * thick), (s * over * half, edge), (s * over * half, edge + 1.5 * thick)],
-                      -0.35 * deep, deep, 0)  # fmt: skip
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.1 * radius, 0.006)
-    top, wide = eaves + 0.25 * (ridge - eaves), 0.22 * half
-    base = radius * 1.15
-    clock = Assembly()
-    length = radius * rng.uniform(1.5, 3.0)
-    body += box((0.35 * deep, -0.004, low - 0.0025), (0.45 * deep, 0.004, low + 0.01))
-    clock.add("body", body, density=DENSITY)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
-    pieces = [0] if rng.random() < 0.5 else [0, 1]
-    thin = 0.003
-    for number in pieces:
-        left = number == 0
-        if len(pieces) == 1:
-            across = (-wide, wide)
-        else:
-            across = (0.0006, wide) if left else (-wide, -0.0006)
-        leaf = box((0.002 - GAP - thin, across[0], base), (0.002 - GAP, across[1], max(top, base + 1.5 * wide)))
-        edge = across[1] if left else across[0]
-        joint = side_hinge(0.002 - GAP - thin, edge, rng.uniform(1.2, 2.0), left)
-        clock.add(f"door_{number}" if len(pieces) > 1 else "door", leaf, joint, density=DENSITY)
-    solid, swing = _pendulum(rng, 0.4 * deep, low - 0.004, length, 0.9 * half)
-    clock.add("pendulum", solid, revolute("body", FRONT, (0.4 * deep, 0, low - 0.004), -swing, swing), density=1500.0)
-    if rng.random() < 0.7:
-        x = 0.8 * deep
-        for number, y in enumerate((-0.35 * half, 0.35 * half)):
-            drop = length * rng.uniform(0.6, 1.6)
-            r = 0.14 * radius
-            weight = cylinder((x, y, low - GAP), (x, y, low - drop), 0.001, sections=6)
-            weight += hull_of(cylinder((x, y, low - drop), (x, y, low - drop - 3 * r), r, 0.5 * r, 10),
-                              ellipsoid((x, y, low - drop - 0.5 * r), r, 10))  # fmt: skip
-            fall = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.05, 0.2), (x, y, low))
-            clock.add(f"weight_{number}", weight, fall, density=4000.0)
     return clock
 
 

@@ -1,9 +1,9 @@
 """Dispensers: pumps for soap and lotion, soap boxes on a wall, drink dispensers with a tap, water coolers.
 
-What varies: the kind; the bottle's outline from above and from the side; a pump's head, its nozzle and stroke, whether its
-collar turns; one to three pumps on a tray; a lever, a push bar or a button of a soap box, and its cover, which swings up or
-down; a jar with a lid that lifts or swings, one or two taps with levers or knobs, a stand; a cooler with its bottle,
-levers or buttons, and a door below. One to six parts move.
+What varies: the kind; the bottle's outline from above and from the side; a pump's head, its nozzle and stroke, whether
+its collar turns; one to three pumps on a tray; a lever, a push bar or a button of a soap box, and its cover, which
+swings up or down; a jar with a lid that lifts or swings, one or two taps with levers or wings, a stand; a cooler with
+its bottle, levers or buttons, and a door below. One to six parts move.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _pump_bottle(rng: np.random.Generator) -> Assembly:
     turret = outer * rng.choice([0.0, rng.uniform(0.3, 1.2)])
     size = outer * rng.uniform(0.6, 1.25)
     reach = max(rng.uniform(0.9, 2.2) * max(depth, outer), 1.3 * size)
-    head = high + turret + stroke + 0.0015 + (0.25 * reach if turret < 0.25 * reach else 0.0)
+    head = high + turret + stroke + 0.0015 + (0.25 * reach if turret < 0.5 * reach else 0.0)
     collar = cap(outer * rng.uniform(1.0, 1.15), wall, low, high, stem + GAP, outer)
     if turret > 0:
         collar += ring((0, 0, high + 0.5 * turret - 0.0005), UP, stem + GAP, outer * rng.uniform(0.4, 0.75), turret, 16)
@@ -126,14 +126,18 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
     cover = rounded_tray((face - thick, -half, low + 0.002 + CLEAR), (face, half, height), 0.003, radius,
                          ((0.0, rng.uniform(0.0, 0.25) * half), (0.35, 0.0), (1.0, 0.0)), axis=0, side=1)  # fmt: skip
     if rng.random() < 0.5:  # a window that shows how much is left
-        body_window = rounded_box((face - thick - 0.0015, -0.2 * half, low + 0.3 * (height - low)),
-                                  (face - thick + 0.002, 0.2 * half, low + 0.8 * (height - low)), 0.003, axis=0)  # fmt: skip
+        body_window = rounded_box(
+            (face - thick - 0.0015, -0.2 * half, low + 0.3 * (height - low)),
+            (face - thick + 0.002, 0.2 * half, low + 0.8 * (height - low)),
+            0.003,
+            axis=0,
+        )
         cover += body_window
     dispenser.add("body", body, density=DENSITY)
     style = str(rng.choice(["bar", "lever", "button", "twin", "sensor"]))
     if style == "sensor":  # nothing to press, and the cover swings down
-        pivot = (face - 0.005, 0, low + 0.001)  # before the foot of the box
-        down = revolute("body", (0, -1, 0), pivot, 0.0, rng.uniform(0.6, 1.5))
+        down_at = (face - 0.005, 0.0, low + 0.001)  # before the foot of the box
+        down = revolute("body", (0, -1, 0), down_at, 0.0, rng.uniform(0.6, 1.5))
         dispenser.add("lid", cover, down, density=DENSITY)
         return dispenser
     up = revolute("body", (0, 1, 0), (face, 0, height), 0.0, rng.uniform(0.6, 1.6))
@@ -239,9 +243,7 @@ def _drink_jar(rng: np.random.Generator) -> Assembly:
     return dispenser
 
 
-def _tap_handle(
-    style: str, at: Array, r: float, long: float, rng: np.random.Generator
-) -> tuple[Solid, JointSpec]:
+def _tap_handle(style: str, at: Array, r: float, long: float, rng: np.random.Generator) -> tuple[Solid, JointSpec]:
     """What opens a tap: a lever that turns about the upright, a wing, or a lever that is pulled towards the front."""
     if style == "flip":
         pivot = at + (0, 0, 1.1 * r)
@@ -322,8 +324,12 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
             face = -depth - 0.001
             middle = 0.5 * (roof + height)
             size = min(0.3 * (height - roof), 0.02)
-            button = rounded_box((face - 0.008, y - 1.3 * size, middle - size), (face - 0.003, y + 1.3 * size,
-                                                                                middle + size), 0.003, axis=0)  # fmt: skip
+            button = rounded_box(
+                (face - 0.008, y - 1.3 * size, middle - size),
+                (face - 0.003, y + 1.3 * size, middle + size),
+                0.003,
+                axis=0,
+            )
             taps.append((button, prismatic("body", (1, 0, 0), 0.0, 0.002, (face, y, middle))))
     cooler.add("body", body, density=250.0)
     name = {"lever": "lever", "tap": "tap", "button": "button"}[style]

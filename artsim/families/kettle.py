@@ -1,9 +1,9 @@
 """Kettles and teapots: for a stove, electric, for tea.
 
 What varies: the outline from the side (cone, drum, belly, ball, squat) and from above, the spout (beak, straight,
-gooseneck), the lid, which lifts off, turns, screws or swings about a hinge, its knob, the handle (a bow over the lid that
-swings down or that stands fast, or a grip at the back), a cover of the spout, a switch or a button, and the stand below,
-on which electric kettles turn or from which they lift. One to three parts move.
+gooseneck), the lid, which lifts off, turns, screws or swings about a hinge, its knob, the handle (a bow over the lid
+that swings down or that stands fast, or a grip at the back), a cover of the spout, a switch or a button, and the stand
+below, on which electric kettles turn or from which they lift. One to three parts move.
 """
 
 from __future__ import annotations
@@ -121,9 +121,7 @@ def _pot(rng: np.random.Generator, kind: str, foot: float) -> Pot:
     return Pot(levels, mouth * wide, foot, foot + height)
 
 
-def _spout(
-    rng: np.random.Generator, kind: str, pot: Pot
-) -> tuple[Solid, tuple[Array, Array, float] | None]:
+def _spout(rng: np.random.Generator, kind: str, pot: Pot) -> tuple[Solid, tuple[Array, Array, float] | None]:
     """Beak at the rim, or a tube from the belly; the mouth of a straight one: its middle, direction and radius."""
     height = pot.top - pot.foot
     choice = str(rng.choice(["tube", "goose", "beak"], p=[0.55, 0.3, 0.15]))
@@ -133,10 +131,10 @@ def _spout(
         z0, z1 = pot.top - height * rng.uniform(0.2, 0.6), pot.top - rng.uniform(0.001, 0.03) * height
         reach = pot.radius(z1) + pot.mouth * rng.uniform(0.2, 0.55)
         half = pot.mouth * rng.uniform(0.35, 0.75)
-        root = np.array([(-pot.radius(z) * c, y, z) for z in (z0, z1) for y, c in ((-half, 0.6), (half, 0.6))])
-        root[:2, 1] *= 0.25
-        tip = [(-reach, y, z) for y in (-0.12 * half, 0.12 * half) for z in (z1 - 0.06 * height, z1 + 0.02 * height)]
-        return hull(np.concatenate([root, [(-0.3 * pot.radius(z1), 0.0, z1 - 0.002)], tip])), None
+        foot = [(-0.6 * pot.radius(z0), y, z0) for y in (-0.25 * half, 0.25 * half)]
+        rim = [(-0.6 * pot.radius(z1), y, z1) for y in (-half, half)] + [(-0.3 * pot.radius(z1), 0.0, z1 - 0.002)]
+        edge = [(-reach, y, z) for y in (-0.12 * half, 0.12 * half) for z in (z1 - 0.06 * height, z1 + 0.02 * height)]
+        return hull([*foot, *rim, *edge]), None
     start = pot.foot + height * rng.uniform(0.2, 0.5)
     wide = pot.mouth * (rng.uniform(0.2, 0.36) if choice == "tube" else rng.uniform(0.12, 0.2))
     root = pot.radius(start)
@@ -145,7 +143,9 @@ def _spout(
     if choice == "tube":
         tip = np.array([-reach, 0.0, end])
         bend = np.array([-root - 0.3 * (reach - root), 0.0, start + 0.3 * (end - start)])
-        solid = tube([(-0.6 * root, 0.0, start - 0.05 * height), bend, tip], [1.5 * wide, wide, 0.6 * wide], 14)
+        solid = tube(
+            np.array([(-0.6 * root, 0.0, start - 0.05 * height), bend, tip]), [1.5 * wide, wide, 0.6 * wide], 14
+        )
         return solid, (tip, unit(tip - bend), 0.6 * wide)
     # An S: out of the belly, up, and over to the front.
     s = np.linspace(0.0, 1.0, 10)

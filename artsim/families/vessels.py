@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -132,9 +133,7 @@ def dome(radius: float, low: float, rise: float, sections: int = 20) -> Solid:
     return hull_of(*discs)
 
 
-def pump_head(
-    rng: np.random.Generator, low: float, stem: float, size: float, reach: float, down: float
-) -> Solid:
+def pump_head(rng: np.random.Generator, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
     """Head of a pump with a nozzle towards -X, above its stem.
 
     Parameters
@@ -188,6 +187,6 @@ def grip_loop(points: ArrayLike, wide: float, thick: float) -> Solid:
     knots = [rounded_box((x - thick, -wide, z - thick), (x + thick, wide, z + thick), 0.8 * thick, axis=1)
              for x, z in path.tolist()]  # fmt: skip
     solid = Solid()
-    for a, b in zip(knots[:-1], knots[1:], strict=True):
+    for a, b in pairwise(knots):
         solid += hull_of(a, b)
     return solid
