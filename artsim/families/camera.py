@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rounded_box, tube
 from artsim.model.kinematics import Array
 
@@ -49,9 +49,12 @@ def build(rng: np.random.Generator) -> Assembly:
     styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
     style = str(rng.choice(styles.get(kind, ["tubes", "prime", "zoom", "zoom"])))
     lens = Lens(rng, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
-    camera.add("body", body + lens.fixed, density=DENSITY)
+    seats, controls = _top_controls(rng, shell, top, kind)
+    camera.add("body", body + lens.fixed + seats, density=DENSITY)
     lens.add_to(camera)
-    _top_controls(rng, camera, shell, top, kind)
+    for name, solid, joint in controls:
+        label = "button" if name.endswith("button") else name.partition("_")[0]
+        camera.add(name, solid, joint, label=label, density=DENSITY)
     _back(rng, camera, shell)
     if kind != "compact" and top[1] - top[0] > 0.01 and rng.random() < 0.5:
         _flash(rng, camera, shell, top)
@@ -131,36 +134,46 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
 
 
 def _top_controls(
-    rng: np.random.Generator, camera: Assembly, shell: Shell, middle: tuple[float, float, float], kind: str
-) -> None:
-    """Shutter button, dials and a film lever on the deck, beside what stands on its middle."""
+    rng: np.random.Generator, shell: Shell, middle: tuple[float, float, float], kind: str
+) -> tuple[Solid, list[tuple[str, Solid, JointSpec]]]:
+    """Shutter button and dials on the deck, beside what stands on its middle: their seats, and the parts."""
     half, depth = shell.half, shell.depth
-    raised = kind == "rangefinder"
-    z = shell.height * (1.06 if raised else 1.0) + GAP
-    right = max(middle[1] * 1.8 if kind == "reflex" else 0.0, 0.35 * half if kind != "instant" else middle[1] / 0.6)
-    left = min(middle[0] * 1.8 if kind == "reflex" else 0.0, -0.35 * half if kind != "instant" else middle[0] / 0.6)
+    z = shell.height * (1.06 if kind == "rangefinder" else 1.0) + GAP
+    beside = {"reflex": (1.8 * middle[0], 1.8 * middle[1]), "instant": (middle[0] / 0.6, middle[1] / 0.6)}
+    left, right = beside.get(kind, (-0.35 * half, 0.35 * half))
+    if kind == "reflex":
+        left, right = min(left, -0.35 * half), max(right, 0.35 * half)
+    seats = Solid()
+    parts: list[tuple[str, Solid, JointSpec]] = []
+
+    def seat(at: Array, radius: float) -> Solid:
+        return cylinder(at - (0, 0, 0.4 * depth), at - (0, 0, GAP), 1.05 * radius, sections=16)
+
     size = min(0.3 * depth, 0.18 * (half - right), 0.011)
     if size > 0.0015:
         spots = np.linspace(right + 1.3 * size, half - 1.5 * size, 2 if half - right < 7.8 * size else 3).tolist()
         r = size * rng.uniform(0.6, 0.9)
-        y = spots.pop()
-        x = depth * rng.uniform(0.3, 0.6)
-        button = cylinder((x, y, z + 0.0016), (x, y, z + 0.0016 + 0.5 * r), r, 0.9 * r, 18)
-        press = prismatic("body", -UP, 0.0, 0.0015, (x, y, z))
-        camera.add("shutter_button", button, press, label="button", density=DENSITY)
+        at = np.array([depth * rng.uniform(0.3, 0.6), spots.pop(), z])
+        button = cylinder(at + (0, 0, 0.0016), at + (0, 0, 0.0016 + 0.5 * r), r, 0.9 * r, 18)
+        seats += seat(at, r)
+        parts.append(("shutter_button", button, prismatic("body", -UP, 0.0, 0.0015, at)))
         for number, y in enumerate(spots):
             if rng.random() < 0.75:
                 at = np.array([rng.uniform(0.4, 0.6) * depth, y, z])
-                camera.add(f"dial_{number}", _dial(rng, at, size), continuous("body", UP, at), density=DENSITY)
-    room = abs(-half - left)
+                seats += seat(at, size)
+                parts.append((f"dial_{number}", _dial(rng, at, size), continuous("body", UP, at)))
+    room = half + left
     if kind in ("reflex", "rangefinder") and room > 0.012 and rng.random() < 0.65:
         size = min(0.3 * depth, 0.4 * room, 0.012)
-        y = 0.5 * (left - half)
-        crank = _dial(rng, np.array([0.5 * depth, y, z]), size)
+        at = np.array([0.5 * depth, 0.5 * (left - half), z])
+        crank = _dial(rng, at, size)
         if rng.random() < 0.4:
-            crank += rounded_box((0.5 * depth - 0.15 * size, y - 0.9 * size, z + 0.8 * size),
-                                 (0.5 * depth + 0.15 * size, y + 0.9 * size, z + 1.2 * size), 0.1 * size)  # fmt: skip
-        camera.add("knob", crank, continuous("body", UP, (0.5 * depth, y, z)), density=DENSITY)
+            crank += rounded_box(
+                at + (-0.15 * size, -0.9 * size, 0.8 * size), at + (0.15 * size, 0.9 * size, 1.2 * size), 0.1 * size
+            )
+        seats += seat(at, size)
+        parts.append(("knob", crank, continuous("body", UP, at)))
+    return seats, parts
 
 
 def _dial(rng: np.random.Generator, foot: Array, radius: float) -> Solid:

@@ -170,16 +170,15 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
         rows = int(rng.integers(1, 6))
         edges = np.linspace(base + wall, top - wall, rows + 1)
         face = rng.uniform(0.01, 0.018)
-        doors_at = rows - 1 if rows > 1 and rng.random() < 0.35 else -1
-        only_doors = rows == 1
+        doors = rows == 1 or rng.random() < 0.35  # in the top row
         kind = str(rng.choice(["bar", "bow", "flat"]))
         for row in range(rows):
             z0, z1 = float(edges[row]) + 0.002, float(edges[row + 1]) - 0.002
-            if row < rows - 1 and (row + 1 != doors_at):
+            if row < rows - 1:
                 body += box(
                     (-depth, -half + 0.5 * wall, z1 + 0.0005), (depth - 0.5 * wall, half - 0.5 * wall, z1 + 0.0035)
                 )
-            if only_doors or row == doors_at - 0 == rows - 1:
+            if doors and row == rows - 1:
                 _doors(rng, moving, depth, half, wall, z0, z1, face, kind)
                 continue
             inner = half - wall - 0.003
