@@ -127,6 +127,9 @@ def _spout(rng: np.random.Generator, kind: str, pot: Pot) -> tuple[Solid, tuple[
     choice = str(rng.choice(["tube", "goose", "beak"], p=[0.55, 0.3, 0.15]))
     if kind == "electric":
         choice = str(rng.choice(["beak", "goose", "tube"], p=[0.75, 0.15, 0.1]))
+    shoulder = pot.radius(pot.top - 0.1 * height) < 0.75 * max(level[1] for level in pot.levels)
+    if choice == "beak" and shoulder:  # a beak at a narrow rim would pour onto the body
+        choice = "tube"
     if choice == "beak":
         z0, z1 = pot.top - height * rng.uniform(0.2, 0.6), pot.top - rng.uniform(0.001, 0.03) * height
         reach = pot.radius(z1) + pot.mouth * rng.uniform(0.2, 0.55)
