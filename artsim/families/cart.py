@@ -1,8 +1,8 @@
-"""Carts: shopping carts, hand trucks, platform and service trolleys, wheelbarrows, wagons.
+"""Carts: shopping carts, hand trucks, platform and service trolleys, wheelbarrows, wagons, hand carts.
 
 What varies: the kind, the proportions, baskets of bars or of one piece, wheels (spokes, tread, size), which of them
 hang in casters that swivel, handles that fold, slide out or are fixed, a flap, a toe plate that folds up, shelves,
-drawers and doors, an axle that steers with a drawbar. One to fourteen parts move.
+drawers and doors, an axle that steers with a drawbar, a tailgate. One to fourteen parts move.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from artsim.common.elementary import arctan2, cos, sin
-from artsim.families.details import front_handle, rounded_tray, side_hinge
+from artsim.common.elementary import cos, sin
+from artsim.families.details import front_handle, side_hinge
 from artsim.families.shopping_carts import shopping_cart
+from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tray, tube, union
@@ -24,9 +25,9 @@ UP = np.array([0.0, 0.0, 1.0])
 def build(rng: np.random.Generator) -> Assembly:
     """A cart that moves towards -X; whoever pushes it stands at +X. Everything is folded out and shut at rest."""
     kinds: tuple[Callable[[np.random.Generator], Assembly], ...] = (
-        shopping_cart, _platform_trolley, _hand_truck, _service_trolley, _wheelbarrow, _wagon
+        shopping_cart, _platform_trolley, _hand_truck, _service_trolley, _wheelbarrow, wagon, hand_cart
     )  # fmt: skip
-    return kinds[int(rng.choice(len(kinds), p=[0.22, 0.17, 0.17, 0.22, 0.1, 0.12]))](rng)
+    return kinds[int(rng.choice(len(kinds), p=[0.2, 0.15, 0.16, 0.2, 0.09, 0.1, 0.1]))](rng)
 
 
 def _platform_trolley(rng: np.random.Generator) -> Assembly:
@@ -310,70 +311,4 @@ def _wheelbarrow(rng: np.random.Generator) -> Assembly:
     cart.add("body", body, density=STEEL)
     for y in spots:
         wheels.add(cart, (axle_x, y, wheels.radius))
-    return cart
-
-
-def _wagon(rng: np.random.Generator) -> Assembly:
-    """A tray on four wheels; the front axle steers with the drawbar."""
-    wheels = Wheels(rng, rng.uniform(0.07, 0.15), rng.uniform(0.03, 0.06))
-    length, half = rng.uniform(0.7, 1.1), rng.uniform(0.2, 0.32)
-    floor = 2.0 * wheels.radius + 0.03 + 3.0 * GAP
-    tall = rng.uniform(0.08, 0.3)
-    radius = rng.uniform(0.01, 0.08)
-    if rng.random() < 0.5:
-        body = rounded_tray((-0.5 * length, -half, floor), (0.5 * length, half, floor + tall), 0.006, radius,
-                            ((0.0, rng.uniform(0.0, 0.04)), (1.0, 0.0)))  # fmt: skip
-    else:  # stakes and boards
-        body = box((-0.5 * length, -half, floor), (0.5 * length, half, floor + 0.02))
-        boards = int(rng.integers(1, 4))
-        for k in range(boards):
-            z0 = floor + 0.02 + (k + 0.3) * tall / boards
-            z1 = z0 + 0.6 * tall / boards
-            for s in (-1.0, 1.0):
-                y0, y1 = sorted((s * half, s * (half - 0.015)))
-                body += box((-0.5 * length, y0, z0), (0.5 * length, y1, z1))
-                a, b = sorted((s * 0.5 * length, s * (0.5 * length - 0.015)))
-                body += box((a, -half, z0), (b, half, z1))
-        for sx in (-1.0, 1.0):
-            for sy in (-1.0, 1.0):
-                x, y = sx * (0.5 * length - 0.025), sy * (half - 0.025)
-                body += box((x - 0.012, y - 0.012, floor), (x + 0.012, y + 0.012, floor + 0.02 + tall))
-    x_front, x_back = -0.5 * length + 1.3 * wheels.radius, 0.5 * length - 1.2 * wheels.radius
-    track = half - 0.5 * wheels.wide
-    inner = track - 0.5 * wheels.wide - GAP
-    z = wheels.radius
-    body += box((x_back - 0.02, -inner + 0.03, z - 0.015), (x_back + 0.02, inner - 0.03, floor + 0.002))
-    body += cylinder((x_back, -inner, z), (x_back, inner, z), 0.012, sections=12)
-    cart = Assembly()
-    cart.add("body", body, density=500.0)
-    top = floor - GAP
-    axle = cylinder((x_front, 0, top), (x_front, 0, top - 0.015), 0.4 * half, sections=20)
-    axle += box((x_front - 0.02, -0.35 * half, z - 0.015), (x_front + 0.02, 0.35 * half, top - 0.005))
-    axle += cylinder((x_front, -inner, z), (x_front, inner, z), 0.012, sections=12)
-    limit = rng.uniform(0.3, 0.6)
-    # Steered all the way and turned up, the drawbar stays in front of the tray's lower edge.
-    rise, ahead = floor - z, (x_front + 0.5 * length + 0.04) / cos(limit)
-    nose = x_front - max(0.5 * wheels.radius, 0.06, ahead - rise * rng.uniform(0.2, 1.2))
-    steepest = float(arctan2(rise, max(ahead - (x_front - nose), 0.15 * rise)))
-    axle += box((nose, -0.025, z - 0.012), (x_front, 0.025, z + 0.012))
-    cart.add("axle", axle, revolute("body", UP, (x_front, 0, top), -limit, limit), density=STEEL)
-    long = rng.uniform(0.5, 0.85)
-    start = rng.uniform(0.35, 0.95) * steepest
-    pivot = np.array([nose - 0.014, 0.0, z])
-    out = np.array([-cos(start), 0.0, sin(start)])
-    bar = cylinder(pivot - (0, 0.022, 0), pivot + (0, 0.022, 0), 0.011, sections=12)
-    bar += tube([pivot, pivot + long * out], 0.009, 8)
-    if rng.random() < 0.6:
-        grip = pivot + long * out
-        bar += cylinder(grip - (0, 0.07, 0), grip + (0, 0.07, 0), 0.013, sections=12)
-    else:
-        across = np.array([0.0, 0.06, 0.0])
-        tip = pivot + long * out
-        bar += tube(np.array([tip, tip + across + 0.06 * out, tip + 0.13 * out, tip - across + 0.06 * out]), 0.008, 6,
-                    closed=True)  # fmt: skip
-    joint = revolute("axle", (0, 1, 0), pivot, -0.8 * start, steepest - start)
-    cart.add("handle", bar, joint, density=STEEL)
-    for x, parent in ((x_front, "axle"), (x_back, "body")):
-        for s in (-1.0, 1.0):
-            wheels.add(cart, (x, s * track, z), parent)
     return cart

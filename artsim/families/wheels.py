@@ -23,6 +23,7 @@ class Wheels:
         self.style = str(rng.choice(["disc", "rim", "spokes"]))
         self.spokes = int(rng.integers(3, 7))
         self.hub = radius * rng.uniform(0.2, 0.45)
+        self.sections = 20 if radius > 0.1 else 14  # small wheels need fewer to look round
         self.count = 0
 
     def solid(self, center: Vector) -> Solid:
@@ -32,12 +33,12 @@ class Wheels:
         r = self.radius
         hub = cylinder(middle - half, middle + half, self.hub, sections=12)
         if self.style == "disc":
-            tyre = cylinder(middle - 0.8 * half, middle + 0.8 * half, r, sections=20)
+            tyre = cylinder(middle - 0.8 * half, middle + 0.8 * half, r, sections=self.sections)
             return tyre + hub
         if self.style == "rim":
-            web = cylinder(middle - 0.3 * half, middle + 0.3 * half, 0.85 * r, sections=16)
-            return web + ring(middle, (0, 1, 0), 0.78 * r, r, 0.9 * self.wide, 16) + hub
-        solid = ring(middle, (0, 1, 0), 0.8 * r, r, 0.9 * self.wide, 16) + hub
+            web = cylinder(middle - 0.3 * half, middle + 0.3 * half, 0.85 * r, sections=self.sections)
+            return web + ring(middle, (0, 1, 0), 0.78 * r, r, 0.9 * self.wide, self.sections) + hub
+        solid = ring(middle, (0, 1, 0), 0.8 * r, r, 0.9 * self.wide, self.sections) + hub
         for k in range(self.spokes):
             a = 2.0 * np.pi * k / self.spokes
             out = np.array([cos(a), 0.0, sin(a)])
