@@ -96,21 +96,16 @@ def cap(
         Radius at the top; that of the edge by default.
     """
     upper = radius if top is None else top
-    rings = _skirt(radius, upper, wall, low, high - wall, sections)
-    shoulder = upper + (radius - upper) * wall / (high - low)
+    shoulder = upper + (radius - upper) * wall / (high - low)  # outside, where the top begins
+    inner, under = min(radius, upper) - wall, high - wall
+    corners = np.array([(inner, low), (radius, low), (shoulder, under), (inner, under)])
+    slices = [
+        np.column_stack([corners[:, 0] * cos(a), corners[:, 0] * sin(a), corners[:, 1]])
+        for a in np.linspace(0.0, 2.0 * np.pi, sections + 1).tolist()
+    ]
     if bore > 0:
-        lid = ring((0, 0, high - 0.5 * wall), UP, bore, min(upper, shoulder), wall, sections)
-    else:
-        lid = cylinder((0, 0, high - wall), (0, 0, high), shoulder, upper, sections)
-    return rings + lid
-
-
-def _skirt(radius: float, upper: float, wall: float, low: float, high: float, sections: int) -> Solid:
-    angles = np.linspace(0.0, 2.0 * np.pi, sections + 1)
-    inner = min(radius, upper) - wall
-    corners = np.array([(inner, low), (radius, low), (upper, high), (inner, high)])
-    return loft([np.column_stack([corners[:, 0] * cos(a), corners[:, 0] * sin(a), corners[:, 1]])
-                 for a in angles.tolist()])  # fmt: skip
+        return loft(slices) + ring((0, 0, high - 0.5 * wall), UP, bore, min(upper, shoulder), wall, sections)
+    return loft(slices) + cylinder((0, 0, under), (0, 0, high), shoulder, upper, sections)
 
 
 def ribs(radius: float, low: float, high: float, count: int, size: float) -> Solid:
