@@ -1,9 +1,10 @@
 """Bottles, flasks, jars and canisters with what closes them.
 
 What varies: the outline seen from above (round, square, six or eight sides, flat) and from the side (wine, beer, water,
-shampoo, cone, ball, jar, flask, jug), the handle, and the closure. Screw caps ride on a thread, slide or only turn;
-stoppers and lids lift off; flip tops swing about a hinge, on a collar that screws on or that is fixed; pumps slide in a
-collar that turns; sprayers have a trigger; flasks have a cup over their stopper. One to three parts move.
+shampoo, cone, ball, jar, flask, a can with its neck at the front or the back), the handle, and the closure. Screw caps
+ride on a thread, slide or only turn; stoppers and lids lift off; flip tops swing about a hinge, on a collar that screws
+on or that is fixed; pumps slide in a collar that turns; sprayers have a trigger; flasks have a cup over their stopper;
+preserving jars have a bail. One to three parts move.
 """
 
 from __future__ import annotations
@@ -75,7 +76,10 @@ def _body(rng: np.random.Generator, shape: str, wide: bool, tall: float) -> tupl
         long = rng.uniform(0.5, 2.2) * half
         levels.append((foot + long, 1.04 * radius, 1.04 * radius, 1.0))
         foot += long
-    body = moulded(_bevelled(levels), outline)
+    shift = 0.0
+    if shape in ("shampoo", "water", "tube", "waist", "jar") and not wide and rng.random() < 0.2:
+        shift = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 0.8) * max(depth - 1.2 * radius, 0.0)  # a can
+    body = moulded(_bevelled(levels), outline, shift)
     wall = radius * rng.uniform(0.12, 0.25)
     rim = foot + max(tall, radius * rng.uniform(0.5, 1.1))
     body += neck(radius, radius - wall, foot - 0.0005, rim)
@@ -83,15 +87,13 @@ def _body(rng: np.random.Generator, shape: str, wide: bool, tall: float) -> tupl
     if shape in ("shampoo", "water", "waist", "jar", "tube") and not wide and rng.random() < 0.25:
         z0, z1 = sorted(rng.uniform(0.15, 0.9, 2) * height)
         if z1 - z0 > 0.3 * height:
-            body += _jug_handle(rng, depth, half, z0, z1)
+            body += _jug_handle(rng, depth, half, z0, z1).moved((shift, 0, 0))
     if rng.random() < 0.2:  # a label or a moulded band
         z0 = rng.uniform(0.2, 0.4) * height
         z1 = z0 + rng.uniform(0.1, 0.35) * height
-        z = np.array([level[0] for level in levels])
-        most = [float(np.interp(rng.uniform(0.9, 1.0) * (z0 + z1) / 2, z, [v[i] for v in levels])) for i in (1, 2)]
-        r = float(np.interp(0.5 * (z0 + z1), z, [v[3] for v in levels]))
-        band = [(level, 1.02 * most[0], 1.02 * most[1], r) for level in (z0, z1)]
-        body += moulded(band, outline)
+        table = np.array(levels)
+        x, y, r = (float(np.interp(0.5 * (z0 + z1), table[:, 0], table[:, i])) for i in (1, 2, 3))
+        body += moulded([(z, 1.02 * x, 1.02 * y, r) for z in (z0, z1)], outline, shift)
     return body, mouth
 
 

@@ -53,7 +53,7 @@ def cross_section(kind: str, sharpness: float = 0.5) -> Array:
     return circle
 
 
-def moulded(levels: Sequence[Level], outline: Array) -> Solid:
+def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Solid:
     """Body with a cross-section that changes with height.
 
     Parameters
@@ -62,12 +62,14 @@ def moulded(levels: Sequence[Level], outline: Array) -> Solid:
         From the bottom up.
     outline : (N, 2) float
         As :func:`cross_section` makes it.
+    shift : float
+        How far the levels stand towards +X, those that are round less: the round neck of a can stays at x = 0.
     """
     angles = (np.arange(len(outline)) + 0.5) * (2.0 * np.pi / len(outline))
     circle = np.stack([cos(angles), sin(angles)], axis=1)
     rings = []
     for z, x, y, roundness in levels:
-        plane = ((1.0 - roundness) * outline + roundness * circle) * (x, y)
+        plane = ((1.0 - roundness) * outline + roundness * circle) * (x, y) + ((1.0 - roundness) * shift, 0.0)
         rings.append(np.column_stack([plane, np.full(len(plane), z)]))
     return loft(rings)
 
