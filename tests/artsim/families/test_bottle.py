@@ -20,7 +20,8 @@ def test_closures_leave_the_mouth_upward_or_to_the_back(seed: int) -> None:
         T = bottle.tree.forward_kinematics(opened)[k]
         moved = transform_points(T, part.vertices).mean(axis=0) - part.vertices.mean(axis=0)
         assert moved[2] > 0 or moved[0] > 0
-        assert moved[0] > -1e-9
+        # A cap that turns on its thread moves the mean of its vertices a little.
+        assert moved[0] > -1e-3 * bottle.diagonal
         assert abs(moved[1]) < 1e-3 * bottle.diagonal
 
 
