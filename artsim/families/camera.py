@@ -139,10 +139,11 @@ def _top_controls(
     """Shutter button and dials on the deck, beside what stands on its middle: their seats, and the parts."""
     half, depth = shell.half, shell.depth
     z = shell.height * (1.06 if kind == "rangefinder" else 1.0) + GAP
-    beside = {"reflex": (1.8 * middle[0], 1.8 * middle[1]), "instant": (middle[0] / 0.6, middle[1] / 0.6)}
-    left, right = beside.get(kind, (-0.35 * half, 0.35 * half))
-    if kind == "reflex":
-        left, right = min(left, -0.35 * half), max(right, 0.35 * half)
+    # The crest is 0.4 of the prism's foot wide, and 0.6 of an instant camera's top.
+    share = {"reflex": 0.4, "instant": 0.6}.get(kind, 1.0)
+    center, foot = 0.5 * (middle[0] + middle[1]), 0.5 * (middle[1] - middle[0]) / share
+    least = 0.0 if kind == "instant" else 0.35 * half
+    left, right = min(center - foot, -least), max(center + foot, least)
     seats = Solid()
     parts: list[tuple[str, Solid, JointSpec]] = []
 
