@@ -75,13 +75,18 @@ _VIVID: tuple[Colour, ...] = (
 
 _Choice = tuple[str, ...]
 _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
+    "bottle": (("gloss", "plastic", "smoke"), ("plastic", "chrome")),
     "box": (("card", "card", "wood", "plastic"), ("steel", "chrome")),
     "bucket": (("plastic", "steel", "enamel"), ("steel", "plastic")),
+    "camera": (("shell", "plastic", "steel"), ("rubber", "chrome")),
+    "cart": (("steel", "enamel", "plastic"), ("steel", "plastic")),
     "carton": (("card",), ("card",)),
+    "clock": (("wood", "plastic", "enamel", "chrome"), ("gloss", "chrome")),
     "coffee_machine": (("shell", "gloss", "steel"), ("plastic", "chrome")),
     "cutter": (("plastic",), ("steel",)),
     "desk_lamp": (("enamel", "shell", "steel"), ("chrome", "rubber")),
     "dishwasher": (("enamel", "steel"), ("chrome",)),
+    "dispenser": (("plastic", "gloss", "steel"), ("chrome", "plastic")),
     "door": (("wood", "enamel"), ("chrome", "steel")),
     "drawer": (("wood",), ("chrome", "steel", "wood")),
     "eyeglasses": (("smoke",), ("gloss", "steel")),
@@ -89,6 +94,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "faucet": (("chrome", "steel"), ("chrome",)),
     "folding_knife": (("wood", "plastic", "steel"), ("steel",)),
     "globe": (("wood", "chrome"), ("chrome",)),
+    "kettle": (("steel", "enamel", "gloss"), ("rubber", "plastic")),
     "kitchen_pot": (("steel", "enamel"), ("rubber", "plastic")),
     "knife": (("plastic", "wood"), ("steel",)),
     "laptop": (("steel", "shell"), ("plastic",)),
@@ -114,7 +120,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
 _PART_FINISHES: Mapping[str, str] = {
     "blade": "steel", "button": "rubber", "carafe": "gloss", "handwheel": "enamel", "magazine": "steel",
     "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "",
-    "temple": "", "temple_left": "", "temple_right": "",
+    "temple": "", "temple_left": "", "temple_right": "", "hand": "", "lens": "shell", "pendulum": "chrome", "pump": "",
 }  # fmt: skip
 """Finishes of parts by their label; "" stands for that of the details."""
 

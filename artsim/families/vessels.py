@@ -1,0 +1,189 @@
+"""Closed vessels that several families share: moulded bodies of any outline, necks, caps that cover them, pumps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from artsim.common.elementary import cos, power, sin
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull_of, loft, ring, rounded_box, tube
+from artsim.model.kinematics import Array
+
+GAP = 0.0008
+"""Metres between a neck and its cap, and between a stem and its bore: bottles are small."""
+UP = np.array([0.0, 0.0, 1.0])
+SECTIONS = 24
+
+Level = tuple[float, float, float, float]
+"""Height, half depth (X), half width (Y), and how round the outline is there: 0 as drawn, 1 an ellipse."""
+
+
+def cross_section(kind: str, sharpness: float = 0.5) -> Array:
+    """Outline of a moulded body, seen from above.
+
+    Parameters
+    ----------
+    kind : str
+        "round", "square" (a superellipse), "hexagon", "octagon", or "flask" (round in front, flat behind).
+    sharpness : float
+        Of a square's corners, from 0 (nearly round) to 1.
+
+    Returns
+    -------
+    (24, 2) float
+        From -1 to 1 along X and Y.
+    """
+    angles = (np.arange(SECTIONS) + 0.5) * (2.0 * np.pi / SECTIONS)
+    circle = np.stack([cos(angles), sin(angles)], axis=1)
+    if kind == "square":
+        # |x|^n + |y|^n = 1, along rays: n = 2 is a circle, n = 10 nearly a square.
+        n = 2.5 + 7.5 * sharpness
+        return circle / power(power(np.abs(circle), n).sum(axis=1), 1.0 / n)[:, None]
+    if kind in ("hexagon", "octagon"):
+        sides = 6 if kind == "hexagon" else 8
+        corner = 2.0 * np.pi / sides
+        offset = np.mod(angles, corner) - 0.5 * corner
+        outline = circle * (cos(0.5 * corner) / cos(offset))[:, None]
+        return outline / np.abs(outline).max(axis=0)
+    if kind == "flask":
+        return np.column_stack([np.minimum(circle[:, 0], 0.35), circle[:, 1]])
+    return circle
+
+
+def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Solid:
+    """Body with a cross-section that changes with height.
+
+    Parameters
+    ----------
+    levels : sequence of (height, half depth, half width, roundness)
+        From the bottom up.
+    outline : (N, 2) float
+        As :func:`cross_section` makes it.
+    shift : float
+        How far the levels stand towards +X, those that are round less: the round neck of a can stays at x = 0.
+    """
+    angles = (np.arange(len(outline)) + 0.5) * (2.0 * np.pi / len(outline))
+    circle = np.stack([cos(angles), sin(angles)], axis=1)
+    rings = []
+    for z, x, y, roundness in levels:
+        plane = ((1.0 - roundness) * outline + roundness * circle) * (x, y) + ((1.0 - roundness) * shift, 0.0)
+        rings.append(np.column_stack([plane, np.full(len(plane), z)]))
+    return loft(rings)
+
+
+def neck(radius: float, bore: float, low: float, high: float, sections: int = 18) -> Solid:
+    """Open round neck."""
+    return ring((0, 0, 0.5 * (low + high)), UP, bore, radius, high - low, sections)
+
+
+def cap(
+    radius: float, wall: float, low: float, high: float, bore: float = 0.0, top: float | None = None, sections: int = 24
+) -> Solid:
+    """Cup upside down: it covers a neck.
+
+    Parameters
+    ----------
+    radius : float
+        Outside.
+    wall : float
+        Thickness of the skirt and of the top.
+    low, high : float
+        Heights of its edge and of its top.
+    bore : float
+        Radius of a hole in the top; 0 for none.
+    top : float, optional
+        Radius at the top; that of the edge by default.
+    """
+    upper = radius if top is None else top
+    shoulder = upper + (radius - upper) * wall / (high - low)  # outside, where the top begins
+    inner, under = min(radius, upper) - wall, high - wall
+    corners = np.array([(inner, low), (radius, low), (shoulder, under), (inner, under)])
+    slices = [
+        np.column_stack([corners[:, 0] * cos(a), corners[:, 0] * sin(a), corners[:, 1]])
+        for a in np.linspace(0.0, 2.0 * np.pi, sections + 1).tolist()
+    ]
+    if bore > 0:
+        return loft(slices) + ring((0, 0, high - 0.5 * wall), UP, bore, min(upper, shoulder), wall, sections)
+    return loft(slices) + cylinder((0, 0, under), (0, 0, high), shoulder, upper, sections)
+
+
+def ribs(radius: float, low: float, high: float, count: int, size: float) -> Solid:
+    """Upright ribs around a cap."""
+    solid = Solid()
+    for k in range(count):
+        a = 2.0 * np.pi * k / count
+        x, y = radius * cos(a), radius * sin(a)
+        solid += cylinder((x, y, low), (x, y, high), size, sections=6)
+    return solid
+
+
+def dome(radius: float, low: float, rise: float, sections: int = 20) -> Solid:
+    """Round cap of a sphere or flatter, on a level circle."""
+    levels = ((0.0, 1.0), (0.4, 0.9), (0.75, 0.64), (0.95, 0.3), (1.0, 0.08))
+    discs = [
+        cylinder((0, 0, low + h * rise), (0, 0, low + h * rise + 1e-5), max(s * radius, 1e-4), sections=sections)
+        for h, s in levels
+    ]
+    return hull_of(*discs)
+
+
+def pump_head(rng: np.random.Generator, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
+    """Head of a pump with a nozzle towards -X, above its stem.
+
+    Parameters
+    ----------
+    low : float
+        Height of the head's underside.
+    stem : float
+        Radius of the stem, which goes ``down`` below the head.
+    size : float
+        Radius of the head.
+    reach : float
+        How far the nozzle reaches from the axis.
+    """
+    tall = size * rng.uniform(0.45, 1.3)
+    solid = cylinder((0, 0, low - down), (0, 0, low + 0.5 * tall), stem, sections=14)
+    kind = str(rng.choice(["saddle", "disc", "hook", "block", "drop"]))
+    droop = rng.uniform(0.0, 0.25)
+    r = min(size * rng.uniform(0.3, 0.48), 0.48 * tall)
+    middle = low + 0.5 * tall
+    if kind == "saddle":  # a wide thumb rest that narrows to the nozzle
+        back = rounded_box((-0.6 * size, -size, low), (size, size, low + tall), 0.35 * tall)
+        tip = ellipsoid((-reach, 0, middle - droop * reach), r, 10)
+        return solid + back + hull_of(ellipsoid((-0.3 * size, 0, middle), 1.3 * r, 10), tip)
+    if kind == "block":
+        wide = max(1.2 * r, 0.55 * size)
+        return solid + rounded_box((-reach, -wide, low), (0.9 * size, wide, low + tall), 0.4 * min(tall, wide))
+    if kind == "hook":
+        bend = -reach * rng.uniform(0.75, 0.9)
+        path = [(0, 0, middle), (bend, 0, middle + 0.1 * reach), (-reach, 0, middle - max(droop, 0.1) * reach)]
+        return solid + tube(path, [1.2 * r, r, 0.8 * r], 10) + cylinder((0, 0, low), (0, 0, low + tall), size)
+    if kind == "drop":
+        back = ellipsoid((0, 0, middle), (size, size, 0.5 * tall), 14)
+        return solid + hull_of(back, ellipsoid((-reach, 0, middle - 0.5 * droop * reach), 0.7 * r, 10))
+    top = low + tall
+    solid += cylinder((0, 0, low), (0, 0, top), size * rng.uniform(0.5, 0.9), size)
+    solid += dome(size, top - 1e-4, 0.25 * tall)
+    return solid + tube([(0, 0, middle), (-reach, 0, middle - droop * reach)], [r, 0.8 * r], 10)
+
+
+def grip_loop(points: ArrayLike, wide: float, thick: float) -> Solid:
+    """Flat strap along points in the plane y = 0: a jug's handle.
+
+    Parameters
+    ----------
+    points : (N, 2) float
+        X and Z.
+    wide, thick : float
+        Half extents along Y and across.
+    """
+    path = np.asarray(points, dtype=np.float64)
+    knots = [rounded_box((x - thick, -wide, z - thick), (x + thick, wide, z + thick), 0.8 * thick, axis=1)
+             for x, z in path.tolist()]  # fmt: skip
+    solid = Solid()
+    for a, b in pairwise(knots):
+        solid += hull_of(a, b)
+    return solid

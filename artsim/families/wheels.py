@@ -1,0 +1,94 @@
+"""Wheels and casters of carts, and the bars of their frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.common.elementary import cos, sin
+from artsim.making.assembly import Assembly, continuous
+from artsim.making.solids import Solid, Vector, box, cylinder, hull_of, ring, tube
+
+GAP = 0.003
+STEEL = 1500.0  # kg/m^3, as real tubes are hollow
+UP = np.array([0.0, 0.0, 1.0])
+ROLL = np.array([0.0, -1.0, 0.0])
+"""Axis of wheels: a cart that moves towards -X turns them by a positive angle."""
+
+
+class Wheels:
+    """The wheels of one cart: all of one form, numbered as they come."""
+
+    def __init__(self, rng: np.random.Generator, radius: float, wide: float):
+        self.rng, self.radius, self.wide = rng, radius, wide
+        self.style = str(rng.choice(["disc", "rim", "spokes"]))
+        self.spokes = int(rng.integers(3, 7))
+        self.hub = radius * rng.uniform(0.2, 0.45)
+        self.sections = 20 if radius > 0.1 else 14  # small wheels need fewer to look round
+        self.count = 0
+
+    def solid(self, center: Vector) -> Solid:
+        """A wheel in the plane across Y."""
+        middle = np.asarray(center, dtype=np.float64)
+        half = np.array([0.0, 0.5 * self.wide, 0.0])
+        r = self.radius
+        hub = cylinder(middle - half, middle + half, self.hub, sections=12)
+        if self.style == "disc":
+            tyre = cylinder(middle - 0.8 * half, middle + 0.8 * half, r, sections=self.sections)
+            return tyre + hub
+        if self.style == "rim":
+            web = cylinder(middle - 0.3 * half, middle + 0.3 * half, 0.85 * r, sections=self.sections)
+            return web + ring(middle, (0, 1, 0), 0.78 * r, r, 0.9 * self.wide, self.sections) + hub
+        solid = ring(middle, (0, 1, 0), 0.8 * r, r, 0.9 * self.wide, self.sections) + hub
+        for k in range(self.spokes):
+            a = 2.0 * np.pi * k / self.spokes
+            out = np.array([cos(a), 0.0, sin(a)])
+            solid += tube([middle + 0.5 * self.hub * out, middle + 0.85 * r * out], 0.22 * self.wide, 4)
+        return solid
+
+    def bracket(self, x: float, y: float, top: float) -> Solid:
+        """Two cheeks that hold a wheel below ``top``; part of the cart."""
+        solid = Solid()
+        r = self.radius
+        for s in (-1.0, 1.0):
+            y0, y1 = sorted((y + s * (0.5 * self.wide + 0.003), y + s * (0.5 * self.wide + 0.007)))
+            plate = box((x - 0.7 * r, y0, top - 0.006), (x + 0.7 * r, y1, top))
+            solid += hull_of(plate, cylinder((x, y0, r), (x, y1, r), 0.3 * r, sections=8))
+        lid = max(2.0 * r + GAP, top - 0.006)
+        return solid + box(
+            (x - 0.7 * r, y - 0.5 * self.wide - 0.007, lid), (x + 0.7 * r, y + 0.5 * self.wide + 0.007, top)
+        )
+
+    def add(self, cart: Assembly, center: Vector, parent: str = "body") -> None:
+        """A wheel that turns on its axle."""
+        joint = continuous(parent, ROLL, center)
+        cart.add(f"wheel_{self.count}", self.solid(center), joint, density=900.0)
+        self.count += 1
+
+    def add_caster(self, cart: Assembly, x: float, y: float, top: float) -> None:
+        """A fork that swivels below ``top`` about an upright axis, and a wheel in it that stands on the floor."""
+        plate = 0.008
+        trail = self.radius * 0.5
+        axle = np.array([x + trail, y, self.radius])
+        disc = top - GAP
+        cheek = 0.5 * self.wide + 0.002
+        fork = cylinder((x, y, disc - plate), (x, y, disc), max(0.5 * self.radius, cheek), sections=12)
+        for s in (-1.0, 1.0):
+            y0, y1 = sorted((y + s * cheek, y + s * (cheek + 0.003)))
+            fork += hull_of(
+                box((x - 0.3 * self.radius, y0, disc - plate), (x + 0.4 * self.radius, y1, disc - plate + 0.004)),
+                cylinder((axle[0], y0, axle[2]), (axle[0], y1, axle[2]), 0.3 * self.radius, sections=8),
+            )
+            fork += box((x - 0.3 * self.radius, y0, disc - plate), (x + 0.4 * self.radius, y1, disc - 0.001))
+        name = f"caster_{self.count}"
+        cart.add(name, fork, continuous("body", UP, (x, y, disc)), density=STEEL)
+        self.add(cart, axle, name)
+
+    @property
+    def caster_height(self) -> float:
+        """What a caster needs below a floor."""
+        return 2.0 * self.radius + 0.008 + 2.0 * GAP
+
+
+def bar(start: Vector, end: Vector, radius: float, sections: int = 8) -> Solid:
+    """Straight rod."""
+    return tube([np.asarray(start), np.asarray(end)], radius, sections)
