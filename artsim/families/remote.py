@@ -66,8 +66,9 @@ def _draw_body(rng: np.random.Generator) -> _Body:
     length = 0.17 * exp(rng.uniform(-0.75, 0.6))
     half = 0.5 * length * rng.triangular(0.16, 0.26, 0.62)
     thick = max(length * rng.triangular(0.035, 0.1, 0.26), 0.006)
-    levels = np.linspace(0.0, length, 9)
-    share = levels / length
+    low, high = rng.uniform(0.06, 0.3), rng.uniform(0.9, 0.96)
+    share = np.unique([*np.linspace(0.0, 1.0, 8), low, high])  # the face between low and high is flat
+    levels = length * share
     kind = str(rng.choice(["straight", "tapered", "waisted", "oval"], p=[0.34, 0.24, 0.24, 0.18]))
     amount = rng.uniform(0.12, 0.5)
     if kind == "tapered":
@@ -81,7 +82,6 @@ def _draw_body(rng: np.random.Generator) -> _Body:
     round_end = rng.uniform(0.0, 0.6) if kind != "oval" else 0.0
     widths = widths * np.where((levels == 0) | (levels == length), 1.0 - round_end, 1.0)
     # Ends of the front bend back or forward beyond the keys; the back has humps.
-    low, high = rng.uniform(0.06, 0.35), rng.uniform(0.9, 0.96)
     bends = rng.uniform(-0.1, 0.3, 2) * length * rng.choice([0.0, 1.0], p=[0.35, 0.65])
     below, above = np.clip((low - share) / low, 0.0, 1.0), np.clip((share - high) / (1 - high), 0.0, 1.0)
     fronts = bends[0] * low * 2.0 * below**2 + 0.15 * bends[1] * above**2
@@ -93,7 +93,10 @@ def _draw_body(rng: np.random.Generator) -> _Body:
     backs = np.maximum(backs, np.maximum(fronts, 0.0) + 0.004)
     roundness = rng.uniform(0.1, 0.95)
     inside = (share >= low - 1e-9) & (share <= high + 1e-9)
-    edge = roundness * 0.5 * np.minimum(backs - fronts, 2.0 * half * widths)
+    # Edges as round as the body is thick leave no room for keys on a narrow one.
+    edge = 0.5 * np.minimum(backs - fronts, 2.0 * half * widths)
+    roundness = min(roundness, float((0.55 * half * widths / edge)[inside].min()))
+    edge = roundness * edge
     keys = float((half * widths - edge)[inside].min()) * rng.uniform(0.82, 0.97)
     return _Body(levels, fronts, backs, half * widths, roundness, low * length, high * length, keys)
 
@@ -108,6 +111,8 @@ def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> b
     levels = np.concatenate([[0.0], body.levels[(body.levels > 0) & (body.levels < end - 0.001)], [end - GAP]])
     _, backs, halves = body.at(levels)
     slides = bool(np.ptp(backs) < 0.02 * length and np.ptp(halves) < 0.1 * halves.max()) and rng.random() < 0.7
+    if not slides and backs[0] > backs.min() + 0.1 * end:
+        return False  # the bent end of the body would stop a cover that swings
     if slides:  # over a flat back
         backs, inset = np.full(len(levels), backs.min()), thick + backs - backs.min()
     solid = body.between(end, length)
@@ -122,45 +127,36 @@ def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> b
     if slides:
         joint = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.3, 1.0) * end, (float(backs[0]), 0, 0))
     else:
-        # It turns about its upper edge where it may stand out, so that a bent back does not stop it.
-        joint = revolute("body", (0, 1, 0), (float(body.backs.max()) + 0.001, 0, 0), 0.0, rng.uniform(0.9, 1.9))
+        # All of it lies on one side of the axis, so that none of it moves towards the body.
+        joint = revolute("body", (0, 1, 0), (float(backs.min()) - thick, 0, 0), 0.0, rng.uniform(0.9, 1.9))
     remote.add("battery_cover", cover, joint, density=900.0)
     return True
 
 
 def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
     """Bands of keys from the top down; returns how far they stand out."""
-    face = front_face(0.0)
-    half = body.key_half
+    face, half = front_face(0.0), body.key_half
     height, travel = rng.uniform(0.0009, 0.0035), rng.uniform(0.0003, 0.0008)
-    pitch = min(max(half * rng.uniform(0.45, 0.75), 0.0055), 0.02)
+    pitch = min(max(half * rng.uniform(0.45, 0.8), 0.0055), 0.02)
     kind = str(rng.choice(["square", "pill", "round", "diamond"], p=[0.3, 0.35, 0.3, 0.05]))
     fill, shrink = rng.uniform(0.55, 0.85), rng.uniform(0.0, 0.35)
-    top, count = body.key_high, 0
-    plan = list(rng.permutation(["pad", "numbers", "rockers", "row", "row"]))[: int(rng.integers(1, 6))]
-    plan = ["row", *plan, "numbers", "row"][: int(rng.integers(1, 8))]
-    tallest = height
-    for band in plan:
-        room = top - body.key_low
-        columns = int(rng.integers(2, 5)) if half > 0.009 else int(rng.integers(1, 3))
-        if band == "pad" and room > 1.5 * half:
-            radius = min(0.92 * half, 0.03)
-            added = _pad(rng, remote, face, top - radius, radius, height, travel)
-            tallest = max(tallest, added[1])
-            count, top = count + added[0], top - 2.0 * radius - 0.25 * pitch
+    bands = _plan(rng, half, body.key_high - body.key_low, pitch)
+    spare = body.key_high - body.key_low - sum(deep for _, _, _, deep in bands)
+    gap = min(spare / len(bands), rng.uniform(0.2, 2.0) * pitch)
+    top, count, tallest = body.key_high, 0, height
+    for band, columns, rows, deep in bands:
+        if band == "pad":
+            added = _pad(rng, remote, face, top - 0.5 * deep, 0.46 * deep, height, travel)
+            tallest = max(tallest, added)
+            top -= deep + gap
             continue
-        deep = {"numbers": 4.0, "rockers": 2.6, "row": 1.0, "pad": 1.0}[band] * pitch
-        if deep > room:
-            continue
-        rows = 4 if band == "numbers" else 1
-        columns = {"numbers": 3, "rockers": 2}.get(band, columns)
-        if count + rows * columns > MOST_KEYS or 2.0 * half / columns < 0.003:
-            continue
-        size = np.array([min(fill * 2.0 * half / columns, 1.7 * pitch), fill * deep / rows])
+        size = np.array([min(fill * 2.0 * half / columns, 1.9 * pitch), fill * deep / rows])
         outline = key_outline("pill" if band == "rockers" else kind, size, 10)
+        rocks = band == "rockers" and height > 0.0016 and rng.random() < 0.7
         for _, _, u, v in key_cells((-half, half), (top - deep, top), columns, rows):
             name = f"button_{count}"
-            if band == "rockers" and height > 0.0016 and rng.random() < 0.7:
+            count += 1
+            if rocks:
                 tilt = 0.8 * (height - 0.0004) / float(size[1])
                 solid = key(face, u, v, outline, 0.5 * height, height + 0.0004, shrink)
                 hinge = revolute("body", (0, 1, 0), face.at(u, v, 0.5 * height), -0.6 * tilt, 0.6 * tilt)
@@ -168,36 +164,47 @@ def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
                 tallest = max(tallest, 1.8 * height)
             else:
                 add_key(remote, "body", name, face, (u, v), outline, height, travel, shrink)
-            count += 1
-        top -= deep + rng.uniform(0.05, 0.4) * pitch
-    if count == 0:
-        size = 1.2 * half
-        add_key(remote, "body", "button_0", face, (0.0, body.key_high - half), key_outline("round", (size, size), 16), height, travel)  # fmt: skip
+        top -= deep + gap
     return tallest
+
+
+def _plan(rng: np.random.Generator, half: float, room: float, pitch: float) -> list[tuple[str, int, int, float]]:
+    """Kind, columns, rows and height of each band of keys; at least one, at most ``MOST_KEYS`` keys."""
+    wanted = list(rng.permutation(["pad", "numbers", "rockers", "row", "row"]))[: int(rng.integers(1, 6))]
+    wanted = ["row", *wanted, "numbers", "row"][: int(rng.integers(1, 9))]
+    bands: list[tuple[str, int, int, float]] = []
+    count, left = 0, room
+    for band in wanted:
+        columns = int(rng.integers(2, 5)) if half > 0.009 else int(rng.integers(1, 3))
+        columns, rows = {"numbers": (3, 4), "rockers": (2, 1), "pad": (5, 1)}.get(band, (columns, 1))
+        deep = {"numbers": 4.0 * pitch, "rockers": 2.6 * pitch, "pad": min(2.0 * half, 0.06)}.get(band, pitch)
+        narrow = band != "pad" and 2.0 * half / columns < 0.003
+        if deep <= left and count + rows * columns <= MOST_KEYS and not narrow:
+            bands.append((band, columns, rows, deep))
+            count, left = count + rows * columns, left - deep
+    return bands or [("row", 1, 1, min(room, 2.0 * half))]
 
 
 def _pad(
     rng: np.random.Generator, remote: Assembly, face: Face, v: float, radius: float, height: float, travel: float
-) -> tuple[int, float]:
-    """Four keys about a fifth, or a dial about it; returns how many keys, and how far all that stands out."""
-    center = face.at(0.0, v)
-    number = len(remote._parts)
+) -> float:
+    """Four keys about a fifth, or a dial; returns how far that stands out."""
+    center = tuple(face.at(0.0, v))
     if rng.random() < 0.2:
         reach = max(height + 0.001, 0.004)
-        remote.add("dial", dial(center, (-1, 0, 0), reach, 0.85 * radius, 20),
-                   continuous("body", (-1, 0, 0), tuple(center)), density=1100.0)  # fmt: skip
-        return 0, reach
+        solid = dial(center, (-1, 0, 0), reach, radius, 20)
+        remote.add("dial", solid, continuous("body", (-1, 0, 0), center), density=1100.0)
+        return reach
     inner = radius * rng.uniform(0.38, 0.55)
     low, high = travel + 0.0003, max(height, travel + 0.0008) * rng.uniform(0.8, 1.3)
-    middle = face.at(0.0, v, 0.5 * (low + high))
+    middle = tuple(face.at(0.0, v, 0.5 * (low + high)))
     for k in range(4):
         turn = k * 0.5 * np.pi
-        arc = (turn - 0.7, turn + 0.7)
-        solid = ring(middle, (-1, 0, 0), inner + 0.0004, radius, high - low, 3, arc)
-        remote.add(f"arrow_{k}", solid, prismatic("body", (1, 0, 0), 0.0, travel, tuple(middle)), density=1100.0)
+        solid = ring(middle, (-1, 0, 0), inner + 0.0004, radius, high - low, 3, (turn - 0.7, turn + 0.7))
+        remote.add(f"arrow_{k}", solid, prismatic("body", (1, 0, 0), 0.0, travel, middle), density=1100.0)
     outline = key_outline("round", (1.7 * inner, 1.7 * inner), 14)
-    add_key(remote, "body", f"button_{100 + number}", face, (0.0, v), outline, height, travel)
-    return 5, max(high, height)
+    add_key(remote, "body", "select", face, (0.0, v), outline, height, travel)
+    return max(high, height)
 
 
 def _front_cover(rng: np.random.Generator, remote: Assembly, body: _Body, height: float) -> None:
