@@ -106,20 +106,21 @@ def lip_of(panel: _Panel) -> float:
     return min(0.12 * panel.thick, 0.004)
 
 
-def _keys(rng: np.random.Generator, display: Assembly, parent: str, face: Face, half: float, size: float) -> None:
-    """A row of keys to one side of a chin, on some."""
+def _keys(rng: np.random.Generator, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
+    """A row of keys to one side of a chin, on some; returns how many."""
     if rng.random() < 0.35 or size < 0.004:
-        return
+        return 0
     count = int(rng.integers(1, 7))
     wide = min(rng.uniform(0.8, 2.5) * size, 0.028)
     kind = str(rng.choice(["round", "square", "pill"]))
     side, travel = float(rng.choice([-1.0, 0.0, 1.0])), rng.uniform(0.0008, 0.0015)
-    pitch = 1.3 * wide
+    pitch = 1.3 * max(wide, size)
     middle = side * (half - 0.5 * count * pitch - 0.01)
     outline = key_outline(kind, (size if kind == "round" else wide, size), 12)
     for k in range(count):
         u = middle + (k - 0.5 * (count - 1)) * pitch
         add_key(display, parent, f"button_{k}", face, (u, 0.0), outline, travel + rng.uniform(0.0015, 0.004), travel)
+    return count
 
 
 def _foot(rng: np.random.Generator, half: float, depth: float, thick: float) -> Solid:
@@ -368,7 +369,7 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
     shell += hull([glass + (x, s * half_glass * t, u * rise_glass * t) for x, t in ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
                    for s in (-1, 1) for u in (-1, 1)])  # fmt: skip
     chain.solid += shell
-    name = chain.finish()
+    name, keys = chain.finish(), 0
     if side:
         face = front_face(front, inset + 0.5 * (side + rim) - half, low + rise)
         for k in range(int(rng.integers(1, 4))):
@@ -377,8 +378,8 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
             knob = dial(center, OUT, rng.uniform(0.6, 1.2) * size, size, 18)
             display.add(f"knob_{k}", knob, continuous(name, OUT, tuple(center)), density=900.0)
     else:
-        _keys(rng, display, name, front_face(front, 0.0, low + inset + 0.5 * (chin + rim)), half - inset, 0.5 * (chin + rim))
-    if rng.random() < 0.4:
+        keys = _keys(rng, display, name, front_face(front, 0.0, low + inset + 0.5 * (chin + rim)), half - inset, 0.5 * (chin + rim))
+    if rng.random() < 0.4 or not (swivels or side or keys):
         _rabbit_ears(rng, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
 
 

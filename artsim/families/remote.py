@@ -55,7 +55,7 @@ def build(rng: np.random.Generator) -> Assembly:
     if not covered:
         remote.add("body", body.between(body.levels[0], body.levels[-1]), density=900.0)
     height = _keys(rng, remote, body)
-    if rng.random() < 0.16:
+    if rng.random() < 0.2 and body.fronts.min() > -1e-6:  # no end that is bent forward is in the way
         _front_cover(rng, remote, body, height)
     if rng.random() < 0.08:
         _antenna(rng, remote, body)

@@ -17,6 +17,7 @@ from artsim.making.solids import (
     Solid,
     box,
     cylinder,
+    hull,
     hull_of,
     prism,
     ring,
@@ -170,7 +171,7 @@ def _cap(rng: np.random.Generator, usb: Assembly, stick: _Stick, name: str, x: f
     shrink = rng.uniform(0.5, 1.0)
     tips = [(end, 1.0), (0.5 * (end + far), 0.5 + 0.5 * shrink), (far, shrink)]
     rim = rounded_rectangle((-half, -thick), (half, thick), radius, 3)
-    solid += hull_of(*(prism(s * rim, min(a, a + sign * 1e-4), max(a, a + sign * 1e-4), 0) for a, s in tips))
+    solid += hull([(a, *(s * point)) for a, s in tips for point in rim])
     pull = plug.reach * rng.uniform(1.1, 2.5)
     usb.add(name, solid, prismatic("body", (sign, 0, 0), 0.0, pull, (x, 0, 0)), density=1100.0)
 
@@ -217,7 +218,7 @@ def _sleeved(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     # Behind the sleeve is a grip that is thinner than the sleeve's hole, so that the sleeve slides over it.
     body += _body(rng, inner, start, length + travel - grip + 0.004, plain=True)
     usb.add("body", body, density=1300.0)
-    hole = np.array([inner.half + GAP, inner.thick + GAP])
+    hole = np.array([max(inner.half, plug.half) + GAP, max(inner.thick, plug.thick) + GAP])
     outer = hole + rng.uniform(0.0009, 0.003)
     shell = sleeve((-plug.reach, *-outer), (end, *outer), -hole, hole, rng.uniform(0.2, 0.95) * float(outer.min()), 3)
     if rng.random() < 0.5:
