@@ -84,8 +84,11 @@ def _screen(rng: np.random.Generator, panel: _Panel, chin: float) -> Solid:
         forward = panel.bend * (edges / half) ** 2
         for k in range(7):
             corners = list(zip(edges[k : k + 2], forward[k : k + 2], strict=True))
-            for x0, x1, z0, z1 in ((lip - thick, back, -rise, rise), (-thick, lip - thick + 0.0005, -rise, chin + rim - rise),
-                                   (-thick, lip - thick + 0.0005, rise - rim, rise)):  # fmt: skip
+            for x0, x1, z0, z1 in (
+                (lip - thick, back, -rise, rise),
+                (-thick, lip - thick + 0.0005, -rise, chin + rim - rise),
+                (-thick, lip - thick + 0.0005, rise - rim, rise),
+            ):
                 solid += hull([(x - f, y, z) for y, f in corners for x in (x0, x1) for z in (z0, z1)])
     else:
         radius = rng.uniform(0.01, 0.12) * rise
@@ -143,10 +146,11 @@ def _foot(rng: np.random.Generator, half: float, depth: float, thick: float) -> 
             (-0.02, -0.95 * outer, 0), (0.03, 0.95 * outer, thick))  # fmt: skip
     if kind == "arc":
         width = rng.uniform(0.025, 0.05)
-        angles = np.linspace(-1.0, 1.0, 9)
-        outer = [np.array([(front + (back - front) * r * a**2 * 0.6 + d, half * a, z) for d in (0.0, width) for z in (0.0, thick)])
-                 for a, r in zip(angles, np.ones(9), strict=True)]  # fmt: skip
-        return loft(outer) + box((front + 0.5 * width, -width, 0), (0.6 * back, width, thick))
+        bows = [
+            [(front + 0.6 * (back - front) * a * a + d, half * a, z) for d in (0.0, width) for z in (0.0, thick)]
+            for a in np.linspace(-1.0, 1.0, 9)
+        ]
+        return loft(bows) + box((front + 0.5 * width, -width, 0), (0.6 * back, width, thick))
     outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.02, 0.95) * min(half, 0.5 * depth), 4)
     top = rng.uniform(0.55, 0.9) if kind == "tapered" else rng.uniform(0.96, 1.0)
     return hull([(x, y, 0.0) for x, y in outline] + [(x, y, 0.4 * thick) for x, y in outline]
@@ -203,11 +207,15 @@ def _on_stand(rng: np.random.Generator, display: Assembly) -> None:
         travel = (top - middle) * rng.uniform(0.5, 0.9) + rng.uniform(0.0, half_sleeve)
         chain.part("slider", prismatic(chain.name, (0, 0, 1), 0.0, travel, (0, 0, middle)))
         outer = radius + GAP + 0.006
-        chain.solid = frame((-outer, -outer, middle - half_sleeve), (outer, outer, middle + half_sleeve), [0.006] * 4, 0, 1)
+        chain.solid = frame(
+            (-outer, -outer, middle - half_sleeve), (outer, outer, middle + half_sleeve), [0.006] * 4, 0, 1
+        )
     offsets = (np.arange(count) - 0.5 * (count - 1)) * (2.0 * panel.half + 0.02)
     if count > 1:
         reach = float(offsets[-1]) + 0.03
-        chain.solid += rounded_box((front - 0.004, -reach, middle - 0.014), (front + 0.005, reach, middle + 0.014), 0.004)
+        chain.solid += rounded_box(
+            (front - 0.004, -reach, middle - 0.014), (front + 0.005, reach, middle + 0.014), 0.004
+        )
     ear = 0.6 * radius
     for y in offsets:
         chain.solid += box((axis, y - ear, middle - 0.8 * knuckle), (front + 0.004, y + ear, middle + 0.8 * knuckle))
@@ -248,7 +256,9 @@ def _column(rng: np.random.Generator, radius: float, low: float, high: float, fr
     wide = radius * {"square": 1.0, "wide": rng.uniform(1.5, 4.0), "tapered": 1.0}[kind]
     foot = wide * (rng.uniform(1.2, 4.0) if kind == "tapered" else 1.0)
     deep = radius if not free else radius * rng.uniform(0.5, 1.0)
-    return hull([(x, y, z) for z, w in ((low, foot), (high, wide)) for x in (-radius, 2.0 * deep - radius) for y in (-w, w)])
+    return hull(
+        [(x, y, z) for z, w in ((low, foot), (high, wide)) for x in (-radius, 2.0 * deep - radius) for y in (-w, w)]
+    )
 
 
 def _head(
@@ -277,7 +287,11 @@ def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: _Panel, at: A
         face = front_face(float(at[0]) - panel.thick, float(at[1]), float(at[2]) - panel.rise + 0.5 * chin)
         _keys(rng, chain.display, name, face, 0.9 * panel.half, 0.6 * chin)
     else:  # on the right edge
-        face = Face(at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        face = Face(
+            at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0),
+            np.array([1.0, 0.0, 0.0]),
+            np.array([0.0, 0.0, 1.0]),
+        )
         _edge_keys(rng, chain.display, name, face, panel)
 
 
@@ -308,8 +322,18 @@ def _on_feet(rng: np.random.Generator, display: Assembly) -> None:
     for k, s in enumerate((-1.0, 1.0)):
         y = s * spread
         solid = hull([(x + a * reach, y + b * wide, z) for a in (-1, 1) for b in (-1, 1) for z in (0.0, 0.006)])
-        solid += hull([(x + a * (0.3 if z > 0.5 * foot else 0.8) * reach * 0.9, y + b * rod, z) for a in (-1, 1) for b in (-1, 1)
-                       for z in (0.004, foot)]) if rng.random() < 0.5 else cylinder((x, y, 0.004), (x, y, foot), rod, sections=14)  # fmt: skip
+        solid += (
+            hull(
+                [
+                    (x + a * (0.3 if z > 0.5 * foot else 0.8) * reach * 0.9, y + b * rod, z)
+                    for a in (-1, 1)
+                    for b in (-1, 1)
+                    for z in (0.004, foot)
+                ]
+            )
+            if rng.random() < 0.5
+            else cylinder((x, y, 0.004), (x, y, foot), rod, sections=14)
+        )
         display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)
 
 
@@ -350,8 +374,17 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
         splay = rng.uniform(1.0, 1.3)
         rod = rng.uniform(0.008, 0.02)
         x0 = -0.5 * cabinet
-        chain.solid = union(cylinder((x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0), (x0 + a * 0.4 * cabinet, s * 0.75 * half, foot + 0.003),
-                                     0.7 * rod, rod, 12) for a in (-1, 1) for s in (-1, 1))  # fmt: skip
+        chain.solid = union(
+            cylinder(
+                (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0),
+                (x0 + a * 0.4 * cabinet, s * 0.75 * half, foot + 0.003),
+                0.7 * rod,
+                rod,
+                12,
+            )
+            for a in (-1, 1)
+            for s in (-1, 1)
+        )
     front = -0.5 * cabinet - 0.2 * depth if swivels else -cabinet
     low, high = foot, foot + 2.0 * rise
     rim = rng.uniform(0.06, 0.16) * half
@@ -360,14 +393,24 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
     lip = rng.uniform(0.006, 0.02)
     shell = rounded_box((front + lip, -half, low), (front + cabinet, half, high), rng.uniform(0.02, 0.2) * rise, axis=0)
     inset = 0.08 * rise
-    shell += frame((front, inset - half, low + inset), (front + lip + 0.001, half - inset, high - inset), [rim + side, rim, rim + chin, rim])
+    shell += frame(
+        (front, inset - half, low + inset),
+        (front + lip + 0.001, half - inset, high - inset),
+        [rim + side, rim, rim + chin, rim],
+    )
     shrink = rng.uniform(0.4, 0.8)
     shell += hull([(x, s * half * 0.96 * t, z) for x, t in ((front + cabinet - 0.001, 1.0), (front + depth, shrink))
                    for s in (-1, 1) for z in (low + 0.02 * rise, low + rise * (1.0 + 0.96 * t))])  # fmt: skip
     glass = np.array([front + lip, 0.5 * side, low + rise + 0.5 * chin])
     half_glass, rise_glass = half - inset - rim - 0.5 * side, rise - inset - rim - 0.5 * chin
-    shell += hull([glass + (x, s * half_glass * t, u * rise_glass * t) for x, t in ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
-                   for s in (-1, 1) for u in (-1, 1)])  # fmt: skip
+    shell += hull(
+        [
+            glass + (x, s * half_glass * t, u * rise_glass * t)
+            for x, t in ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
+            for s in (-1, 1)
+            for u in (-1, 1)
+        ]
+    )
     chain.solid += shell
     name, keys = chain.finish(), 0
     if side:
@@ -378,7 +421,14 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
             knob = dial(center, OUT, rng.uniform(0.6, 1.2) * size, size, 18)
             display.add(f"knob_{k}", knob, continuous(name, OUT, tuple(center)), density=900.0)
     else:
-        keys = _keys(rng, display, name, front_face(front, 0.0, low + inset + 0.5 * (chin + rim)), half - inset, 0.5 * (chin + rim))
+        keys = _keys(
+            rng,
+            display,
+            name,
+            front_face(front, 0.0, low + inset + 0.5 * (chin + rim)),
+            half - inset,
+            0.5 * (chin + rim),
+        )
     if rng.random() < 0.4 or not (swivels or side or keys):
         _rabbit_ears(rng, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
 
@@ -389,6 +439,8 @@ def _rabbit_ears(rng: np.random.Generator, display: Assembly, parent: str, foot:
     for k, s in enumerate((-1.0, 1.0)):
         pivot = foot + (0.0, s * 0.05, 0.012)
         tip = pivot + length * np.array([0.0, s * float(sin(lean)), float(cos(lean))])
-        rod = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12)
+        rod = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(
+            pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12
+        )
         hinge = revolute(parent, (s, 0, 0), tuple(pivot), -rng.uniform(0.3, 0.8), lean * 0.8)
         display.add(f"antenna_{k}", rod, hinge, density=3000.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -125,7 +126,7 @@ def _row(rng: np.random.Generator, u: float, v: float, units: float, space: bool
         count = int(units - first - 1.0)
         widths = [first, *[1.0] * count, units - first - count]
     edges = u + np.concatenate([[0.0], np.cumsum(widths)])
-    return [(0.5 * (a + b), v - 0.5, b - a, 1.0) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(0.5 * (a + b), v - 0.5, b - a, 1.0) for a, b in pairwise(edges)]
 
 
 def _full(rng: np.random.Generator) -> list[list[Cell]]:
@@ -138,7 +139,9 @@ def _full(rng: np.random.Generator) -> list[list[Cell]]:
     if rng.random() < 0.6:  # function keys
         top = rows + 1.0 + rng.uniform(0.1, 0.5)
         for k in range(3):
-            groups.append([(c + 0.5 + k * units / 3.0 + 0.2, top - 0.5, 1.0, 0.85) for c in range(int(units / 3.0 - 0.2))])
+            groups.append(
+                [(c + 0.5 + k * units / 3.0 + 0.2, top - 0.5, 1.0, 0.85) for c in range(int(units / 3.0 - 0.2))]
+            )
     right = units
     if rng.random() < 0.6:  # the cursor block
         right += 0.3
@@ -204,7 +207,9 @@ def _add_keys(
             shape = (wide, deep, row)
             if shape not in shapes:
                 size = caps.pitch * (np.array([wide, deep]) - (1.0 - caps.fill))
-                outline = key_outline(caps.kind if wide == deep else "pill" if caps.kind == "round" else caps.kind, size, 10)
+                outline = key_outline(
+                    caps.kind if wide == deep else "pill" if caps.kind == "round" else caps.kind, size, 10
+                )
                 high = caps.height + row * caps.step
                 shapes[shape] = key(face, 0.0, 0.0, outline, caps.travel + CLEAR, high + CLEAR, caps.shrink)
             offset = caps.pitch * (u - middle[0]) * face.right + caps.pitch * (v - middle[1]) * face.up
@@ -411,14 +416,21 @@ def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
         face = Face(np.zeros(3), right, up)
         corners = face.raised(np.array([(u, v) for u in (-half[0], half[0]) for v in (-half[1], half[1])]), 0.0)
         inner = float((side * corners[:, 1]).min())
-        face = Face(np.array([0.0, side * (0.001 + rng.uniform(0.0, 0.01)) - side * inner, low - corners[:, 2].min()]), right, up)
+        face = Face(
+            np.array([0.0, side * (0.001 + rng.uniform(0.0, 0.01)) - side * inner, low - corners[:, 2].min()]),
+            right,
+            up,
+        )
         corners = corners + face.origin
         body += hull(np.concatenate([corners, corners * (1, 1, 0)]))
         faces.append(face)
     ends = [body.bounds()]
     first, last = ends[0]
     bridge = 0.5 * low + 0.25 * float(last[2] - low)
-    body += box((first[0] + 0.25 * (last[0] - first[0]), 0.25 * first[1], 0.0), (last[0] - 0.15 * (last[0] - first[0]), 0.25 * last[1], min(bridge, 0.9 * low)))  # fmt: skip
+    body += box(
+        (first[0] + 0.25 * (last[0] - first[0]), 0.25 * first[1], 0.0),
+        (last[0] - 0.15 * (last[0] - first[0]), 0.25 * last[1], min(bridge, 0.9 * low)),
+    )
     keyboard.add("body", body, density=900.0)
     for number, face in enumerate(faces):
         _add_keys(keyboard, "body", face, groups, caps, number * len(groups))

@@ -57,7 +57,7 @@ def top_face(z: float, x: float = 0.0, y: float = 0.0) -> Face:
     return Face(np.array([x, y, z]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
 
 
-def key_outline(kind: str, size: Sequence[float], sections: int = 12) -> Array:
+def key_outline(kind: str, size: Vector, sections: int = 12) -> Array:
     """(N, 2) outline about 0 of a key of a size along u and v: "square", "pill" (round corners), "round", "diamond"."""
     half = 0.5 * np.asarray(size, dtype=np.float64)
     if kind == "round":
@@ -107,9 +107,7 @@ def key_cells(
             yield row, column, u[0] + (column + 0.5) * wide, v[1] - (row + 0.5) * high
 
 
-def sleeve(
-    low: Vector, high: Vector, hole_low: Sequence[float], hole_high: Sequence[float], radius: float, steps: int = 2
-) -> Solid:
+def sleeve(low: Vector, high: Vector, hole_low: Vector, hole_high: Vector, radius: float, steps: int = 2) -> Solid:
     """Tunnel along X with round outer edges and a rectangular hole.
 
     Parameters
@@ -131,7 +129,7 @@ def sleeve(
     return union(pieces)
 
 
-def _corners(low: Sequence[float], high: Sequence[float]) -> Array:
+def _corners(low: Vector, high: Vector) -> Array:
     """(4, 2) corners of a rectangle, in the order of :func:`artsim.making.solids.rounded_rectangle`."""
     return np.array([(high[0], high[1]), (low[0], high[1]), (low[0], low[1]), (high[0], low[1])])
 

@@ -1,8 +1,7 @@
 """Computer mice that lie on a table, their buttons towards -X.
 
-What varies: length, width, height, where the hump is, waist and ends, how steep the sides are; one, two or three buttons,
-parted or as one shell; a wheel between them, keys on the side and on top, a ball to turn; the roll of upright mice; a
-foot plate, a cable or a stub of one.
+What varies: length, width, height, where the hump is, waist and ends, how steep the sides are; one, two or three
+buttons; a wheel between them, keys on the side and on top, a ball to turn; the roll of upright mice; glides, a cable.
 """
 
 from __future__ import annotations
@@ -42,7 +41,9 @@ class _Dome:
 
     def at(self, x: float) -> tuple[float, float, float]:
         """Height, half width and shift at x."""
-        height, half, shift = (float(np.interp(x, self.stations, row)) for row in (self.heights, self.halves, self.shifts))
+        height, half, shift = (
+            float(np.interp(x, self.stations, row)) for row in (self.heights, self.halves, self.shifts)
+        )
         return height, half, shift
 
     def cut(
@@ -61,7 +62,9 @@ class _Dome:
         angles = np.linspace(0.0, np.pi, 9)
         c, s = cos(angles), sin(angles)
         across = (1.0 - self.steep) * c + self.steep * np.sign(c) * np.sqrt(np.abs(c))
-        rise = self.shoulder + (1.0 - self.shoulder) * ((1.0 - self.steep) * s + self.steep * np.sqrt(np.maximum(s, 0.0)))
+        rise = self.shoulder + (1.0 - self.shoulder) * (
+            (1.0 - self.steep) * s + self.steep * np.sqrt(np.maximum(s, 0.0))
+        )
         plane = np.column_stack([shift + half * across, height * rise])
         foot = 0.94 * half
         plane = np.concatenate([plane, [(shift - half, 0.12 * height), (shift - foot, 0.0), (shift + foot, 0.0),
@@ -121,7 +124,9 @@ class _Parts:
             if self.turn is not None:
                 solid = solid.rotated(self.turn)
                 if joint is not None:
-                    axis, origin = (apply(self.turn, np.asarray(v, dtype=np.float64)) for v in (joint.axis, joint.origin))
+                    axis, origin = (
+                        apply(self.turn, np.asarray(v, dtype=np.float64)) for v in (joint.axis, joint.origin)
+                    )
                     joint = replace(joint, axis=axis, origin=origin)
             mouse.add(name, solid if joint is not None else solid + self.foot, joint, density=900.0)
         return mouse
@@ -144,7 +149,9 @@ def _draw_dome(rng: np.random.Generator) -> _Dome:
     before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
     profile = 1.0 - (1.0 - front) * before**2 - (1.0 - back) * behind**2.5
     ends = rng.uniform(0.1, 0.75, 2)
-    widths = 1.0 - ends[0] * np.maximum(1.0 - share / 0.35, 0.0) ** 2 - ends[1] * np.maximum((share - 0.6) / 0.4, 0.0) ** 2
+    widths = (
+        1.0 - ends[0] * np.maximum(1.0 - share / 0.35, 0.0) ** 2 - ends[1] * np.maximum((share - 0.6) / 0.4, 0.0) ** 2
+    )
     waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - ((share - 0.42) / 0.3) ** 2, 0.0)
     slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half * np.maximum(1.0 - ((share - 0.5) / 0.5) ** 2, 0.0)
     return _Dome(length * (share - 0.5), height * profile, half * (widths - waist), slant, rng.uniform(0.0, 1.0),
@@ -196,9 +203,14 @@ def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
         solid = cylinder((x, drift - wide, z), (x, drift + wide, z), radius, sections=20)
         if rng.random() < 0.6:
             solid += union(
-                cylinder((x + 0.97 * radius * cos(a), drift - 0.9 * wide, z + 0.97 * radius * sin(a)),
-                         (x + 0.97 * radius * cos(a), drift + 0.9 * wide, z + 0.97 * radius * sin(a)), 0.09 * radius, sections=5)
-                for a in np.arange(10) * 0.2 * np.pi)  # fmt: skip
+                cylinder(
+                    (x + 0.97 * radius * cos(a), drift - 0.9 * wide, z + 0.97 * radius * sin(a)),
+                    (x + 0.97 * radius * cos(a), drift + 0.9 * wide, z + 0.97 * radius * sin(a)),
+                    0.09 * radius,
+                    sections=5,
+                )
+                for a in np.arange(10) * 0.2 * np.pi
+            )
         parts.add("wheel", solid, continuous("body", (0, 1, 0), (x, drift, z)))
     _extras(rng, parts, dome, split)
 
@@ -227,12 +239,18 @@ def _underside(rng: np.random.Generator, dome: _Dome) -> Solid:
     if rng.random() < 0.5:
         for x in (0.7 * front, 0.7 * back):
             half, shift = 0.6 * dome.at(x)[1], dome.at(x)[2]
-            solid += hull([(x + a * 0.006, shift + b * half, z) for a in (-1, 1) for b in (-1, 1) for z in (-0.0008, 0.001)])
+            solid += hull(
+                [(x + a * 0.006, shift + b * half, z) for a in (-1, 1) for b in (-1, 1) for z in (-0.0008, 0.001)]
+            )
     if rng.random() < 0.45:
         height, _, shift = dome.at(front)
         z, radius = 0.14 * height + 0.001, min(rng.uniform(0.0012, 0.0025), 0.12 * height)
         reach = rng.uniform(0.008, 0.05)
-        path = [(front + 0.004, shift, z), (front - 0.4 * reach, shift, z), (front - reach, shift + rng.uniform(-0.3, 0.3) * reach, z)]
+        path = [
+            (front + 0.004, shift, z),
+            (front - 0.4 * reach, shift, z),
+            (front - reach, shift + rng.uniform(-0.3, 0.3) * reach, z),
+        ]
         solid += tube(np.array(path), [1.6 * radius, radius, radius], 8)
     return solid
 
@@ -293,4 +311,3 @@ def _ball(rng: np.random.Generator, parts: _Parts, dome: _Dome, x: float) -> Non
     name, body, joint = parts.items[0]
     parts.items[0] = (name, body + revolved(cup, (x, shift, 0.0), (0, 0, 1), 16), joint)
     parts.add("ball", ellipsoid((x, shift, z), radius, 20), continuous("body", (0, 1, 0), (x, shift, z)))
-

@@ -52,7 +52,10 @@ def _slab(
     waist = rng.uniform(-0.12, 0.12) * rng.choice([0.0, 1.0]) * np.array([0.0, 0.05, 0.6, 1.0, 0.6, 0.05, 0.0])
     thick = x[1] - x[0]
     bow = (
-        rng.uniform(0.1, 0.7) * thick * rng.choice([0.0, 1.0]) * np.array([1.0, 0.9, 0.4, rng.uniform(0.0, 0.3), 0.4, 0.9, 1.0])
+        rng.uniform(0.1, 0.7)
+        * thick
+        * rng.choice([0.0, 1.0])
+        * np.array([1.0, 0.9, 0.4, rng.uniform(0.0, 0.3), 0.4, 0.9, 1.0])
     )
     fronts, backs = np.full(7, x[0]), np.full(7, x[1])
     if curve > 0:
@@ -192,7 +195,9 @@ def _flip(rng: np.random.Generator, phone: Assembly) -> None:
     if rng.random() < 0.6:  # a small display on the outside
         z = bottom + rng.uniform(0.45, 0.7) * (pivot - bottom)
         size = 0.45 * half
-        lid += rounded_box((plane - upper - 0.0008, -size, z - size), (plane - 0.5 * upper, size, z + size), 0.3 * size, 0, 2)  # fmt: skip
+        lid += rounded_box(
+            (plane - upper - 0.0008, -size, z - size), (plane - 0.5 * upper, size, z + size), 0.3 * size, 0, 2
+        )
     phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)), density=1300.0)
     _keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
@@ -208,7 +213,10 @@ def _slider(rng: np.random.Generator, phone: Assembly) -> None:
     sideways = rng.random() < 0.3
     travel = (half if sideways else 0.5 * length) * rng.uniform(0.7, 0.95)
     if sideways:
-        body += union(box((plane + GAP, -0.5 * half, z), (0.001, 0.5 * half, z + 0.03 * length)) for z in (0.02 * length, 0.95 * length))  # fmt: skip
+        body += union(
+            box((plane + GAP, -0.5 * half, z), (0.001, 0.5 * half, z + 0.03 * length))
+            for z in (0.02 * length, 0.95 * length)
+        )
         keys = (0.12 * length, 0.88 * length)
     else:
         body += union(box((plane + GAP, y - 0.05 * half, 0.55 * length), (0.001, y + 0.05 * half, 0.95 * length))
@@ -259,7 +267,9 @@ def _fold(rng: np.random.Generator, phone: Assembly) -> None:
     for low, high in ((first[0], first[1]), (first[4], first[5])):
         body += cylinder((0, y, low), (0, y, high), radius, sections=16)
         body += box((0.5 * gap, reach[0], low), (0.5 * gap + 0.5 * (leaf - 0.5 * gap), reach[1], high))
-    body += rounded_box((leaf - 0.0005, -0.6 * half, 0.7 * length), (leaf + 0.0016, 0.1 * half, 0.95 * length), 0.3 * half, 0, 2)  # fmt: skip
+    body += rounded_box(
+        (leaf - 0.0005, -0.6 * half, 0.7 * length), (leaf + 0.0016, 0.1 * half, 0.95 * length), 0.3 * half, 0, 2
+    )
     phone.add("body", body, density=1500.0)
     lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
     lid += cylinder((0, y, first[1] + GAP), (0, y, first[4] - GAP), radius, sections=16)
@@ -309,7 +319,9 @@ def _cordless(rng: np.random.Generator, phone: Assembly) -> None:
             across = opening[1] if axis == 0 else 0.5 * size[1]
             foot = np.array([(a, b) for a in (near, far) for b in (-across, across)])
             crown = np.array([(a, b) for a in (near, near + taper * 0.5 * (far - near)) for b in (-across, across)])
-            points = [np.column_stack([ring_, np.full(4, z)]) for ring_, z in ((foot, floor - 1e-4), (crown, floor + rise))]
+            points = [
+                np.column_stack([ring_, np.full(4, z)]) for ring_, z in ((foot, floor - 1e-4), (crown, floor + rise))
+            ]
             flat = np.concatenate(points)
             dock += hull(flat if axis == 0 else flat[:, [1, 0, 2]])
     phone.add("dock", dock, density=900.0)
@@ -320,7 +332,13 @@ def _cordless(rng: np.random.Generator, phone: Assembly) -> None:
     body += box((-0.5 * thick - 0.0005, -inner, start + 0.68 * length), (0.0, inner, start + 0.9 * length))
     if rng.random() < 0.4:
         y = rng.choice([-0.6, 0.6]) * half
-        body += cylinder((0, y, start + 0.9 * length), (0, y, start + length * rng.uniform(1.08, 1.4)), 0.25 * thick, 0.18 * thick, 12)  # fmt: skip
+        body += cylinder(
+            (0, y, start + 0.9 * length),
+            (0, y, start + length * rng.uniform(1.08, 1.4)),
+            0.25 * thick,
+            0.18 * thick,
+            12,
+        )
     lift = prismatic("dock", (0, 0, 1), 0.0, length * rng.uniform(0.4, 1.2), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)
     _keypad(rng, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), rng.uniform(0.0011, 0.002))
@@ -338,7 +356,10 @@ def _desk(rng: np.random.Generator, phone: Assembly) -> None:
     reach = depth - inset  # of the deck
     slope = np.array([reach, 0.0, back - front]) / np.sqrt(reach**2 + (back - front) ** 2)
     corners = [(x, y) for x in (-0.5 * depth, 0.5 * depth) for y in (-0.5 * width, 0.5 * width)]
-    upper = [(x * (1 - inset / depth), y * (1 - inset / width), front + (x / depth + 0.5) * (back - front)) for x, y in corners]
+    upper = [
+        (x * (1 - inset / depth), y * (1 - inset / width), front + (x / depth + 0.5) * (back - front))
+        for x, y in corners
+    ]
     base = hull([(x, y, z) for x, y in corners for z in (0.0, 0.3 * front)] + upper)
     across = rng.random() < 0.4  # the handset lies along the back
     grip = rng.uniform(0.018, 0.03)
@@ -372,7 +393,9 @@ def _desk(rng: np.random.Generator, phone: Assembly) -> None:
         return
     split = v0 + (v1 - v0) * rng.uniform(0.55, 0.95)
     deep = min(split - v0, rng.uniform(1.2, 2.4) * half * 2)
-    _keypad(rng, phone, "base", shifted, half * rng.uniform(0.7, 0.95), (split - deep, split), rng.uniform(0.0015, 0.005))
+    _keypad(
+        rng, phone, "base", shifted, half * rng.uniform(0.7, 0.95), (split - deep, split), rng.uniform(0.0015, 0.005)
+    )
     room = v1 - split
     if room > 0.02:
         _display(rng, phone, shifted, split + 0.12 * room, 0.8 * room, 0.9 * half)
@@ -392,13 +415,23 @@ def _handset(
         rise = thick + bow * (1.0 - s * s)
         center = foot + 0.5 * s * length * along + rise * out
         wide = grip * (0.75 + 0.25 * s * s)
-        rings.append(np.array([center + a * wide * side + b * 0.5 * thick * out for a, b in ((-1, -1), (1, -1), (0.7, 1), (-0.7, 1))]))
+        rings.append(
+            np.array(
+                [center + a * wide * side + b * 0.5 * thick * out for a, b in ((-1, -1), (1, -1), (0.7, 1), (-0.7, 1))]
+            )
+        )
     solid = loft(rings)
     for s in (-1.0, 1.0):
         center = foot + s * 0.5 * (length - 1.9 * grip) * along
         if square:
-            solid += hull([center + a * 0.95 * grip * along + b * grip * w * side + z * out for a in (-1, 1) for b in (-1, 1)
-                           for z, w in ((0.0, 0.9), (0.9 * thick, 1.0))])  # fmt: skip
+            solid += hull(
+                [
+                    center + a * 0.95 * grip * along + b * grip * w * side + z * out
+                    for a in (-1, 1)
+                    for b in (-1, 1)
+                    for z, w in ((0.0, 0.9), (0.9 * thick, 1.0))
+                ]
+            )
         else:
             solid += cylinder(center, center + 0.9 * thick * out, 0.95 * grip, 0.8 * grip, 20)
     phone.add("handset", solid, prismatic("base", out, 0.0, rng.uniform(0.06, 0.2), tuple(foot)), density=500.0)
@@ -415,8 +448,11 @@ def _dial(rng: np.random.Generator, phone: Assembly, face: Face, v: float, radiu
     for k in range(11):
         angle = 0.5 * k
         spoke = cos(angle) * face.right + sin(angle) * face.up
-        solid += tube([center + 0.6 * thick * out + 0.45 * radius * spoke, center + 0.6 * thick * out + 0.9 * radius * spoke],
-                      0.35 * thick, 6)  # fmt: skip
+        solid += tube(
+            [center + 0.6 * thick * out + 0.45 * radius * spoke, center + 0.6 * thick * out + 0.9 * radius * spoke],
+            0.35 * thick,
+            6,
+        )
     phone.add("dial", solid, revolute("base", -out, tuple(center), 0.0, rng.uniform(4.2, 5.4)), density=1200.0)
 
 

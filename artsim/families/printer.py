@@ -38,7 +38,9 @@ class _Case:
     y: float
     outline: Array
 
-    def block(self, low: float, high: float, x: tuple[float, float] = (-9.0, 9.0), y: tuple[float, float] = (-9.0, 9.0)) -> Solid:
+    def block(
+        self, low: float, high: float, x: tuple[float, float] = (-9.0, 9.0), y: tuple[float, float] = (-9.0, 9.0)
+    ) -> Solid:
         """The body between two heights, cut to a range of x and of y."""
         return prism(np.clip(self.outline, (x[0], y[0]), (x[1], y[1])), low, high)
 
@@ -114,9 +116,11 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
     spots = [(a * 0.75 * case.x, b * 0.75 * case.y) for a in (-1, 1) for b in (-1, 1)]
     if casters:
         radius = 0.45 * height
-        return union(cylinder((x, y - 0.4 * radius, radius), (x, y + 0.4 * radius, radius), radius, sections=14)
-                     + box((x - 0.5 * radius, y - 0.6 * radius, radius), (x + 0.5 * radius, y + 0.6 * radius, height + 0.001))
-                     for x, y in spots)  # fmt: skip
+        return union(
+            cylinder((x, y - 0.4 * radius, radius), (x, y + 0.4 * radius, radius), radius, sections=14)
+            + box((x - 0.5 * radius, y - 0.6 * radius, radius), (x + 0.5 * radius, y + 0.6 * radius, height + 0.001))
+            for x, y in spots
+        )
     size = 0.1 * min(case.x, case.y)
     return union(cylinder((x, y, 0.0), (x, y, height + 0.001), 0.8 * size, size, 12) for x, y in spots)
 
@@ -143,10 +147,18 @@ def _fill(
     elif band.kind == "flap":
         solid = rounded_box((front, -wide, low + GAP), (front + thick, wide, high - GAP), 0.03 * wide, axis=0, steps=2)
         if rng.random() < 0.6:
-            solid += box((front - 0.006, -0.15 * wide, high - GAP - 0.012), (front + 0.5 * thick, 0.15 * wide, high - GAP - 0.004))
+            solid += box(
+                (front - 0.006, -0.15 * wide, high - GAP - 0.012),
+                (front + 0.5 * thick, 0.15 * wide, high - GAP - 0.004),
+            )
         if rng.random() < 0.4:  # guides for paper on its inner side
-            solid += union(box((front + thick - 0.001, s * 0.7 * wide - 0.003, low + 0.2 * band.height),
-                               (front + thick + 0.006, s * 0.7 * wide + 0.003, high - 0.1 * band.height)) for s in (-1, 1))  # fmt: skip
+            solid += union(
+                box(
+                    (front + thick - 0.001, s * 0.7 * wide - 0.003, low + 0.2 * band.height),
+                    (front + thick + 0.006, s * 0.7 * wide + 0.003, high - 0.1 * band.height),
+                )
+                for s in (-1, 1)
+            )
         hinge = revolute("body", (0, -1, 0), (front, 0, low + GAP), 0.0, rng.uniform(0.9, 1.55))
         printer.add(f"flap_{number}", solid, hinge, density=900.0)
     elif band.kind == "sliding tray":
@@ -173,7 +185,9 @@ def _pull(rng: np.random.Generator, front: float, half: float, low: float, high:
     if kind < 0.6:
         z = 0.5 * (low + high)
         deep = min(0.2 * (high - low), 0.01)
-        return rounded_box((front - reach, -half, z - deep), (front + 0.003, half, z + deep), 0.4 * deep, axis=1, steps=2)
+        return rounded_box(
+            (front - reach, -half, z - deep), (front + 0.003, half, z + deep), 0.4 * deep, axis=1, steps=2
+        )
     return Solid()
 
 
@@ -196,7 +210,9 @@ def _keys(
     for side in sides:
         middle = side * (0.9 * half - 0.5 * columns * pitch)
         reach = 0.5 * columns * pitch
-        for _, _, u, v in key_cells((middle - reach, middle + reach), (-0.45 * rise, 0.45 * rise), max(columns, 1), rows):
+        for _, _, u, v in key_cells(
+            (middle - reach, middle + reach), (-0.45 * rise, 0.45 * rise), max(columns, 1), rows
+        ):
             add_key(printer, parent, f"button_{number}", face, (u, v), outline, travel + 0.002, travel)
             number += 1
 
@@ -236,13 +252,18 @@ def _top(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, to
     shrink = rng.uniform(0.9, 1.0)
     middle = outline.mean(axis=0)
     lid = prism(outline, seam, seam + 0.6 * thick)
-    lid += hull([(*p, seam + 0.5 * thick) for p in outline] + [(*(middle + shrink * (p - middle)), seam + thick) for p in outline])
+    lid += hull(
+        [(*p, seam + 0.5 * thick) for p in outline]
+        + [(*(middle + shrink * (p - middle)), seam + thick) for p in outline]
+    )
     crown = seam + thick
     feeder = back == case.x and kind in ("copier", "inkjet") and rng.random() < (0.6 if kind == "copier" else 0.35)
     if feeder:
         rise = rng.uniform(0.03, 0.09)
         y0, y1 = 0.15 * case.y, 0.8 * case.y
-        lid += rounded_box((front + 0.15 * case.x, y0, crown - 0.002), (edge - 0.1 * case.x, y1, crown + rise), 0.3 * rise, axis=0)
+        lid += rounded_box(
+            (front + 0.15 * case.x, y0, crown - 0.002), (edge - 0.1 * case.x, y1, crown + rise), 0.3 * rise, axis=0
+        )
     hinge = revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, rng.uniform(0.7, 1.5))
     printer.add("lid", lid, hinge, density=300.0)
     if feeder:
@@ -263,7 +284,9 @@ def _top_keys(rng: np.random.Generator, printer: Assembly, case: _Case, top: flo
     outline = key_outline(str(rng.choice(["round", "square", "pill"])), (0.7 * pitch, 0.6 * pitch), 10)
     face = top_face(top, -case.x + 0.5 * room, 0.0)
     middle = rng.uniform(-0.3, 0.3) * case.y
-    for _, column, u, v in key_cells((middle - 0.5 * columns * pitch, middle + 0.5 * columns * pitch), (-0.01, 0.01), columns, 1):
+    for _, column, u, v in key_cells(
+        (middle - 0.5 * columns * pitch, middle + 0.5 * columns * pitch), (-0.01, 0.01), columns, 1
+    ):
         add_key(printer, "body", f"top_button_{column}", face, (u, v), outline, travel + 0.002, travel)
 
 
@@ -271,6 +294,11 @@ def _paper_support(rng: np.random.Generator, printer: Assembly, case: _Case, sea
     """A flap that lies over the paper's slot at the back and folds up and back."""
     thick, wide = rng.uniform(0.004, 0.01), case.y * rng.uniform(0.5, 0.85)
     solid = rounded_box((front + GAP, -wide, seam), (case.x - 0.004, wide, seam + thick), 0.01, axis=2)
-    solid += cylinder((case.x - 0.004, -wide, seam + 0.5 * thick), (case.x - 0.004, wide, seam + 0.5 * thick), 0.5 * thick, sections=12)
+    solid += cylinder(
+        (case.x - 0.004, -wide, seam + 0.5 * thick),
+        (case.x - 0.004, wide, seam + 0.5 * thick),
+        0.5 * thick,
+        sections=12,
+    )
     hinge = revolute("body", (0, 1, 0), (case.x - 0.004, 0, seam + 0.5 * thick), 0.0, rng.uniform(1.3, 2.1))
     printer.add("paper_support", solid, hinge, density=800.0)

@@ -114,7 +114,7 @@ def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> b
     if not slides and backs[0] > backs.min() + 0.1 * end:
         return False  # the bent end of the body would stop a cover that swings
     if slides:  # over a flat back
-        backs, inset = np.full(len(levels), backs.min()), thick + backs - backs.min()
+        backs = np.full(len(levels), backs.min())
     solid = body.between(end, length)
     if slides:
         fronts = body.at(levels)[0]

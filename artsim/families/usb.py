@@ -80,10 +80,18 @@ def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
     """Connector that stands out from a plane at x towards -X (sign -1) or +X: a shell around a tongue."""
     wall = 0.14 * plug.thick
     first, last = sorted((x - sign * 0.002, x + sign * plug.reach))
-    solid = sleeve((first, -plug.half, -plug.thick), (last, plug.half, plug.thick),
-                   (wall - plug.half, wall - plug.thick), (plug.half - wall, plug.thick - wall), 0.2 * plug.thick, 1)  # fmt: skip
+    solid = sleeve(
+        (first, -plug.half, -plug.thick),
+        (last, plug.half, plug.thick),
+        (wall - plug.half, wall - plug.thick),
+        (plug.half - wall, plug.thick - wall),
+        0.2 * plug.thick,
+        1,
+    )
     first, last = sorted((x - sign * 0.002, x + sign * 0.93 * plug.reach))
-    return solid + box((first, -plug.half + 0.5 * wall, -0.05 * plug.thick), (last, plug.half - 0.5 * wall, 0.5 * plug.thick))
+    return solid + box(
+        (first, -plug.half + 0.5 * wall, -0.05 * plug.thick), (last, plug.half - 0.5 * wall, 0.5 * plug.thick)
+    )
 
 
 def _outline(kind: str, x0: float, x1: float, half: float, rng: np.random.Generator) -> list[Array]:
@@ -98,7 +106,9 @@ def _outline(kind: str, x0: float, x1: float, half: float, rng: np.random.Genera
                           (x1 - 0.3 * radius, -end)])]  # fmt: skip
     if kind == "waisted":
         waist, middle = rng.uniform(0.6, 0.88) * half, x0 + rng.uniform(0.35, 0.65) * (x1 - x0)
-        ends = [np.array([(x, s * half) for x in (a, a + 0.15 * (b - a)) for s in (-1, 1)]) for a, b in ((x0, x1), (x1, x0))]
+        ends = [
+            np.array([(x, s * half) for x in (a, a + 0.15 * (b - a)) for s in (-1, 1)]) for a, b in ((x0, x1), (x1, x0))
+        ]
         return [np.concatenate([end, [(middle, waist), (middle, -waist)]]) for end in ends]
     if kind == "round end":
         bow = key_outline("round", (2.0 * half, 2.0 * half), 20)
@@ -134,10 +144,14 @@ def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: 
         size = 0.3 * min(span / columns, half)
         for share in (np.arange(columns) + 0.5) / columns:
             x = x0 + (0.12 + 0.76 * share) * span
-            solid += union(cylinder((x, s * 0.42 * half, 0), (x, s * 0.42 * half, thick + 0.6 * size), size, sections=12)
-                           for s in (-1, 1))  # fmt: skip
+            solid += union(
+                cylinder((x, s * 0.42 * half, 0), (x, s * 0.42 * half, thick + 0.6 * size), size, sections=12)
+                for s in (-1, 1)
+            )
     elif extra < 0.6:
-        solid += rounded_box((x0 + 0.3 * span, -0.5 * half, 0), (x0 + 0.7 * span, 0.5 * half, 1.1 * thick), 0.2 * half, 2)
+        solid += rounded_box(
+            (x0 + 0.3 * span, -0.5 * half, 0), (x0 + 0.7 * span, 0.5 * half, 1.1 * thick), 0.2 * half, 2
+        )
     return solid
 
 
@@ -178,7 +192,7 @@ def _cap(rng: np.random.Generator, usb: Assembly, stick: _Stick, name: str, x: f
 
 def _swivel(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     """A bent sheet about the stick that turns about an upright pivot."""
-    half, thick = stick.half, stick.thick
+    half = stick.half
     back = stick.length
     pivot = back - half * rng.uniform(0.6, 1.0) - rng.uniform(0.0, 0.25) * max(back - 2.0 * half, 0.0)
     body = _body(rng, stick, 0.0, back, plain=rng.random() < 0.6) + _plug(stick.plug, 0.0)
@@ -189,7 +203,9 @@ def _swivel(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     usb.add("body", body + eyelet, density=1500.0)
     sheet = rng.uniform(0.0006, 0.0014)
     # The bridge before the connector's end also passes the corners of the body, and the eyelet.
-    corners = np.array([(-stick.plug.reach, stick.plug.half), (0.0, half), (back + (1.5 if eyelet.pieces else 0.0) * half, half)])
+    corners = np.array(
+        [(-stick.plug.reach, stick.plug.half), (0.0, half), (back + (1.5 if eyelet.pieces else 0.0) * half, half)]
+    )
     reach = float(np.sqrt(((corners - (pivot, 0.0)) ** 2).sum(axis=1)).max()) + GAP
     tail = half * rng.uniform(0.5, 1.0)
     wide = half * rng.uniform(0.7, 1.1)
