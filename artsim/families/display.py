@@ -7,13 +7,12 @@ limits; keys, knobs and rabbit ears.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, front_face, key_outline
+from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
@@ -34,79 +33,12 @@ GAP = 0.0015
 OUT = (-1.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class _Panel:
-    """A flat or bent screen about the origin, its back at x = 0.
-
-    Attributes
-    ----------
-    half : float
-        Half of the width.
-    rise : float
-        Half of the height.
-    thick : float
-        Of the whole panel, before x = 0.
-    bend : float
-        How far the left and right edges come forward.
-    """
-
-    half: float
-    rise: float
-    thick: float
-    bend: float
-
-
 def build(rng: np.random.Generator) -> Assembly:
     """A display; upright and at its lowest, no key pressed at rest."""
     kind = str(rng.choice(["stand", "feet", "tube", "easel"], p=[0.58, 0.14, 0.16, 0.12]))
     display = Assembly()
     {"stand": _on_stand, "feet": _on_feet, "tube": _tube, "easel": _on_easel}[kind](rng, display)
     return display
-
-
-def _draw_panel(rng: np.random.Generator, most: float = 0.95) -> _Panel:
-    width = rng.triangular(0.22, 0.52, most)
-    ratio = rng.choice([rng.uniform(0.36, 0.48), rng.uniform(0.54, 0.68), rng.uniform(0.72, 0.85)], p=[0.2, 0.5, 0.3])
-    thick = width * rng.triangular(0.015, 0.05, 0.16)
-    bend = width * rng.uniform(0.03, 0.14) if ratio < 0.6 and rng.random() < 0.4 else 0.0
-    return _Panel(0.5 * width, 0.5 * width * ratio, thick, bend)
-
-
-def _screen(rng: np.random.Generator, panel: _Panel, chin: float) -> Solid:
-    """The panel: a shell with a frame around the sunken screen, and a hump on its back."""
-    half, rise, thick = panel.half, panel.rise, panel.thick
-    rim = rng.uniform(0.008, 0.07) * half + 0.002
-    lip = lip_of(panel)
-    back = -thick * rng.choice([0.0, rng.uniform(0.0, 0.65)])  # the rest of the thickness goes to the hump
-    solid = Solid()
-    if panel.bend:
-        edges = np.linspace(-half, half, 8)
-        forward = panel.bend * (edges / half) ** 2
-        for k in range(7):
-            corners = list(zip(edges[k : k + 2], forward[k : k + 2], strict=True))
-            for x0, x1, z0, z1 in (
-                (lip - thick, back, -rise, rise),
-                (-thick, lip - thick + 0.0005, -rise, chin + rim - rise),
-                (-thick, lip - thick + 0.0005, rise - rim, rise),
-            ):
-                solid += hull([(x - f, y, z) for y, f in corners for x in (x0, x1) for z in (z0, z1)])
-    else:
-        radius = rng.uniform(0.01, 0.12) * rise
-        solid += rounded_box((lip - thick, -half, -rise), (back, half, rise), radius, axis=0)
-        inset = 0.3 * radius
-        solid += frame((-thick, inset - half, inset - rise), (lip - thick + 0.0005, half - inset, rise - inset),
-                       [rim, rim, chin + rim, rim])  # fmt: skip
-    if back < 0:
-        wide, high = rng.uniform(0.25, 0.85) * half, rng.uniform(0.3, 0.85) * rise
-        wide, inner = min(wide, 0.35 * half) if panel.bend else wide, rng.uniform(0.5, 0.95)
-        solid += hull([(x, s * wide * t, u * high * t) for x, t in ((back - 0.001, 1.0), (0.0, inner))
-                       for s in (-1, 1) for u in (-1, 1)])  # fmt: skip
-    return solid
-
-
-def lip_of(panel: _Panel) -> float:
-    """How far the frame stands before the screen."""
-    return min(0.12 * panel.thick, 0.004)
 
 
 def _keys(rng: np.random.Generator, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
@@ -176,7 +108,7 @@ class _Chain:
 
 def _on_stand(rng: np.random.Generator, display: Assembly) -> None:
     """Screens on a column that turns, slides, tilts and turns to portrait, or some of these."""
-    panel = _draw_panel(rng)
+    panel = draw_panel(rng)
     count = int(rng.choice([1, 2, 3], p=[0.84, 0.1, 0.06])) if not panel.bend and panel.half < 0.3 else 1
     swivels, slides, tilts, pivots = (bool(v) for v in rng.random(4) < (0.5, 0.45, 0.85, 0.3))
     tilts = tilts or count > 1 or not (swivels or slides)
@@ -262,7 +194,7 @@ def _column(rng: np.random.Generator, radius: float, low: float, high: float, fr
 
 
 def _head(
-    plane: float, axis: float, y: float, z: float, ear: float, knuckle: float, panel: _Panel, tilts: bool
+    plane: float, axis: float, y: float, z: float, ear: float, knuckle: float, panel: Panel, tilts: bool
 ) -> Solid:  # fmt: skip
     """What holds a screen: a plate behind it, and ears on either side of the hinge, or an arm where nothing tilts."""
     size = min(0.045, 0.5 * panel.rise)
@@ -276,10 +208,10 @@ def _head(
     return solid
 
 
-def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: _Panel, at: Array, number: int) -> None:
+def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
     """Add the panel to the chain's last part, finish that, and put keys on the first one."""
     chin = rng.uniform(0.0, 0.16) * panel.rise * rng.choice([0.0, 1.0], p=[0.4, 0.6])
-    chain.solid += _screen(rng, panel, chin).moved(at)
+    chain.solid += screen(rng, panel, chin).moved(at)
     name = chain.finish()
     if number > 0:
         return
@@ -295,7 +227,7 @@ def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: _Panel, at: A
         _edge_keys(rng, chain.display, name, face, panel)
 
 
-def _edge_keys(rng: np.random.Generator, display: Assembly, name: str, face: Face, panel: _Panel) -> None:
+def _edge_keys(rng: np.random.Generator, display: Assembly, name: str, face: Face, panel: Panel) -> None:
     """Keys above one another on an edge, on some."""
     size = min(0.4 * panel.thick, 0.008)
     if rng.random() < 0.5 or size < 0.002:
@@ -308,7 +240,7 @@ def _edge_keys(rng: np.random.Generator, display: Assembly, name: str, face: Fac
 
 def _on_feet(rng: np.random.Generator, display: Assembly) -> None:
     """A television set on two feet that fold in below it."""
-    panel = _draw_panel(rng, 1.5)
+    panel = draw_panel(rng, 1.5)
     foot = rng.uniform(0.02, 0.1)
     middle = foot + GAP + panel.rise
     chain = _Chain(display)
@@ -339,7 +271,7 @@ def _on_feet(rng: np.random.Generator, display: Assembly) -> None:
 
 def _on_easel(rng: np.random.Generator, display: Assembly) -> None:
     """A thin panel with a leaf or two legs on its back that fold out."""
-    panel = _draw_panel(rng, 0.6)
+    panel = draw_panel(rng, 0.6)
     chain = _Chain(display)
     chain.name = "body"
     _finish_screen(rng, chain, panel, np.array([0.0, 0.0, panel.rise]), 0)

@@ -9,23 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from artsim.common.elementary import cos, exp, sin
+from artsim.common.products import dot, unit
 from artsim.families.details import dial
+from artsim.families.key_layouts import (
+    Cell,
+    compact_layout,
+    extent,
+    full_layout,
+    half_layout,
+    macro_layout,
+    number_layout,
+)
 from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull, rounded_box, rounded_rectangle, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
-MOST_KEYS = 40
-"""Parts that the keys of one keyboard make at most; larger ones move row by row."""
-
-Cell = tuple[float, float, float, float]
-"""Centre and size of a key along u and v, in key pitches."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +69,11 @@ def build(rng: np.random.Generator) -> Assembly:
     if kind in ("pivot", "folding", "angled"):
         {"pivot": _pivot, "folding": _folding, "angled": _angled}[kind](rng, keyboard, caps)
         return keyboard
-    groups = {"full": _full, "compact": _compact, "numbers": _numbers, "macro": _macro}[kind](rng)
+    layouts = {"full": full_layout, "compact": compact_layout, "numbers": number_layout, "macro": macro_layout}
+    groups = layouts[kind](rng)
     if sum(len(group) for group in groups) > 45:
         caps = replace(caps, kind="square")  # so many round keys would be most of the triangles of a scene
-    size = _extent(groups) * caps.pitch
+    size = extent(groups) * caps.pitch
     margin = caps.pitch * rng.uniform(0.15, 1.2, 4)  # right, left, front, back
     if rng.random() < 0.4:
         margin[3] += caps.pitch * rng.uniform(0.5, 2.5)
@@ -107,88 +112,6 @@ def _draw_caps(rng: np.random.Generator) -> _Caps:
     return _Caps(pitch, height, travel, shrink, rng.uniform(0.76, 0.95), kind, step)
 
 
-# --- layouts: groups of cells, each of which moves as one part -------------------------------------------------------
-
-
-def _grid(u: float, v: float, columns: int, rows: int) -> list[list[Cell]]:
-    """Single keys, with the upper left corner of the first at (u, v)."""
-    return [[(u + c + 0.5, v - r - 0.5, 1.0, 1.0)] for r in range(rows) for c in range(columns)]
-
-
-def _row(rng: np.random.Generator, u: float, v: float, units: float, space: bool) -> list[Cell]:
-    """Keys from u on, ``units`` pitches together, with wider ones at the ends or a space bar in the middle."""
-    if space:
-        sides = int(rng.integers(1, 4))
-        bar = units - 2 * sides * 1.25
-        widths = [1.25] * sides + [bar] + [1.25] * sides
-    else:
-        first = float(rng.choice([1.0, 1.5, 1.75, 2.25]))
-        count = int(units - first - 1.0)
-        widths = [first, *[1.0] * count, units - first - count]
-    edges = u + np.concatenate([[0.0], np.cumsum(widths)])
-    return [(0.5 * (a + b), v - 0.5, b - a, 1.0) for a, b in pairwise(edges)]
-
-
-def _full(rng: np.random.Generator) -> list[list[Cell]]:
-    """Rows that move as one each; the space bar and some keys by themselves; blocks to the right."""
-    units, rows = float(rng.integers(12, 16)), int(rng.integers(4, 6))
-    groups = [_row(rng, 0.0, float(rows - r), units, r == rows - 1) for r in range(rows)]
-    last = groups.pop()
-    middle = len(last) // 2
-    groups += [[last[middle]], last[:middle], last[middle + 1 :]]
-    if rng.random() < 0.6:  # function keys
-        top = rows + 1.0 + rng.uniform(0.1, 0.5)
-        for k in range(3):
-            groups.append(
-                [(c + 0.5 + k * units / 3.0 + 0.2, top - 0.5, 1.0, 0.85) for c in range(int(units / 3.0 - 0.2))]
-            )
-    right = units
-    if rng.random() < 0.6:  # the cursor block
-        right += 0.3
-        groups.append([(right + c + 0.5, 0.5, 1.0, 1.0) for c in range(3)] + [(right + 1.5, 1.5, 1.0, 1.0)])
-        groups.append([(right + c + 0.5, rows - r - 0.5, 1.0, 1.0) for r in range(2) for c in range(3)])
-        right += 3.0
-    if rng.random() < 0.5:  # the number block
-        right += 0.3
-        groups += [[(right + c + 0.5, rows - r - 0.5, 1.0, 1.0) for c in range(4)] for r in range(rows)]
-    return groups
-
-
-def _compact(rng: np.random.Generator) -> list[list[Cell]]:
-    """Three or four rows of single keys."""
-    rows = int(rng.integers(3, 5))
-    units = float(rng.integers(8, 13 if rows == 3 else 11))
-    groups = [[cell] for r in range(rows - 1) for cell in _row(rng, 0.0, float(rows - r), units, False)]
-    return groups + [[cell] for cell in _row(rng, 0.0, 1.0, units, units > 8)]
-
-
-def _numbers(rng: np.random.Generator) -> list[list[Cell]]:
-    """A number pad; at times with a double 0 and tall keys."""
-    rows, columns = int(rng.integers(4, 7)), int(rng.integers(3, 6))
-    groups = _grid(0.0, float(rows), columns, rows)
-    if rng.random() < 0.7:
-        del groups[-columns : -columns + 2]
-        groups.append([(1.0, 0.5, 2.0, 1.0)])
-    if rng.random() < 0.6:
-        tall = [(columns - 0.5, 0.5, 1.0, 1.0), (columns - 0.5, 1.5, 1.0, 1.0)]
-        if all([cell] in groups for cell in tall):
-            groups = [group for group in groups if group[0] not in tall]
-            groups.append([(columns - 0.5, 1.0, 1.0, 2.0)])
-    return groups
-
-
-def _macro(rng: np.random.Generator) -> list[list[Cell]]:
-    """A few keys in a grid."""
-    return _grid(0.0, 0.0, int(rng.integers(1, 7)), int(rng.integers(1, 5)))
-
-
-def _extent(groups: Sequence[Sequence[Cell]]) -> Array:
-    """(2,) extent of all cells along u and v, in pitches."""
-    cells = np.array([cell for group in groups for cell in group])
-    extent: Array = (cells[:, :2] + 0.5 * cells[:, 2:]).max(axis=0) - (cells[:, :2] - 0.5 * cells[:, 2:]).min(axis=0)
-    return extent
-
-
 # --- parts -----------------------------------------------------------------------------------------------------------
 
 
@@ -198,7 +121,7 @@ def _add_keys(
     """A part for each group of cells, the whole centred on the face's origin."""
     cells = np.array([cell for group in groups for cell in group])
     low = (cells[:, :2] - 0.5 * cells[:, 2:]).min(axis=0)
-    middle = low + 0.5 * _extent(groups)
+    middle = low + 0.5 * extent(groups)
     shapes: dict[tuple[float, float, float], Solid] = {}
     for number, group in enumerate(groups, first):
         solid = Solid()
@@ -332,23 +255,15 @@ def _wrist_rest(
 # --- keyboards of two halves -----------------------------------------------------------------------------------------
 
 
-def _half_groups(rng: np.random.Generator) -> list[list[Cell]]:
-    """Keys of one half: single ones, or rows."""
-    rows, units = int(rng.integers(3, 6)), float(rng.integers(4, 8))
-    if rows * units <= 0.5 * MOST_KEYS:
-        return _grid(0.0, float(rows), int(units), rows)
-    return [_row(rng, 0.0, float(rows - r), units, False) for r in range(rows)]
-
-
 def _half_size(groups: Sequence[Sequence[Cell]], caps: _Caps, margin: float) -> Array:
-    size: Array = 0.5 * _extent(groups) * caps.pitch + margin
+    size: Array = 0.5 * extent(groups) * caps.pitch + margin
     return size
 
 
 def _pivot(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     """Two halves that a pivot at the back lets splay."""
     margin = caps.pitch * rng.uniform(0.2, 0.8)
-    groups = _half_groups(rng)
+    groups = half_layout(rng)
     half = _half_size(groups, caps, margin)
     thick = rng.uniform(0.008, 0.028)
     radius = rng.uniform(0.012, 0.02)
@@ -377,7 +292,7 @@ def _folding(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     """Two flat halves; the right one folds over the left one."""
     caps = replace(caps, height=min(caps.height, 0.003), travel=min(caps.travel, 0.0012), step=0.0)
     margin = caps.pitch * rng.uniform(0.2, 0.6)
-    groups = _half_groups(rng)
+    groups = half_layout(rng)
     half = _half_size(groups, caps, margin)
     thick = rng.uniform(0.004, 0.012)
     axis = thick + caps.height + 2.0 * CLEAR
@@ -403,7 +318,7 @@ def _folding(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
 def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     """One body with a deck for each hand, turned inwards and lower at its outer side."""
     margin = caps.pitch * rng.uniform(0.2, 0.8)
-    groups = _half_groups(rng)
+    groups = half_layout(rng)
     half = _half_size(groups, caps, margin)
     yaw, tent, slope = rng.uniform(0.05, 0.4), rng.uniform(0.0, 0.35), rng.uniform(0.0, 0.12)
     low = rng.uniform(0.006, 0.02)
@@ -411,8 +326,8 @@ def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     for side in (1.0, -1.0):
         up = np.array([cos(yaw) * cos(slope), -side * sin(yaw), sin(slope)])
         right = np.array([-side * sin(yaw), -cos(yaw) * cos(tent), side * sin(tent)])
-        right = right - right.dot(up) / up.dot(up) * up
-        right, up = right / np.sqrt(right.dot(right)), up / np.sqrt(up.dot(up))
+        up = unit(up)
+        right = unit(right - dot(right, up) * up)
         face = Face(np.zeros(3), right, up)
         corners = face.raised(np.array([(u, v) for u in (-half[0], half[0]) for v in (-half[1], half[1])]), 0.0)
         inner = float((side * corners[:, 1]).min())

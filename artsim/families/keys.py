@@ -107,6 +107,43 @@ def key_cells(
             yield row, column, u[0] + (column + 0.5) * wide, v[1] - (row + 0.5) * high
 
 
+def add_keypad(
+    rng: np.random.Generator, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
+    height: float, first: int = 0,
+) -> int:  # fmt: skip
+    """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
+    kind = str(rng.choice(["square", "pill", "round"]))
+    columns, rows = (3, 4) if rng.random() < 0.7 else (int(rng.integers(3, 6)), int(rng.integers(2, 5)))
+    fill = rng.uniform(0.6, 0.9, 2)
+    travel = min(rng.uniform(0.0003, 0.0006), height - 0.0008)
+    number, low, high = first, v[0], v[1]
+    if rng.random() < 0.7:
+        split = high - (high - low) * rng.uniform(0.15, 0.3)
+        number = add_function_keys(rng, phone, parent, face, half, (split, high), height, number)
+        high = split
+    pitch = np.array([2.0 * half / columns, (high - low) / rows])
+    outline = key_outline(kind, np.minimum(fill * pitch, 2.2 * pitch.min()), 10)
+    for _, _, a, b in key_cells((-half, half), (low, high), columns, rows):
+        add_key(phone, parent, f"button_{number}", face, (a, b), outline, height, travel, 0.2)
+        number += 1
+    return number
+
+
+def add_function_keys(
+    rng: np.random.Generator, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
+    height: float, number: int,
+) -> int:  # fmt: skip
+    """Two keys with a larger one between them; returns the next free number."""
+    travel, deep, middle = 0.0003, v[1] - v[0], 0.5 * (v[0] + v[1])
+    wide = 0.5 * half
+    big = key_outline(str(rng.choice(["round", "pill", "square"])), (min(0.8 * half, 1.4 * deep), 0.85 * deep), 14)
+    small = key_outline(str(rng.choice(["round", "pill", "square"])), (0.8 * wide, 0.5 * deep), 10)
+    for u, outline in ((-0.75 * half, small), (0.0, big), (0.75 * half, small)):
+        add_key(phone, parent, f"button_{number}", face, (u, middle), outline, height, travel, 0.15)
+        number += 1
+    return number
+
+
 def sleeve(low: Vector, high: Vector, hole_low: Vector, hole_high: Vector, radius: float, steps: int = 2) -> Solid:
     """Tunnel along X with round outer edges and a rectangular hole.
 

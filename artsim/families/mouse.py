@@ -147,7 +147,7 @@ def _draw_dome(rng: np.random.Generator) -> _Dome:
     top = rng.uniform(0.35, 0.8)
     front, back = rng.uniform(0.3, 0.85), rng.uniform(0.15, 0.8)
     before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
-    profile = 1.0 - (1.0 - front) * before**2 - (1.0 - back) * behind**2.5
+    profile = 1.0 - (1.0 - front) * before**2 - (1.0 - back) * behind**2 * np.sqrt(behind)
     ends = rng.uniform(0.1, 0.75, 2)
     widths = (
         1.0 - ends[0] * np.maximum(1.0 - share / 0.35, 0.0) ** 2 - ends[1] * np.maximum((share - 0.6) / 0.4, 0.0) ** 2

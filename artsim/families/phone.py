@@ -11,18 +11,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from artsim.common.elementary import cos, exp, sin
+from artsim.common.elementary import exp
+from artsim.families.desk_phone import desk_set
 from artsim.families.keys import (
     Face,
+    add_function_keys,
     add_key,
+    add_keypad,
     cross_sections,
     front_face,
-    key_cells,
     key_outline,
 )
-from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull, loft, ring, rounded_box, tube, union
-from artsim.model.kinematics import Array
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, hull, loft, rounded_box, union
 
 GAP = 0.0005
 KINDS = ("bar", "flip", "slider", "swivel", "fold", "smartphone", "cordless", "desk")
@@ -33,7 +34,7 @@ def build(rng: np.random.Generator) -> Assembly:
     kind = str(rng.choice(KINDS, p=[0.15, 0.17, 0.12, 0.07, 0.08, 0.1, 0.11, 0.2]))
     phone = Assembly()
     if kind == "desk":
-        _desk(rng, phone)
+        desk_set(rng, phone)
     elif kind == "cordless":
         _cordless(rng, phone)
     else:
@@ -64,43 +65,6 @@ def _slab(
         fronts = fronts + bow
     halves = half * (1.0 - corner - np.abs(waist))
     return loft(cross_sections(z[0] + levels * (z[1] - z[0]), fronts, backs, halves, rng.uniform(0.1, 0.8)))
-
-
-def _keypad(
-    rng: np.random.Generator, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
-    height: float, first: int = 0,
-) -> int:  # fmt: skip
-    """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
-    kind = str(rng.choice(["square", "pill", "round"]))
-    columns, rows = (3, 4) if rng.random() < 0.7 else (int(rng.integers(3, 6)), int(rng.integers(2, 5)))
-    fill = rng.uniform(0.6, 0.9, 2)
-    travel = min(rng.uniform(0.0003, 0.0006), height - 0.0008)
-    number, low, high = first, v[0], v[1]
-    if rng.random() < 0.7:
-        split = high - (high - low) * rng.uniform(0.15, 0.3)
-        number = _functions(rng, phone, parent, face, half, (split, high), height, number)
-        high = split
-    pitch = np.array([2.0 * half / columns, (high - low) / rows])
-    outline = key_outline(kind, np.minimum(fill * pitch, 2.2 * pitch.min()), 10)
-    for _, _, a, b in key_cells((-half, half), (low, high), columns, rows):
-        add_key(phone, parent, f"button_{number}", face, (a, b), outline, height, travel, 0.2)
-        number += 1
-    return number
-
-
-def _functions(
-    rng: np.random.Generator, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
-    height: float, number: int,
-) -> int:  # fmt: skip
-    """Two keys with a larger one between them; returns the next free number."""
-    travel, deep, middle = 0.0003, v[1] - v[0], 0.5 * (v[0] + v[1])
-    wide = 0.5 * half
-    big = key_outline(str(rng.choice(["round", "pill", "square"])), (min(0.8 * half, 1.4 * deep), 0.85 * deep), 14)
-    small = key_outline(str(rng.choice(["round", "pill", "square"])), (0.8 * wide, 0.5 * deep), 10)
-    for u, outline in ((-0.75 * half, small), (0.0, big), (0.75 * half, small)):
-        add_key(phone, parent, f"button_{number}", face, (u, middle), outline, height, travel, 0.15)
-        number += 1
-    return number
 
 
 def _side_keys(rng: np.random.Generator, phone: Assembly, parent: str, half: float, x: float, z: tuple[float, float],
@@ -158,7 +122,7 @@ def _bar(rng: np.random.Generator, phone: Assembly) -> None:
         body += cylinder((0.5 * thick, y, 0.9 * length), (0.5 * thick, y, top), 0.3 * thick, 0.22 * thick, 12)
     phone.add("body", body, density=1300.0)
     height = rng.uniform(0.0011, 0.0026)
-    _keypad(rng, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
+    add_keypad(rng, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
     _side_keys(rng, phone, "body", half, 0.5 * thick, (0.0, length), thick)
     _aerial(rng, phone, half, 0.5 * thick, length, thick)
     _stand(rng, phone, half, thick, length)
@@ -199,7 +163,7 @@ def _flip(rng: np.random.Generator, phone: Assembly) -> None:
             (plane - upper - 0.0008, -size, z - size), (plane - 0.5 * upper, size, z + size), 0.3 * size, 0, 2
         )
     phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)), density=1300.0)
-    _keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
+    add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
 
 
@@ -228,9 +192,9 @@ def _slider(rng: np.random.Generator, phone: Assembly) -> None:
     lid += box((plane - upper - 0.0005, -0.75 * half, 0.35 * length), (plane - 0.5 * upper, 0.75 * half, 0.88 * length))
     axis = (0, float(rng.choice([-1.0, 1.0])), 0) if sideways else (0, 0, 1)
     phone.add("lid", lid, prismatic("body", axis, 0.0, travel, (plane, 0, 0)), density=1300.0)
-    number = _keypad(rng, phone, "body", front_face(0.0), 0.78 * half, keys, height)
+    number = add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, keys, height)
     front = front_face(plane - upper)
-    _functions(rng, phone, "lid", front, 0.7 * half, (0.08 * length, 0.24 * length), 0.0014, number)
+    add_function_keys(rng, phone, "lid", front, 0.7 * half, (0.08 * length, 0.24 * length), 0.0014, number)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
 
 
@@ -250,7 +214,7 @@ def _swivel(rng: np.random.Generator, phone: Assembly) -> None:
     side = float(rng.choice([-1.0, 1.0]))
     turn = revolute("body", (side, 0, 0), (plane, 0, pivot), 0.0, rng.uniform(1.57, 3.2))
     phone.add("lid", lid, turn, density=1300.0)
-    _keypad(rng, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
+    add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
 
 
@@ -292,7 +256,9 @@ def _smartphone(rng: np.random.Generator, phone: Assembly) -> None:
         body += rounded_box((0.5 * thick, y - size, z - size), (thick + bump, y + size, z + size), 0.5 * size, 0, 2)
     phone.add("body", body, density=1800.0)
     if chin > 0.1:
-        _functions(rng, phone, "body", front_face(0.0), 0.8 * half, (0.02 * length, (chin - 0.02) * length), 0.0013, 0)
+        add_function_keys(
+            rng, phone, "body", front_face(0.0), 0.8 * half, (0.02 * length, (chin - 0.02) * length), 0.0013, 0
+        )
     else:
         face = Face(np.array([0.5 * thick, 0.0, length]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
         outline = key_outline("pill", (0.25 * half, 0.3 * thick), 8)
@@ -341,127 +307,4 @@ def _cordless(rng: np.random.Generator, phone: Assembly) -> None:
         )
     lift = prismatic("dock", (0, 0, 1), 0.0, length * rng.uniform(0.4, 1.2), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)
-    _keypad(rng, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), rng.uniform(0.0011, 0.002))
-
-
-# --- desk sets -------------------------------------------------------------------------------------------------------
-
-
-def _desk(rng: np.random.Generator, phone: Assembly) -> None:
-    """A sloping base with keys or a dial, and a handset across its left side or along its back."""
-    depth, width = rng.uniform(0.14, 0.26), rng.uniform(0.13, 0.3)
-    front, back = rng.uniform(0.012, 0.04), rng.uniform(0.03, 0.13)
-    back = max(back, front)
-    inset = rng.uniform(0.0, 0.18) * min(width, depth)
-    reach = depth - inset  # of the deck
-    slope = np.array([reach, 0.0, back - front]) / np.sqrt(reach**2 + (back - front) ** 2)
-    corners = [(x, y) for x in (-0.5 * depth, 0.5 * depth) for y in (-0.5 * width, 0.5 * width)]
-    upper = [
-        (x * (1 - inset / depth), y * (1 - inset / width), front + (x / depth + 0.5) * (back - front))
-        for x, y in corners
-    ]
-    base = hull([(x, y, z) for x, y in corners for z in (0.0, 0.3 * front)] + upper)
-    across = rng.random() < 0.4  # the handset lies along the back
-    grip = rng.uniform(0.018, 0.03)
-    deck = Face(np.array([-0.5 * reach, 0.0, front]), np.array([0.0, -1.0, 0.0]), slope)
-    run = reach / slope[0]
-    if across:
-        length = max(width * rng.uniform(0.8, 1.15), 0.15)
-        middle = deck.at(0.0, run - 1.4 * grip)
-        along = np.array([0.0, 1.0, 0.0])
-        keys_u, keys_v = (-0.42, 0.42), (0.1, 1.0 - 3.2 * grip / run)
-    else:
-        length = max(run * rng.uniform(0.85, 1.15), 0.15)
-        middle = deck.at(-0.5 * width + 1.3 * grip + 0.5 * inset, 0.5 * run)
-        along = slope
-        keys_u, keys_v = (-0.5 + (3.0 * grip + 0.5 * inset) / width, 0.42), (0.1, 0.9)
-    out = deck.outward
-    side = np.cross(out, along)
-    lift = rng.uniform(0.006, 0.022)
-    for s in (-1.0, 1.0):  # the cradle
-        spot = middle + s * 0.33 * length * along
-        base += hull([spot + a * 0.4 * grip * along + b * grip * w * side + z * out for a in (-1, 1) for b in (-1, 1)
-                      for z, w in ((-0.004, 0.9), (lift, 0.7))])  # fmt: skip
-    phone.add("base", base, density=700.0)
-    _handset(rng, phone, middle + (lift + GAP) * out, along, side, out, length, grip)
-    u0, u1 = keys_u[0] * width, (keys_u[1] * width - 0.5 * inset)
-    v0, v1 = keys_v[0] * run, keys_v[1] * run
-    middle_u, half = 0.5 * (u0 + u1), 0.5 * (u1 - u0)
-    shifted = Face(deck.at(middle_u, 0.0), deck.right, deck.up)
-    if rng.random() < 0.25:
-        _dial(rng, phone, shifted, 0.5 * (v0 + v1), min(half, 0.5 * (v1 - v0), 0.045))
-        return
-    split = v0 + (v1 - v0) * rng.uniform(0.55, 0.95)
-    deep = min(split - v0, rng.uniform(1.2, 2.4) * half * 2)
-    _keypad(
-        rng, phone, "base", shifted, half * rng.uniform(0.7, 0.95), (split - deep, split), rng.uniform(0.0015, 0.005)
-    )
-    room = v1 - split
-    if room > 0.02:
-        _display(rng, phone, shifted, split + 0.12 * room, 0.8 * room, 0.9 * half)
-
-
-def _handset(
-    rng: np.random.Generator, phone: Assembly, foot: Array, along: Array, side: Array, out: Array, length: float,
-    grip: float,
-) -> None:  # fmt: skip
-    """A bar between two round or square ends that lie on the cradle; it is lifted off."""
-    thick = grip * rng.uniform(0.7, 1.2)
-    bow = rng.uniform(0.1, 0.9) * thick
-    square = rng.random() < 0.5
-    shares = np.linspace(-1.0, 1.0, 7)
-    rings = []
-    for s in shares:
-        rise = thick + bow * (1.0 - s * s)
-        center = foot + 0.5 * s * length * along + rise * out
-        wide = grip * (0.75 + 0.25 * s * s)
-        rings.append(
-            np.array(
-                [center + a * wide * side + b * 0.5 * thick * out for a, b in ((-1, -1), (1, -1), (0.7, 1), (-0.7, 1))]
-            )
-        )
-    solid = loft(rings)
-    for s in (-1.0, 1.0):
-        center = foot + s * 0.5 * (length - 1.9 * grip) * along
-        if square:
-            solid += hull(
-                [
-                    center + a * 0.95 * grip * along + b * grip * w * side + z * out
-                    for a in (-1, 1)
-                    for b in (-1, 1)
-                    for z, w in ((0.0, 0.9), (0.9 * thick, 1.0))
-                ]
-            )
-        else:
-            solid += cylinder(center, center + 0.9 * thick * out, 0.95 * grip, 0.8 * grip, 20)
-    phone.add("handset", solid, prismatic("base", out, 0.0, rng.uniform(0.06, 0.2), tuple(foot)), density=500.0)
-
-
-def _dial(rng: np.random.Generator, phone: Assembly, face: Face, v: float, radius: float) -> None:
-    """A dial with ten holes that turns."""
-    center, out = face.at(0.0, v, 0.001), face.outward
-    thick = rng.uniform(0.0025, 0.006)
-    solid = cylinder(center, center + 0.4 * thick * out, radius, sections=30)
-    rim = [(0.86, 1.0), (0.3, 0.5)]
-    for inner, outer in rim:
-        solid += ring(center + 0.5 * thick * out, out, inner * radius, outer * radius, thick, 24)
-    for k in range(11):
-        angle = 0.5 * k
-        spoke = cos(angle) * face.right + sin(angle) * face.up
-        solid += tube(
-            [center + 0.6 * thick * out + 0.45 * radius * spoke, center + 0.6 * thick * out + 0.9 * radius * spoke],
-            0.35 * thick,
-            6,
-        )
-    phone.add("dial", solid, revolute("base", -out, tuple(center), 0.0, rng.uniform(4.2, 5.4)), density=1200.0)
-
-
-def _display(rng: np.random.Generator, phone: Assembly, face: Face, v: float, deep: float, half: float) -> None:
-    """A display above the keys, hinged at its lower edge."""
-    thick = rng.uniform(0.006, 0.012)
-    corners = [face.at(u, w, h) for u in (-half, half) for w in (v, v + deep) for h in (0.001, thick)]
-    solid = hull(corners)
-    inner = [face.at(u, w, h) for u in (-0.85 * half, 0.85 * half) for w in (v + 0.15 * deep, v + 0.85 * deep)
-             for h in (0.5 * thick, thick + 0.0006)]  # fmt: skip
-    hinge: JointSpec = revolute("base", face.right, tuple(face.at(0.0, v, 0.001)), 0.0, rng.uniform(0.4, 1.2))
-    phone.add("display", solid + hull(inner), hinge, density=900.0)
+    add_keypad(rng, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), rng.uniform(0.0011, 0.002))
