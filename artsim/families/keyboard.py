@@ -216,12 +216,12 @@ def _controls(
         u = 0.5 * (low[0] + high[0]) + span * (0.5 - (k + 0.5) / max(count, 3))
         center = face.at(u, v)
         if rng.random() < 0.6:
-            solid = dial(center, face.outward, rng.uniform(0.5, 1.0) * room, 0.42 * room, 18)
+            solid = dial(center, face.outward, min(rng.uniform(0.4, 1.0) * room, 0.014), min(0.42 * room, 0.014), 18)
             keyboard.add(f"knob_{k}", solid, continuous("body", face.outward, tuple(center)), density=1200.0)
         else:
             outline = key_outline("pill", (0.35 * room, 0.3 * room), 8)
             start = v - 0.3 * room
-            solid = key(face, u, start, outline, 0.0006, rng.uniform(0.3, 0.5) * room, 0.2)
+            solid = key(face, u, start, outline, 0.0006, min(rng.uniform(0.3, 0.5) * room, 0.007), 0.2)
             slide = prismatic("body", face.up, 0.0, 0.6 * room, tuple(face.at(u, start)))
             keyboard.add(f"slider_{k}", solid, slide, density=1200.0)
 
@@ -322,7 +322,7 @@ def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     half = _half_size(groups, caps, margin)
     yaw, tent, slope = rng.uniform(0.05, 0.4), rng.uniform(0.0, 0.35), rng.uniform(0.0, 0.12)
     low = rng.uniform(0.006, 0.02)
-    body, faces = Solid(), []
+    body, faces, edges = Solid(), [], []
     for side in (1.0, -1.0):
         up = np.array([cos(yaw) * cos(slope), -side * sin(yaw), sin(slope)])
         right = np.array([-side * sin(yaw), -cos(yaw) * cos(tent), side * sin(tent)])
@@ -339,13 +339,9 @@ def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
         corners = corners + face.origin
         body += hull(np.concatenate([corners, corners * (1, 1, 0)]))
         faces.append(face)
-    ends = [body.bounds()]
-    first, last = ends[0]
-    bridge = 0.5 * low + 0.25 * float(last[2] - low)
-    body += box(
-        (first[0] + 0.25 * (last[0] - first[0]), 0.25 * first[1], 0.0),
-        (last[0] - 0.15 * (last[0] - first[0]), 0.25 * last[1], min(bridge, 0.9 * low)),
-    )
+        inside = face.raised(np.array([(-side * half[0], v) for v in (-half[1], half[1])]), 0.0)
+        edges += [inside * (1, 1, 0), inside * (1, 1, 0.95)]
+    body += hull(np.concatenate(edges))  # the bridge
     keyboard.add("body", body, density=900.0)
     for number, face in enumerate(faces):
         _add_keys(keyboard, "body", face, groups, caps, number * len(groups))

@@ -12,9 +12,10 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply
+from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, revolved, rotation_about, tube, union
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007
@@ -172,7 +173,8 @@ def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
     half = float(dome.halves[3])
     slot = {1: 0.0, 2: min(rng.uniform(0.003, 0.007), 0.3 * half), 3: 0.33 * half}[count]
     drift = float(np.interp(0.5 * (front + split), dome.stations, dome.shifts))
-    body = dome.between(split, back) + dome.between(front, split + 0.0002, (-1.0, 1.0), 0.0, floor)
+    ball = _well(rng, dome, split) if rng.random() < 0.16 else None
+    body = _rear(dome, split, ball) + dome.between(front, split + 0.0002, (-1.0, 1.0), 0.0, floor)
     turns = bool(count == 2 and rng.random() < 0.9)
     angle = 0.002 / (split - front)
     hinge_z = (floor + room) * height
@@ -212,7 +214,10 @@ def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
                 for a in np.arange(10) * 0.2 * np.pi
             )
         parts.add("wheel", solid, continuous("body", (0, 1, 0), (x, drift, z)))
-    _extras(rng, parts, dome, split)
+    if ball is not None:
+        solid = ellipsoid(ball[0], ball[1], 20)
+        parts.add("ball", solid, continuous("body", (0, 1, 0), tuple(ball[0])))
+    _extras(rng, parts, dome, split, ball is None)
 
 
 def _wheel(
@@ -255,29 +260,22 @@ def _underside(rng: np.random.Generator, dome: _Dome) -> Solid:
     return solid
 
 
-def _extras(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float) -> None:
-    """Keys on the side and on top, or a ball."""
-    back = float(dome.stations[-1])
-    length = back - float(dome.stations[0])
+def _extras(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
+    """Keys on the side, and on top where that is free."""
+    length = float(dome.stations[-1] - dome.stations[0])
     travel = 0.0007
     if rng.random() < 0.4:
         _side_keys(rng, parts, dome, split, travel)
-    start, room = split + 0.04 * length, 0.45 * length
-    if start + room > back:
+    start = split + 0.04 * length
+    if not free or start + 0.25 * length > dome.stations[-1] or rng.random() < 0.65:
         return
-    chance = rng.random()
-    if chance < 0.3:
-        wide = min(rng.uniform(0.004, 0.009), 0.4 * float(dome.halves.max()))
-        top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
-        count = int(rng.integers(1, 3))
-        for k in range(count):
-            shift = dome.at(start)[2]
-            face = top_face(top, start + (0.04 + 0.075 * k) * length, shift)
-            outline = key_outline("pill", (wide, 0.055 * length), 8)
-            solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0016)
-            parts.add(f"key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
-    elif chance < 0.5:
-        _ball(rng, parts, dome, start + 0.5 * room)
+    wide = min(rng.uniform(0.004, 0.009), 0.4 * float(dome.halves.max()))
+    top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
+    for k in range(int(rng.integers(1, 3))):
+        face = top_face(top, start + (0.04 + 0.075 * k) * length, dome.at(start)[2])
+        outline = key_outline("pill", (wide, 0.055 * length), 8)
+        solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0016)
+        parts.add(f"key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
 
 
 def _side_keys(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
@@ -300,14 +298,30 @@ def _side_keys(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: floa
         parts.add(f"side_key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
 
 
-def _ball(rng: np.random.Generator, parts: _Parts, dome: _Dome, x: float) -> None:
-    """A ball in a cup on top, which turns about Y."""
-    radius = rng.uniform(0.25, 0.55) * dome.at(x)[1]
-    reach = 1.5 * radius
-    spots = [dome.at(x + d)[0] for d in np.linspace(-reach, reach, 7)]
-    shift, lowest = dome.at(x)[2], 0.5 * min(spots)
-    z = max(spots) + radius + GAP
-    cup = [(radius + GAP, lowest), (reach, lowest), (1.15 * radius, z - 0.1 * radius), (radius + GAP, z - 0.1 * radius)]
-    name, body, joint = parts.items[0]
-    parts.items[0] = (name, body + revolved(cup, (x, shift, 0.0), (0, 0, 1), 16), joint)
-    parts.add("ball", ellipsoid((x, shift, z), radius, 20), continuous("body", (0, 1, 0), (x, shift, z)))
+def _well(rng: np.random.Generator, dome: _Dome, split: float) -> tuple[Array, float] | None:
+    """Centre (3,) and radius of a ball that is sunk into the back, where there is room for one."""
+    back = float(dome.stations[-1])
+    x = split + rng.uniform(0.4, 0.6) * (back - split)
+    height, _, shift = dome.at(x)
+    near = np.array([dome.at(x + d) for d in np.linspace(-0.012, 0.012, 5)])
+    # The ball stands out by 0.6 radii, and its lower end keeps clear of a floor at 0.2 of the height.
+    radius = min((height - 0.2 * float(near[:, 0].max()) - GAP) / 1.4, 0.75 * float(near[:, 1].min()) - 0.003,
+                 0.4 * (back - split), rng.uniform(0.008, 0.02))  # fmt: skip
+    if radius < 0.006:
+        return None
+    return np.array([x, shift, height - 0.4 * radius]), radius
+
+
+def _rear(dome: _Dome, split: float, ball: tuple[Array, float] | None) -> Solid:
+    """The body behind the buttons, with a well for a ball."""
+    back = float(dome.stations[-1])
+    if ball is None:
+        return dome.between(split, back)
+    (x, y, _), radius = ball
+    room = radius + GAP
+    solid = dome.between(split, x - room) + dome.between(x + room, back)
+    first, last = x - room - 1e-4, x + room + 1e-4
+    solid += dome.between(first, last, (-1.0, 1.0), 0.0, 0.2)
+    solid += dome.between(first, last, (y + room, 1.0)) + dome.between(first, last, (-1.0, y - room))
+    rim = (room + 0.0005, room + 0.0005, 0.0008)
+    return solid + holed_plate(ball[0] - rim, ball[0] + rim, (x, y), room, axis=2, sections=16)

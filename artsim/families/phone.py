@@ -2,7 +2,7 @@
 
 What varies: the kind (bar, flip, slider, swivel, folding screen, smartphone, cordless in its dock, desk set with a
 handset); proportions, round edges, bent backs; keypads and their keys, function and side keys; antennas, kickstands,
-battery covers, cameras; on desk sets the slope, a dial in place of keys, a display that tilts, the handset's shape.
+cameras; on desk sets the slope, a dial in place of keys, a display that tilts, the handset's shape.
 """
 
 from __future__ import annotations

@@ -87,11 +87,17 @@ def build(rng: np.random.Generator) -> Assembly:
             body += case.block(float(low) - 1e-4, high + 1e-4)
         body += case.block(high, high + SHELF)
     top = float(levels[-1])
-    body += _top_of_body(rng, case, kind, top)
+    slopes = kind == "laser" and rng.random() < 0.65
+    rise = x * rng.uniform(0.15, 0.4)
+    if slopes:
+        body += _slope(case, top, rise, y * rng.uniform(0.75, 0.9))
     printer.add("body", body, density=350.0)
     for number, (band, low) in enumerate(zip(bands, levels[:-1], strict=True)):
         _fill(rng, printer, case, band, number, float(low), half, cavity)
-    _top(rng, printer, case, kind, top)
+    if slopes:
+        _paper_stop(rng, printer, case, top + 0.75 * rise)
+    else:
+        _lid(rng, printer, case, kind, top)
     return printer
 
 
@@ -220,23 +226,28 @@ def _keys(
 # --- the top ---------------------------------------------------------------------------------------------------------
 
 
-def _top_of_body(rng: np.random.Generator, case: _Case, kind: str, top: float) -> Solid:
-    """A slope for printed paper on lasers."""
-    if kind != "laser":
-        return Solid()
-    rise = case.x * rng.uniform(0.15, 0.4)
-    side = case.y * rng.uniform(0.75, 0.9)
-    solid = case.block(top - 1e-4, top + rise, y=(side, 9.0)) + case.block(top - 1e-4, top + rise, y=(-9.0, -side))
-    solid += case.block(top - 1e-4, top + rise, x=(0.75 * case.x, 9.0))
-    slope = np.array([(-0.9 * case.x, top - 1e-4), (0.76 * case.x, top - 1e-4), (-0.9 * case.x, top + 0.75 * rise),
-                      (-0.2 * case.x, top + 0.7 * rise)])  # fmt: skip
-    return solid + hull([(x, s * (side + 1e-4), z) for x, z in slope for s in (-1, 1)])
+def _slope(case: _Case, top: float, rise: float, side: float) -> Solid:
+    """The top of a laser printer: walls around a slope for printed paper, which reaches ``side`` to either side."""
+    high = top + rise
+    solid = case.block(top - 1e-4, high, y=(side, 9.0)) + case.block(top - 1e-4, high, y=(-9.0, -side))
+    solid += case.block(top - 1e-4, high, x=(0.75 * case.x, 9.0))
+    slope = [(-0.9, top - 1e-4), (0.76, top - 1e-4), (-0.9, top + 0.75 * rise), (-0.2, top + 0.7 * rise)]
+    return solid + hull([(x * case.x, s * (side + 1e-4), z) for x, z in slope for s in (-1, 1)])
 
 
-def _top(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, top: float) -> None:
-    """Lids, covers and supports on top."""
-    if kind == "laser":
+def _paper_stop(rng: np.random.Generator, printer: Assembly, case: _Case, level: float) -> None:
+    """A flap that lies on the front end of the slope and folds up, on some."""
+    if rng.random() < 0.3:
         return
+    thick, z = 0.004, level + GAP
+    wide, first = case.y * rng.uniform(0.1, 0.6), -0.86 * case.x
+    flap = rounded_box((first, -wide, z), (rng.uniform(-0.6, -0.3) * case.x, wide, z + thick), 0.008, axis=2, steps=2)
+    hinge = revolute("body", (0, -1, 0), (first, 0, z), 0.0, rng.uniform(0.6, 1.6))
+    printer.add("paper_stop", flap, hinge, density=900.0)
+
+
+def _lid(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, top: float) -> None:
+    """The lid of a scanner, at times with a feeder; keys before it and a paper support behind it."""
     seam = top + GAP
     back = case.x
     if kind in ("inkjet", "small") and rng.random() < 0.45:
@@ -257,7 +268,7 @@ def _top(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, to
         + [(*(middle + shrink * (p - middle)), seam + thick) for p in outline]
     )
     crown = seam + thick
-    feeder = back == case.x and kind in ("copier", "inkjet") and rng.random() < (0.6 if kind == "copier" else 0.35)
+    feeder = back == case.x and kind != "small" and rng.random() < (0.6 if kind == "copier" else 0.35)
     if feeder:
         rise = rng.uniform(0.03, 0.09)
         y0, y1 = 0.15 * case.y, 0.8 * case.y

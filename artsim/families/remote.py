@@ -1,8 +1,8 @@
 """Remote controls that stand upright: keys on the front towards -X, a battery cover on the back.
 
 What varies: length, width, thickness; outline (straight, tapered, waisted, oval), humps of the back, bent ends, round
-edges; bands of keys (numbers, rows, tall rockers, a navigation pad or a jog dial), their shape, travel and number; a
-battery cover that slides or swings; a front cover that slides or swings; a hinged antenna.
+edges; bands of keys (numbers, rows, tall rockers, a slide switch, a navigation pad or a jog dial), their shape, travel
+and number; a battery cover that slides or swings; a front cover that slides or swings; a hinged antenna.
 """
 
 from __future__ import annotations
@@ -150,6 +150,12 @@ def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
             tallest = max(tallest, added)
             top -= deep + gap
             continue
+        if band == "slider":
+            outline, start = key_outline("pill", (min(half, 1.6 * pitch), 0.8 * pitch), 8), top - deep + 0.5 * pitch
+            slide = prismatic("body", (0, 0, 1), 0.0, deep - pitch, tuple(face.at(0.0, start)))
+            remote.add("slider", key(face, 0.0, start, outline, 0.0004, height + 0.0006), slide, density=1100.0)
+            top -= deep + gap
+            continue
         size = np.array([min(fill * 2.0 * half / columns, 1.9 * pitch), fill * deep / rows])
         outline = key_outline("pill" if band == "rockers" else kind, size, 10)
         rocks = band == "rockers" and height > 0.0016 and rng.random() < 0.7
@@ -170,14 +176,19 @@ def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
 
 def _plan(rng: np.random.Generator, half: float, room: float, pitch: float) -> list[tuple[str, int, int, float]]:
     """Kind, columns, rows and height of each band of keys; at least one, at most ``MOST_KEYS`` keys."""
-    wanted = list(rng.permutation(["pad", "numbers", "rockers", "row", "row"]))[: int(rng.integers(1, 6))]
+    wanted = list(rng.permutation(["pad", "numbers", "rockers", "row", "row", "slider"]))[: int(rng.integers(1, 6))]
     wanted = ["row", *wanted, "numbers", "row"][: int(rng.integers(1, 9))]
     bands: list[tuple[str, int, int, float]] = []
     count, left = 0, room
     for band in wanted:
         columns = int(rng.integers(2, 5)) if half > 0.009 else int(rng.integers(1, 3))
-        columns, rows = {"numbers": (3, 4), "rockers": (2, 1), "pad": (5, 1)}.get(band, (columns, 1))
-        deep = {"numbers": 4.0 * pitch, "rockers": 2.6 * pitch, "pad": min(2.0 * half, 0.06)}.get(band, pitch)
+        columns, rows = {"numbers": (3, 4), "rockers": (2, 1), "pad": (5, 1), "slider": (1, 1)}.get(band, (columns, 1))
+        deep = {
+            "numbers": 4.0 * pitch,
+            "rockers": 2.6 * pitch,
+            "slider": 2.2 * pitch,
+            "pad": min(2.0 * half, 0.06),
+        }.get(band, pitch)
         narrow = band != "pad" and 2.0 * half / columns < 0.003
         if deep <= left and count + rows * columns <= MOST_KEYS and not narrow:
             bands.append((band, columns, rows, deep))
