@@ -122,6 +122,7 @@ _PART_FINISHES: Mapping[str, str] = {
     "blade": "steel", "button": "rubber", "carafe": "gloss", "handwheel": "enamel", "magazine": "steel",
     "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "",
     "temple": "", "temple_left": "", "temple_right": "",
+    "connector": "steel", "key": "", "keys": "",
 }  # fmt: skip
 """Finishes of parts by their label; "" stands for that of the details."""
 

@@ -135,7 +135,7 @@ class _Parts:
 
 def _roll(rng: np.random.Generator) -> Array | None:
     """(3, 3) roll of an upright mouse; None for the usual ones."""
-    if rng.random() < 0.8:
+    if rng.random() < 0.86:
         return None
     return rotation_about((1.0, 0.0, 0.0), float(rng.choice([-1.0, 1.0], p=[0.85, 0.15])) * rng.uniform(0.25, 0.85))
 
