@@ -154,10 +154,11 @@ def sleeve(low: Vector, high: Vector, hole_low: Vector, hole_high: Vector, radiu
     hole_low, hole_high : 2 float
         Corners of the hole, in y and z.
     radius : float
-        Of the outer edges.
+        Of the outer edges; cut to three times the thinnest wall, so that they keep clear of the hole's.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-    outer = rounded_rectangle(low[1:], high[1:], radius, steps)
+    walls = np.minimum(np.asarray(hole_low) - low[1:], high[1:] - np.asarray(hole_high))
+    outer = rounded_rectangle(low[1:], high[1:], min(radius, 3.0 * float(walls.min())), steps)
     inner = np.repeat(_corners(hole_low, hole_high), steps + 1, axis=0)
     pieces = []
     for k in range(len(outer)):

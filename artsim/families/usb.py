@@ -183,7 +183,7 @@ def _cap(rng: np.random.Generator, usb: Assembly, stick: _Stick, name: str, x: f
     first, last = sorted((x + sign * GAP, end + sign * 0.0002))
     solid = sleeve((first, -half, -thick), (last, half, thick), -inner, inner, radius, 3)
     shrink = rng.uniform(0.5, 1.0)
-    tips = [(end, 1.0), (0.5 * (end + far), 0.5 + 0.5 * shrink), (far, shrink)]
+    tips = [(end, 1.0), (0.5 * (end + far), 0.8 + 0.2 * shrink), (far, shrink)]
     rim = rounded_rectangle((-half, -thick), (half, thick), radius, 3)
     solid += hull([(a, *(s * point)) for a, s in tips for point in rim])
     pull = plug.reach * rng.uniform(1.1, 2.5)
