@@ -88,7 +88,7 @@ def _size(rng: np.random.Generator) -> tuple[float, float, float]:
 
 def _aerial(rng: np.random.Generator, phone: Assembly, half: float, x: float, length: float, thick: float) -> None:
     """A rod along one side that swings up about its upper end, on some."""
-    if rng.random() < 0.7:
+    if rng.random() < 0.55:
         return
     radius = min(rng.uniform(0.0015, 0.004), 0.4 * thick)
     side = float(rng.choice([-1.0, 1.0]))
@@ -101,7 +101,7 @@ def _aerial(rng: np.random.Generator, phone: Assembly, half: float, x: float, le
 
 def _stand(rng: np.random.Generator, phone: Assembly, half: float, x: float, length: float) -> None:
     """A leaf on the back that folds out, on some."""
-    if rng.random() < 0.75:
+    if rng.random() < 0.55:
         return
     thick, z = 0.0015, length * rng.uniform(0.4, 0.65)
     wide, low = half * rng.uniform(0.3, 0.8), length * rng.uniform(0.03, 0.2)

@@ -109,15 +109,15 @@ def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> b
         return False
     end = rng.uniform(0.3, 0.62) * length
     levels = np.concatenate([[0.0], body.levels[(body.levels > 0) & (body.levels < end - 0.001)], [end - GAP]])
-    _, backs, halves = body.at(levels)
-    slides = bool(np.ptp(backs) < 0.02 * length and np.ptp(halves) < 0.1 * halves.max()) and rng.random() < 0.7
+    fronts, backs, halves = body.at(levels)
+    even = np.ptp(backs) < 0.06 * length and backs.min() - thick > fronts.max() + 0.003
+    slides = bool(even and np.ptp(halves) < 0.3 * halves.max()) and rng.random() < 0.75
     if not slides and backs[0] > backs.min() + 0.1 * end:
         return False  # the bent end of the body would stop a cover that swings
     if slides:  # over a flat back
         backs = np.full(len(levels), backs.min())
     solid = body.between(end, length)
     if slides:
-        fronts = body.at(levels)[0]
         lower = np.append(levels[:-1], end + 0.0004)
         solid += loft(cross_sections(lower, fronts, backs - thick, halves, body.roundness))
     else:
