@@ -87,6 +87,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "desk_lamp": (("enamel", "shell", "steel"), ("chrome", "rubber")),
     "dishwasher": (("enamel", "steel"), ("chrome",)),
     "dispenser": (("plastic", "gloss", "steel"), ("chrome", "plastic")),
+    "display": (("shell", "gloss"), ("shell", "plastic")),
     "door": (("wood", "enamel"), ("chrome", "steel")),
     "drawer": (("wood",), ("chrome", "steel", "wood")),
     "eyeglasses": (("smoke",), ("gloss", "steel")),
@@ -95,13 +96,18 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "folding_knife": (("wood", "plastic", "steel"), ("steel",)),
     "globe": (("wood", "chrome"), ("chrome",)),
     "kettle": (("steel", "enamel", "gloss"), ("rubber", "plastic")),
+    "keyboard": (("shell", "plastic"), ("plastic", "shell")),
     "kitchen_pot": (("steel", "enamel"), ("rubber", "plastic")),
     "knife": (("plastic", "wood"), ("steel",)),
     "laptop": (("steel", "shell"), ("plastic",)),
     "microwave": (("shell", "steel"), ("shell",)),
+    "mouse": (("shell", "gloss", "plastic"), ("rubber", "plastic")),
     "oven": (("enamel", "steel"), ("chrome",)),
+    "phone": (("gloss", "shell", "plastic"), ("smoke", "gloss")),
     "pliers": (("steel",), ("rubber",)),
+    "printer": (("shell", "plastic"), ("shell", "gloss")),
     "refrigerator": (("enamel", "steel"), ("chrome",)),
+    "remote": (("shell", "plastic", "gloss"), ("gloss", "rubber")),
     "robot_arm": (("enamel", "plastic"), ("rubber",)),
     "safe": (("enamel", "steel"), ("chrome",)),
     "scissors": (("steel",), ("plastic", "gloss")),
@@ -112,6 +118,7 @@ _OF_CATEGORY: Mapping[str, tuple[_Choice, _Choice]] = {
     "table": (("wood",), ("chrome",)),
     "toaster": (("steel", "enamel"), ("shell",)),
     "trash_can": (("plastic", "steel"), ("rubber",)),
+    "usb": (("plastic", "gloss", "steel"), ("steel", "chrome")),
     "valve": (("steel", "enamel"), ("steel",)),
     "washing_machine": (("enamel",), ("chrome",)),
     "window": (("enamel", "wood"), ("chrome",)),
@@ -121,6 +128,8 @@ _PART_FINISHES: Mapping[str, str] = {
     "blade": "steel", "button": "rubber", "carafe": "gloss", "handwheel": "enamel", "magazine": "steel",
     "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "",
     "temple": "", "temple_left": "", "temple_right": "", "hand": "", "lens": "shell", "pendulum": "chrome", "pump": "",
+
+    "connector": "steel", "key": "", "keys": "",
 }  # fmt: skip
 """Finishes of parts by their label; "" stands for that of the details."""
 

@@ -1,0 +1,378 @@
+"""Displays, their screens towards -X: monitors on stands, television sets on feet, tubes on swivels, panels on easels.
+
+What varies: the kind; size, format and thickness of the panel, its frame, a bent screen, one to three screens on a bar;
+the foot (plate, disc, two legs, ring, arms); which of turn, height, tilt and portrait joints there are, and their
+limits; keys, knobs and rabbit ears.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.common.elementary import arcsin, cos, hypot, sin
+from artsim.families.details import dial
+from artsim.families.keys import Face, add_key, front_face, key_outline
+from artsim.families.screens import Panel, draw_panel, screen
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.solids import (
+    Solid,
+    box,
+    cylinder,
+    frame,
+    hull,
+    loft,
+    ring,
+    rounded_box,
+    rounded_rectangle,
+    tube,
+    union,
+)
+from artsim.model.kinematics import Array
+
+GAP = 0.0015
+OUT = (-1.0, 0.0, 0.0)
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A display; upright and at its lowest, no key pressed at rest."""
+    kind = str(rng.choice(["stand", "feet", "tube", "easel"], p=[0.58, 0.14, 0.16, 0.12]))
+    display = Assembly()
+    {"stand": _on_stand, "feet": _on_feet, "tube": _tube, "easel": _on_easel}[kind](rng, display)
+    return display
+
+
+def _keys(rng: np.random.Generator, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
+    """A row of keys to one side of a chin, on some; returns how many."""
+    if rng.random() < 0.35 or size < 0.004:
+        return 0
+    count = int(rng.integers(1, 7))
+    wide = min(rng.uniform(0.8, 2.5) * size, 0.028)
+    kind = str(rng.choice(["round", "square", "pill"]))
+    side, travel = float(rng.choice([-1.0, 0.0, 1.0])), rng.uniform(0.0008, 0.0015)
+    pitch = 1.3 * max(wide, size)
+    middle = side * (half - 0.5 * count * pitch - 0.01)
+    outline = key_outline(kind, (size if kind == "round" else wide, size), 12)
+    for k in range(count):
+        u = middle + (k - 0.5 * (count - 1)) * pitch
+        add_key(display, parent, f"button_{k}", face, (u, 0.0), outline, travel + rng.uniform(0.0015, 0.004), travel)
+    return count
+
+
+def _foot(rng: np.random.Generator, half: float, depth: float, thick: float) -> Solid:
+    """What stands on the table, below z = ``thick``; the middle of it is solid."""
+    kind = str(rng.choice(["plate", "disc", "legs", "ring", "tapered", "arc"], p=[0.27, 0.22, 0.15, 0.08, 0.18, 0.1]))
+    back = 0.45 * depth
+    front = back - depth
+    if kind == "disc":
+        return cylinder((0, 0, 0), (0, 0, thick), 0.5 * depth, 0.5 * depth * rng.uniform(0.7, 1.0), 32)
+    if kind == "legs":  # two legs that spread to the front
+        width = rng.uniform(0.02, 0.05)
+        solid = box((-0.3 * back, -1.5 * width, 0), (back, 1.5 * width, thick))
+        for s in (-1.0, 1.0):
+            solid += hull([(x, y, z) for x, y in ((0.5 * back, s * 0.2 * width), (0.5 * back, s * 1.2 * width),
+                           (front, s * half), (front, s * (half - width))) for z in (0, thick)])  # fmt: skip
+        return solid
+    if kind == "ring":
+        outer = 0.5 * depth
+        return ring((0, 0, 0.5 * thick), (0, 0, 1), outer * rng.uniform(0.6, 0.8), outer, thick, 28) + box(
+            (-0.02, -0.95 * outer, 0), (0.03, 0.95 * outer, thick))  # fmt: skip
+    if kind == "arc":
+        width = rng.uniform(0.025, 0.05)
+        bows = [
+            [(front + 0.6 * (back - front) * a * a + d, half * a, z) for d in (0.0, width) for z in (0.0, thick)]
+            for a in np.linspace(-1.0, 1.0, 9)
+        ]
+        return loft(bows) + box((front + 0.5 * width, -width, 0), (0.6 * back, width, thick))
+    outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.02, 0.95) * min(half, 0.5 * depth), 4)
+    top = rng.uniform(0.55, 0.9) if kind == "tapered" else rng.uniform(0.96, 1.0)
+    return hull([(x, y, 0.0) for x, y in outline] + [(x, y, 0.4 * thick) for x, y in outline]
+                + [(top * x, top * y, thick) for x, y in outline])  # fmt: skip
+
+
+class _Chain:
+    """Parts in a row, each on the one before it; what no joint parts goes into the same part."""
+
+    def __init__(self, display: Assembly) -> None:
+        self.display = display
+        self.name, self.joint, self.solid = "base", None, Solid()  # type: tuple[str, JointSpec | None, Solid]
+
+    def part(self, name: str, joint: JointSpec) -> None:
+        """Finish the part so far, and begin one that hangs on it."""
+        self.finish()
+        self.name, self.joint, self.solid = name, joint, Solid()
+
+    def finish(self) -> str:
+        """Add the part so far to the display; returns its name."""
+        return self.display.add(self.name, self.solid, self.joint, density=1500.0)
+
+
+def _on_stand(rng: np.random.Generator, display: Assembly) -> None:
+    """Screens on a column that turns, slides, tilts and turns to portrait, or some of these."""
+    panel = draw_panel(rng)
+    count = int(rng.choice([1, 2, 3], p=[0.84, 0.1, 0.06])) if not panel.bend and panel.half < 0.3 else 1
+    swivels, slides, tilts, pivots = (bool(v) for v in rng.random(4) < (0.5, 0.45, 0.85, 0.3))
+    tilts = tilts or count > 1 or not (swivels or slides)
+    pivots = pivots and count == 1 and not panel.bend
+    below = float(hypot(panel.half, panel.rise)) if pivots else panel.rise  # how far the panel reaches from its middle
+    radius, knuckle = rng.uniform(0.012, 0.026), rng.uniform(0.006, 0.012)
+    front = -radius - (GAP + 0.006 if slides else 0.0)  # of what the hinge is fixed to
+    axis = front - knuckle - 0.004
+    plane = axis - knuckle - rng.uniform(0.008, 0.03)  # of the panel's back
+    forward = _forward_tilt(axis - plane, below, axis, -radius) if tilts else 0.0
+    forward = min(forward, rng.uniform(0.03, 0.12))
+    thick = rng.uniform(0.006, 0.03)
+    drop = (axis - plane + panel.thick + panel.bend) * float(sin(forward))
+    middle = thick + below + drop + rng.uniform(0.02, 0.16)
+    half_sleeve = rng.uniform(0.015, 0.035)
+    top = middle + (half_sleeve + rng.uniform(0.0, 0.6) * panel.rise if slides else 0.0)
+
+    chain = _Chain(display)
+    chain.solid = _foot(rng, panel.half * rng.uniform(0.35, 0.85), max(panel.half * rng.uniform(0.5, 1.0), 0.13), thick)
+    foot = thick
+    if swivels:
+        turn = rng.uniform(0.35, 1.57)
+        foot += GAP
+        chain.part("neck", revolute("base", (0, 0, 1), (0, 0, foot), -turn, turn))
+        chain.solid = cylinder((0, 0, foot), (0, 0, foot + 0.006), rng.uniform(1.6, 2.4) * radius, sections=24)
+    chain.solid += _column(rng, radius, foot + (0.004 if swivels else -0.004), top, not slides)
+    if slides:
+        travel = (top - middle) * rng.uniform(0.5, 0.9) + rng.uniform(0.0, half_sleeve)
+        chain.part("slider", prismatic(chain.name, (0, 0, 1), 0.0, travel, (0, 0, middle)))
+        outer = radius + GAP + 0.006
+        chain.solid = frame(
+            (-outer, -outer, middle - half_sleeve), (outer, outer, middle + half_sleeve), [0.006] * 4, 0, 1
+        )
+    offsets = (np.arange(count) - 0.5 * (count - 1)) * (2.0 * panel.half + 0.02)
+    if count > 1:
+        reach = float(offsets[-1]) + 0.03
+        chain.solid += rounded_box(
+            (front - 0.004, -reach, middle - 0.014), (front + 0.005, reach, middle + 0.014), 0.004
+        )
+    ear = 0.6 * radius
+    for y in offsets:
+        chain.solid += box((axis, y - ear, middle - 0.8 * knuckle), (front + 0.004, y + ear, middle + 0.8 * knuckle))
+        if tilts:
+            chain.solid += cylinder((axis, y - ear, middle), (axis, y + ear, middle), knuckle, sections=14)
+    parent = chain.name
+    if count > 1:
+        chain.finish()
+    back_tilt = _forward_tilt(axis - plane, below, axis, -radius) if slides else 0.5
+    for k, y in enumerate(offsets):
+        name = "screen" if count == 1 else f"screen_{k}"
+        limits = (-forward, min(back_tilt, rng.uniform(0.15, 0.5)))
+        tilt = revolute(parent, (0, 1, 0), (axis, float(y), middle), *limits)
+        head = _head(plane + (GAP if pivots else -0.001), axis, float(y), middle, ear, knuckle, panel, tilts)
+        if count > 1:
+            chain.name, chain.joint, chain.solid = name, tilt, head
+        elif tilts:
+            chain.part("head" if pivots else name, tilt)
+            chain.solid = head
+        else:
+            chain.solid += head
+        if pivots:
+            chain.part(name, revolute(chain.name, (-1, 0, 0), (plane, 0, middle), -1.5708, 1.5708))
+        _finish_screen(rng, chain, panel, np.array([plane, y, middle]), k)
+
+
+def _forward_tilt(reach: float, below: float, axis: float, column: float) -> float:
+    """How far a panel whose back lies ``reach`` before its hinge tilts until its edge is 5 mm from the column."""
+    far = float(hypot(reach, below))
+    return max(float(arcsin(min(reach / far, 1.0))) + float(arcsin(min((column - axis - 0.005) / far, 1.0))), 0.01)
+
+
+def _column(rng: np.random.Generator, radius: float, low: float, high: float, free: bool) -> Solid:
+    """The upright of a stand; a square one, unless its shape is free."""
+    kind = str(rng.choice(["square", "round", "wide", "tapered"])) if free else "square"
+    if kind == "round":
+        return cylinder((0, 0, low), (0, 0, high), radius, sections=20)
+    wide = radius * {"square": 1.0, "wide": rng.uniform(1.5, 4.0), "tapered": 1.0}[kind]
+    foot = wide * (rng.uniform(1.2, 4.0) if kind == "tapered" else 1.0)
+    deep = radius if not free else radius * rng.uniform(0.5, 1.0)
+    return hull(
+        [(x, y, z) for z, w in ((low, foot), (high, wide)) for x in (-radius, 2.0 * deep - radius) for y in (-w, w)]
+    )
+
+
+def _head(
+    plane: float, axis: float, y: float, z: float, ear: float, knuckle: float, panel: Panel, tilts: bool
+) -> Solid:  # fmt: skip
+    """What holds a screen: a plate behind it, and ears on either side of the hinge, or an arm where nothing tilts."""
+    size = min(0.045, 0.5 * panel.rise)
+    solid = box((plane, y - 0.8 * size, z - size), (plane + 0.006, y + 0.8 * size, z + size))
+    if not tilts:
+        return solid + box((plane, y - ear, z - 0.8 * knuckle), (axis + 0.001, y + ear, z + 0.8 * knuckle))
+    for s in (-1.0, 1.0):
+        first, last = sorted((y + s * (ear + 0.001), y + s * (ear + 0.006)))
+        solid += cylinder((axis, first, z), (axis, last, z), knuckle, sections=14)
+        solid += box((plane, first, z - 0.8 * knuckle), (axis, last, z + 0.8 * knuckle))
+    return solid
+
+
+def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
+    """Add the panel to the chain's last part, finish that, and put keys on the first one."""
+    chin = rng.uniform(0.0, 0.16) * panel.rise * rng.choice([0.0, 1.0], p=[0.4, 0.6])
+    chain.solid += screen(rng, panel, chin).moved(at)
+    name = chain.finish()
+    if number > 0:
+        return
+    if chin > 0.012 and not panel.bend:
+        face = front_face(float(at[0]) - panel.thick, float(at[1]), float(at[2]) - panel.rise + 0.5 * chin)
+        _keys(rng, chain.display, name, face, 0.9 * panel.half, 0.6 * chin)
+    else:  # on the right edge
+        face = Face(
+            at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0),
+            np.array([1.0, 0.0, 0.0]),
+            np.array([0.0, 0.0, 1.0]),
+        )
+        _edge_keys(rng, chain.display, name, face, panel)
+
+
+def _edge_keys(rng: np.random.Generator, display: Assembly, name: str, face: Face, panel: Panel) -> None:
+    """Keys above one another on an edge, on some."""
+    size = min(0.4 * panel.thick, 0.008)
+    if rng.random() < 0.5 or size < 0.002:
+        return
+    pitch = 2.6 * size
+    outline = key_outline("pill", (size, 1.8 * size), 8)
+    for k in range(min(int(rng.integers(1, 6)), int(0.8 * panel.rise / pitch))):
+        add_key(display, name, f"button_{k}", face, (0.0, (k - 3.0) * pitch), outline, 0.003, 0.001)
+
+
+def _on_feet(rng: np.random.Generator, display: Assembly) -> None:
+    """A television set on two feet that fold in below it."""
+    panel = draw_panel(rng, 1.5)
+    foot = rng.uniform(0.02, 0.1)
+    middle = foot + GAP + panel.rise
+    chain = _Chain(display)
+    chain.name = "body"
+    _finish_screen(rng, chain, panel, np.array([0.0, 0.0, middle]), 0)
+    x = -0.5 * panel.thick
+    spread = panel.half * rng.uniform(0.45, 0.85)
+    reach = min(panel.half * rng.uniform(0.2, 0.5), 0.8 * spread)
+    wide, rod = rng.uniform(0.006, 0.03), min(0.3 * panel.thick, 0.012)
+    limit = rng.uniform(0.8, 1.57)
+    for k, s in enumerate((-1.0, 1.0)):
+        y = s * spread
+        solid = hull([(x + a * reach, y + b * wide, z) for a in (-1, 1) for b in (-1, 1) for z in (0.0, 0.006)])
+        solid += (
+            hull(
+                [
+                    (x + a * (0.3 if z > 0.5 * foot else 0.8) * reach * 0.9, y + b * rod, z)
+                    for a in (-1, 1)
+                    for b in (-1, 1)
+                    for z in (0.004, foot)
+                ]
+            )
+            if rng.random() < 0.5
+            else cylinder((x, y, 0.004), (x, y, foot), rod, sections=14)
+        )
+        display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)
+
+
+def _on_easel(rng: np.random.Generator, display: Assembly) -> None:
+    """A thin panel with a leaf or two legs on its back that fold out."""
+    panel = draw_panel(rng, 0.6)
+    chain = _Chain(display)
+    chain.name = "body"
+    _finish_screen(rng, chain, panel, np.array([0.0, 0.0, panel.rise]), 0)
+    z = 2.0 * panel.rise * rng.uniform(0.3, 0.85)
+    low, thick = 0.04 * panel.rise, rng.uniform(0.002, 0.008)
+    count = int(rng.integers(1, 3))
+    wide = panel.half * (rng.uniform(0.2, 0.85) if count == 1 else rng.uniform(0.04, 0.15))
+    for k in range(count):
+        y = 0.0 if count == 1 else (k - 0.5) * 1.2 * panel.half
+        leaf = box((GAP, y - wide, low), (GAP + thick, y + wide, z))
+        leaf += cylinder((GAP + 0.5 * thick, y - wide, z), (GAP + 0.5 * thick, y + wide, z), 0.5 * thick, sections=12)
+        hinge = revolute("body", (0, -1, 0), (GAP + 0.5 * thick, y, z), 0.0, rng.uniform(0.5, 1.6))
+        display.add("stand" if count == 1 else f"leg_{k}", leaf, hinge, density=1500.0)
+
+
+def _tube(rng: np.random.Generator, display: Assembly) -> None:
+    """A deep set with a picture tube, on a swivel, or a television set on legs with knobs and rabbit ears."""
+    half, ratio = rng.uniform(0.14, 0.38), rng.uniform(0.7, 1.05)
+    rise, depth = half * ratio, half * rng.uniform(1.2, 2.3)
+    cabinet = depth * rng.uniform(0.2, 0.6)
+    foot = rng.uniform(0.02, 0.07)
+    chain = _Chain(display)
+    swivels = rng.random() < 0.65
+    if swivels:
+        thick = 0.4 * foot
+        chain.solid = _foot(rng, 0.6 * half, rng.uniform(0.8, 1.3) * half, thick)
+        turn = rng.uniform(0.5, 1.57)
+        chain.part("screen", revolute("base", (0, 0, 1), (0, 0, thick), -turn, turn))
+        chain.solid = cylinder((0, 0, thick + GAP), (0, 0, foot + 0.004), 0.35 * half, 0.5 * half, 24)
+    else:
+        chain.name = "body"
+        splay = rng.uniform(1.0, 1.3)
+        rod = rng.uniform(0.008, 0.02)
+        x0 = -0.5 * cabinet
+        chain.solid = union(
+            cylinder(
+                (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0),
+                (x0 + a * 0.4 * cabinet, s * 0.75 * half, foot + 0.003),
+                0.7 * rod,
+                rod,
+                12,
+            )
+            for a in (-1, 1)
+            for s in (-1, 1)
+        )
+    front = -0.5 * cabinet - 0.2 * depth if swivels else -cabinet
+    low, high = foot, foot + 2.0 * rise
+    rim = rng.uniform(0.06, 0.16) * half
+    side = rng.uniform(0.3, 0.6) * half if rng.random() < 0.4 else 0.0  # a strip for knobs, on the right
+    chin = rng.uniform(0.1, 0.3) * rise if side == 0 else 0.0
+    lip = rng.uniform(0.006, 0.02)
+    shell = rounded_box((front + lip, -half, low), (front + cabinet, half, high), rng.uniform(0.02, 0.2) * rise, axis=0)
+    inset = 0.08 * rise
+    shell += frame(
+        (front, inset - half, low + inset),
+        (front + lip + 0.001, half - inset, high - inset),
+        [rim + side, rim, rim + chin, rim],
+    )
+    shrink = rng.uniform(0.4, 0.8)
+    shell += hull([(x, s * half * 0.96 * t, z) for x, t in ((front + cabinet - 0.001, 1.0), (front + depth, shrink))
+                   for s in (-1, 1) for z in (low + 0.02 * rise, low + rise * (1.0 + 0.96 * t))])  # fmt: skip
+    glass = np.array([front + lip, 0.5 * side, low + rise + 0.5 * chin])
+    half_glass, rise_glass = half - inset - rim - 0.5 * side, rise - inset - rim - 0.5 * chin
+    shell += hull(
+        [
+            glass + (x, s * half_glass * t, u * rise_glass * t)
+            for x, t in ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
+            for s in (-1, 1)
+            for u in (-1, 1)
+        ]
+    )
+    chain.solid += shell
+    name, keys = chain.finish(), 0
+    if side:
+        face = front_face(front, inset + 0.5 * (side + rim) - half, low + rise)
+        for k in range(int(rng.integers(1, 4))):
+            size = min(0.3 * side, 0.2 * rise)
+            center = face.at(0.0, (0.65 - 0.5 * k) * rise)
+            knob = dial(center, OUT, rng.uniform(0.6, 1.2) * size, size, 18)
+            display.add(f"knob_{k}", knob, continuous(name, OUT, tuple(center)), density=900.0)
+    else:
+        keys = _keys(
+            rng,
+            display,
+            name,
+            front_face(front, 0.0, low + inset + 0.5 * (chin + rim)),
+            half - inset,
+            0.5 * (chin + rim),
+        )
+    if rng.random() < 0.4 or not (swivels or side or keys):
+        _rabbit_ears(rng, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
+
+
+def _rabbit_ears(rng: np.random.Generator, display: Assembly, parent: str, foot: Array, half: float) -> None:
+    """Two rods that turn about a block's axes."""
+    length, lean = half * rng.uniform(0.8, 2.2), rng.uniform(0.25, 0.6)
+    for k, s in enumerate((-1.0, 1.0)):
+        pivot = foot + (0.0, s * 0.05, 0.012)
+        tip = pivot + length * np.array([0.0, s * float(sin(lean)), float(cos(lean))])
+        rod = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(
+            pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12
+        )
+        hinge = revolute(parent, (s, 0, 0), tuple(pivot), -rng.uniform(0.3, 0.8), lean * 0.8)
+        display.add(f"antenna_{k}", rod, hinge, density=3000.0)

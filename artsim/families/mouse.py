@@ -1,0 +1,327 @@
+"""Computer mice that lie on a table, their buttons towards -X.
+
+What varies: length, width, height, where the hump is, waist and ends, how steep the sides are; one, two or three
+buttons; a wheel between them, keys on the side and on top, a ball to turn; the roll of upright mice; glides, a cable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from artsim.common.elementary import cos, sin
+from artsim.common.products import apply
+from artsim.families.details import holed_plate
+from artsim.families.keys import Face, key, key_outline, press, top_face
+from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rotation_about, tube, union
+from artsim.model.kinematics import Array
+
+GAP = 0.0007
+
+
+@dataclass(frozen=True, eq=False)
+class _Dome:
+    """The outer shape: height, half width and lateral shift at stations along X, front first.
+
+    Attributes
+    ----------
+    steep : float
+        0 for a round cross-section, 1 for one with upright sides.
+    shoulder : float
+        Share of the height up to which the sides stand upright.
+    """
+
+    stations: Array
+    heights: Array
+    halves: Array
+    shifts: Array
+    steep: float
+    shoulder: float
+
+    def at(self, x: float) -> tuple[float, float, float]:
+        """Height, half width and shift at x."""
+        height, half, shift = (
+            float(np.interp(x, self.stations, row)) for row in (self.heights, self.halves, self.shifts)
+        )
+        return height, half, shift
+
+    def cut(
+        self, x: float, y: tuple[float, float] = (-1.0, 1.0), low: float = 0.0, share: float = 1.0, drop: float = 0.0
+    ) -> Array:
+        """(N, 3) cross-section at x, clamped to a range of y.
+
+        Parameters
+        ----------
+        low : float
+            Lower end, in shares of the height there.
+        share, drop : float
+            Upper end, in shares of the height there, less ``drop`` metres.
+        """
+        height, half, shift = self.at(x)
+        angles = np.linspace(0.0, np.pi, 9)
+        c, s = cos(angles), sin(angles)
+        across = (1.0 - self.steep) * c + self.steep * np.sign(c) * np.sqrt(np.abs(c))
+        rise = self.shoulder + (1.0 - self.shoulder) * (
+            (1.0 - self.steep) * s + self.steep * np.sqrt(np.maximum(s, 0.0))
+        )
+        plane = np.column_stack([shift + half * across, height * rise])
+        foot = 0.94 * half
+        plane = np.concatenate([plane, [(shift - half, 0.12 * height), (shift - foot, 0.0), (shift + foot, 0.0),
+                                        (shift + half, 0.12 * height)]])  # fmt: skip
+        plane[:, 0] = np.clip(plane[:, 0], *y)
+        plane[:, 1] = np.clip(plane[:, 1], low * height, share * height - drop)
+        return np.column_stack([np.full(len(plane), x), plane])
+
+    def between(self, first: float, last: float, *clamp: object, **more: object) -> Solid:
+        """The part of the dome between two x; see :meth:`cut` for the rest."""
+        inside = self.stations[(self.stations > first + 1e-5) & (self.stations < last - 1e-5)]
+        return loft([self.cut(x, *clamp, **more) for x in (first, *inside, last)])  # type: ignore[arg-type]
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A mouse; no button is pressed at rest."""
+    dome = _draw_dome(rng)
+    parts = _Parts(_roll(rng))
+    _shell(rng, parts, dome)
+    if parts.turn is not None:
+        # An upright mouse stands on what is between its own bottom and the table.
+        bottom = np.concatenate([ring[ring[:, 2] <= 0.0] for ring in map(dome.cut, dome.stations)])
+        edge = np.stack([apply(parts.turn, point) for point in bottom])
+        floor = float(edge[:, 2].min()) - rng.uniform(0.001, 0.006)
+        middle = edge.mean(axis=0)
+        shadow = middle + (edge - middle) * (1.0, rng.uniform(1.0, 1.4), 0.0)
+        shadow[:, 2] = floor
+        parts.foot = hull(np.concatenate([edge, shadow]))
+    return parts.assembly()
+
+
+class _Parts:
+    """Parts of a mouse that is rolled about X once it is complete.
+
+    Attributes
+    ----------
+    turn : (3, 3) float or None
+        The roll.
+    foot : Solid
+        What the rolled body stands on.
+    items : list of (str, Solid, JointSpec or None)
+    """
+
+    def __init__(self, turn: Array | None) -> None:
+        self.turn = turn
+        self.foot = Solid()
+        self.items: list[tuple[str, Solid, JointSpec | None]] = []
+
+    def add(self, name: str, solid: Solid, joint: JointSpec | None = None) -> None:
+        """Add a part as it stands before the roll."""
+        self.items.append((name, solid, joint))
+
+    def assembly(self) -> Assembly:
+        """All parts, rolled."""
+        mouse = Assembly()
+        for name, solid, joint in self.items:
+            if self.turn is not None:
+                solid = solid.rotated(self.turn)
+                if joint is not None:
+                    axis, origin = (
+                        apply(self.turn, np.asarray(v, dtype=np.float64)) for v in (joint.axis, joint.origin)
+                    )
+                    joint = replace(joint, axis=axis, origin=origin)
+            mouse.add(name, solid if joint is not None else solid + self.foot, joint, density=900.0)
+        return mouse
+
+
+def _roll(rng: np.random.Generator) -> Array | None:
+    """(3, 3) roll of an upright mouse; None for the usual ones."""
+    if rng.random() < 0.86:
+        return None
+    return rotation_about((1.0, 0.0, 0.0), float(rng.choice([-1.0, 1.0], p=[0.85, 0.15])) * rng.uniform(0.25, 0.85))
+
+
+def _draw_dome(rng: np.random.Generator) -> _Dome:
+    length = rng.uniform(0.07, 0.14)
+    half = 0.5 * length * rng.triangular(0.4, 0.58, 0.85)
+    height = length * rng.triangular(0.13, 0.32, 0.5)
+    share = np.array([0.0, 0.03, 0.1, 0.22, 0.38, 0.55, 0.72, 0.86, 0.95, 1.0])
+    top = rng.uniform(0.35, 0.8)
+    front, back = rng.uniform(0.3, 0.85), rng.uniform(0.15, 0.8)
+    before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
+    profile = 1.0 - (1.0 - front) * before**2 - (1.0 - back) * behind**2 * np.sqrt(behind)
+    ends = rng.uniform(0.1, 0.75, 2)
+    widths = (
+        1.0 - ends[0] * np.maximum(1.0 - share / 0.35, 0.0) ** 2 - ends[1] * np.maximum((share - 0.6) / 0.4, 0.0) ** 2
+    )
+    waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - ((share - 0.42) / 0.3) ** 2, 0.0)
+    slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half * np.maximum(1.0 - ((share - 0.5) / 0.5) ** 2, 0.0)
+    return _Dome(length * (share - 0.5), height * profile, half * (widths - waist), slant, rng.uniform(0.0, 1.0),
+                 rng.uniform(0.15, 0.55))  # fmt: skip
+
+
+def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
+    """Body, buttons and what sits between them."""
+    front, back = float(dome.stations[0]), float(dome.stations[-1])
+    length = back - front
+    split = front + rng.uniform(0.33, 0.62) * length
+    floor = rng.uniform(0.3, 0.55)
+    count = int(rng.choice([1, 2, 3], p=[0.15, 0.65, 0.2]))
+    height = dome.at(split)[0]
+    # The gap below the buttons, in shares of the height, leaves room for their travel.
+    room = (0.0022 + GAP) / float(dome.heights[dome.stations <= split].min())
+    floor = min(floor, 0.8 - room)
+    half = float(dome.halves[3])
+    slot = {1: 0.0, 2: min(rng.uniform(0.003, 0.007), 0.3 * half), 3: 0.33 * half}[count]
+    drift = float(np.interp(0.5 * (front + split), dome.stations, dome.shifts))
+    ball = _well(rng, dome, split) if rng.random() < 0.16 else None
+    body = _rear(dome, split, ball) + dome.between(front, split + 0.0002, (-1.0, 1.0), 0.0, floor)
+    turns = bool(count == 2 and rng.random() < 0.9)
+    angle = 0.002 / (split - front)
+    hinge_z = (floor + room) * height
+    edge = split - GAP
+    spans: list[tuple[str, tuple[float, float]]] = []
+    if count == 1:
+        spans.append(("button", (-1.0, 1.0)))
+    else:
+        spans += [("button_left", (drift + slot, 1.0)), ("button_right", (-1.0, drift - slot))]
+    if count == 3:
+        spans.append(("button_middle", (drift - slot + GAP, drift + slot - GAP)))
+    wheel = _wheel(rng, dome, drift, slot, split, floor) if turns else None
+    if count == 2:
+        clear = (drift - slot + GAP, drift + slot - GAP)
+        gaps = [(front + 0.06 * length, split + 0.0002)]
+        if wheel is not None:
+            x, _, radius, _ = wheel
+            gaps = [(gaps[0][0], x - radius - 0.001), (x + radius + 0.001, gaps[0][1])]
+        body += union(dome.between(a, b, clear, 0.0, 0.98, 0.0004) for a, b in gaps if b > a + 0.002)
+    body += _underside(rng, dome)
+    parts.add("body", body)
+    for name, span in spans:
+        solid = dome.between(front, edge, span, floor + room)
+        joint = revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle)
+        parts.add(name, solid, joint)
+    if wheel is not None:
+        x, z, radius, wide = wheel
+        solid = cylinder((x, drift - wide, z), (x, drift + wide, z), radius, sections=20)
+        if rng.random() < 0.6:
+            solid += union(
+                cylinder(
+                    (x + 0.97 * radius * cos(a), drift - 0.9 * wide, z + 0.97 * radius * sin(a)),
+                    (x + 0.97 * radius * cos(a), drift + 0.9 * wide, z + 0.97 * radius * sin(a)),
+                    0.09 * radius,
+                    sections=5,
+                )
+                for a in np.arange(10) * 0.2 * np.pi
+            )
+        parts.add("wheel", solid, continuous("body", (0, 1, 0), (x, drift, z)))
+    if ball is not None:
+        solid = ellipsoid(ball[0], ball[1], 20)
+        parts.add("ball", solid, continuous("body", (0, 1, 0), tuple(ball[0])))
+    _extras(rng, parts, dome, split, ball is None)
+
+
+def _wheel(
+    rng: np.random.Generator, dome: _Dome, y: float, slot: float, split: float, floor: float
+) -> tuple[float, float, float, float] | None:
+    """X and Z of the axle, radius and half of the width of a wheel between the buttons."""
+    front = float(dome.stations[0])
+    x = front + rng.uniform(0.35, 0.7) * (split - front)
+    height = dome.at(x)[0]
+    proud = rng.uniform(0.0015, 0.005)
+    # It must keep clear of the floor under it, which rises to the back.
+    radius = 0.5 * (height + proud - floor * dome.at(min(x + 0.012, split))[0] - 0.0016)
+    radius = min(radius, rng.uniform(0.007, 0.014), 0.42 * (split - front))
+    wide = slot - GAP
+    if radius < 0.003 or wide < 0.001:
+        return None
+    return x, height + proud - radius, radius, wide
+
+
+def _underside(rng: np.random.Generator, dome: _Dome) -> Solid:
+    """Glides below and a cable in front, on some."""
+    front, back = float(dome.stations[0]), float(dome.stations[-1])
+    solid = Solid()
+    if rng.random() < 0.5:
+        for x in (0.7 * front, 0.7 * back):
+            half, shift = 0.6 * dome.at(x)[1], dome.at(x)[2]
+            solid += hull(
+                [(x + a * 0.006, shift + b * half, z) for a in (-1, 1) for b in (-1, 1) for z in (-0.0008, 0.001)]
+            )
+    if rng.random() < 0.45:
+        height, _, shift = dome.at(front)
+        z, radius = 0.14 * height + 0.001, min(rng.uniform(0.0012, 0.0025), 0.12 * height)
+        reach = rng.uniform(0.008, 0.05)
+        path = [
+            (front + 0.004, shift, z),
+            (front - 0.4 * reach, shift, z),
+            (front - reach, shift + rng.uniform(-0.3, 0.3) * reach, z),
+        ]
+        solid += tube(np.array(path), [1.6 * radius, radius, radius], 8)
+    return solid
+
+
+def _extras(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
+    """Keys on the side, and on top where that is free."""
+    length = float(dome.stations[-1] - dome.stations[0])
+    travel = 0.0007
+    if rng.random() < 0.4:
+        _side_keys(rng, parts, dome, split, travel)
+    start = split + 0.04 * length
+    if not free or start + 0.25 * length > dome.stations[-1] or rng.random() < 0.65:
+        return
+    wide = min(rng.uniform(0.004, 0.009), 0.4 * float(dome.halves.max()))
+    top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
+    for k in range(int(rng.integers(1, 3))):
+        face = top_face(top, start + (0.04 + 0.075 * k) * length, dome.at(start)[2])
+        outline = key_outline("pill", (wide, 0.055 * length), 8)
+        solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0016)
+        parts.add(f"key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
+
+
+def _side_keys(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
+    """Keys for the thumb, on the left (+Y)."""
+    back = float(dome.stations[-1])
+    count = int(rng.integers(1, 4))
+    span = (split + 0.002, split + 0.55 * (back - split))
+    pitch = (span[1] - span[0]) / count
+    inside = np.linspace(*span, 9)
+    rows = np.array([dome.at(x) for x in inside])
+    side = float((rows[:, 1] + rows[:, 2]).max())
+    low, high = 0.16 * float(rows[:, 0].min()), dome.shoulder * float(rows[:, 0].min())
+    if high - low < 0.003:
+        return
+    for k in range(count):
+        face = Face(np.array([span[0] + (k + 0.5) * pitch, side, 0.5 * (low + high)]), np.array([-1.0, 0.0, 0.0]),
+                    np.array([0.0, 0.0, 1.0]))  # fmt: skip
+        outline = key_outline("pill", (0.85 * pitch, 0.9 * (high - low)), 8)
+        solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0018, 0.15)
+        parts.add(f"side_key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
+
+
+def _well(rng: np.random.Generator, dome: _Dome, split: float) -> tuple[Array, float] | None:
+    """Centre (3,) and radius of a ball that is sunk into the back, where there is room for one."""
+    back = float(dome.stations[-1])
+    x = split + rng.uniform(0.4, 0.6) * (back - split)
+    height, _, shift = dome.at(x)
+    near = np.array([dome.at(x + d) for d in np.linspace(-0.012, 0.012, 5)])
+    # The ball stands out by 0.6 radii, and its lower end keeps clear of a floor at 0.2 of the height.
+    radius = min((height - 0.2 * float(near[:, 0].max()) - GAP) / 1.4, 0.75 * float(near[:, 1].min()) - 0.003,
+                 0.4 * (back - split), rng.uniform(0.008, 0.02))  # fmt: skip
+    if radius < 0.006:
+        return None
+    return np.array([x, shift, height - 0.4 * radius]), radius
+
+
+def _rear(dome: _Dome, split: float, ball: tuple[Array, float] | None) -> Solid:
+    """The body behind the buttons, with a well for a ball."""
+    back = float(dome.stations[-1])
+    if ball is None:
+        return dome.between(split, back)
+    (x, y, _), radius = ball
+    room = radius + GAP
+    solid = dome.between(split, x - room) + dome.between(x + room, back)
+    first, last = x - room - 1e-4, x + room + 1e-4
+    solid += dome.between(first, last, (-1.0, 1.0), 0.0, 0.2)
+    solid += dome.between(first, last, (y + room, 1.0)) + dome.between(first, last, (-1.0, y - room))
+    rim = (room + 0.0005, room + 0.0005, 0.0008)
+    return solid + holed_plate(ball[0] - rim, ball[0] + rim, (x, y), room, axis=2, sections=16)

@@ -1,0 +1,243 @@
+"""Remote controls that stand upright: keys on the front towards -X, a battery cover on the back.
+
+What varies: length, width, thickness; outline (straight, tapered, waisted, oval), humps of the back, bent ends, round
+edges; bands of keys (numbers, rows, tall rockers, a slide switch, a navigation pad or a jog dial), their shape, travel
+and number; a battery cover that slides or swings; a front cover that slides or swings; a hinged antenna.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.common.elementary import exp, sin
+from artsim.families.details import dial
+from artsim.families.keys import Face, add_key, cross_sections, front_face, key, key_cells, key_outline
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, cylinder, loft, ring, rounded_box
+from artsim.model.kinematics import Array
+
+GAP = 0.0005
+MOST_KEYS = 34
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """Cross-sections of the body: x of front and back and half of the width at heights; the keys stand at x = 0."""
+
+    levels: Array
+    fronts: Array
+    backs: Array
+    halves: Array
+    roundness: float
+    key_low: float
+    key_high: float
+    key_half: float
+
+    def at(self, z: float | Array) -> tuple[Array, Array, Array]:
+        """Front, back and half width at a height."""
+        return tuple(np.interp(z, self.levels, row) for row in (self.fronts, self.backs, self.halves))  # type: ignore[return-value]
+
+    def between(self, low: float, high: float, inset: float = 0.0) -> Solid:
+        """The body between two heights, its back set forward by ``inset``."""
+        inside = self.levels[(self.levels > low + 1e-5) & (self.levels < high - 1e-5)]
+        levels = np.concatenate([[low], inside, [high]])
+        fronts, backs, halves = self.at(levels)
+        return loft(cross_sections(levels, fronts, backs - inset, halves, self.roundness))
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A remote control; no key is pressed and all covers are closed at rest."""
+    body = _draw_body(rng)
+    remote = Assembly()
+    covered = _battery_cover(rng, remote, body)
+    if not covered:
+        remote.add("body", body.between(body.levels[0], body.levels[-1]), density=900.0)
+    height = _keys(rng, remote, body)
+    if rng.random() < 0.2 and body.fronts.min() > -1e-6:  # no end that is bent forward is in the way
+        _front_cover(rng, remote, body, height)
+    if rng.random() < 0.08:
+        _antenna(rng, remote, body)
+    return remote
+
+
+def _draw_body(rng: np.random.Generator) -> _Body:
+    length = 0.17 * exp(rng.uniform(-0.75, 0.6))
+    half = 0.5 * length * rng.triangular(0.16, 0.26, 0.62)
+    thick = max(length * rng.triangular(0.035, 0.1, 0.26), 0.006)
+    low, high = rng.uniform(0.06, 0.3), rng.uniform(0.9, 0.96)
+    share = np.unique([*np.linspace(0.0, 1.0, 8), low, high])  # the face between low and high is flat
+    levels = length * share
+    kind = str(rng.choice(["straight", "tapered", "waisted", "oval"], p=[0.34, 0.24, 0.24, 0.18]))
+    amount = rng.uniform(0.12, 0.5)
+    if kind == "tapered":
+        widths = 1.0 - amount * (share if rng.random() < 0.5 else 1.0 - share)
+    elif kind == "waisted":
+        widths = 1.0 - amount * sin(np.pi * np.clip((share - rng.uniform(0.0, 0.2)) / 0.8, 0.0, 1.0)) ** 2
+    elif kind == "oval":
+        widths = np.sqrt(1.0 - (0.9 + 0.08 * amount) * (2.0 * share - 1.0) ** 2)
+    else:
+        widths = np.ones(len(levels))
+    round_end = rng.uniform(0.0, 0.6) if kind != "oval" else 0.0
+    widths = widths * np.where((levels == 0) | (levels == length), 1.0 - round_end, 1.0)
+    # Ends of the front bend back or forward beyond the keys; the back has humps.
+    bends = rng.uniform(-0.1, 0.3, 2) * length * rng.choice([0.0, 1.0], p=[0.35, 0.65])
+    below, above = np.clip((low - share) / low, 0.0, 1.0), np.clip((share - high) / (1 - high), 0.0, 1.0)
+    fronts = bends[0] * low * 2.0 * below**2 + 0.15 * bends[1] * above**2
+    hump, spot = rng.uniform(0.0, 1.2) * rng.choice([0.0, 1.0]), rng.uniform(0.1, 0.9)
+    wide = rng.uniform(0.15, 0.4)
+    slim = rng.uniform(0.45, 1.0)
+    depth = thick * (slim + (1.0 - slim) * share + hump * exp(-(((share - spot) / wide) ** 2)))
+    backs = fronts + depth * np.where((levels == 0) | (levels == length), rng.uniform(0.6, 1.0), 1.0)
+    backs = np.maximum(backs, np.maximum(fronts, 0.0) + 0.004)
+    roundness = rng.uniform(0.1, 0.95)
+    inside = (share >= low - 1e-9) & (share <= high + 1e-9)
+    # Edges as round as the body is thick leave no room for keys on a narrow one.
+    edge = 0.5 * np.minimum(backs - fronts, 2.0 * half * widths)
+    roundness = min(roundness, float((0.55 * half * widths / edge)[inside].min()))
+    edge = roundness * edge
+    keys = float((half * widths - edge)[inside].min()) * rng.uniform(0.82, 0.97)
+    return _Body(levels, fronts, backs, half * widths, roundness, low * length, high * length, keys)
+
+
+def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> bool:
+    """Add the body with a recess in the back and a cover over it; False where there is none."""
+    length = float(body.levels[-1])
+    thick = min(rng.uniform(0.0012, 0.0022), 0.3 * float((body.backs - body.fronts).min()))
+    if rng.random() < 0.3:
+        return False
+    end = rng.uniform(0.3, 0.62) * length
+    levels = np.concatenate([[0.0], body.levels[(body.levels > 0) & (body.levels < end - 0.001)], [end - GAP]])
+    fronts, backs, halves = body.at(levels)
+    even = np.ptp(backs) < 0.06 * length and backs.min() - thick > fronts.max() + 0.003
+    slides = bool(even and np.ptp(halves) < 0.3 * halves.max()) and rng.random() < 0.75
+    if not slides and backs[0] > backs.min() + 0.1 * end:
+        return False  # the bent end of the body would stop a cover that swings
+    if slides:  # over a flat back
+        backs = np.full(len(levels), backs.min())
+    solid = body.between(end, length)
+    if slides:
+        lower = np.append(levels[:-1], end + 0.0004)
+        solid += loft(cross_sections(lower, fronts, backs - thick, halves, body.roundness))
+    else:
+        solid += body.between(0.0, end + 0.0004, thick)
+    remote.add("body", solid, density=900.0)
+    cover = loft(cross_sections(levels, backs - thick + GAP, backs, 0.96 * halves, 0.9, 1))
+    if slides:
+        joint = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.3, 1.0) * end, (float(backs[0]), 0, 0))
+    else:
+        # All of it lies on one side of the axis, so that none of it moves towards the body.
+        joint = revolute("body", (0, 1, 0), (float(backs.min()) - thick, 0, 0), 0.0, rng.uniform(0.9, 1.9))
+    remote.add("battery_cover", cover, joint, density=900.0)
+    return True
+
+
+def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
+    """Bands of keys from the top down; returns how far they stand out."""
+    face, half = front_face(0.0), body.key_half
+    height, travel = rng.uniform(0.0009, 0.0035), rng.uniform(0.0003, 0.0008)
+    pitch = min(max(half * rng.uniform(0.45, 0.8), 0.0055), 0.02)
+    kind = str(rng.choice(["square", "pill", "round", "diamond"], p=[0.3, 0.35, 0.3, 0.05]))
+    fill, shrink = rng.uniform(0.55, 0.85), rng.uniform(0.0, 0.35)
+    bands = _plan(rng, half, body.key_high - body.key_low, pitch)
+    spare = body.key_high - body.key_low - sum(deep for _, _, _, deep in bands)
+    gap = min(spare / len(bands), rng.uniform(0.2, 2.0) * pitch)
+    top, count, tallest = body.key_high, 0, height
+    for band, columns, rows, deep in bands:
+        if band == "pad":
+            added = _pad(rng, remote, face, top - 0.5 * deep, 0.46 * deep, height, travel)
+            tallest = max(tallest, added)
+            top -= deep + gap
+            continue
+        if band == "slider":
+            outline, start = key_outline("pill", (min(half, 1.6 * pitch), 0.8 * pitch), 8), top - deep + 0.5 * pitch
+            slide = prismatic("body", (0, 0, 1), 0.0, deep - pitch, tuple(face.at(0.0, start)))
+            remote.add("slider", key(face, 0.0, start, outline, 0.0004, height + 0.0006), slide, density=1100.0)
+            top -= deep + gap
+            continue
+        size = np.array([min(fill * 2.0 * half / columns, 1.9 * pitch), fill * deep / rows])
+        outline = key_outline("pill" if band == "rockers" else kind, size, 10)
+        rocks = band == "rockers" and height > 0.0016 and rng.random() < 0.7
+        for _, _, u, v in key_cells((-half, half), (top - deep, top), columns, rows):
+            name = f"button_{count}"
+            count += 1
+            if rocks:
+                tilt = 0.8 * (height - 0.0004) / float(size[1])
+                solid = key(face, u, v, outline, 0.5 * height, height + 0.0004, shrink)
+                hinge = revolute("body", (0, 1, 0), face.at(u, v, 0.5 * height), -0.6 * tilt, 0.6 * tilt)
+                remote.add(name, solid, hinge, density=1100.0)
+                tallest = max(tallest, 1.8 * height)
+            else:
+                add_key(remote, "body", name, face, (u, v), outline, height, travel, shrink)
+        top -= deep + gap
+    return tallest
+
+
+def _plan(rng: np.random.Generator, half: float, room: float, pitch: float) -> list[tuple[str, int, int, float]]:
+    """Kind, columns, rows and height of each band of keys; at least one, at most ``MOST_KEYS`` keys."""
+    wanted = list(rng.permutation(["pad", "numbers", "rockers", "row", "row", "slider"]))[: int(rng.integers(1, 6))]
+    wanted = ["row", *wanted, "numbers", "row"][: int(rng.integers(1, 9))]
+    bands: list[tuple[str, int, int, float]] = []
+    count, left = 0, room
+    for band in wanted:
+        columns = int(rng.integers(2, 5)) if half > 0.009 else int(rng.integers(1, 3))
+        columns, rows = {"numbers": (3, 4), "rockers": (2, 1), "pad": (5, 1), "slider": (1, 1)}.get(band, (columns, 1))
+        deep = {
+            "numbers": 4.0 * pitch,
+            "rockers": 2.6 * pitch,
+            "slider": 2.2 * pitch,
+            "pad": min(2.0 * half, 0.06),
+        }.get(band, pitch)
+        narrow = band != "pad" and 2.0 * half / columns < 0.003
+        if deep <= left and count + rows * columns <= MOST_KEYS and not narrow:
+            bands.append((band, columns, rows, deep))
+            count, left = count + rows * columns, left - deep
+    return bands or [("row", 1, 1, min(room, 2.0 * half))]
+
+
+def _pad(
+    rng: np.random.Generator, remote: Assembly, face: Face, v: float, radius: float, height: float, travel: float
+) -> float:
+    """Four keys about a fifth, or a dial; returns how far that stands out."""
+    center = tuple(face.at(0.0, v))
+    if rng.random() < 0.2:
+        reach = max(height + 0.001, 0.004)
+        solid = dial(center, (-1, 0, 0), reach, radius, 20)
+        remote.add("dial", solid, continuous("body", (-1, 0, 0), center), density=1100.0)
+        return reach
+    inner = radius * rng.uniform(0.38, 0.55)
+    low, high = travel + 0.0003, max(height, travel + 0.0008) * rng.uniform(0.8, 1.3)
+    middle = tuple(face.at(0.0, v, 0.5 * (low + high)))
+    for k in range(4):
+        turn = k * 0.5 * np.pi
+        solid = ring(middle, (-1, 0, 0), inner + 0.0004, radius, high - low, 3, (turn - 0.7, turn + 0.7))
+        remote.add(f"arrow_{k}", solid, prismatic("body", (1, 0, 0), 0.0, travel, middle), density=1100.0)
+    outline = key_outline("round", (1.7 * inner, 1.7 * inner), 14)
+    add_key(remote, "body", "select", face, (0.0, v), outline, height, travel)
+    return max(high, height)
+
+
+def _front_cover(rng: np.random.Generator, remote: Assembly, body: _Body, height: float) -> None:
+    """A cover over the lower keys, which swings down or slides down."""
+    low, high = body.key_low, body.key_low + rng.uniform(0.3, 0.7) * (body.key_high - body.key_low)
+    _, _, halves = body.at(np.linspace(low, high, 8))
+    half = float(halves.min())
+    back, thick = -height - 0.0006, rng.uniform(0.0012, 0.003)
+    cover = rounded_box((back - thick, -half, low), (back, half, high), 0.3 * half, axis=0)
+    if rng.random() < 0.5:
+        joint = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.6, 1.0) * (high - low), (back, 0, low))
+    else:
+        cover += cylinder((back - thick, -half, low), (back - thick, half, low), 0.8 * thick, sections=10)
+        joint = revolute("body", (0, -1, 0), (back - thick, 0, low), 0.0, rng.uniform(1.2, 2.6))
+    remote.add("cover", cover, joint, density=1000.0)
+
+
+def _antenna(rng: np.random.Generator, remote: Assembly, body: _Body) -> None:
+    """A rod at the top that turns from side to side."""
+    length = float(body.levels[-1])
+    radius = rng.uniform(0.0015, 0.003)
+    x, z = float(body.fronts[-1] + 0.5 * (body.backs[-1] - body.fronts[-1])), length + radius + GAP
+    rod = cylinder((x, 0, z), (x, 0, z + length * rng.uniform(0.2, 0.8)), radius, 0.7 * radius, 12)
+    rod += cylinder((x - radius, 0, z), (x + radius, 0, z), radius, sections=12)
+    remote.add("antenna", rod, revolute("body", (1, 0, 0), (x, 0, z), -0.35, 0.35), density=2000.0)

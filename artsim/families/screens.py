@@ -1,0 +1,71 @@
+"""Panels of displays: flat or bent ones, their screens towards -X."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from artsim.making.solids import Solid, frame, hull, rounded_box
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A flat or bent screen about the origin, its back at x = 0.
+
+    Attributes
+    ----------
+    half : float
+        Half of the width.
+    rise : float
+        Half of the height.
+    thick : float
+        Of the whole panel, before x = 0.
+    bend : float
+        How far the left and right edges come forward.
+    """
+
+    half: float
+    rise: float
+    thick: float
+    bend: float
+
+
+def draw_panel(rng: np.random.Generator, most: float = 0.95) -> Panel:
+    width = rng.triangular(0.22, 0.52, most)
+    ratio = rng.choice([rng.uniform(0.36, 0.48), rng.uniform(0.54, 0.68), rng.uniform(0.72, 0.85)], p=[0.2, 0.5, 0.3])
+    thick = width * rng.triangular(0.015, 0.05, 0.16)
+    bend = width * rng.uniform(0.03, 0.14) if ratio < 0.6 and rng.random() < 0.4 else 0.0
+    return Panel(0.5 * width, 0.5 * width * ratio, thick, bend)
+
+
+def screen(rng: np.random.Generator, panel: Panel, chin: float) -> Solid:
+    """The panel: a shell with a frame around the sunken screen, and a hump on its back."""
+    half, rise, thick = panel.half, panel.rise, panel.thick
+    rim = rng.uniform(0.008, 0.07) * half + 0.002
+    lip = min(0.12 * thick, 0.004)  # how far the frame stands before the screen
+    back = -thick * rng.choice([0.0, rng.uniform(0.0, 0.65)])  # the rest of the thickness goes to the hump
+    solid = Solid()
+    if panel.bend:
+        edges = np.linspace(-half, half, 8)
+        forward = panel.bend * (edges / half) ** 2
+        for k in range(7):
+            corners = list(zip(edges[k : k + 2], forward[k : k + 2], strict=True))
+            for x0, x1, z0, z1 in (
+                (lip - thick, back, -rise, rise),
+                (-thick, lip - thick + 0.0005, -rise, chin + rim - rise),
+                (-thick, lip - thick + 0.0005, rise - rim, rise),
+            ):
+                solid += hull([(x - f, y, z) for y, f in corners for x in (x0, x1) for z in (z0, z1)])
+    else:
+        radius = rng.uniform(0.01, 0.12) * rise
+        solid += rounded_box((lip - thick, -half, -rise), (back, half, rise), radius, axis=0)
+        inset = 0.3 * radius
+        solid += frame((-thick, inset - half, inset - rise), (lip - thick + 0.0005, half - inset, rise - inset),
+                       [rim, rim, chin + rim, rim])  # fmt: skip
+    if back < 0:
+        wide, high = rng.uniform(0.25, 0.85) * half, rng.uniform(0.3, 0.85) * rise
+        wide, inner = min(wide, 0.35 * half) if panel.bend else wide, rng.uniform(0.5, 0.95)
+        solid += hull([(x, s * wide * t, u * high * t) for x, t in ((back - 0.001, 1.0), (0.0, inner))
+                       for s in (-1, 1) for u in (-1, 1)])  # fmt: skip
+    return solid
