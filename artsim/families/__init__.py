@@ -65,6 +65,57 @@ FAMILIES: dict[str, Family] = {name: import_module(f"artsim.families.{name}").bu
 """Every category that :func:`make` knows."""
 
 
+PARTNET_MOBILITY: dict[str, tuple[str, ...]] = {
+    "Bottle": ("bottle",),
+    "Box": ("box",),
+    "Bucket": ("bucket",),
+    "Camera": ("camera",),
+    "Cart": ("cart",),
+    "Chair": ("chair",),
+    "Clock": ("clock",),
+    "CoffeeMachine": ("coffee_machine",),
+    "Dishwasher": ("dishwasher",),
+    "Dispenser": ("dispenser",),
+    "Display": ("display",),
+    "Door": ("door",),
+    "Eyeglasses": ("eyeglasses",),
+    "Fan": ("fan",),
+    "Faucet": ("faucet",),
+    "FoldingChair": ("folding_chair",),
+    "Globe": ("globe",),
+    "Kettle": ("kettle",),
+    "Keyboard": ("keyboard",),
+    "KitchenPot": ("kitchen_pot",),
+    "Knife": ("cutter", "folding_knife"),
+    "Lamp": ("lamp",),
+    "Laptop": ("laptop",),
+    "Lighter": ("lighter",),
+    "Microwave": ("microwave",),
+    "Mouse": ("mouse",),
+    "Oven": ("oven",),
+    "Pen": ("pen",),
+    "Phone": ("phone",),
+    "Pliers": ("pliers",),
+    "Printer": ("printer",),
+    "Refrigerator": ("refrigerator",),
+    "Remote": ("remote",),
+    "Safe": ("safe",),
+    "Scissors": ("scissors",),
+    "Stapler": ("stapler",),
+    "StorageFurniture": ("storage_furniture", "drawer"),
+    "Suitcase": ("suitcase",),
+    "Switch": ("switch",),
+    "Table": ("table", "drawer"),
+    "Toaster": ("toaster",),
+    "Toilet": ("toilet",),
+    "TrashCan": ("trash_can",),
+    "USB": ("usb",),
+    "WashingMachine": ("washing_machine",),
+    "Window": ("window",),
+}
+"""The families that stand for each category of PartNet-Mobility, the nearest first."""
+
+
 def make(category: str, seed: int = 0) -> ArticulatedObject:
     """A new procedural object: the same for the same category and seed, different for every other seed.
 

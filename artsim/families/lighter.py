@@ -251,13 +251,14 @@ def _table(rng: np.random.Generator) -> Assembly:
     split = rng.uniform(-0.25, 0.15) * half_x
     travel = rng.uniform(0.003, 0.006)
     lighter = Assembly()
-    body += cylinder((0.5 * (split + half_x), 0, height - 0.001), (0.5 * (split + half_x), 0, height + 0.5 * flap_tall), 0.22 * half_y, sections=12)
-    wide = 0.75 * half_y
+    wide, hinge_x = 0.75 * half_y, 0.78 * half_x
+    flame = 0.5 * (split + hinge_x)
+    burner = min(0.22 * half_y, 0.3 * (hinge_x - split))
+    body += cylinder((flame, 0, height - 0.001), (flame, 0, height + 0.5 * flap_tall), burner, sections=12)
     low = height + travel + GAP
     top = low + rng.uniform(0.004, 0.014)
     button = rounded_box((-0.8 * half_x, -0.7 * wide, low), (split - 2 * GAP - 0.001, 0.7 * wide, top), rng.uniform(0.001, 0.004))
     thin = 0.0012
-    hinge_x = 0.78 * half_x
     if rng.random() < 0.7:
         at = height + 0.0016
         body += union(box((hinge_x - 0.0012, s * 0.5 * wide - 0.0015, height - 0.001), (hinge_x + 0.0012, s * 0.5 * wide + 0.0015, at - 0.0004))

@@ -193,10 +193,11 @@ def _apron(rng: np.random.Generator, table: _Table) -> None:
     for back in (False, True):
         if both or back == rear:
             table.add_case(rng, low, high, style, grid, 0.25, back)
+    rail = min(0.008, 0.4 * size)
     for s in (-1, 1):  # rails into the legs, beside and behind the case
         table.body += box((s * (x - inset) - 0.008, -half, top - apron), (s * (x - inset) + 0.008, half, top + 0.001)) if (
             s > 0 and not both and not rear) or (s < 0 and rear) else Solid()  # fmt: skip
-        table.body += box((-x + 0.5 * size, s * half - 0.008, top - apron), (x - 0.5 * size, s * half + 0.008, top + 0.001))
+        table.body += box((-x + 0.5 * size, s * half - rail, top - apron), (x - 0.5 * size, s * half + rail, top + 0.001))
         for near in (-x + inset, x - inset - 0.012):
             a, b = sorted((s * (high[1] - 0.002), s * half))
             table.body += box((near, a, top - apron), (near + 0.012, b, top + 0.001))
@@ -223,6 +224,7 @@ def _pedestals(rng: np.random.Generator, table: _Table) -> None:
     on_legs = not rolling and rng.random() < 0.35
     size = rng.uniform(0.03, 0.06)
     outer = y - (size if on_legs else 0.0)
+    panel = 0.001
     low_z = rng.uniform(0.1, 0.5) * height if on_legs else 0.07 if rolling else rng.choice([0.0, rng.uniform(0.03, 0.12)])
     deep = rng.uniform(0.75, 1.0) * 2 * x
     recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
@@ -242,10 +244,11 @@ def _pedestals(rng: np.random.Generator, table: _Table) -> None:
     if on_legs:
         table.body += _legs(rng, x, y, 0.0, top + 0.001, size, splay=False)
     elif len(sides) == 1:
-        a, b = sorted((-sides[0] * y, -sides[0] * (y - rng.uniform(0.02, 0.05))))
+        panel = rng.uniform(0.02, 0.05)
+        a, b = sorted((-sides[0] * y, -sides[0] * (y - panel)))
         table.body += box((-x + overhang, a, 0.0), (x, b, top + 0.001))
-    near = -outer + (broad - 0.001 if -1 in sides else 0.0)
-    far = outer - (broad - 0.001 if 1 in sides else 0.0)
+    near = -outer + (broad if -1 in sides else panel) - 0.001
+    far = outer - (broad if 1 in sides else panel) + 0.001
     table.body += box((front + deep - overhang - 0.03, near, top - rng.uniform(0.2, 0.8) * (top - low_z)),
                       (front + deep - overhang - 0.012, far, top + 0.001))  # fmt: skip
     between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
@@ -430,7 +433,7 @@ def _wheels(rng: np.random.Generator, table: _Table, spots: list[tuple[float, fl
         for s in (-1, 1):
             a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
             body += box((x - 0.35 * radius, a, 0.7 * radius), (x + 0.35 * radius, b, height))
-        body += cylinder((x, y - half - 0.004, height), (x, y + half + 0.004, height + 0.01), 0.4 * size, sections=12)
+        body += cylinder((x, y, height - 0.001), (x, y, height + 0.01), 0.4 * size, sections=12)
         table.body += body
         wheel = cylinder((x, y - half, radius), (x, y + half, radius), radius, sections=18)
         table.moving.append(("wheel", wheel, continuous("body", (0, 1, 0), (x, y, radius))))
