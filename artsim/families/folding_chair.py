@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, rounded_box, tube, union
+from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, rounded_box, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004
@@ -156,8 +156,12 @@ def _crossed(rng: np.random.Generator) -> Assembly:
 
     seat_half = inner - bar.thick - GAP
     hinge_at = np.array([joint_at[0] - 0.012 - bar.deep, 0.0, seat_low + 0.5 * seat_thick])
-    seat = _panel(rng, np.array([hinge_at[0] - depth, -seat_half, seat_low]),
-                  np.array([hinge_at[0], seat_half, seat_low + seat_thick]), 0)  # fmt: skip
+    seat = _panel(
+        rng,
+        np.array([hinge_at[0] - depth, -seat_half, seat_low]),
+        np.array([hinge_at[0], seat_half, seat_low + seat_thick]),
+        0,
+    )
     steep = np.pi / 2 + (lean - bend)
     swing = steep - 0.08 - float(arctan2(0.5 * seat_thick + thick + 0.02, back_low))
     how = str(rng.choice(["follows", "free", "fixed"], p=[0.4, 0.45, 0.15]))
@@ -178,22 +182,24 @@ def _under(rng: np.random.Generator) -> Assembly:
     seat_z, thick = rng.uniform(0.25, 0.48), rng.uniform(0.02, 0.04)
     x0, x1 = -0.5 * depth, 0.5 * depth
     rail = max(bar.deep, bar.thick)
-    seat = _panel(rng, np.array([x0, -half + 0.5 * bar.thick, seat_z]), np.array([x1, half - 0.5 * bar.thick, seat_z + thick]), 0)
+    seat = _panel(
+        rng, np.array([x0, -half + 0.5 * bar.thick, seat_z]), np.array([x1, half - 0.5 * bar.thick, seat_z + thick]), 0
+    )
     for s in (-1, 1):
         seat += bar.between((x0, s * half, seat_z + 0.5 * thick), (x1, s * half, seat_z + 0.5 * thick))
     chair = Assembly()
     under = seat_z - rail - GAP
     knee = under - rail
     legs = []
-    for name, x, s, way in (("front_legs", x0 + 0.05, -1.0, 1.0), ("rear_legs", x1 - 0.05, 1.0, -1.0)):
-        y = half - (0.0 if s < 0 else 2.0 * bar.thick + GAP)
+    for name, x, ahead, way in (("front_legs", x0 + 0.05, -1.0, 1.0), ("rear_legs", x1 - 0.05, 1.0, -1.0)):
+        y = half - (0.0 if ahead < 0 else 2.0 * bar.thick + GAP)
         slant = rng.uniform(0.0, 0.3)
-        foot_x = x + s * slant * knee
+        foot_x = x + ahead * slant * knee
         solid = union(bar.between((x, t * y, knee), (foot_x, t * y, 0.0)) for t in (-1, 1))
         z = knee * rng.uniform(0.15, 0.6)
-        solid += bar.across(x + s * slant * (knee - z), z, y)
-        length = float(np.hypot(knee, s * slant * knee))
-        legs.append((name, solid, way, (x, 0.0, knee), length, s * slant))
+        solid += bar.across(x + ahead * slant * (knee - z), z, y)
+        length = float(np.hypot(knee, ahead * slant * knee))
+        legs.append((name, solid, way, (x, 0.0, knee), length, ahead * slant))
         for t in (-1, 1):  # lugs
             seat += box((x - 0.02, t * y - bar.thick, under + 0.001), (x + 0.02, t * y + bar.thick, seat_z + 0.002))
     chair.add("seat", seat, density=600.0)
@@ -208,10 +214,16 @@ def _under(rng: np.random.Generator) -> Assembly:
         hinge = np.array([x1 + rail + GAP + 0.012, 0.0, seat_z + thick + 0.012])
         back_thick = rng.uniform(0.012, 0.03)
         wide = half - 0.01
-        back = _panel(rng, np.array([hinge[0] - 0.5 * back_thick, -wide, hinge[2] + 0.05]),
-                      np.array([hinge[0] + 0.5 * back_thick, wide, hinge[2] + tall]), 2)  # fmt: skip
+        back = _panel(
+            rng,
+            np.array([hinge[0] - 0.5 * back_thick, -wide, hinge[2] + 0.05]),
+            np.array([hinge[0] + 0.5 * back_thick, wide, hinge[2] + tall]),
+            2,
+        )
         for t in (-1, 1):
-            back += bar.between(hinge + (0, t * (wide - bar.thick), 0), hinge + (0, t * (wide - bar.thick), tall - 0.02))
+            back += bar.between(
+                hinge + (0, t * (wide - bar.thick), 0), hinge + (0, t * (wide - bar.thick), tall - 0.02)
+            )
         lean = rng.uniform(0.08, 0.6)
         fold = np.pi / 2 + lean - 0.06 - float(arctan2(rail + 0.5 * back_thick + 0.012, 0.08))
         back = back.turned(SIDE, lean, hinge)
@@ -240,7 +252,18 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
             body += box((-0.02, a, 0.0), (0.06, b, arm_z)) + box((x0 + 0.05, a, 0.0), (x1 + 0.06, b, 0.025))
             body += box((-0.02, a, seat_z - 0.05), (x1 + 0.03 + back_thick, b, seat_z + thick + 0.1))
         else:
-            body += hull([(x, t, z) for t in (a, b) for x, z in ((x0 + 0.05, 0.0), (x1 + 0.05, 0.0), (x1 + 0.05 + back_thick, arm_z), (x0 + 0.08, arm_z))])
+            body += hull(
+                [
+                    (x, t, z)
+                    for t in (a, b)
+                    for x, z in (
+                        (x0 + 0.05, 0.0),
+                        (x1 + 0.05, 0.0),
+                        (x1 + 0.05 + back_thick, arm_z),
+                        (x0 + 0.08, arm_z),
+                    )
+                ]
+            )
         body += rounded_box((x0 + 0.02, a - 0.006, arm_z - 0.002), (x1 + 0.04, b + 0.006, arm_z + 0.03), 0.01)
     hinge_x = x1 - 0.04
     chair = Assembly()
@@ -251,7 +274,9 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
         low = np.array([x1 + 0.01, a - 0.002, lift])
         back = _panel(rng, low, np.array([x1 + 0.01 + back_thick, b + 0.002, lift + back_tall]), 2)
         body += back.turned(SIDE, lean, (x1 + 0.01, 0, lift))
-        seat = _panel(rng, np.array([x0, a + GAP + 0.008, seat_z]), np.array([hinge_x + 0.01, b - GAP - 0.008, seat_z + thick]), 0)
+        seat = _panel(
+            rng, np.array([x0, a + GAP + 0.008, seat_z]), np.array([hinge_x + 0.01, b - GAP - 0.008, seat_z + thick]), 0
+        )
         at = (hinge_x, 0.5 * (a + b), seat_z + 0.5 * thick)
         seat += cylinder((at[0], a + GAP, at[2]), (at[0], b - GAP, at[2]), 0.012, sections=12)
         room = x1 + 0.01 - hinge_x

@@ -51,8 +51,9 @@ def _outline(rng: np.random.Generator, half_x: float, half_y: float) -> Array:
     power = rng.choice([2.0, rng.uniform(2.2, 4.0), rng.uniform(5.0, 12.0)])
     angles = np.arange(count) * 2.0 * np.pi / count
     c, s = cos(angles), sin(angles)
-    return np.column_stack([np.sign(c) * np.abs(c) ** (2.0 / power) * half_x,
-                            np.sign(s) * np.abs(s) ** (2.0 / power) * half_y])  # fmt: skip
+    return np.column_stack(
+        [np.sign(c) * np.abs(c) ** (2.0 / power) * half_x, np.sign(s) * np.abs(s) ** (2.0 / power) * half_y]
+    )
 
 
 def _layers(outline: Array, levels: list[tuple[float, float]]) -> Solid:
@@ -70,16 +71,22 @@ def _pocket(rng: np.random.Generator) -> Assembly:
     corner = rng.uniform(0.1, 0.95) * half_y
     body = rounded_box((-half_x, -half_y, 0), (half_x, half_y, height), corner, axis=2)
     if rng.random() < 0.5:  # bevelled foot
-        body += rounded_box((-0.93 * half_x, -0.9 * half_y, -0.002), (0.93 * half_x, 0.9 * half_y, 0.001), corner, axis=2)
+        body += rounded_box(
+            (-0.93 * half_x, -0.9 * half_y, -0.002), (0.93 * half_x, 0.9 * half_y, 0.001), corner, axis=2
+        )
     # Insert: a chimney with the wick, and the wheel before it.
     room_y, top = half_y - wall - 2 * GAP, height + lid_tall - wall - 2 * GAP
     wheel_radius = min(rng.uniform(0.003, 0.0045), 0.28 * lid_tall, 0.22 * half_x)
     wheel_half = 0.45 * room_y
-    wheel_center = np.array([-0.45 * half_x, 0.0, min(height + 0.35 * lid_tall + wheel_radius, top - 1.1 * wheel_radius)])
+    wheel_center = np.array(
+        [-0.45 * half_x, 0.0, min(height + 0.35 * lid_tall + wheel_radius, top - 1.1 * wheel_radius)]
+    )
     chimney_high = height + (lid_tall - wall) * rng.uniform(0.5, 0.85)
     x0, x1 = wheel_center[0] + 1.25 * wheel_radius, 0.55 * half_x
     body += frame((x0, -0.85 * room_y, height - 0.001), (x1, 0.85 * room_y, chimney_high), [wall] * 4, 0, 1)
-    body += cylinder(((x0 + x1) / 2, 0, height - 0.001), ((x0 + x1) / 2, 0, chimney_high - 0.003), 0.25 * room_y, sections=10)
+    body += cylinder(
+        ((x0 + x1) / 2, 0, height - 0.001), ((x0 + x1) / 2, 0, chimney_high - 0.003), 0.25 * room_y, sections=10
+    )
     body += _fork(wheel_center, wheel_half + GAP, 0.3 * room_y, height - 0.001, 0.7 * wheel_radius)
     lighter = Assembly()
     hinge_x = half_x + 0.0012
@@ -101,8 +108,12 @@ def _pocket(rng: np.random.Generator) -> Assembly:
     for k in range(len(plan)):
         corners = [np.append(o[k - j], z) for o in (plan, inside) for j in (0, 1) for z in (low, high - wall)]
         lid += hull(corners)
-    lid += loft([np.column_stack([plan, np.full(len(plan), high - wall - 0.0002)]),
-                 np.column_stack([plan * (0.85 if dome else 0.97), np.full(len(plan), high + dome)])])  # fmt: skip
+    lid += loft(
+        [
+            np.column_stack([plan, np.full(len(plan), high - wall - 0.0002)]),
+            np.column_stack([plan * (0.85 if dome else 0.97), np.full(len(plan), high + dome)]),
+        ]
+    )
     for side in (-1, 1):
         y0, y1 = sorted((side * 0.53 * half_y, side * 0.85 * half_y))
         lid += cylinder((hinge_x, y0, height), (hinge_x, y1, height), knuckle, sections=10)
@@ -143,10 +154,14 @@ def _disposable(rng: np.random.Generator) -> Assembly:
         x0, x1 = -0.85 * half_x, front + 0.1 * half_x - 0.001
         low = height + travel + GAP
         wide = 0.6 * half_y
-        button = hull_of(box((x0, -wide, low), (x1, wide, low + 0.001)),
-                         rounded_box((x0 + rng.uniform(0, 0.3) * half_x, -wide, top - 0.003), (x1, wide, top), 0.001))  # fmt: skip
+        button = hull_of(
+            box((x0, -wide, low), (x1, wide, low + 0.001)),
+            rounded_box((x0 + rng.uniform(0, 0.3) * half_x, -wide, top - 0.003), (x1, wide, top), 0.001),
+        )
         lighter.add("body", body, density=1100.0)
-        lighter.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel, (0.5 * (x0 + x1), 0, top)), density=1100.0)
+        lighter.add(
+            "button", button, prismatic("body", (0, 0, -1), 0.0, travel, (0.5 * (x0 + x1), 0, top)), density=1100.0
+        )
         return lighter
     center = np.array([front - 0.15 * half_x - 0.001, 0.0, height + hood_tall - 0.35 * wheel_radius])
     cheek = 0.0008
@@ -194,18 +209,29 @@ def _long(rng: np.random.Generator) -> Assembly:
     body = _layers(outline, [(0.8, 0.0), (1.0, 0.1 * handle), (waist, 0.35 * handle), (1.0, slot_low)])
     neck = rng.uniform(0.5, 0.9)
     body += _layers(outline, [(1.0, slot_high), (neck, handle)])
-    back = box((-half_x + depth + 0.004, -0.55 * half_y, slot_low - 0.001), (0.9 * half_x, 0.55 * half_y, slot_high + 0.001))
+    back = box(
+        (-half_x + depth + 0.004, -0.55 * half_y, slot_low - 0.001), (0.9 * half_x, 0.55 * half_y, slot_high + 0.001)
+    )
     body += back
     guard = rng.random() < 0.4
     out = rng.uniform(0.004, 0.01)
     if guard:
-        bow = [(-0.8 * half_x, 0, slot_low - 0.006), (-half_x - out - 0.008, 0, slot_low - 0.002),
-               (-half_x - out - 0.01, 0, slot_high - 0.004), (-0.75 * half_x, 0, slot_high + 0.006)]  # fmt: skip
+        bow = [
+            (-0.8 * half_x, 0, slot_low - 0.006),
+            (-half_x - out - 0.008, 0, slot_low - 0.002),
+            (-half_x - out - 0.01, 0, slot_high - 0.004),
+            (-0.75 * half_x, 0, slot_high + 0.006),
+        ]
         body += tube(bow, 0.002, 10)
     radius = min(neck * half_x, neck * half_y, rng.uniform(0.0035, 0.006))
     lean = rng.uniform(0.0, 0.5) * rng.choice([0.0, 1.0])
-    path = np.array([[0, 0, handle - 0.01], [0, 0, handle + 0.3 * nozzle],
-                     [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle]])  # fmt: skip
+    path = np.array(
+        [
+            [0, 0, handle - 0.01],
+            [0, 0, handle + 0.3 * nozzle],
+            [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle],
+        ]
+    )
     body += tube(path, radius, 14)
     tip = path[2] - path[1]
     end = path[2] - 0.1 * tip
@@ -219,15 +245,19 @@ def _long(rng: np.random.Generator) -> Assembly:
     z0, z1 = slot_low + GAP, slot_high - GAP
     if rng.random() < 0.55:
         trigger = box((-half_x - 0.2 * out, -wide, z0), (-half_x + depth - travel, wide, z1))
-        trigger += hull_of(box((-half_x, -wide, z0), (-half_x + 0.001, wide, z1)),
-                           box((-half_x - out, -wide, z0 + 0.3 * (z1 - z0)), (-half_x, wide, z1 - rng.uniform(0, 0.3) * (z1 - z0))))  # fmt: skip
+        trigger += hull_of(
+            box((-half_x, -wide, z0), (-half_x + 0.001, wide, z1)),
+            box((-half_x - out, -wide, z0 + 0.3 * (z1 - z0)), (-half_x, wide, z1 - rng.uniform(0, 0.3) * (z1 - z0))),
+        )
         joint = prismatic("body", (1, 0, 0), 0.0, travel, (-half_x - out, 0, 0.5 * (z0 + z1)))
     else:
         pivot = np.array([-half_x + 0.35 * depth, 0.0, z1 - 0.003])
         long = z1 - z0 - 0.004
         trigger = cylinder(pivot - (0, wide, 0), pivot + (0, wide, 0), 0.0024, sections=12)
-        trigger += hull_of(box(pivot - (0.0024, wide, 0.001), pivot + (0.001, wide, 0)),
-                           box((-half_x - out, -wide, z0 + 0.0015), (-half_x - out + 0.004, wide, z0 + 0.3 * long)))  # fmt: skip
+        trigger += hull_of(
+            box(pivot - (0.0024, wide, 0.001), pivot + (0.001, wide, 0)),
+            box((-half_x - out, -wide, z0 + 0.0015), (-half_x - out + 0.004, wide, z0 + 0.3 * long)),
+        )
         turn = min(0.7 * travel / long, 0.5)
         joint = revolute("body", (0, -1, 0), pivot, 0.0, max(turn, 0.05))
     lighter.add("trigger", trigger, joint, density=1100.0)
@@ -257,18 +287,30 @@ def _table(rng: np.random.Generator) -> Assembly:
     body += cylinder((flame, 0, height - 0.001), (flame, 0, height + 0.5 * flap_tall), burner, sections=12)
     low = height + travel + GAP
     top = low + rng.uniform(0.004, 0.014)
-    button = rounded_box((-0.8 * half_x, -0.7 * wide, low), (split - 2 * GAP - 0.001, 0.7 * wide, top), rng.uniform(0.001, 0.004))
+    button = rounded_box(
+        (-0.8 * half_x, -0.7 * wide, low), (split - 2 * GAP - 0.001, 0.7 * wide, top), rng.uniform(0.001, 0.004)
+    )
     thin = 0.0012
     if rng.random() < 0.7:
         at = height + 0.0016
-        body += union(box((hinge_x - 0.0012, s * 0.5 * wide - 0.0015, height - 0.001), (hinge_x + 0.0012, s * 0.5 * wide + 0.0015, at - 0.0004))
-                      for s in (-1, 1))  # fmt: skip
+        body += union(
+            box(
+                (hinge_x - 0.0012, s * 0.5 * wide - 0.0015, height - 0.001),
+                (hinge_x + 0.0012, s * 0.5 * wide + 0.0015, at - 0.0004),
+            )
+            for s in (-1, 1)
+        )
         base = at + GAP
         flap = frame((split, -wide, base), (hinge_x - 0.0015, wide, base + flap_tall), [thin] * 4, 0, 1)
         flap += box((split, -wide, base + flap_tall - thin), (hinge_x - 0.0015, wide, base + flap_tall))
         flap += box((hinge_x - 0.003, -0.3 * wide, base), (hinge_x + 0.001, 0.3 * wide, base + 0.5 * flap_tall))
         lighter.add("body", body, density=2500.0)
-        lighter.add("lid", flap, revolute("body", (0, 1, 0), (hinge_x + 0.001, 0, at + GAP), 0.0, rng.uniform(1.2, 1.9)), density=2500.0)
+        lighter.add(
+            "lid",
+            flap,
+            revolute("body", (0, 1, 0), (hinge_x + 0.001, 0, at + GAP), 0.0, rng.uniform(1.2, 1.9)),
+            density=2500.0,
+        )
     else:
         body += frame((split, -wide, height - 0.001), (hinge_x, wide, height + flap_tall), [thin] * 4, 0, 1)
         lighter.add("body", body, density=2500.0)

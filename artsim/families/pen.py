@@ -106,10 +106,19 @@ def _clip(rng: np.random.Generator, section: _Section, radius: float, top: float
     strip = rounded_box((reach - thick, -half, top - length), (reach, half, top), 0.4 * thick, axis=1)
     if rng.random() < 0.5:  # it narrows to a ball at the free end
         ball = 1.1 * thick
-        strip = hull([(reach - a, s * half * w, z) for a in (0.0, thick) for s in (-1, 1)
-                      for w, z in ((1.0, top), (0.5, top - length))])  # fmt: skip
-        strip += rounded_box((reach - thick, -ball, top - length), (min(reach + 0.5 * thick, near - GAP), ball,
-                              top - length + 2 * ball), 0.4 * ball)  # fmt: skip
+        strip = hull(
+            [
+                (reach - a, s * half * w, z)
+                for a in (0.0, thick)
+                for s in (-1, 1)
+                for w, z in ((1.0, top), (0.5, top - length))
+            ]
+        )
+        strip += rounded_box(
+            (reach - thick, -ball, top - length),
+            (min(reach + 0.5 * thick, near - GAP), ball, top - length + 2 * ball),
+            0.4 * ball,
+        )
     return strip + box((reach - 0.5 * thick, -0.8 * half, top - 1.6 * thick), (0.4 * near, 0.8 * half, top))
 
 
@@ -170,13 +179,15 @@ def _double(rng: np.random.Generator, section: _Section, length: float, radius: 
         covered = length * rng.uniform(0.16, 0.25)
         neck = (radius - wall - GAP) * 0.97
         tip = min(0.6 * covered, 3.0 * radius)
-        half = _tip(rng, section, 0.6 * neck, tip) + section.rod([(0.6 * neck, tip), (neck, tip + 0.001),
-                                                                 (neck, covered + 0.001)])  # fmt: skip
+        half = _tip(rng, section, 0.6 * neck, tip) + section.rod(
+            [(0.6 * neck, tip), (neck, tip + 0.001), (neck, covered + 0.001)]
+        )
         half = half.moved((0, 0, -covered - 0.25 * length))
         low = -covered - 0.25 * length - 0.001
         cap = section.sleeve(radius - wall, [(radius * rng.uniform(0.95, 1.1), low), (radius, -0.25 * length - GAP)])
-        cap += section.rod([(radius * rng.uniform(0.4, 0.9), low - rng.uniform(0.2, 1.2) * radius),
-                            (0.94 * radius, low + 0.0003)])  # fmt: skip
+        cap += section.rod(
+            [(radius * rng.uniform(0.4, 0.9), low - rng.uniform(0.2, 1.2) * radius), (0.94 * radius, low + 0.0003)]
+        )
         travel = covered + radius
         body += half if side < 0 else half.mirrored(2)
         caps.append((cap if side < 0 else cap.mirrored(2), (0.0, 0.0, float(side)), travel))
@@ -187,7 +198,9 @@ def _double(rng: np.random.Generator, section: _Section, length: float, radius: 
     return pen
 
 
-def _shell(rng: np.random.Generator, section: _Section, length: float, radius: float, bore: float) -> tuple[Solid, float]:
+def _shell(
+    rng: np.random.Generator, section: _Section, length: float, radius: float, bore: float
+) -> tuple[Solid, float]:
     """Barrel with a bore at the bottom for the refill; returns it and how far up the bore goes."""
     cone = min(length * rng.uniform(0.08, 0.25), 5.0 * radius)
     waist = radius * rng.uniform(0.75, 1.0)
@@ -223,8 +236,13 @@ def _clicked(rng: np.random.Generator, section: _Section, length: float, radius:
     if wide and top - 0.35 * out - travel > length + collar + GAP:  # an eraser or a disc on it
         button += section.rod([(1.3 * push, top - 0.35 * out), (1.2 * push, top)])
     pen.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel * 0.98, (0, 0, top)), density=1000.0)
-    refill = section.rod([(0.35 * bore, -0.5 * travel), (0.9 * bore - 0.0001, 0.4 * cone), (0.9 * bore - 0.0001, cone - travel)]) if (
-        cone > 3.0 * travel) else None  # fmt: skip
+    refill = (
+        section.rod(
+            [(0.35 * bore, -0.5 * travel), (0.9 * bore - 0.0001, 0.4 * cone), (0.9 * bore - 0.0001, cone - travel)]
+        )
+        if (cone > 3.0 * travel)
+        else None
+    )
     if refill is not None:
         joint = prismatic("body", (0, 0, -1), 0.0, travel * 0.98, mimic=("button", 1.0))
         pen.add("tip", refill.moved((0, 0, 0.5 * travel)), joint, density=2000.0)
@@ -241,7 +259,9 @@ def _twisted(rng: np.random.Generator, section: _Section, length: float, radius:
     body += section.rod(profile) + section.rod([(band, split - 0.5 * radius), (band, split)])
     upper = section.rod(_barrel(rng, split + GAP, length, radius, radius * rng.uniform(0.6, 1.0)))
     last = upper.bounds()[1, 1] * rng.uniform(0.2, 0.6)
-    upper += section.rod([(last, length - 0.0002), (last * rng.uniform(0.3, 1.0), length + rng.uniform(0.1, 2.0) * radius)])
+    upper += section.rod(
+        [(last, length - 0.0002), (last * rng.uniform(0.3, 1.0), length + rng.uniform(0.1, 2.0) * radius)]
+    )
     upper += _clip(rng, section, radius, length, (length - split) * rng.uniform(0.5, 0.9))
     pen = Assembly()
     pen.add("body", body, density=1100.0)
@@ -277,7 +297,9 @@ def _sliders(rng: np.random.Generator, length: float, radius: float) -> Assembly
         top = length - 0.4 * radius - GAP
         half_here = min(half, 0.3 * core)
         slider = box((-1.0 * radius, -half_here, top - size), (-core - GAP, half_here, top))
-        slider += rounded_box((-1.25 * radius, -half_here, top - 0.5 * size), (-0.9 * radius, half_here, top), 0.2 * half_here)
+        slider += rounded_box(
+            (-1.25 * radius, -half_here, top - 0.5 * size), (-0.9 * radius, half_here, top), 0.2 * half_here
+        )
         joint = prismatic("body", (0, 0, -1), 0.0, (room - size) * 0.95, (-radius, 0, top))
         angle = 2.0 * np.pi * k / count
         turned = slider.turned(UP, angle)

@@ -106,7 +106,9 @@ def _fill(
         return fronts.shelves(rng, cell, style) if rng.random() < 0.7 else fronts.fixed(cell, style)
     if height > 0.2 and width > 0.16 and rng.random() < doors * (1.0 if height > 0.3 else 0.6):
         if width > 0.42 and rng.random() < 0.75:
-            return fronts.double_door(rng, cell, style) if rng.random() < 0.85 else fronts.sliding_doors(rng, cell, style)
+            return (
+                fronts.double_door(rng, cell, style) if rng.random() < 0.85 else fronts.sliding_doors(rng, cell, style)
+            )
         if width < 1.3 * height:
             return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
         return fronts.door(rng, cell, style, str(rng.choice(["bottom", "top"])))
@@ -195,9 +197,14 @@ def _apron(rng: np.random.Generator, table: _Table) -> None:
             table.add_case(rng, low, high, style, grid, 0.25, back)
     rail = min(0.008, 0.4 * size)
     for s in (-1, 1):  # rails into the legs, beside and behind the case
-        table.body += box((s * (x - inset) - 0.008, -half, top - apron), (s * (x - inset) + 0.008, half, top + 0.001)) if (
-            s > 0 and not both and not rear) or (s < 0 and rear) else Solid()  # fmt: skip
-        table.body += box((-x + 0.5 * size, s * half - rail, top - apron), (x - 0.5 * size, s * half + rail, top + 0.001))
+        table.body += (
+            box((s * (x - inset) - 0.008, -half, top - apron), (s * (x - inset) + 0.008, half, top + 0.001))
+            if (s > 0 and not both and not rear) or (s < 0 and rear)
+            else Solid()
+        )
+        table.body += box(
+            (-x + 0.5 * size, s * half - rail, top - apron), (x - 0.5 * size, s * half + rail, top + 0.001)
+        )
         for near in (-x + inset, x - inset - 0.012):
             a, b = sorted((s * (high[1] - 0.002), s * half))
             table.body += box((near, a, top - apron), (near + 0.012, b, top + 0.001))
@@ -207,7 +214,9 @@ def _apron(rng: np.random.Generator, table: _Table) -> None:
     if rng.random() < 0.1:
         _leaves(rng, table, depth, width, top, height)
     if rolling:
-        _wheels(rng, table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size)
+        _wheels(
+            rng, table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size
+        )
 
 
 def _pedestals(rng: np.random.Generator, table: _Table) -> None:
@@ -225,7 +234,9 @@ def _pedestals(rng: np.random.Generator, table: _Table) -> None:
     size = rng.uniform(0.03, 0.06)
     outer = y - (size if on_legs else 0.0)
     panel = 0.001
-    low_z = rng.uniform(0.1, 0.5) * height if on_legs else 0.07 if rolling else rng.choice([0.0, rng.uniform(0.03, 0.12)])
+    low_z = (
+        rng.uniform(0.1, 0.5) * height if on_legs else 0.07 if rolling else rng.choice([0.0, rng.uniform(0.03, 0.12)])
+    )
     deep = rng.uniform(0.75, 1.0) * 2 * x
     recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
     doors = float(rng.choice([0.0, 0.4, 1.0], p=[0.45, 0.3, 0.25]))
@@ -234,8 +245,14 @@ def _pedestals(rng: np.random.Generator, table: _Table) -> None:
     for side in sides:
         a, b = sorted((side * outer, side * (outer - broad)))
         draw = np.random.default_rng(recipe) if alike else rng
-        table.add_case(draw, np.array([front, a, low_z]), np.array([front + deep - overhang, b, top + 0.001]), style,
-                       (1, int(draw.integers(1, 5))), doors)  # fmt: skip
+        table.add_case(
+            draw,
+            np.array([front, a, low_z]),
+            np.array([front + deep - overhang, b, top + 0.001]),
+            style,
+            (1, int(draw.integers(1, 5))),
+            doors,
+        )
         if not on_legs and not rolling and low_z > 0:
             table.body += box((front + 0.03, a + 0.01, 0.0), (front + deep - overhang - 0.02, b - 0.01, low_z + 0.001))
         if rolling:
@@ -249,13 +266,21 @@ def _pedestals(rng: np.random.Generator, table: _Table) -> None:
         table.body += box((-x + overhang, a, 0.0), (x, b, top + 0.001))
     near = -outer + (broad if -1 in sides else panel) - 0.001
     far = outer - (broad if 1 in sides else panel) + 0.001
-    table.body += box((front + deep - overhang - 0.03, near, top - rng.uniform(0.2, 0.8) * (top - low_z)),
-                      (front + deep - overhang - 0.012, far, top + 0.001))  # fmt: skip
+    table.body += box(
+        (front + deep - overhang - 0.03, near, top - rng.uniform(0.2, 0.8) * (top - low_z)),
+        (front + deep - overhang - 0.012, far, top + 0.001),
+    )
     between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
     if between == "case":
         flat = rng.uniform(0.085, 0.14)
-        table.add_case(rng, np.array([front, near, top - flat]), np.array([front + 0.8 * deep - 0.04, far, top + 0.001]),
-                       style, (int(rng.integers(1, 4)), 1), 0.0)  # fmt: skip
+        table.add_case(
+            rng,
+            np.array([front, near, top - flat]),
+            np.array([front + 0.8 * deep - 0.04, far, top + 0.001]),
+            style,
+            (int(rng.integers(1, 4)), 1),
+            0.0,
+        )
     elif between == "tray":
         _keyboard_tray(rng, table, front, near, far, top, 0.6 * deep)
     if rng.random() < 0.15:  # shelves on the top
@@ -285,8 +310,15 @@ def _case(rng: np.random.Generator, table: _Table) -> None:
     end = -0.002 if both else x
     for back in (False, True):
         if both or not back:
-            table.add_case(rng, np.array([-x + ahead, -y, low]), np.array([end, y, top + 0.001]), style,
-                           (columns, rows), float(rng.choice([0.0, 0.5, 1.0])), back)  # fmt: skip
+            table.add_case(
+                rng,
+                np.array([-x + ahead, -y, low]),
+                np.array([end, y, top + 0.001]),
+                style,
+                (columns, rows),
+                float(rng.choice([0.0, 0.5, 1.0])),
+                back,
+            )
     size = rng.uniform(0.02, 0.05)
     if stand == "legs":
         table.body += _legs(rng, x - ahead, y, 0.0, low + 0.002, size, splay=rng.random() < 0.3)
@@ -306,11 +338,15 @@ def _column(rng: np.random.Generator, table: _Table) -> None:
     angles = np.arange(count) * 2.0 * np.pi / count
     c, s = cos(angles), sin(angles)
     long = wide * rng.choice([1.0, rng.uniform(1.0, 2.2)])
-    outline = np.column_stack([np.sign(c) * np.abs(c) ** (2.0 / power) * wide, np.sign(s) * np.abs(s) ** (2.0 / power) * long])
+    outline = np.column_stack(
+        [np.sign(c) * np.abs(c) ** (2.0 / power) * wide, np.sign(s) * np.abs(s) ** (2.0 / power) * long]
+    )
 
     def slab(z: float) -> Solid:
-        rings = [np.column_stack([k * outline, np.full(count, h)]) for k, h in
-                 ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))]  # fmt: skip
+        rings = [
+            np.column_stack([k * outline, np.full(count, h)])
+            for k, h in ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))
+        ]
         return loft(rings)
 
     radius = rng.uniform(0.022, 0.06)
@@ -323,12 +359,16 @@ def _column(rng: np.random.Generator, table: _Table) -> None:
     spots = []
     for k in range(feet):
         angle = 2.0 * np.pi * (k + 0.5) / feet
-        leg = hull_of(box((0, -0.6 * radius, low), (0.01, 0.6 * radius, low + rng.uniform(0.05, 0.15))),
-                      box((span - 0.02, -0.02, foot), (span + 0.015, 0.02, foot + 0.03)))  # fmt: skip
+        leg = hull_of(
+            box((0, -0.6 * radius, low), (0.01, 0.6 * radius, low + rng.uniform(0.05, 0.15))),
+            box((span - 0.02, -0.02, foot), (span + 0.015, 0.02, foot + 0.03)),
+        )
         base += leg.turned(UP, angle)
         spots.append((span * cos(angle), span * sin(angle)))
     if not feet:
-        base += cylinder((0, 0, 0), (0, 0, 0.02), span, 0.9 * span, 32) + cylinder((0, 0, 0.02), (0, 0, 0.06), 2 * radius, radius, 24)
+        base += cylinder((0, 0, 0), (0, 0, 0.02), span, 0.9 * span, 32) + cylinder(
+            (0, 0, 0.02), (0, 0, 0.06), 2 * radius, radius, 24
+        )
     kind = str(rng.choice(["turning", "tipping", "rising"]))
     top = height - thick
     if kind == "rising":
@@ -342,13 +382,23 @@ def _column(rng: np.random.Generator, table: _Table) -> None:
     elif kind == "turning":
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - GAP), radius)
         base += cylinder((0, 0, top - 0.02 - GAP), (0, 0, top - GAP), min(3 * radius, 0.5 * wide))
-        joint = continuous("body", UP, (0, 0, top)) if rng.random() < 0.6 else revolute("body", UP, (0, 0, top), -1.57, 1.57)
+        joint = (
+            continuous("body", UP, (0, 0, top))
+            if rng.random() < 0.6
+            else revolute("body", UP, (0, 0, top), -1.57, 1.57)
+        )
         table.moving.append(("top", slab(top), joint))
     else:
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - 0.05), radius)
         base += box((-radius, -radius, top - 0.06), (0.5 * radius, radius, top - 0.02))
         hinge = (radius + 0.01, 0.0, top - 0.03)
-        lugs = union(box((hinge[0] - 0.01, t * 1.3 * radius - 0.008, top - 0.04), (hinge[0] + 0.01, t * 1.3 * radius + 0.008, top + 0.002)) for t in (-1, 1))
+        lugs = union(
+            box(
+                (hinge[0] - 0.01, t * 1.3 * radius - 0.008, top - 0.04),
+                (hinge[0] + 0.01, t * 1.3 * radius + 0.008, top + 0.002),
+            )
+            for t in (-1, 1)
+        )
         base += box((0.0, -1.1 * radius, top - 0.04), (hinge[0] + 0.005, 1.1 * radius, top - 0.025))
         # Beyond the hinge's axis the top comes down before the column.
         table.moving.append(("top", slab(top) + lugs, revolute("body", (0, 1, 0), hinge, 0.0, rng.uniform(0.5, 0.9))))
@@ -387,9 +437,14 @@ def _legs(rng: np.random.Generator, x: float, y: float, low: float, high: float,
             elif kind == "round":
                 solid += cylinder(foot, head, taper * half, half, 16)
             elif kind == "tapered":
-                solid += cylinder(foot, head, taper * half, 1.2 * half, 4) if out else hull_of(
-                    box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01)),
-                    box(head - (half, half, 0.25 * tall), head + (half, half, 0)))  # fmt: skip
+                solid += (
+                    cylinder(foot, head, taper * half, 1.2 * half, 4)
+                    if out
+                    else hull_of(
+                        box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01)),
+                        box(head - (half, half, 0.25 * tall), head + (half, half, 0)),
+                    )
+                )
             else:
                 levels = low + np.array([0.0, 0.05, 0.12, 0.5, 0.56, 0.62, 0.75, 1.0]) * tall
                 radii = half * np.array([0.55, 0.85, 0.5, 0.95, 0.6, 0.95, 1.0, 1.0])
@@ -421,15 +476,22 @@ def _keyboard_tray(
     for y in (y0 - 0.012, y1):
         table.body += box((front + 0.01, y, z - 0.005), (front + deep, y + 0.012, top + 0.001))
     board = rounded_box((front + 0.005, y0 + GAP, z), (front + deep, y1 - GAP, z + 0.018), 0.004)
-    table.moving.append(("drawer", board, prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z))))
+    table.moving.append(
+        ("drawer", board, prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z)))
+    )
 
 
-def _wheels(rng: np.random.Generator, table: _Table, spots: list[tuple[float, float]], height: float, size: float) -> None:
+def _wheels(
+    rng: np.random.Generator, table: _Table, spots: list[tuple[float, float]], height: float, size: float
+) -> None:
     """A wheel between two cheeks under each spot, which is ``height`` above the floor."""
     radius = 0.42 * height
     half, thick = 0.3 * radius, 0.004
     for x, y in spots:
-        body = box((x - 0.5 * radius, y - half - thick - 0.002, height - 0.1 * radius), (x + 0.5 * radius, y + half + thick + 0.002, height + 0.012))
+        body = box(
+            (x - 0.5 * radius, y - half - thick - 0.002, height - 0.1 * radius),
+            (x + 0.5 * radius, y + half + thick + 0.002, height + 0.012),
+        )
         for s in (-1, 1):
             a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
             body += box((x - 0.35 * radius, a, 0.7 * radius), (x + 0.35 * radius, b, height))

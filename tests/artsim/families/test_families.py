@@ -68,7 +68,9 @@ def test_objects_stand_in_their_rest_frame(category: str) -> None:
 def test_each_of_the_46_categories_of_partnet_mobility_has_a_family() -> None:
     assert len(PARTNET_MOBILITY) == 46
     assert all(PARTNET_MOBILITY.values())
-    assert {name: set(names) - set(FAMILIES) for name, names in PARTNET_MOBILITY.items() if set(names) - set(FAMILIES)} == {}
+    assert {
+        name: set(names) - set(FAMILIES) for name, names in PARTNET_MOBILITY.items() if set(names) - set(FAMILIES)
+    } == {}
     assert {folder for source in REAL.values() for folder in source.folders} <= set(PARTNET_MOBILITY)
 
 
