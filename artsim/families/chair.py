@@ -1,7 +1,8 @@
-"""Swivel chairs: office chairs, task chairs and stools on a star of legs.
+"""Chairs that turn, slide or lean: office chairs, task chairs and stools on a star of legs or a disc.
 
-What varies: legs, castors (with or without wheels of their own) or glides, seat, back (fixed or tilting, framed or
-solid), head rest, arm rests. The seat turns on a piston that slides in the column.
+What varies: legs or disc, castors (with or without wheels of their own) or glides, a piston that lifts the seat or a
+fixed column, seat, back (fixed or tilting, framed or solid), head rest, arm rests (fixed or sliding up), a lever below
+the seat, a knob at its side.
 """
 
 from __future__ import annotations
@@ -15,34 +16,40 @@ from artsim.model.kinematics import Array
 
 GAP = 0.0025
 UP = np.array([0.0, 0.0, 1.0])
+SIDE = np.array([0.0, 1.0, 0.0])
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """A swivel chair; one sits down facing -X. At rest the seat is at its lowest and faces forward."""
-    legs = int(rng.choice([4, 5, 5, 5, 6]))
-    span = rng.uniform(0.24, 0.34)
-    castors = rng.random() < 0.75
+    """A chair; one sits down facing -X. At rest the seat is at its lowest and faces forward."""
+    legs = int(rng.choice([0, 3, 4, 5, 6], p=[0.15, 0.07, 0.18, 0.5, 0.1]))  # none: a disc
+    span = rng.uniform(0.22, 0.36)
+    castors = legs > 2 and rng.random() < 0.75
+    lifted = rng.random() < 0.7
     wheel = rng.uniform(0.022, 0.032)
     floor = 2.0 * wheel + 0.024 if castors else 0.0
     column = rng.uniform(0.022, 0.03)
     piston = column - 0.004 - GAP
-    stool = rng.random() < 0.2
+    stool = rng.random() < 0.25
     hub = floor + rng.uniform(0.05, 0.09)
-    sleeve = hub + rng.uniform(0.1, 0.2)
+    sleeve = hub + (rng.uniform(0.1, 0.45) if stool else rng.uniform(0.08, 0.22))
     travel = 0.6 * (sleeve - hub)
     seat_low = sleeve + rng.uniform(0.05, 0.1)
 
     chair = Assembly()
-    chair.add("base", _star(rng, legs, span, floor, hub, column, piston, sleeve, castors), density=1500.0)
+    base = _star(rng, legs, span, floor, hub, column, piston, sleeve, castors)
+    if not lifted:
+        base += cylinder((0, 0, hub - 0.01), (0, 0, seat_low - 0.002), column, sections=18)
+    chair.add("base", base, density=1500.0)
     if castors:
         _castors(rng, chair, legs, span, floor, wheel)
     rod = cylinder((0, 0, sleeve - travel - 0.03), (0, 0, seat_low - 0.002), piston, sections=18)
-    chair.add("piston", rod, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)), density=4000.0)
+    if lifted:
+        chair.add("piston", rod, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)), density=4000.0)
 
     depth, width = (rng.uniform(0.32, 0.4),) * 2 if stool else (rng.uniform(0.42, 0.5), rng.uniform(0.42, 0.52))
     thick = rng.uniform(0.04, 0.09)
     seat = _seat(rng, depth, width, thick, seat_low, stool)
-    joint = continuous("piston", UP, (0, 0, seat_low))
+    joint = continuous("piston" if lifted else "base", UP, (0, 0, seat_low))
     back = rng.random() < (0.3 if stool else 1.0)
     tilting = back and rng.random() < 0.5
     top = seat_low + 0.03 + thick
@@ -56,12 +63,55 @@ def build(rng: np.random.Generator) -> Assembly:
             for side in (-1, 1):
                 y0, y1 = sorted((side * (0.03 + GAP), side * 0.05))
                 seat += box((0.2 * depth, y0, seat_low + 0.005), (hinge[0] + 0.012, y1, seat_low + 0.045))
-    if not stool and rng.random() < 0.6:
+    arms = str(rng.choice(["none", "fixed", "sliding"], p=[1, 0, 0] if stool else [0.4, 0.4, 0.2]))
+    if arms == "fixed":
         seat += _arms(rng, depth, width, seat_low, top)
+    elif arms == "sliding":
+        seat += _arm_sleeves(width, seat_low, top)
     chair.add("seat", seat if tilting else seat + rest, joint, density=400.0)
     if tilting:
         chair.add("back", rest, revolute("seat", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(12, 28))), density=400.0)
+    if arms == "sliding":
+        _sliding_arms(rng, chair, depth, width, top)
+    _controls(rng, chair, width, seat_low)
     return chair
+
+
+def _arm_sleeves(width: float, low: float, top: float) -> Solid:
+    """Upright tubes beside the seat, on beams from below it."""
+    y = 0.5 * width + 0.04
+    side = box((-0.02, 0.08, low + 0.004), (0.02, y, low + 0.026))
+    side += frame((-0.024, y - 0.014, low + 0.004), (0.024, y + 0.014, top + 0.08), [0.005] * 4, 0, 1)
+    return side + side.mirrored(1)
+
+
+def _sliding_arms(rng: np.random.Generator, chair: Assembly, depth: float, width: float, top: float) -> None:
+    """Pads on bars that slide in their sleeves."""
+    y, z = 0.5 * width + 0.04, top + 0.08 + GAP
+    half, fore, aft = rng.uniform(0.025, 0.05), rng.uniform(0.2, 0.35) * depth, rng.uniform(0.15, 0.3) * depth
+    travel = rng.uniform(0.04, 0.09)
+    for number, side in enumerate((-1, 1)):
+        arm = rounded_box((-fore, side * y - half, z), (aft, side * y + half, z + 0.03), 0.012)
+        arm += box((-0.016, side * y - 0.006, z - travel - 0.03), (0.016, side * y + 0.006, z + 0.01))
+        joint = prismatic("seat", UP, 0.0, travel, (0.0, side * y, z))
+        chair.add(f"arm_{number}", arm, joint, density=500.0)
+
+
+def _controls(rng: np.random.Generator, chair: Assembly, width: float, low: float) -> None:
+    """A lever and a knob at the plate below the seat."""
+    side = float(rng.choice([-1.0, 1.0]))
+    reach, z = rng.uniform(0.1, 0.2), low + 0.002
+    if rng.random() < 0.45:
+        start, tip = np.array([-0.06, side * (0.09 + GAP), z]), np.array([-0.06, side * (0.09 + reach), z - 0.01])
+        lever = cylinder(start, tip, 0.006, sections=12)
+        lever += cylinder(start + 0.6 * (tip - start), tip, 0.011, 0.009, 12)
+        joint = revolute("seat", (-side, 0, 0), start, 0.0, rng.uniform(0.1, 0.3))
+        chair.add("lever", lever, joint, density=1200.0)
+    if rng.random() < 0.3:
+        foot = np.array([0.055, -side * (0.09 + GAP), low - 0.01])
+        knob = cylinder(foot, foot - (0, side * 0.03, 0), 0.006, sections=10)
+        knob += cylinder(foot - (0, side * 0.028, 0), foot - (0, side * 0.055, 0), 0.019, sections=8)
+        chair.add("knob", knob, continuous("seat", SIDE, foot), density=1200.0)
 
 
 def _star(
@@ -75,10 +125,14 @@ def _star(
     sleeve: float,
     castors: bool,
 ) -> Solid:
-    """Legs around a column with a bore for the piston."""
+    """Legs around a column with a bore for the piston, or a disc."""
     low = floor + (0.004 if castors else 0.012)
     solid = ring((0, 0, 0.5 * (hub - 0.03 + sleeve)), UP, piston + GAP, column + 0.002, sleeve - hub + 0.03, 14)
     solid += cylinder((0, 0, low), (0, 0, hub), 1.7 * column, 1.35 * column, 20)
+    if not legs:
+        thick = rng.uniform(0.012, 0.03)
+        solid += cylinder((0, 0, 0), (0, 0, thick), 0.85 * span, 0.8 * span, 36)
+        return solid + cylinder((0, 0, thick - 0.002), (0, 0, hub), 0.5 * span, 1.35 * column, 24)
     wide, narrow = rng.uniform(0.022, 0.03), rng.uniform(0.014, 0.02)
     slope = rng.uniform(0.0, 0.7)
     for k in range(legs):

@@ -1,7 +1,8 @@
-"""Desk lamps: two arms and a shade in a row of joints on a base.
+"""Lamps: desk lamps with arms in a row of joints, standing lamps and spotlights.
 
-What varies: the base (disc, square, clamp), whether it swivels, arms of one or two rods, springs, a parallel rod that
-follows the lower arm, a third arm, and the shade (cone, bell, flat panel).
+What varies: the kind. Of desk lamps the base (disc, square, clamp), whether it swivels, arms of one or two rods,
+springs, a parallel rod that follows the lower arm, a third arm, and the shade (cone, bell, flat panel). The others are
+in :mod:`artsim.families.standing_lamp`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from artsim.common.elementary import arcsin, arctan2, cos, sin
 from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
+from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube
 from artsim.model.kinematics import Array
@@ -23,7 +25,12 @@ SIDE = np.array([0.0, 1.0, 0.0])
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """A desk lamp; it leans forward to -X at rest."""
+    """A lamp; what leans, leans forward to -X at rest."""
+    return (_desk, standing, spotlight)[rng.choice(3, p=[0.5, 0.32, 0.18])](rng)
+
+
+def _desk(rng: np.random.Generator) -> Assembly:
+    """Base, arms and shade."""
     while True:
         links, half, r, foot = _links(rng)
         if narrow_limits(links, 0.02):
