@@ -108,9 +108,7 @@ def _apron(rng: np.random.Generator, table: Table) -> None:
     if rng.random() < 0.1:
         drop_leaves(rng, table, depth, width, top, height)
     if rolling:
-        wheels(
-            rng, table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size
-        )
+        wheels(table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size)
 
 
 def _pedestals(rng: np.random.Generator, table: Table) -> None:
