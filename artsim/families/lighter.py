@@ -64,7 +64,7 @@ def _layers(outline: Array, levels: list[tuple[float, float]]) -> Solid:
 def _pocket(rng: np.random.Generator) -> Assembly:
     """A case with a lid that swings over the chimney; the hinge is behind, at +X."""
     half_x = rng.uniform(0.013, 0.03)
-    half_y = half_x * rng.uniform(0.25, 0.6)
+    half_y = max(half_x * rng.uniform(0.25, 0.6), 0.0055)
     height = rng.uniform(0.03, 0.055)
     lid_tall = rng.uniform(0.014, 0.03)
     wall = rng.uniform(0.0008, 0.0014)
@@ -219,8 +219,8 @@ def _long(rng: np.random.Generator) -> Assembly:
         bow = [
             (-0.8 * half_x, 0, slot_low - 0.006),
             (-half_x - out - 0.008, 0, slot_low - 0.002),
-            (-half_x - out - 0.01, 0, slot_high - 0.004),
-            (-0.75 * half_x, 0, slot_high + 0.006),
+            (-half_x - out - 0.01, 0, slot_high + 0.002),
+            (-0.75 * half_x, 0, slot_high + 0.01),
         ]
         body += tube(bow, 0.002, 10)
     radius = min(neck * half_x, neck * half_y, rng.uniform(0.0035, 0.006))

@@ -144,6 +144,7 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
             style,
             (1, int(draw.integers(1, 5))),
             doors,
+            free=(side < 0 and not on_legs, side > 0 and not on_legs),
         )
         if not on_legs and not rolling and low_z > 0:
             table.body += box((front + 0.03, a + 0.01, 0.0), (front + deep - overhang - 0.02, b - 0.01, low_z + 0.001))
@@ -210,6 +211,7 @@ def _case(rng: np.random.Generator, table: Table) -> None:
                 (columns, rows),
                 float(rng.choice([0.0, 0.5, 1.0])),
                 back,
+                free=(True, True),
             )
     size = rng.uniform(0.02, 0.05)
     if stand == "legs":

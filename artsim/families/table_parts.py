@@ -31,6 +31,7 @@ class Table:
         grid: tuple[int, int],
         doors: float,
         back: bool = False,
+        free: tuple[bool, bool] = (False, False),
     ) -> None:
         """A case, open towards -X, with a grid of cells.
 
@@ -44,6 +45,8 @@ class Table:
             How likely a cell that is high enough has doors.
         back : bool
             Turns it to open towards +X, reflected in the plane x = 0.
+        free : 2 bool
+            Whether nothing stands beside it at -Y and +Y, so that doors there open beyond a right angle.
         """
         board = style.board
         style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)
@@ -52,7 +55,8 @@ class Table:
             solid += box((style.face, low[1], z), (high[0], high[1], z + board))
         for y in (low[1], high[1] - board):
             solid += box((style.face, y, low[2]), (high[0], y + board, high[2]))
-        whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board))
+        whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
+                     (free[0], True), (free[1], True))  # fmt: skip
         columns, boards = _divided(rng, whole, 0, grid[0], style)
         solid += boards
         recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
@@ -75,6 +79,7 @@ def _divided(rng: np.random.Generator, cell: Cell, axis: int, count: int, style:
     room = cell.sides[axis]
     count = max(1, min(count, int(room / (0.16 if axis == 0 else 0.085))))
     shares = np.ones(count) if rng.random() < 0.5 else rng.uniform(0.7, 1.5, count)
+    shares = np.maximum(shares / shares.sum(), 0.75 / count)  # the least still holds a drawer
     edges = cell.low[axis] + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * room
     half = style.board / 2
     cells, boards = [], Solid()
