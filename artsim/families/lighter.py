@@ -204,7 +204,7 @@ def _long(rng: np.random.Generator) -> Assembly:
     half_x, half_y = rng.uniform(0.01, 0.02), rng.uniform(0.006, 0.011)
     outline = _outline(rng, half_x, half_y)
     waist = rng.uniform(0.75, 1.1)
-    slot_low, slot_high = 0.55 * handle, 0.55 * handle + rng.uniform(0.02, 0.034)
+    slot_low, slot_high = 0.55 * handle, 0.55 * handle + min(rng.uniform(0.02, 0.034), 0.35 * handle)
     depth = rng.uniform(0.4, 0.7) * half_x
     body = _layers(outline, [(0.8, 0.0), (1.0, 0.1 * handle), (waist, 0.35 * handle), (1.0, slot_low)])
     neck = rng.uniform(0.5, 0.9)
@@ -227,7 +227,7 @@ def _long(rng: np.random.Generator) -> Assembly:
     lean = rng.uniform(0.0, 0.5) * rng.choice([0.0, 1.0])
     path = np.array(
         [
-            [0, 0, handle - 0.01],
+            [0, 0, slot_high + 0.002],
             [0, 0, handle + 0.3 * nozzle],
             [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle],
         ]
@@ -283,7 +283,7 @@ def _table(rng: np.random.Generator) -> Assembly:
     lighter = Assembly()
     wide, hinge_x = 0.75 * half_y, 0.78 * half_x
     flame = 0.5 * (split + hinge_x)
-    burner = min(0.22 * half_y, 0.3 * (hinge_x - split))
+    burner = min(0.22 * half_y, 0.5 * (hinge_x - split) - 0.0035)  # before the flap's tongue
     body += cylinder((flame, 0, height - 0.001), (flame, 0, height + 0.5 * flap_tall), burner, sections=12)
     low = height + travel + GAP
     top = low + rng.uniform(0.004, 0.014)
