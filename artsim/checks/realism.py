@@ -90,6 +90,7 @@ REAL: dict[str, RealSource] = {
     "storage_furniture": RealSource(("StorageFurniture",)),
     "suitcase": RealSource(("Suitcase",)),
     "switch": RealSource(("Switch",)),
+    "table": RealSource(("Table",)),
     "toaster": RealSource(("Toaster",)),
     "trash_can": RealSource(("TrashCan",)),
     "washing_machine": RealSource(("WashingMachine",)),

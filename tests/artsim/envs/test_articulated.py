@@ -124,7 +124,7 @@ def test_an_action_is_a_share_of_the_limits(one_drawer: ArticulatedObject) -> No
 
 
 def small_env() -> ArticulatedEnv:
-    return new(categories=("laptop", "swivel_chair"))
+    return new(categories=("laptop", "chair"))
 
 
 def test_many_envs_run_side_by_side() -> None:
@@ -185,7 +185,7 @@ def test_options_that_make_no_sense_are_refused(options: dict[str, Any], words: 
 
 def test_an_object_with_too_many_joints_is_refused() -> None:
     with pytest.raises(ConfigError, match="max_joints=15"):
-        new(obj=make("swivel_chair", 0), max_joints=4).reset(seed=0)
+        new(obj=make("chair", 0), max_joints=4).reset(seed=0)
 
 
 def test_a_step_before_the_first_reset_is_refused() -> None:

@@ -59,7 +59,7 @@ def camera_of(info: dict[str, Any]) -> Camera:
 # Poses, joints, dynamics
 
 
-@pytest.mark.parametrize("category", ["valve", "robot_arm", "coffee_machine", "eyeglasses", "swivel_chair"])
+@pytest.mark.parametrize("category", ["valve", "robot_arm", "coffee_machine", "eyeglasses", "chair"])
 def test_parts_are_where_forward_kinematics_puts_them(category: str) -> None:
     env = new(categories=(category,), goal="random")
     _, info = env.reset(seed=3)
@@ -277,7 +277,7 @@ def test_other_pictures_of_the_process_stay_as_they_were() -> None:
 
 
 def test_objects_of_many_sizes_share_tensors() -> None:
-    objects = [make("swivel_chair", 0), make("drawer", 0), valve()]
+    objects = [make("chair", 0), make("drawer", 0), valve()]
     truth = truth_of(objects, 16, "cpu")
     rng = np.random.default_rng(0)
     states = [obj.tree.complete_state(rng.uniform(*np.clip(joint_intervals(obj), -9, 9).T)) for obj in objects]
@@ -335,7 +335,7 @@ def test_equal_seeds_make_equal_episodes() -> None:
 
 
 def test_objects_with_too_many_joints_are_passed_over() -> None:
-    env = new(categories=("drawer", "swivel_chair"), max_joints=1)
+    env = new(categories=("drawer", "chair"), max_joints=1)
     for seed in range(4):
         observation, _ = env.reset(seed=seed)
         assert len(env.objects[0]) == 2

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import artsim
+from artsim.checks.realism import REAL
 from artsim.checks.validity import check
 from artsim.errors import ConfigError
-from artsim.families import FAMILIES, make
+from artsim.families import FAMILIES, PARTNET_MOBILITY, make
 from artsim.loading.sources import FamilySource
 from benchmarks.audit import Outcome, audit
 
@@ -62,6 +63,15 @@ def test_objects_stand_in_their_rest_frame(category: str) -> None:
     assert len({part.name for part in obj.parts}) == len(obj)
     assert all(re.fullmatch(r"[a-z]+(_[a-z0-9]+)*", part.name) for part in obj.parts)
     assert len(obj.tree.free_joints) >= 1
+
+
+def test_each_of_the_46_categories_of_partnet_mobility_has_a_family() -> None:
+    assert len(PARTNET_MOBILITY) == 46
+    assert all(PARTNET_MOBILITY.values())
+    assert {
+        name: set(names) - set(FAMILIES) for name, names in PARTNET_MOBILITY.items() if set(names) - set(FAMILIES)
+    } == {}
+    assert {folder for source in REAL.values() for folder in source.folders} <= set(PARTNET_MOBILITY)
 
 
 @pytest.mark.parametrize("seed", [2750, 4487])

@@ -38,7 +38,7 @@ def traits(obj: ArticulatedObject, q: np.ndarray, T_world_camera: np.ndarray) ->
     ],
 )
 def test_views_at_once_are_distributed_as_views_one_by_one(states: StateOptions, preset: ViewPreset) -> None:
-    obj, rng = make("desk_lamp", seed=1), np.random.default_rng(0)
+    obj, rng = make("lamp", seed=1), np.random.default_rng(0)
     cameras = replace(CAMERAS, preset=preset)
     views = draw_views([obj], COUNT, rng, states, cameras)
     together = np.array(

@@ -89,7 +89,7 @@ def test_different_objects_at_once_look_as_they_do_one_by_one(renderer: WarpRend
 
 
 def test_every_type_of_joint_moves_on_the_device_as_in_numpy(renderer: WarpRenderer) -> None:
-    objects = [valve(), valve().scaled(0.1), artsim.load(ASSETS / "cabinet"), make("desk_lamp", seed=1)]
+    objects = [valve(), valve().scaled(0.1), artsim.load(ASSETS / "cabinet"), make("lamp", seed=1)]
     scenes = scenes_of(objects, states=4)
     objects, views = views_of(scenes)
     # A mimic follows its source whatever its own entry says, and nothing reads the root's.

@@ -1,0 +1,203 @@
+"""Lamps: desk lamps with arms in a row of joints, standing lamps and spotlights.
+
+What varies: the kind. Of desk lamps the base (disc, square, clamp), whether it swivels, arms of one or two rods,
+springs, a parallel rod that follows the lower arm, a third arm, and the shade (cone, bell, flat panel). The others are
+in :mod:`artsim.families.standing_lamp`.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from artsim.common.elementary import arcsin, arctan2, cos, sin
+from artsim.common.products import apply
+from artsim.families.clearance import Link, narrow_limits
+from artsim.families.standing_lamp import spotlight, standing
+from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube
+from artsim.model.kinematics import Array
+
+GAP = 0.001
+UP = np.array([0.0, 0.0, 1.0])
+SIDE = np.array([0.0, 1.0, 0.0])
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A lamp; what leans, leans forward to -X at rest."""
+    return (_desk, standing, spotlight)[rng.choice(3, p=[0.5, 0.32, 0.18])](rng)
+
+
+def _desk(rng: np.random.Generator) -> Assembly:
+    """Base, arms and shade."""
+    while True:
+        links, half, r, foot = _links(rng)
+        if narrow_limits(links, 0.02):
+            break
+    lamp = Assembly()
+    for link in links:
+        lamp.add(link.name, link.solid, link.joint, density=1200.0)
+    if foot is not None:
+        _parallel_rod(lamp, links, foot, half, r)
+    return lamp
+
+
+def _links(rng: np.random.Generator) -> tuple[list[Link], float, float, Array | None]:
+    """All links, half width and radius of their knuckles, and the foot of the parallel rod, if there is one."""
+    half, r = rng.uniform(0.006, 0.009), rng.uniform(0.010, 0.015)
+    links = [Link("base")]
+    top = _base(rng, links[0], r)
+    if rng.random() < 0.6:
+        links.append(Link("turret", continuous("base", UP, (0, 0, top))))
+        top += GAP
+        links[-1].rod((0, 0, top), (0, 0, top + 0.012), 1.3 * r)
+    at = np.array([0.0, 0.0, top + 3.0 * r])
+    links[-1].rod((0, 0, top + (0.003 if len(links) > 1 else -0.003)), at, 0.8 * half)
+    links[-1].rod(at - half * SIDE, at + half * SIDE, r)
+
+    double, sprung = rng.random() < 0.45, rng.random() < 0.4
+    arms = 3 if rng.random() < 0.2 else 2
+    names = ["lower_arm", "upper_arm"] if arms == 2 else ["lower_arm", "middle_arm", "upper_arm"]
+    angles = np.deg2rad([rng.uniform(5, 40), rng.uniform(-100, -55), rng.uniform(-30, 40)])  # from the link before
+    angle, side = 0.0, float(rng.choice([-1.0, 1.0]))
+    foot = None
+    if rng.random() < 0.35:  # a lug behind the knuckle carries the parallel rod
+        foot = at + (2.4 * r, 0, 0)
+        ends = [cylinder(p - half * SIDE, p + half * SIDE, q, sections=16) for p, q in ((at, r), (foot, 0.7 * r))]
+        links[-1].solid += hull_of(*ends)
+        links[-1].guard(at, foot, r)
+        foot = foot - side * (2.0 * half + GAP) * SIDE
+    for k, name in enumerate(names):
+        angle += angles[k]
+        at = at + side * (2.0 * half + GAP) * SIDE
+        hinge = at - side * (half + 0.5 * GAP) * SIDE
+        if k == 0:  # stay clear of the base's disc
+            lower, upper = np.deg2rad(-62) - angle, np.deg2rad(62) - angle
+        else:
+            lower, upper = -np.deg2rad(rng.uniform(50, 85)), np.deg2rad(rng.uniform(50, 85))
+        links.append(Link(name, revolute(links[-1].name, SIDE, hinge, lower, upper)))
+        length = rng.uniform(0.2, 0.36) * (0.75 if arms == 3 else 1.0)
+        if k == 0 and foot is not None:  # the rod stays within this distance
+            links[-1].guard(at + 0.09 * _lean(angle), at + 0.9 * length * _lean(angle), 3.4 * r + 2.0 * half)
+        at = _arm(links[-1], at, _lean(angle), length, half, r, double, sprung and k < 2)
+        if rng.random() < 0.7:
+            side = -side
+    at = at + side * (2.0 * half + GAP) * SIDE
+    _shade(rng, links, at, side, angle, half, r)
+    return links, half, r, foot
+
+
+def _lean(angle: float) -> Array:
+    """Direction that leans from the vertical to +X by an angle."""
+    return apply(rotation_about(SIDE, angle), UP)
+
+
+def _base(rng: np.random.Generator, link: Link, r: float) -> float:
+    """The foot; returns the height of its top."""
+    wide, thick = rng.uniform(0.06, 0.1), rng.uniform(0.012, 0.03)
+    kind = rng.choice(["disc", "dome", "square", "clamp"], p=[0.4, 0.2, 0.25, 0.15])
+    if kind == "clamp":
+        link.solid += rounded_box((-0.06, -0.025, -0.012), (0.035, 0.025, 0.012), 0.004)
+        link.solid += box((0.02, -0.025, -0.09), (0.035, 0.025, 0.0)) + box((-0.04, -0.02, -0.09), (0.03, 0.02, -0.078))
+        link.solid += tube([(-0.02, 0, -0.11), (-0.02, 0, -0.045)], 0.006, 12)
+        link.solid += cylinder((-0.02, 0, -0.05), (-0.02, 0, -0.042), 0.014, sections=16)
+        link.solid += box((-0.04, -0.004, -0.114), (0.0, 0.004, -0.106))
+        link.guard((-0.02, 0, -0.12), (-0.02, 0, 0.03), 0.05)
+        link.guard((-0.08, 0, 0), (0.05, 0, 0), 0.03)
+        thick = 0.012
+    elif kind == "square":
+        link.solid += rounded_box((-wide, -0.8 * wide, 0), (wide, 0.8 * wide, thick), 0.25 * wide, axis=2)
+    else:
+        link.solid += cylinder((0, 0, 0), (0, 0, thick), wide, 0.95 * wide, 36)
+        if kind == "dome":
+            link.solid += cylinder((0, 0, thick - 0.001), (0, 0, thick + 0.015), 0.9 * wide, 0.3 * wide, 32)
+    if kind != "clamp":
+        for angle in np.arange(8) * np.pi / 4.0:  # a rim of rods guards the disc
+            out = np.array([cos(angle), sin(angle), 0.0])
+            link.guard((0, 0, 0.5 * thick), wide * 1.1 * out + (0, 0, 0.5 * thick), 0.5 * thick)
+    post = rng.uniform(0.02, 0.045)
+    link.solid += cylinder((0, 0, 0.002), (0, 0, thick + post), 1.25 * r)
+    link.guard((0, 0, 0.002), (0, 0, thick + post - 0.7 * r), 1.25 * r)
+    return thick + post
+
+
+def _arm(
+    link: Link, at: Array, along: Array, length: float, half: float, r: float, double: bool, sprung: bool
+) -> Array:
+    """An arm from one knuckle on; returns where the next one is."""
+    end = at + length * along
+    link.solid += cylinder(at - half * SIDE, at + half * SIDE, r, sections=18)
+    across = np.cross(SIDE, along)
+    rod = 0.8 * half
+    if double:
+        for s in (-0.6, 0.6):
+            link.solid += tube([at + s * r * across, end + s * r * across], 0.75 * rod, 10)
+    else:
+        link.solid += tube([at, end], rod, 12)
+    if sprung:
+        low, high = at + 0.15 * length * along, at + 0.4 * length * along
+        coils = np.linspace(0.0, 1.0, 11)
+        for share in coils:
+            middle = low + share * (high - low)
+            link.solid += cylinder(middle, middle + 0.05 * (high - low), 0.97 * half, sections=12)
+    link.solid += cylinder(end - half * SIDE, end + half * SIDE, r, sections=18)
+    link.guard(at, end, r)
+    return end
+
+
+def _shade(
+    rng: np.random.Generator, links: list[Link], at: Array, side: float, arm_angle: float, half: float, r: float
+) -> None:
+    """The last link: knuckle, stem and shade. It turns as far as its rim keeps clear of the arm."""
+    stem = rng.uniform(0.04, 0.06)
+    kind = str(rng.choice(["cone", "bell", "panel"], p=[0.45, 0.3, 0.25]))
+    if kind == "panel":
+        length, wide, deep = rng.uniform(0.16, 0.3), rng.uniform(0.016, 0.035), 0.012
+        outline = np.array([(0.6 * length, -0.003)])
+    else:
+        rim, neck = rng.uniform(0.05, 0.085), rng.uniform(0.018, 0.026)
+        deep = rng.uniform(0.09, 0.15)
+        share, level = (0.55, 0.7) if kind == "cone" else (0.9, 0.6)
+        outline = np.array([(neck, 0), (neck, 0.25 * deep), (neck + share * (rim - neck), level * deep), (rim, deep)])
+    # Seen from its knuckle the shade takes up this angle to either side; the arm takes some as well.
+    keep = float(arctan2(outline[:, 0], stem + outline[:, 1]).max()) + arcsin(min((r + 0.003) / stem, 1.0)) + 0.05
+    # Down and forward, measured from the arm.
+    room = max((np.deg2rad(rng.uniform(-180, -140)) - arm_angle - np.pi) % (2.0 * np.pi), keep + 0.1)
+    along = _lean(arm_angle + np.pi + room)
+
+    solid = cylinder(at - half * SIDE, at + half * SIDE, r, sections=18)
+    solid += tube([at, at + (stem + 0.01) * along], 0.6 * half, 12)
+    start = at + stem * along
+    if kind == "panel":
+        forward = np.cross(SIDE, along)
+        forward = -forward if forward[0] > 0 else forward
+        spots = [start + a * forward + b * SIDE + c * along for a in (-0.4 * length, 0.597 * length)
+                 for b in (-wide, wide) for c in (0.0, deep)]  # fmt: skip
+        solid += hull_of(*(ellipsoid(p, 0.003, 8) for p in spots))
+        guard = (start - 0.4 * length * forward, start + 0.6 * length * forward, wide + 0.004)
+    else:
+        solid += cylinder(start, start + 0.06 * deep * along, neck, sections=20)
+        for (r0, z0), (r1, z1) in pairwise(outline):
+            solid += revolved([(r0 - 0.0025, z0), (r0, z0), (r1, z1), (r1 - 0.0025, z1)], start, along, 18)
+        bulb = start + 0.6 * deep * along
+        solid += ellipsoid(bulb, 0.4 * rim, 14) + tube([start, bulb], 0.4 * neck, 10)
+        guard = (start, start + deep * along, rim)
+    lower, upper = -min(room - keep, 1.2), min(2.0 * np.pi - room - keep, 1.2)
+    hinge = at - side * (half + 0.5 * GAP) * SIDE
+    links.append(Link("shade", revolute(links[-1].name, SIDE, hinge, lower, max(upper, 0.05)), solid=solid))
+    links[-1].guard(*guard)
+
+
+def _parallel_rod(lamp: Assembly, links: list[Link], foot: Array, half: float, r: float) -> None:
+    """A rod beside the lower arm that follows it."""
+    k = next(k for k, link in enumerate(links) if link.name == "lower_arm")
+    joint = links[k].joint
+    assert joint is not None
+    start, end = links[k].capsules[-1][:3], links[k].capsules[-1][3:6]
+    tip = foot + 0.93 * (end - start)
+    solid = tube([foot, tip], 0.55 * half, 10)
+    for point in (foot, tip):
+        solid += cylinder(point - half * SIDE, point + half * SIDE, 0.7 * r, sections=16)
+    hinge = revolute(links[k - 1].name, SIDE, foot, joint.lower, joint.upper, mimic=("lower_arm", 1.0))
+    lamp.add("rod", solid, hinge, density=1200.0)

@@ -1,0 +1,322 @@
+"""Lighters: pocket lighters with a hinged lid, disposable ones, and long ones with a trigger.
+
+What varies: kind, size and cross-section; the spark wheel and the lever or button below the flame; the lid, its hinge
+and limits; slots and vents; the length and bend of a long lighter's nozzle, its trigger, safety switch and gas wheel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.common.elementary import arctan2, cos, sin
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, rounded_box, tube, union
+from artsim.model.kinematics import Array
+
+GAP = 0.0005
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A lighter that stands upright; what one presses or opens is towards -X at its top."""
+    kinds = (_pocket, _disposable, _long, _table)
+    return kinds[rng.choice(4, p=[0.36, 0.3, 0.22, 0.12])](rng)
+
+
+def _spark_wheel(center: Array, radius: float, half: float, notched: bool) -> Solid:
+    """A wheel about the Y axis, with a few teeth."""
+    y = np.array([0.0, 1.0, 0.0])
+    wheel = cylinder(center - half * y, center + half * y, radius, sections=18)
+    if notched:
+        for k in range(6):
+            tooth = box((-1.04 * radius, -0.9 * half, -0.12 * radius), (1.04 * radius, 0.9 * half, 0.12 * radius))
+            wheel += tooth.turned(y, np.pi * k / 6).moved(center)
+    return wheel
+
+
+def _fork(center: Array, inner: float, thick: float, low: float, radius: float) -> Solid:
+    """Two cheeks beside a wheel."""
+    cheeks = Solid()
+    for side in (-1, 1):
+        y0, y1 = sorted((side * inner, side * (inner + thick)))
+        cheeks += hull_of(
+            cylinder((center[0], y0, center[2]), (center[0], y1, center[2]), radius, sections=12),
+            box((center[0] - radius, y0, low), (center[0] + radius, y1, low + 0.001)),
+        )
+    return cheeks
+
+
+def _outline(rng: np.random.Generator, half_x: float, half_y: float) -> Array:
+    """(N, 2) cross-section: oval, rounded rectangle or with a round front."""
+    count = 20
+    power = rng.choice([2.0, rng.uniform(2.2, 4.0), rng.uniform(5.0, 12.0)])
+    angles = np.arange(count) * 2.0 * np.pi / count
+    c, s = cos(angles), sin(angles)
+    return np.column_stack(
+        [np.sign(c) * np.abs(c) ** (2.0 / power) * half_x, np.sign(s) * np.abs(s) ** (2.0 / power) * half_y]
+    )
+
+
+def _layers(outline: Array, levels: list[tuple[float, float]]) -> Solid:
+    """Loft of one outline, scaled, at several heights."""
+    return loft([np.column_stack([scale * outline, np.full(len(outline), z)]) for scale, z in levels])
+
+
+def _pocket(rng: np.random.Generator) -> Assembly:
+    """A case with a lid that swings over the chimney; the hinge is behind, at +X."""
+    half_x = rng.uniform(0.013, 0.03)
+    half_y = max(half_x * rng.uniform(0.25, 0.6), 0.0055)
+    height = rng.uniform(0.03, 0.055)
+    lid_tall = rng.uniform(0.014, 0.03)
+    wall = rng.uniform(0.0008, 0.0014)
+    corner = rng.uniform(0.1, 0.95) * half_y
+    body = rounded_box((-half_x, -half_y, 0), (half_x, half_y, height), corner, axis=2)
+    if rng.random() < 0.5:  # bevelled foot
+        body += rounded_box(
+            (-0.93 * half_x, -0.9 * half_y, -0.002), (0.93 * half_x, 0.9 * half_y, 0.001), corner, axis=2
+        )
+    # Insert: a chimney with the wick, and the wheel before it.
+    room_y, top = half_y - wall - 2 * GAP, height + lid_tall - wall - 2 * GAP
+    wheel_radius = min(rng.uniform(0.003, 0.0045), 0.28 * lid_tall, 0.22 * half_x)
+    wheel_half = 0.45 * room_y
+    wheel_center = np.array(
+        [-0.45 * half_x, 0.0, min(height + 0.35 * lid_tall + wheel_radius, top - 1.1 * wheel_radius)]
+    )
+    chimney_high = height + (lid_tall - wall) * rng.uniform(0.5, 0.85)
+    x0, x1 = wheel_center[0] + 1.25 * wheel_radius, 0.55 * half_x
+    body += frame((x0, -0.85 * room_y, height - 0.001), (x1, 0.85 * room_y, chimney_high), [wall] * 4, 0, 1)
+    body += cylinder(
+        ((x0 + x1) / 2, 0, height - 0.001), ((x0 + x1) / 2, 0, chimney_high - 0.003), 0.25 * room_y, sections=10
+    )
+    body += _fork(wheel_center, wheel_half + GAP, 0.3 * room_y, height - 0.001, 0.7 * wheel_radius)
+    lighter = Assembly()
+    hinge_x = half_x + 0.0012
+    low = height + GAP
+    knuckle = 0.0012
+    body += cylinder((hinge_x, -0.5 * half_y, height), (hinge_x, 0.5 * half_y, height), 0.8 * knuckle, sections=10)
+    body += box((half_x - 0.001, -0.45 * half_y, height - 0.004), (hinge_x, 0.45 * half_y, height - 0.0001))
+    lighter.add("body", body, density=4000.0)
+    # The lid is a cap with walls, open at the bottom.
+    lid = Solid()
+    outline = rounded_box((-half_x, -half_y, 0), (half_x, half_y, 1), corner, axis=2).union()[0]
+    plan = outline[outline[:, 2] > 0.5][:, :2]
+    plan = plan[np.argsort(arctan2(plan[:, 1], plan[:, 0]))]
+    shrink = 1.0 - wall / half_y * np.ones(2)
+    shrink[0] = 1.0 - wall / half_x
+    inside = plan * shrink
+    dome = rng.uniform(0.0, 0.4) * lid_tall if rng.random() < 0.4 else 0.0
+    high = height + lid_tall
+    for k in range(len(plan)):
+        corners = [np.append(o[k - j], z) for o in (plan, inside) for j in (0, 1) for z in (low, high - wall)]
+        lid += hull(corners)
+    lid += loft(
+        [
+            np.column_stack([plan, np.full(len(plan), high - wall - 0.0002)]),
+            np.column_stack([plan * (0.85 if dome else 0.97), np.full(len(plan), high + dome)]),
+        ]
+    )
+    for side in (-1, 1):
+        y0, y1 = sorted((side * 0.53 * half_y, side * 0.85 * half_y))
+        lid += cylinder((hinge_x, y0, height), (hinge_x, y1, height), knuckle, sections=10)
+        lid += box((half_x - 0.0005, y0, low), (hinge_x, y1, low + 0.004))
+    limit = rng.uniform(1.6, 2.6)
+    lighter.add("lid", lid, revolute("body", (0, 1, 0), (hinge_x, 0, height), 0.0, limit), density=7000.0)
+    if rng.random() < 0.85:
+        wheel = _spark_wheel(wheel_center, wheel_radius, wheel_half, True)
+        lighter.add("wheel", wheel, continuous("body", (0, 1, 0), wheel_center), density=7000.0)
+    return lighter
+
+
+def _disposable(rng: np.random.Generator) -> Assembly:
+    """A tank with a metal hood, a wheel and a lever or button under the thumb."""
+    half_x, half_y = rng.uniform(0.009, 0.017), rng.uniform(0.005, 0.0085)
+    height = rng.uniform(0.045, 0.085)
+    outline = _outline(rng, half_x, half_y)
+    waist = rng.uniform(0.85, 1.1)
+    body = _layers(outline, [(0.95, 0.0), (1.0, 0.002), (waist, 0.5 * height), (1.0, height)])
+    hood_tall = rng.uniform(0.009, 0.018)
+    back = 0.95 * half_x
+    front = -0.1 * half_x
+    thin = 0.0008
+    side = 0.86 * half_y
+    lighter = Assembly()
+    wheel_radius = rng.uniform(0.3, 0.45) * hood_tall
+    wheel_half = side - thin - 3 * GAP - 0.0008
+    electric = rng.random() < 0.35  # a button instead of wheel and lever
+    hood = box((front + 0.15 * half_x, -side, height - 0.001), (back * 0.96, -side + thin, height + hood_tall))
+    hood += hood.mirrored(1)
+    hood += box((back * 0.8, -side, height - 0.001), (back * 0.96, side, height + hood_tall * rng.uniform(0.6, 1.0)))
+    nozzle = 0.5 * half_x
+    hood += cylinder((nozzle, 0, height - 0.001), (nozzle, 0, height + 0.55 * hood_tall), 0.002, sections=10)
+    body += hood
+    if electric:
+        travel = rng.uniform(0.003, 0.006)
+        top = height + hood_tall * rng.uniform(0.7, 1.3) + travel
+        x0, x1 = -0.85 * half_x, front + 0.1 * half_x - 0.001
+        low = height + travel + GAP
+        wide = 0.6 * half_y
+        button = hull_of(
+            box((x0, -wide, low), (x1, wide, low + 0.001)),
+            rounded_box((x0 + rng.uniform(0, 0.3) * half_x, -wide, top - 0.003), (x1, wide, top), 0.001),
+        )
+        lighter.add("body", body, density=1100.0)
+        lighter.add(
+            "button", button, prismatic("body", (0, 0, -1), 0.0, travel, (0.5 * (x0 + x1), 0, top)), density=1100.0
+        )
+        return lighter
+    center = np.array([front - 0.15 * half_x - 0.001, 0.0, height + hood_tall - 0.35 * wheel_radius])
+    cheek = 0.0008
+    body += _fork(center, wheel_half + GAP, cheek, height - 0.001, 0.5 * wheel_radius)
+    lighter.add("body", body, density=1100.0)
+    discs = rng.random() < 0.6  # toothed discs at either side of a narrower wheel
+    wheel = _spark_wheel(center, wheel_radius * (0.85 if discs else 1.0), wheel_half, not discs)
+    if discs:
+        for s in (-1, 1):
+            a, b = center + (0, s * 0.5 * wheel_half, 0), center + (0, s * wheel_half, 0)
+            wheel += cylinder(a, b, wheel_radius, sections=16)
+    lighter.add("wheel", wheel, continuous("body", (0, 1, 0), center), density=4000.0)
+    # The lever lies before the wheel, below the thumb.
+    under = center[2] - wheel_radius - 2 * GAP
+    end = center[0] - wheel_radius * 1.04 - GAP
+    reach = -half_x - rng.uniform(0.0, 0.35) * half_x
+    if under - height < 0.0025 or end - reach < 0.004:
+        return lighter
+    thick = rng.uniform(0.0012, 0.002)
+    wide = 0.8 * half_y
+    travel = 0.5 * (under - height - thick)
+    if rng.random() < 0.5:
+        low = height + travel + GAP
+        lever = rounded_box((reach, -wide, low), (end, wide, low + thick), 0.0005)
+        lever += rounded_box((reach, -wide, low), (0.5 * (reach + end), wide, min(low + 2 * thick, center[2])), 0.0005)
+        joint = prismatic("body", (0, 0, -1), 0.0, travel, (reach, 0, low))
+    else:
+        low = under - thick - GAP
+        lever = rounded_box((reach, -wide, low), (end, wide, low + thick), 0.0005)
+        length = end - reach
+        turn = 0.8 * float(arctan2(low - height - GAP, length))
+        joint = revolute("body", (0, -1, 0), (end, 0, low + 0.5 * thick), 0.0, max(turn, 0.03))
+    lighter.add("lever", lever, joint, density=1100.0)
+    return lighter
+
+
+def _long(rng: np.random.Generator) -> Assembly:
+    """A handle with a trigger and a long nozzle that points up; it may be bent."""
+    handle, nozzle = rng.uniform(0.08, 0.14), rng.uniform(0.06, 0.2)
+    half_x, half_y = rng.uniform(0.01, 0.02), rng.uniform(0.006, 0.011)
+    outline = _outline(rng, half_x, half_y)
+    waist = rng.uniform(0.75, 1.1)
+    slot_low, slot_high = 0.55 * handle, 0.55 * handle + min(rng.uniform(0.02, 0.034), 0.35 * handle)
+    depth = rng.uniform(0.4, 0.7) * half_x
+    body = _layers(outline, [(0.8, 0.0), (1.0, 0.1 * handle), (waist, 0.35 * handle), (1.0, slot_low)])
+    neck = rng.uniform(0.5, 0.9)
+    body += _layers(outline, [(1.0, slot_high), (neck, handle)])
+    back = box(
+        (-half_x + depth + 0.004, -0.55 * half_y, slot_low - 0.001), (0.9 * half_x, 0.55 * half_y, slot_high + 0.001)
+    )
+    body += back
+    guard = rng.random() < 0.4
+    out = rng.uniform(0.004, 0.01)
+    if guard:
+        bow = [
+            (-0.8 * half_x, 0, slot_low - 0.006),
+            (-half_x - out - 0.008, 0, slot_low - 0.002),
+            (-half_x - out - 0.01, 0, slot_high + 0.002),
+            (-0.75 * half_x, 0, slot_high + 0.01),
+        ]
+        body += tube(bow, 0.002, 10)
+    radius = min(neck * half_x, neck * half_y, rng.uniform(0.0035, 0.006))
+    lean = rng.uniform(0.0, 0.5) * rng.choice([0.0, 1.0])
+    path = np.array(
+        [
+            [0, 0, slot_high + 0.002],
+            [0, 0, handle + 0.3 * nozzle],
+            [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle],
+        ]
+    )
+    body += tube(path, radius, 14)
+    tip = path[2] - path[1]
+    end = path[2] - 0.1 * tip
+    body += cylinder(end, path[2] + 0.02 * tip, 1.25 * radius, sections=14)
+    if rng.random() < 0.3:  # a ring to hang it up
+        body += ring((0, 0, -0.006), (0, 1, 0), 0.004, 0.0065, 0.003, 16)
+    lighter = Assembly()
+    lighter.add("body", body, density=1100.0)
+    wide = 0.5 * half_y
+    travel = min(depth * 0.5, out * 0.9)
+    z0, z1 = slot_low + GAP, slot_high - GAP
+    if rng.random() < 0.55:
+        trigger = box((-half_x - 0.2 * out, -wide, z0), (-half_x + depth - travel, wide, z1))
+        trigger += hull_of(
+            box((-half_x, -wide, z0), (-half_x + 0.001, wide, z1)),
+            box((-half_x - out, -wide, z0 + 0.3 * (z1 - z0)), (-half_x, wide, z1 - rng.uniform(0, 0.3) * (z1 - z0))),
+        )
+        joint = prismatic("body", (1, 0, 0), 0.0, travel, (-half_x - out, 0, 0.5 * (z0 + z1)))
+    else:
+        pivot = np.array([-half_x + 0.35 * depth, 0.0, z1 - 0.003])
+        long = z1 - z0 - 0.004
+        trigger = cylinder(pivot - (0, wide, 0), pivot + (0, wide, 0), 0.0024, sections=12)
+        trigger += hull_of(
+            box(pivot - (0.0024, wide, 0.001), pivot + (0.001, wide, 0)),
+            box((-half_x - out, -wide, z0 + 0.0015), (-half_x - out + 0.004, wide, z0 + 0.3 * long)),
+        )
+        turn = min(0.7 * travel / long, 0.5)
+        joint = revolute("body", (0, -1, 0), pivot, 0.0, max(turn, 0.05))
+    lighter.add("trigger", trigger, joint, density=1100.0)
+    if rng.random() < 0.55:  # a safety catch on the back, which slides
+        z = rng.uniform(slot_high + 0.01, handle - 0.012) if handle - slot_high > 0.026 else 0.3 * handle
+        share = float(np.interp(z, [0.1 * handle, 0.35 * handle, slot_low, slot_high, handle], [1, waist, 1, 1, neck]))
+        x = max(share, 0.0) * half_x + 0.0025
+        catch = rounded_box((x, -0.4 * half_y, z - 0.004), (x + 0.003, 0.4 * half_y, z + 0.004), 0.001)
+        lighter.add("switch", catch, prismatic("body", (0, 0, 1), 0.0, 0.005, (x, 0, z)), density=1100.0)
+    return lighter
+
+
+def _table(rng: np.random.Generator) -> Assembly:
+    """A torch or a table lighter: a stout body with a button on top and sometimes a flap over the flame."""
+    half_x, half_y = rng.uniform(0.012, 0.028), rng.uniform(0.01, 0.024)
+    height = rng.uniform(0.03, 0.1)
+    outline = _outline(rng, half_x, half_y)
+    foot = rng.uniform(0.85, 1.35)
+    body = _layers(outline, [(foot, 0.0), (foot, 0.004), (rng.uniform(0.75, 1.0), 0.3 * height), (1.0, height)])
+    flap_tall = rng.uniform(0.005, 0.012)
+    split = rng.uniform(-0.25, 0.15) * half_x
+    travel = rng.uniform(0.003, 0.006)
+    lighter = Assembly()
+    wide, hinge_x = 0.75 * half_y, 0.78 * half_x
+    flame = 0.5 * (split + hinge_x)
+    burner = min(0.22 * half_y, 0.5 * (hinge_x - split) - 0.0035)  # before the flap's tongue
+    body += cylinder((flame, 0, height - 0.001), (flame, 0, height + 0.5 * flap_tall), burner, sections=12)
+    low = height + travel + GAP
+    top = low + rng.uniform(0.004, 0.014)
+    button = rounded_box(
+        (-0.8 * half_x, -0.7 * wide, low), (split - 2 * GAP - 0.001, 0.7 * wide, top), rng.uniform(0.001, 0.004)
+    )
+    thin = 0.0012
+    if rng.random() < 0.7:
+        at = height + 0.0016
+        body += union(
+            box(
+                (hinge_x - 0.0012, s * 0.5 * wide - 0.0015, height - 0.001),
+                (hinge_x + 0.0012, s * 0.5 * wide + 0.0015, at - 0.0004),
+            )
+            for s in (-1, 1)
+        )
+        base = at + GAP
+        flap = frame((split, -wide, base), (hinge_x - 0.0015, wide, base + flap_tall), [thin] * 4, 0, 1)
+        flap += box((split, -wide, base + flap_tall - thin), (hinge_x - 0.0015, wide, base + flap_tall))
+        flap += box((hinge_x - 0.003, -0.3 * wide, base), (hinge_x + 0.001, 0.3 * wide, base + 0.5 * flap_tall))
+        lighter.add("body", body, density=2500.0)
+        lighter.add(
+            "lid",
+            flap,
+            revolute("body", (0, 1, 0), (hinge_x + 0.001, 0, at + GAP), 0.0, rng.uniform(1.2, 1.9)),
+            density=2500.0,
+        )
+    else:
+        body += frame((split, -wide, height - 0.001), (hinge_x, wide, height + flap_tall), [thin] * 4, 0, 1)
+        lighter.add("body", body, density=2500.0)
+    lighter.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel, (-0.4 * half_x, 0, top)), density=1500.0)
+    if rng.random() < 0.35:  # a wheel below for the gas
+        radius = 0.4 * half_y
+        wheel = cylinder((0, 0, -0.003 - GAP), (0, 0, -GAP), radius, 0.9 * radius, 16)
+        lighter.add("dial", wheel, continuous("body", (0, 0, 1), (0, 0, 0)), density=1500.0)
+    return lighter

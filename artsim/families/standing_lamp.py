@@ -1,0 +1,180 @@
+"""Lamps on a pole or a body, from table lamps to floor lamps, with what switches them; spotlights in a yoke.
+
+What varies: height, foot (disc, square, three legs, vase), pole, shade (cone, drum, square, ball), whether the shade
+turns or the pole slides, switches (pull chain, button, dial); of spotlights the mount, the yoke, the head, its flaps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from artsim.common.elementary import cos, sin
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube, union, vessel
+
+GAP = 0.002
+UP = (0.0, 0.0, 1.0)
+SIDE = (0.0, 1.0, 0.0)
+
+
+def standing(rng: np.random.Generator) -> Assembly:
+    """A shade on top of a pole or a body."""
+    height = rng.uniform(0.22, 0.6) if rng.random() < 0.55 else rng.uniform(0.9, 1.7)
+    radius = rng.uniform(0.006, 0.014) * (1.0 if height < 0.7 else 1.4)
+    wide = rng.uniform(0.06, 0.12) * (1.0 if height < 0.7 else 1.5)
+    foot = str(rng.choice(["disc", "square", "legs", "vase"], p=[0.35, 0.2, 0.25, 0.2]))
+    thick = rng.uniform(0.012, 0.03)
+    base, floor = _foot(rng, foot, wide, thick, height, radius)
+    lamp = Assembly()
+    slides = foot in ("disc", "square") and rng.random() < 0.35
+    parent = "base"
+    travel = 0.0
+    if slides:
+        sleeve, bore = rng.uniform(0.4, 0.6) * height, 0.6 * radius
+        base += ring((0, 0, 0.5 * (floor + sleeve)), UP, bore + 0.001, radius + 0.002, sleeve - floor + 0.01, 12)
+        travel = rng.uniform(0.4, 0.8) * (sleeve - floor)
+        pole = cylinder((0, 0, sleeve - travel - 0.02), (0, 0, height), bore, sections=12)
+    else:
+        base += cylinder((0, 0, floor - 0.004), (0, 0, height), radius, sections=14)
+    button = rng.random() < 0.35 and foot in ("disc", "square")
+    lamp.add("base", base, density=2500.0)
+    if slides:
+        lamp.add("pole", pole, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)), density=2500.0)
+        parent = "pole"
+    rim = rng.uniform(0.08, 0.19) * (1.0 if height < 0.7 else 1.4)
+    tall = rim * rng.uniform(0.8, 1.9)
+    kind = str(rng.choice(["cone", "drum", "square", "ball"], p=[0.4, 0.25, 0.15, 0.2]))
+    tilts = rng.random() < 0.3
+    low = height + (0.035 if tilts else GAP)
+    shade = _shade(rng, kind, rim, tall, low)
+    if tilts:  # a knuckle at the head of the pole carries it
+        at = (0.0, 0.0, height + 0.015)
+        shade += cylinder((0, -0.006, at[2]), (0, 0.006, at[2]), 0.01, sections=14)
+        shade += box((-0.004, -0.004, at[2]), (0.004, 0.004, low + 0.004))
+        reach = rng.uniform(0.4, 1.0)
+        lamp.add("shade", shade, revolute(parent, SIDE, at, -reach, reach), density=500.0)
+    else:
+        joint = (
+            continuous(parent, UP, (0, 0, height))
+            if rng.random() < 0.7
+            else revolute(parent, UP, (0, 0, height), -1.57, 1.57)
+        )
+        lamp.add("shade", shade, joint, density=500.0)
+    if button:
+        size = rng.uniform(0.008, 0.014)
+        x = -0.62 * wide
+        top = thick + GAP
+        lamp.add(
+            "button",
+            cylinder((x, 0, top + 0.003), (x, 0, top + 0.008), size, sections=16),
+            prismatic("base", (0, 0, -1), 0.0, 0.003, (x, 0, top)),
+            density=900.0,
+        )
+    if rng.random() < 0.5 and not tilts and not slides:
+        _switch(rng, lamp, radius, height)
+    return lamp
+
+
+def _foot(
+    rng: np.random.Generator, kind: str, wide: float, thick: float, height: float, radius: float
+) -> tuple[Solid, float]:
+    """Solid, and the height at which the pole begins."""
+    if kind == "disc":
+        return cylinder((0, 0, 0), (0, 0, thick), wide, rng.uniform(0.8, 1.0) * wide, 36), thick
+    if kind == "square":
+        return rounded_box((-wide, -wide, 0), (wide, wide, thick), rng.uniform(0.05, 0.5) * wide, axis=2), thick
+    if kind == "legs":
+        head = rng.uniform(0.25, 0.75) * height
+        span = min(rng.uniform(0.25, 0.5) * height + 0.06, 0.4)
+        size = rng.uniform(0.006, 0.014)
+        angles = 2.0 * np.pi * (np.arange(3) + 0.5) / 3
+        legs = union(
+            tube([(span * cos(a), span * sin(a), size), (0.5 * radius * cos(a), 0.5 * radius * sin(a), head)], size, 10)
+            for a in angles.tolist()
+        )
+        return legs + cylinder((0, 0, head - 0.02), (0, 0, head + 0.02), 1.8 * radius + size, sections=16), head
+    top = rng.uniform(0.6, 0.85) * height
+    shares = np.linspace(0.0, 1.0, 8)
+    belly, waist = rng.uniform(0.5, 1.0) * wide, rng.uniform(0.2, 0.5) * wide
+    radii = waist + (belly - waist) * sin(np.pi * (0.15 + 0.85 * shares)) ** rng.uniform(0.7, 2.5)
+    radii[-1] = max(1.3 * radius, 0.3 * waist)
+    path = np.column_stack([np.zeros(8), np.zeros(8), shares * top])
+    return tube(path, radii.tolist(), 20), top
+
+
+def _shade(rng: np.random.Generator, kind: str, rim: float, tall: float, low: float) -> Solid:
+    """Open below, with a holder across its inside; it begins at ``low``."""
+    if kind == "ball":
+        return ellipsoid((0, 0, low + 0.8 * rim), (rim, rim, 0.8 * rim), 24)
+    sections = 4 if kind == "square" else 24
+    neck = rim * (rng.uniform(0.3, 0.75) if kind == "cone" else rng.uniform(0.85, 1.0))
+    wall = 0.0025
+    holder = low + rng.uniform(0.02, 0.25) * tall
+    shell = vessel([(rim, low), (neck, low + tall)], wall, (0.0, 0.0, 0.0), sections, floor=False)
+    width = (rim + (neck - rim) * (holder - low) / tall) * cos(np.pi / sections)
+    spokes = box((-width + 0.002, -0.003, holder), (width - 0.002, 0.003, holder + 0.004))
+    spokes += spokes.turned(UP, np.pi / 2)
+    if sections == 4:
+        spokes = spokes.turned(UP, np.pi / 4)
+    bulb = ellipsoid((0, 0, holder + 0.3 * tall), (0.2 * neck, 0.2 * neck, 0.22 * tall), 12)
+    return shell + spokes + bulb + cylinder((0, 0, low), (0, 0, holder + 0.25 * tall), 0.012, sections=14)
+
+
+def _switch(rng: np.random.Generator, lamp: Assembly, radius: float, height: float) -> None:
+    """A dial at the pole, or a chain below the shade."""
+    z = height - rng.uniform(0.03, 0.06)
+    if rng.random() < 0.5:
+        out = radius + GAP
+        dial = cylinder((-out, 0, z), (-out - 0.02, 0, z), 0.004, sections=10)
+        dial += cylinder((-out - 0.01, 0, z), (-out - 0.026, 0, z), 0.008, sections=8)
+        lamp.add("dial", dial, continuous("base", (-1, 0, 0), (-out, 0, z)), density=900.0)
+        return
+    x = -radius - 0.004
+    long = min(rng.uniform(0.04, 0.15), 0.3 * height)
+    chain = cylinder((x, 0, z), (x, 0, z - long), 0.0016, sections=8) + ellipsoid((x, 0, z - long), 0.0035, 10)
+    joint = prismatic("base", (0, 0, -1), 0.0, rng.uniform(0.01, 0.03), (x, 0, z))
+    lamp.add("chain", chain.moved((-0.004, 0, 0)), joint, density=900.0)
+
+
+def spotlight(rng: np.random.Generator) -> Assembly:
+    """A head that tips in a yoke, which turns on a mount."""
+    radius, long = rng.uniform(0.03, 0.09), rng.uniform(0.06, 0.2)
+    thick = 0.08 * radius + 0.002
+    reach = float(np.hypot(radius, 0.6 * long)) + 0.012
+    mount = str(rng.choice(["disc", "pole", "legs"]))
+    high = rng.uniform(0.01, 0.04) if mount == "disc" else rng.uniform(0.1, 1.1)
+    wide = radius * rng.uniform(1.0, 1.8)
+    base = cylinder((0, 0, 0), (0, 0, min(high, 0.02)), wide, 0.9 * wide, 32)
+    if mount == "legs":
+        base, _ = _foot(rng, "legs", wide, 0.02, high, 0.012)
+    if mount != "disc":
+        base += cylinder((0, 0, 0.01 if mount == "pole" else 0.2 * high), (0, 0, high), 0.011, sections=14)
+    lamp = Assembly()
+    lamp.add("base", base, density=2500.0)
+    low = high + GAP
+    center = np.array([0.0, 0.0, low + thick + reach])
+    half = radius + 0.006
+    yoke = box((-0.012, -half - thick, low), (0.012, half + thick, low + thick))
+    for s in (-1, 1):
+        a, b = sorted((s * half, s * (half + thick)))
+        yoke += hull_of(
+            box((-0.012, a, low), (0.012, b, low + thick)),
+            cylinder((0, a, center[2]), (0, b, center[2]), 0.012, sections=14),
+        )
+    lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)), density=2500.0)
+    # The front of the head looks to -X.
+    rim = radius * rng.uniform(0.75, 1.0)
+    back = radius * rng.uniform(0.3, 0.95)
+    start, end = np.array([-0.55 * long, 0, center[2]]), np.array([0.45 * long, 0, center[2]])
+    head = cylinder(start, center, 0.97 * rim, 0.97 * radius, 24) + cylinder(center, end, 0.97 * radius, back, 24)
+    head += ring(start, (1, 0, 0), 0.8 * rim, rim, 0.012, 24)
+    for s in (-1, 1):
+        a, b = sorted((s * 0.6 * radius, s * (half - 0.0015)))
+        head += cylinder((0, a, center[2]), (0, b, center[2]), 0.008, sections=12)
+    lower, upper = -rng.uniform(0.3, 1.3), rng.uniform(0.3, 1.5)
+    lamp.add("head", head, revolute("yoke", SIDE, center, lower, upper), density=1200.0)
+    if rng.random() < 0.4:
+        foot = np.array([0.0, half + thick + GAP, center[2]])
+        knob = cylinder(foot, foot + (0, 0.015, 0), 0.013, 0.011, 8)
+        lamp.add("knob", knob, continuous("yoke", SIDE, foot), density=1200.0)
+    return lamp

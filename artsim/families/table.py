@@ -1,0 +1,301 @@
+"""Tables and desks: drawers and doors under the top, and what else of a table moves.
+
+What varies: the kind (apron between legs, pedestals, a case on a stand, a column), size, tops (square, round, oval),
+legs, the grid of cells under the top and what they hold, cells at the back, leaves that drop, tops that turn, tip or
+rise, a tray for a keyboard, wheels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from artsim.common.elementary import cos, sin
+from artsim.families.fronts import Style
+from artsim.families.table_parts import GAP, Table, drop_leaves, four_legs, keyboard_tray, table_top, wheels
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
+
+UP = (0.0, 0.0, 1.0)
+
+
+def build(rng: np.random.Generator) -> Assembly:
+    """A table, all drawers and doors closed at rest."""
+    table = Table()
+    kinds = (_apron, _pedestals, _case, _column)
+    kinds[rng.choice(4, p=[0.36, 0.27, 0.25, 0.12])](rng, table)
+    assembly = Assembly()
+    assembly.add("body", table.body, density=650.0)
+    count: dict[str, int] = {}
+    for label, solid, joint in table.moving:
+        number = count[label] = count.get(label, -1) + 1
+        assembly.add(f"{label}_{number}", solid, joint, density=650.0)
+    return assembly
+
+
+def _style(rng: np.random.Generator) -> Style:
+    return Style(
+        face=0.0,
+        back=0.0,
+        board=rng.uniform(0.012, 0.024),
+        lap=1.0,
+        place=float(rng.choice([0.5, 0.7, 0.85])),
+        level=rng.random() < 0.2,
+        thickness=rng.uniform(0.014, 0.022),
+        overlay=rng.random() < 0.5,
+        panel=str(rng.choice(["slab", "shaker", "raised", "planks", "glass"], p=[0.62, 0.15, 0.15, 0.04, 0.04])),
+        rail=rng.uniform(0.025, 0.06),
+        recess=rng.uniform(0.004, 0.008),
+        handle=str(rng.choice(["bar", "bow", "knob", "block", "cup", "none"], p=[0.24, 0.15, 0.25, 0.05, 0.05, 0.26])),
+        handle_length=rng.uniform(0.06, 0.4),
+        reach=rng.uniform(0.014, 0.04),
+        grip=rng.uniform(0.004, 0.008),
+        travel=rng.triangular(0.45, 0.8, 0.92),
+    )
+
+
+def _apron(rng: np.random.Generator, table: Table) -> None:
+    """Legs with a low case between them under the top; leaves at the ends, a shelf below, wheels."""
+    height = rng.uniform(0.32, 0.95)
+    width, depth = height * rng.uniform(0.65, 3.4), height * rng.uniform(0.4, 1.7)
+    depth = float(np.clip(depth, 0.3, 1.1))
+    width = float(np.clip(width, 0.34, 2.4))
+    thick, over = rng.uniform(0.014, 0.06), rng.uniform(0.0, 0.06)
+    size = height * rng.uniform(0.04, 0.12)
+    size = min(size, 0.2 * depth, 0.15 * width)
+    over = min(over, 0.12 * depth)
+    top = height - thick
+    x, y = depth / 2 - over, width / 2 - over
+    apron = min(max(height * rng.uniform(0.12, 0.32), 0.09), 0.5 * height)
+    rolling = rng.random() < 0.12
+    foot = 0.07 if rolling else 0.0
+    table.body += table_top(rng, depth, width, top, height)
+    table.body += four_legs(rng, x, y, foot, top + 0.001, size, splay=rng.random() < 0.2)
+    style = _style(rng)
+    inset = 0.25 * size
+    both = rng.random() < 0.12 and 2 * x > 0.5
+    rear = not both and rng.random() < 0.1
+    deep = (0.47 if both else rng.uniform(0.6, 1.0)) * (2 * x - 2 * inset)
+    half = y - 0.5 * size
+    low = np.array([-x + inset, -half, top - apron])
+    high = np.array([-x + inset + deep, half, top + 0.001])
+    grid = int(rng.choice([1, 2, 3, 4], p=[0.45, 0.25, 0.2, 0.1])), 1 if apron < 0.22 else int(rng.integers(1, 3))
+    # The fronts lie between the legs.
+    style = replace(style, overlay=style.overlay and inset > 0.02)
+    low[1], high[1] = -(y - size) + 0.001, y - size - 0.001
+    if high[1] - low[1] < 0.2:
+        low[1], high[1] = -0.1, 0.1
+    for back in (False, True):
+        if both or back == rear:
+            table.add_case(rng, low, high, style, grid, 0.25, back)
+    rail = min(0.008, 0.4 * size)
+    for s in (-1, 1):  # rails into the legs, beside and behind the case
+        table.body += (
+            box((s * (x - inset) - 0.008, -half, top - apron), (s * (x - inset) + 0.008, half, top + 0.001))
+            if (s > 0 and not both and not rear) or (s < 0 and rear)
+            else Solid()
+        )
+        table.body += box(
+            (-x + 0.5 * size, s * half - rail, top - apron), (x - 0.5 * size, s * half + rail, top + 0.001)
+        )
+        for near in (-x + inset, x - inset - 0.012):
+            a, b = sorted((s * (high[1] - 0.002), s * half))
+            table.body += box((near, a, top - apron), (near + 0.012, b, top + 0.001))
+    if rng.random() < 0.25:
+        z = foot + rng.uniform(0.1, 0.4) * (top - apron - foot)
+        table.body += box((-x + 0.3 * size, -y + 0.3 * size, z), (x - 0.3 * size, y - 0.3 * size, z + 0.018))
+    if rng.random() < 0.1:
+        drop_leaves(rng, table, depth, width, top, height)
+    if rolling:
+        wheels(table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size)
+
+
+def _pedestals(rng: np.random.Generator, table: Table) -> None:
+    """A desk: cases at one or both ends, legs or a panel elsewhere, a flat case or a tray between."""
+    height = rng.uniform(0.62, 0.85)
+    width, depth = height * rng.uniform(1.3, 3.4), height * rng.uniform(0.5, 1.4)
+    thick, over = rng.uniform(0.016, 0.05), rng.uniform(0.0, 0.05)
+    top, x, y = height - thick, depth / 2 - over, width / 2 - over
+    table.body += table_top(rng, depth, width, top, height)
+    style = _style(rng)
+    broad = min(rng.uniform(0.26, 0.5), 0.38 * width)
+    sides = [(-1,), (1,), (-1, 1)][rng.choice(3, p=[0.3, 0.3, 0.4])]
+    rolling = rng.random() < 0.1
+    on_legs = not rolling and rng.random() < 0.35
+    size = rng.uniform(0.03, 0.06)
+    outer = y - (size if on_legs else 0.0)
+    panel = 0.001
+    low_z = (
+        rng.uniform(0.1, 0.5) * height if on_legs else 0.07 if rolling else rng.choice([0.0, rng.uniform(0.03, 0.12)])
+    )
+    deep = rng.uniform(0.75, 1.0) * 2 * x
+    recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
+    doors = float(rng.choice([0.0, 0.4, 1.0], p=[0.45, 0.3, 0.25]))
+    overhang = style.thickness + 0.004 if style.overlay else 0.0
+    front = -x + overhang
+    for side in sides:
+        a, b = sorted((side * outer, side * (outer - broad)))
+        draw = np.random.default_rng(recipe) if alike else rng
+        table.add_case(
+            draw,
+            np.array([front, a, low_z]),
+            np.array([front + deep - overhang, b, top + 0.001]),
+            style,
+            (1, int(draw.integers(1, 5))),
+            doors,
+            free=(side < 0 and not on_legs, side > 0 and not on_legs),
+        )
+        if not on_legs and not rolling and low_z > 0:
+            table.body += box((front + 0.03, a + 0.01, 0.0), (front + deep - overhang - 0.02, b - 0.01, low_z + 0.001))
+        if rolling:
+            spots = [(u, v) for u in (front + 0.05, front + deep - overhang - 0.05) for v in (a + 0.05, b - 0.05)]
+            wheels(table, spots, low_z, 0.05)
+    if on_legs:
+        table.body += four_legs(rng, x, y, 0.0, top + 0.001, size, splay=False)
+    elif len(sides) == 1:
+        panel = rng.uniform(0.02, 0.05)
+        a, b = sorted((-sides[0] * y, -sides[0] * (y - panel)))
+        table.body += box((-x + overhang, a, 0.0), (x, b, top + 0.001))
+    near = -outer + (broad if -1 in sides else panel) - 0.001
+    far = outer - (broad if 1 in sides else panel) + 0.001
+    table.body += box(
+        (front + deep - overhang - 0.03, near, top - rng.uniform(0.2, 0.8) * (top - low_z)),
+        (front + deep - overhang - 0.012, far, top + 0.001),
+    )
+    between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
+    if between == "case":
+        flat = rng.uniform(0.085, 0.14)
+        table.add_case(
+            rng,
+            np.array([front, near, top - flat]),
+            np.array([front + 0.8 * deep - 0.04, far, top + 0.001]),
+            style,
+            (int(rng.integers(1, 4)), 1),
+            0.0,
+        )
+    elif between == "tray":
+        keyboard_tray(rng, table, front, near, far, top, 0.6 * deep)
+    if rng.random() < 0.15:  # shelves on the top
+        rise, back = rng.uniform(0.2, 0.5), x - rng.uniform(0.18, 0.3)
+        for yy in (-y, y - 0.02):
+            table.body += box((back, yy, height - 0.001), (x, yy + 0.02, height + rise))
+        table.body += box((back, -y, height + rise - 0.02), (x, y, height + rise))
+
+
+def _case(rng: np.random.Generator, table: Table) -> None:
+    """A low table or a console: one case from side to side on legs, a plinth or wheels."""
+    height = rng.uniform(0.3, 0.95)
+    width, depth = height * rng.uniform(0.6, 3.2), height * rng.uniform(0.4, 1.6)
+    depth = float(np.clip(depth, 0.28, 0.9))
+    width = max(width, 0.34)
+    thick, over = rng.uniform(0.012, 0.05), rng.uniform(0.0, 0.05)
+    top, x, y = height - thick, depth / 2 - min(over, 0.1 * depth), width / 2 - over
+    style = _style(rng)
+    stand = str(rng.choice(["legs", "plinth", "wheels"], p=[0.55, 0.3, 0.15]))
+    low = {"legs": rng.uniform(0.12, 0.65), "plinth": rng.uniform(0.03, 0.2)}.get(stand, 0.0) * height
+    low = 0.07 if stand == "wheels" else min(low, top - 0.12)
+    ahead = style.thickness + 0.004 if style.overlay else 0.0
+    table.body += table_top(rng, depth, width, top, height)
+    rows = int(rng.integers(1, 4))
+    columns = max(1, min(4, int(width / rng.uniform(0.3, 0.7))))
+    both = rng.random() < 0.1 and depth > 0.5
+    end = -0.002 if both else x
+    for back in (False, True):
+        if both or not back:
+            table.add_case(
+                rng,
+                np.array([-x + ahead, -y, low]),
+                np.array([end, y, top + 0.001]),
+                style,
+                (columns, rows),
+                float(rng.choice([0.0, 0.5, 1.0])),
+                back,
+                free=(True, True),
+            )
+    size = rng.uniform(0.02, 0.05)
+    if stand == "legs":
+        table.body += four_legs(rng, x - ahead, y, 0.0, low + 0.002, size, splay=rng.random() < 0.3)
+    elif stand == "plinth":
+        inset = rng.uniform(0.01, 0.06)
+        table.body += box((-x + ahead + inset, -y + inset, 0.0), (x - inset, y - inset, low + 0.001))
+    else:
+        wheels(table, [(sx * (x - 0.06), sy * (y - 0.06)) for sx in (-1, 1) for sy in (-1, 1)], low, 0.05)
+
+
+def _column(rng: np.random.Generator, table: Table) -> None:
+    """A top on a column that turns, tips or rises, on feet, a disc or wheels."""
+    height, wide = rng.uniform(0.45, 1.1), rng.uniform(0.22, 0.6)
+    thick = rng.uniform(0.015, 0.05)
+    power = float(rng.choice([2.0, 4.0, 12.0]))
+    count = 32
+    angles = np.arange(count) * 2.0 * np.pi / count
+    c, s = cos(angles), sin(angles)
+    long = wide * rng.choice([1.0, rng.uniform(1.0, 2.2)])
+    outline = np.column_stack(
+        [np.sign(c) * np.abs(c) ** (2.0 / power) * wide, np.sign(s) * np.abs(s) ** (2.0 / power) * long]
+    )
+
+    def slab(z: float) -> Solid:
+        rings = [
+            np.column_stack([k * outline, np.full(count, h)])
+            for k, h in ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))
+        ]
+        return loft(rings)
+
+    radius = rng.uniform(0.022, 0.06)
+    feet = int(rng.choice([0, 3, 4, 5]))
+    rolling = feet > 2 and rng.random() < 0.4
+    foot = 0.06 if rolling else 0.0
+    span = wide * rng.uniform(0.55, 0.9)
+    base = Solid()
+    low = foot + 0.05
+    spots = []
+    for k in range(feet):
+        angle = 2.0 * np.pi * (k + 0.5) / feet
+        leg = hull_of(
+            box((0, -0.6 * radius, low), (0.01, 0.6 * radius, low + rng.uniform(0.05, 0.15))),
+            box((span - 0.02, -0.02, foot), (span + 0.015, 0.02, foot + 0.03)),
+        )
+        base += leg.turned(UP, angle)
+        spots.append((span * cos(angle), span * sin(angle)))
+    if not feet:
+        base += cylinder((0, 0, 0), (0, 0, 0.02), span, 0.9 * span, 32) + cylinder(
+            (0, 0, 0.02), (0, 0, 0.06), 2 * radius, radius, 24
+        )
+    kind = str(rng.choice(["turning", "tipping", "rising"]))
+    top = height - thick
+    if kind == "rising":
+        sleeve = 0.62 * top
+        inner = 0.7 * radius
+        base += ring((0, 0, 0.5 * (low + sleeve)), UP, inner + GAP, radius + GAP, sleeve - low, 16)
+        base += cylinder((0, 0, foot + 0.01), (0, 0, low + 0.01), radius + GAP)
+        travel = rng.uniform(0.3, 0.6) * (sleeve - low)
+        rod = cylinder((0, 0, sleeve - travel - 0.05), (0, 0, top + 0.002), inner, sections=16)
+        table.moving.append(("top", rod + slab(top), prismatic("body", UP, 0.0, travel, (0, 0, top))))
+    elif kind == "turning":
+        base += cylinder((0, 0, foot + 0.01), (0, 0, top - GAP), radius)
+        base += cylinder((0, 0, top - 0.02 - GAP), (0, 0, top - GAP), min(3 * radius, 0.5 * wide))
+        joint = (
+            continuous("body", UP, (0, 0, top))
+            if rng.random() < 0.6
+            else revolute("body", UP, (0, 0, top), -1.57, 1.57)
+        )
+        table.moving.append(("top", slab(top), joint))
+    else:
+        base += cylinder((0, 0, foot + 0.01), (0, 0, top - 0.05), radius)
+        base += box((-radius, -radius, top - 0.06), (0.5 * radius, radius, top - 0.02))
+        hinge = (radius + 0.01, 0.0, top - 0.03)
+        lugs = union(
+            box(
+                (hinge[0] - 0.01, t * 1.3 * radius - 0.008, top - 0.04),
+                (hinge[0] + 0.01, t * 1.3 * radius + 0.008, top + 0.002),
+            )
+            for t in (-1, 1)
+        )
+        base += box((0.0, -1.1 * radius, top - 0.04), (hinge[0] + 0.005, 1.1 * radius, top - 0.025))
+        # Beyond the hinge's axis the top comes down before the column.
+        table.moving.append(("top", slab(top) + lugs, revolute("body", (0, 1, 0), hinge, 0.0, rng.uniform(0.5, 0.9))))
+    table.body += base
+    if rolling:
+        wheels(table, spots, foot, 0.03)

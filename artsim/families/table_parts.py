@@ -1,0 +1,217 @@
+"""Pieces of tables: tops, legs, cases with drawers and doors, leaves, trays, wheels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from artsim.families import fronts
+from artsim.families.fronts import Cell, Moving, Style
+from artsim.making.assembly import continuous, prismatic, revolute
+from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube
+from artsim.model.kinematics import Array
+
+GAP = 0.003
+
+
+@dataclass
+class Table:
+    """A body under construction, and what moves on it."""
+
+    body: Solid = field(default_factory=Solid)
+    moving: list[Moving] = field(default_factory=list)
+
+    def add_case(
+        self,
+        rng: np.random.Generator,
+        low: Array,
+        high: Array,
+        style: Style,
+        grid: tuple[int, int],
+        doors: float,
+        back: bool = False,
+        free: tuple[bool, bool] = (False, False),
+    ) -> None:
+        """A case, open towards -X, with a grid of cells.
+
+        Parameters
+        ----------
+        low, high : (3,) float
+            Outer corners.
+        grid : 2 int
+            Columns and rows.
+        doors : float
+            How likely a cell that is high enough has doors.
+        back : bool
+            Turns it to open towards +X, reflected in the plane x = 0.
+        free : 2 bool
+            Whether nothing stands beside it at -Y and +Y, so that doors there open beyond a right angle.
+        """
+        board = style.board
+        style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)
+        solid = box((style.back, low[1], low[2]), high)
+        for z in (low[2], high[2] - board):
+            solid += box((style.face, low[1], z), (high[0], high[1], z + board))
+        for y in (low[1], high[1] - board):
+            solid += box((style.face, y, low[2]), (high[0], y + board, high[2]))
+        whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
+                     (free[0], True), (free[1], True))  # fmt: skip
+        columns, boards = _divided(rng, whole, 0, grid[0], style)
+        solid += boards
+        recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
+        parts: list[Moving] = []
+        for column in columns:
+            draw = np.random.default_rng(recipe) if alike else rng
+            rows = grid[1] if alike else int(rng.integers(1, grid[1] + 1))
+            cells, boards = _divided(draw, column, 1, rows, style)
+            solid += boards
+            for cell in cells:
+                inside, more = _fill(draw, cell, style, doors, must_move=not parts)
+                solid += inside
+                parts += more
+        self.body += solid.mirrored(0) if back else solid
+        self.moving += [_mirrored(part) for part in parts] if back else parts
+
+
+def _divided(rng: np.random.Generator, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
+    """Cells side by side (axis 0) or one above the other (axis 1), and the boards between them."""
+    room = cell.sides[axis]
+    count = max(1, min(count, int(room / (0.16 if axis == 0 else 0.085))))
+    shares = np.ones(count) if rng.random() < 0.5 else rng.uniform(0.7, 1.5, count)
+    shares = np.maximum(shares / shares.sum(), 0.75 / count)  # the least still holds a drawer
+    edges = cell.low[axis] + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * room
+    half = style.board / 2
+    cells, boards = [], Solid()
+    for k in range(count):
+        first = edges[k] + (half if k else 0.0)
+        last = edges[k + 1] - (half if k < count - 1 else 0.0)
+        cells.append(cell.between(axis, float(first), float(last)))
+    for edge in edges[1:-1]:
+        low, high = np.array([style.face, *cell.low]) - 0.001, np.array([style.back, *cell.high]) + 0.001
+        low[0] = style.face
+        low[1 + axis], high[1 + axis] = edge - half, edge + half
+        boards += box(low, high)
+    return cells, boards
+
+
+def _fill(
+    rng: np.random.Generator, cell: Cell, style: Style, doors: float, must_move: bool
+) -> tuple[Solid, list[Moving]]:
+    """What a cell holds."""
+    width, height = cell.sides
+    if not must_move and rng.random() < 0.12:
+        return fronts.shelves(rng, cell, style) if rng.random() < 0.7 else fronts.fixed(cell, style)
+    if height > 0.2 and width > 0.16 and rng.random() < doors * (1.0 if height > 0.3 else 0.6):
+        if width > 0.42 and rng.random() < 0.75:
+            return (
+                fronts.double_door(rng, cell, style) if rng.random() < 0.85 else fronts.sliding_doors(rng, cell, style)
+            )
+        if width < 1.3 * height:
+            return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
+        return fronts.door(rng, cell, style, str(rng.choice(["bottom", "top"])))
+    if height > 0.5:
+        return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
+    return fronts.drawer(rng, cell, style)
+
+
+def _mirrored(part: Moving) -> Moving:
+    """Reflected in the plane x = 0: a slide turns about, a hinge turns the other way round."""
+    label, solid, joint = part
+    x, y, z = (float(v) for v in joint.axis)
+    axis = (-x, y, z) if joint.type == "prismatic" else (x, -y, -z)
+    origin = np.asarray(joint.origin, dtype=np.float64) * (-1.0, 1.0, 1.0)
+    return label, solid.mirrored(0), replace(joint, axis=axis, origin=tuple(origin.tolist()))
+
+
+def table_top(rng: np.random.Generator, depth: float, width: float, low: float, high: float) -> Solid:
+    """A board with round corners or round edges, from height ``low`` to ``high``."""
+    corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
+    if rng.random() < 0.25:
+        return rounded_box(*corners, rng.uniform(0.02, 0.12), axis=2)
+    return rounded_box(*corners, rng.choice([0.1, 0.3, 0.49]) * (high - low))
+
+
+def four_legs(rng: np.random.Generator, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
+    """Four legs within a rectangle: square, tapered, round, turned or a loop at either end."""
+    kind = str(rng.choice(["square", "tapered", "round", "turned", "loops"], p=[0.3, 0.22, 0.22, 0.13, 0.13]))
+    half, taper = size / 2, rng.uniform(0.4, 0.9)
+    tall = high - low
+    out = min(0.12 * tall, 0.2 * min(x, y)) if splay and kind in ("tapered", "round") else 0.0
+    solid = Solid()
+    if kind == "loops":
+        for s in (-1, 1):
+            a, b = sorted((s * y, s * (y - size)))
+            for u in (-x, x - size):
+                solid += box((u, a, low), (u + size, b, high))
+            solid += box((-x, a, low), (x, b, low + 0.7 * size))
+        return solid
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            head = np.array([sx * (x - half), sy * (y - half), high])
+            foot = head + (sx * out, sy * out, -tall)
+            if kind == "square":
+                solid += box(foot - (half, half, 0), head + (half, half, 0))
+            elif kind == "round":
+                solid += cylinder(foot, head, taper * half, half, 16)
+            elif kind == "tapered":
+                solid += (
+                    cylinder(foot, head, taper * half, 1.2 * half, 4)
+                    if out
+                    else hull_of(
+                        box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01)),
+                        box(head - (half, half, 0.25 * tall), head + (half, half, 0)),
+                    )
+                )
+            else:
+                levels = low + np.array([0.0, 0.05, 0.12, 0.5, 0.56, 0.62, 0.75, 1.0]) * tall
+                radii = half * np.array([0.55, 0.85, 0.5, 0.95, 0.6, 0.95, 1.0, 1.0])
+                path = np.column_stack([np.full(8, head[0]), np.full(8, head[1]), levels])
+                solid += tube(path, radii.tolist(), 10)
+    return solid
+
+
+def drop_leaves(rng: np.random.Generator, table: Table, depth: float, width: float, top: float, height: float) -> None:
+    """Leaves at one or both ends that hang down when they turn."""
+    long = rng.uniform(0.15, 0.4) * width
+    long = min(long, top - 0.05)
+    for side in (-1, 1)[: int(rng.integers(1, 3))]:
+        near, far = side * (width / 2 + GAP), side * (width / 2 + GAP + long)
+        leaf = rounded_box((-depth / 2, min(near, far), top), (depth / 2, max(near, far), height), 0.2 * (height - top))
+        joint = revolute("body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * rng.uniform(0.9, 1.0))
+        table.moving.append(("leaf", leaf, joint))
+
+
+def keyboard_tray(
+    rng: np.random.Generator, table: Table, front: float, near: float, far: float, top: float, deep: float
+) -> None:
+    """A board that slides out below the top between two rails."""
+    room = far - near
+    wide = room * rng.uniform(0.6, 0.96)
+    middle = 0.5 * (near + far)
+    y0, y1 = middle - 0.5 * wide, middle + 0.5 * wide
+    z = top - rng.uniform(0.07, 0.12)
+    for y in (y0 - 0.012, y1):
+        table.body += box((front + 0.01, y, z - 0.005), (front + deep, y + 0.012, top + 0.001))
+    board = rounded_box((front + 0.005, y0 + GAP, z), (front + deep, y1 - GAP, z + 0.018), 0.004)
+    table.moving.append(
+        ("drawer", board, prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z)))
+    )
+
+
+def wheels(table: Table, spots: list[tuple[float, float]], height: float, size: float) -> None:
+    """A wheel between two cheeks under each spot, which is ``height`` above the floor."""
+    radius = 0.42 * height
+    half, thick = 0.3 * radius, 0.004
+    for x, y in spots:
+        body = box(
+            (x - 0.5 * radius, y - half - thick - 0.002, height - 0.1 * radius),
+            (x + 0.5 * radius, y + half + thick + 0.002, height + 0.012),
+        )
+        for s in (-1, 1):
+            a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
+            body += box((x - 0.35 * radius, a, 0.7 * radius), (x + 0.35 * radius, b, height))
+        body += cylinder((x, y, height - 0.001), (x, y, height + 0.01), 0.4 * size, sections=12)
+        table.body += body
+        wheel = cylinder((x, y - half, radius), (x, y + half, radius), radius, sections=18)
+        table.moving.append(("wheel", wheel, continuous("body", (0, 1, 0), (x, y, radius))))
