@@ -1,4 +1,4 @@
-"""The program ``artsim``: generate, generate-objects, record, scene, view, inspect, verify, repair, doctor."""
+"""The program ``artsim``: generate, families, generate-objects, vary, record, scene, view, inspect, verify, repair, doctor."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from artsim.common.extras import import_failure, is_own_module
 from artsim.common.names import PrintableStream, printable
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artsim.families.constraints import Constraints
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
 from artsim.renderers import RendererName
@@ -30,6 +31,18 @@ _LISTED = 50
 def _cores() -> int:
     """Processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
+Having = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        metavar="NAME=VALUE",
+        help="What every procedural object must have: a number or a range of parts (doors=2 drawers=1..3), of joints "
+        "(joints=2..), of metres (size height width depth: size=0.4..0.8), joint types (joint_types=revolute), "
+        "handles and legs (handles=no).",
+    ),
+]
+"""Constraints of :func:`artsim.make`."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +67,7 @@ class Generate:
     """Procedural objects of each category."""
     first_object: int = 0
     """Seed of the first procedural object; the others count up from it."""
+    having: Having = ()
     objects: tuple[Path, ...] = ()
     """URDF files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
     num_samples: int = 1000
@@ -83,7 +97,9 @@ class Generate:
         from artsim.loading.sources import Source, family_sources, find_sources
 
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
-        sources += family_sources(_categories(self.categories), self.objects_per_category, self.first_object)
+        sources += family_sources(
+            _categories(self.categories), self.objects_per_category, self.first_object, _constraints(self.having)
+        )
         try:
             result = generate(
                 sources,
@@ -138,6 +154,7 @@ class GenerateObjects:
     """File formats: mobility.urdf, mobility.xml, mobility.usda."""
     seed: int = 0
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
+    having: Having = ()
     workers: int = field(default_factory=_cores)
     """Worker processes; by default one for each core."""
 
@@ -146,7 +163,13 @@ class GenerateObjects:
 
         try:
             result = generate_objects(
-                _categories(self.category), self.out, self.count, self.seed, self.formats, self.workers
+                _categories(self.category),
+                self.out,
+                self.count,
+                self.seed,
+                self.formats,
+                self.workers,
+                constraints=_constraints(self.having),
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")
@@ -276,6 +299,7 @@ class Gallery:
     """Objects of each category."""
     first_object: int = 0
     """Seed of the first object of each."""
+    having: Having = ()
     states: int = 3
     """Pictures of each object."""
     out: Path = Path("gallery.png")
@@ -286,9 +310,32 @@ class Gallery:
         from artsim.drawing.gallery import draw_gallery
         from artsim.loading.sources import family_sources
 
-        sources = family_sources(_categories(self.categories), self.objects, self.first_object)
+        sources = family_sources(
+            _categories(self.categories), self.objects, self.first_object, _constraints(self.having)
+        )
         write_atomic(self.out, draw_gallery([source.load() for source in sources], self.states))
         print(f"wrote {self.out}")
+
+
+@dataclass(frozen=True)
+class Families:
+    """Print what each procedural category is: parameters, joint types, numbers of parts, handles and legs.
+
+    Numbers and kinds are those seen over the first seeds. Any of them may be asked for with --having.
+
+    Example: artsim families storage_furniture
+    """
+
+    names: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Categories; by default all of them."""
+    objects: int = 20
+    """Objects of each that are looked at, seeds counting up from 0."""
+
+    def run(self) -> None:
+        from artsim.families.catalogue import describe_family
+
+        for name in _categories(self.names or ("all",)):
+            print(describe_family(name, self.objects))
 
 
 @dataclass(frozen=True)
@@ -398,9 +445,15 @@ def _categories(named: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(FAMILIES)) if "all" in named else named
 
 
+def _constraints(having: tuple[str, ...]) -> Constraints:
+    """Constraints out of texts."""
+    return Constraints.parse(having)
+
+
 Verb = (
     Annotated[Generate, tyro.conf.subcommand("generate")]
     | Annotated[Gallery, tyro.conf.subcommand("gallery")]
+    | Annotated[Families, tyro.conf.subcommand("families")]
     | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
     | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Scene, tyro.conf.subcommand("scene")]

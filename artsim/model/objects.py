@@ -153,6 +153,8 @@ class ArticulatedObject:
     source_joints : mapping
         For each joint of the source file: (part index, multiplier), so that the file's own joint value is
         ``multiplier * q[part]``. Screw parts list two file joints.
+    features : tuple of str
+        What the family of a procedural object records of it besides its parts: "handles", "legs".
     """
 
     object_id: str
@@ -165,6 +167,7 @@ class ArticulatedObject:
     repairs: tuple[Repair, ...] = ()
     source: str = ""
     source_joints: Mapping[str, tuple[int, float]] = None  # type: ignore[assignment]  # empty, set below
+    features: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.T_base_rest is None:
