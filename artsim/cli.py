@@ -17,7 +17,7 @@ import tyro
 from artsim.common.extras import import_failure, is_own_module
 from artsim.common.names import PrintableStream, printable
 from artsim.datasets.plan import SampleOptions
-from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError
 from artsim.families.constraints import Constraints
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
@@ -179,6 +179,46 @@ class GenerateObjects:
             return
         rate = result.made / result.seconds
         print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")
+
+
+@dataclass(frozen=True)
+class Vary:
+    """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
+
+    Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
+    a meta.json that says what was done. Stop it at any moment: the same command goes on where it stopped.
+
+    Example: artsim vary path/to/StorageFurniture/45162 --others path/to/StorageFurniture --count 20 --out out/varied
+    """
+
+    path: tyro.conf.Positional[Path]
+    """URDF file or its folder."""
+    out: Path
+    """Folder to write to; made if missing."""
+    count: int = 10
+    """Variations."""
+    seed: int = 0
+    """Seed of the first variation; the others count up from it."""
+    others: tuple[Path, ...] = ()
+    """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
+    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+
+    def run(self) -> None:
+        from artsim.variation.folder import write_variations
+
+        try:
+            summary = write_variations(self.path, self.out, self.count, self.seed, self.others, self.formats)
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole variations are kept in {self.out}: the same command goes on from there")
+            raise
+        for failure in summary.failed[:_LISTED]:
+            print(failure)
+        if len(summary.failed) > _LISTED:
+            print(f"... and {len(summary.failed) - _LISTED} more")
+        print(f"{summary.folder}: {summary.whole} variations of {self.path}\n{summary}")
+        if not summary.whole:
+            raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")
 
 
 @dataclass(frozen=True)
@@ -455,6 +495,7 @@ Verb = (
     | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     | Annotated[Families, tyro.conf.subcommand("families")]
     | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
+    | Annotated[Vary, tyro.conf.subcommand("vary")]
     | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Scene, tyro.conf.subcommand("scene")]
     | Annotated[View, tyro.conf.subcommand("view")]

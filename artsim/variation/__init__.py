@@ -28,7 +28,8 @@ def vary(obj: ArticulatedObject, seed: int = 0, others: Sequence[ArticulatedObje
     Returns
     -------
     ArticulatedObject
-        Passes every gate of :func:`artsim.checks.check` that ``obj`` passes.
+        Passes every gate of :func:`artsim.checks.check` that ``obj`` passes, and no two parts of it collide that do not
+        in ``obj``. Parts keep their names.
 
     Raises
     ------

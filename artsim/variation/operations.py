@@ -25,7 +25,7 @@ _WHOLE = 0.2
 """Standard deviation of the logarithm of the factors of the whole object's sides."""
 _RANGE, _RANGE_BOUNDS = 0.3, (0.4, 1.25)
 """Standard deviation of the logarithm of a joint's range, and between which factors it stays."""
-_LEAN, _SHIFT = np.deg2rad(1.5), 0.008
+_LEAN, _SHIFT = np.deg2rad(1.5), 0.004
 """Standard deviations of an axis's lean in radians, and of its shift in diagonals."""
 _HALF_TURN = np.pi + 1e-6
 """Axes of joints that turn farther stay: what is round about them would wobble."""

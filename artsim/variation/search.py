@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from artsim.checks.validity import check
 from artsim.errors import ArtsimError, AssetError, ConfigError
 from artsim.model.objects import ArticulatedObject, content_sha256
 from artsim.variation.geometry import centered
 from artsim.variation.operations import OPERATIONS
+from artsim.variation.standard import Standard
 
 DRAWS = 12
 """Draws at most for one variation."""
@@ -43,26 +43,21 @@ class Variation:
     gates: tuple[str, ...]
 
 
-def gates_passed(obj: ArticulatedObject) -> tuple[str, ...]:
-    """The gates of :func:`artsim.checks.check` that an object passes."""
-    return tuple(gate.name for gate in check(obj) if gate.passed)
-
-
 def draw_variation(
     obj: ArticulatedObject,
     seed: int = 0,
     others: Sequence[ArticulatedObject] = (),
-    gates: Collection[str] | None = None,
+    standard: Standard | None = None,
 ) -> Variation:
     """A variation with its record; see :func:`artsim.vary`.
 
     Parameters
     ----------
-    gates : collection of str, optional
-        Gates to pass, where they are known: those that the object passes.
+    standard : Standard, optional
+        That of the object, where it is known.
     """
     _check(obj, seed, others)
-    gates = gates_passed(obj) if gates is None else tuple(gates)
+    standard = standard or Standard.of(obj)
     rejected: list[str] = []
     for draw in range(DRAWS):
         rng = np.random.default_rng([int(obj.sha256[:16], 16), seed, draw])
@@ -70,9 +65,9 @@ def draw_variation(
         if not operations:
             continue
         made = _named(made, obj, seed, operations)
-        failed = [gate.name for gate in check(made, gates) if not gate.passed]
+        failed = standard.failed(made)
         if not failed:
-            return Variation(made, tuple(operations), tuple(rejected), gates)
+            return Variation(made, tuple(operations), tuple(rejected), standard.gates)
         rejected.append(failed[0])
     counts = ", ".join(f"{gate} {number} times" for gate, number in Counter(rejected).items())
     raise AssetError(
