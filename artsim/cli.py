@@ -203,12 +203,16 @@ class Vary:
     """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
     formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
     """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
         from artsim.variation.folder import write_variations
 
         try:
-            summary = write_variations(self.path, self.out, self.count, self.seed, self.others, self.formats)
+            summary = write_variations(
+                self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
+            )
         except KeyboardInterrupt:
             print(f"\nstopped; whole variations are kept in {self.out}: the same command goes on from there")
             raise

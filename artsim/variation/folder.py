@@ -10,7 +10,7 @@ import hashlib
 import os
 import shutil
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -35,10 +35,10 @@ from artsim.variation.search import Variation, draw_variation
 from artsim.variation.standard import Standard
 
 _MAX_META = 10_000_000
-_FILE_GATES = {
+_FILE_GATES: dict[str, Callable[[Path, Mapping[str, Path] | None], list[str]]] = {
     "strict URDF": strict_urdf,
     "convex collision geometry": convex_collision_geometry,
-    "inertia": strict_inertia,
+    "inertia": lambda path, package_roots: strict_inertia(path),
 }
 """Gates of a file that stand besides those of the object that it describes."""
 
@@ -109,6 +109,7 @@ def write_variations(
     seed: int = 0,
     others: Sequence[str | Path] = (),
     formats: Sequence[str] = ("urdf",),
+    package_roots: Mapping[str, Path] | None = None,
     progress: bool = True,
 ) -> VariationSummary:
     """Write variations of an object as files, or go on with a run that was stopped.
@@ -127,6 +128,8 @@ def write_variations(
         Objects of the same category, or folders of them, whose parts may be exchanged for the object's.
     formats : sequence of str
         Keys of ``artsim.export.FORMATS``.
+    package_roots : mapping, optional
+        As for :func:`artsim.load`.
     progress : bool
         Show progress.
 
@@ -146,10 +149,10 @@ def write_variations(
     if seed < 0:
         raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
     check_formats(formats)
-    obj, file_gates = load_with_bodies(path)
+    obj, file_gates = load_with_bodies(path, package_roots)
     if obj.is_rigid:
         raise AssetError("no joint can move: there is no articulated object to vary", path, "give it a moving joint")
-    donors = _load_others(obj, others)
+    donors = _load_others(obj, others, package_roots)
     standard = Standard.of(obj)
     folder = Path(out)
     summary = VariationSummary(folder, tuple(dict.fromkeys([*standard.gates, *file_gates])))
@@ -176,19 +179,21 @@ def write_variations(
     return summary
 
 
-def load_with_bodies(path: str | Path) -> tuple[ArticulatedObject, tuple[str, ...]]:
+def load_with_bodies(
+    path: str | Path, package_roots: Mapping[str, Path] | None = None
+) -> tuple[ArticulatedObject, tuple[str, ...]]:
     """An object with the bodies that its file describes, and the gates of a file that the file passes.
 
     Where the collision geometry or the inertia of the file fails its gate, parts have no body.
     """
-    obj = load(path)
+    obj = load(path, package_roots=package_roots)
     file = find_urdf(Path(path))
     if file.suffix == ".npz":
         return obj, ()
-    gates = tuple(name for name, gate in _FILE_GATES.items() if not gate(file))
+    gates = tuple(name for name, gate in _FILE_GATES.items() if not gate(file, package_roots))
     at_zero = not np.any(obj.tree.rest)
     if {"convex collision geometry", "inertia"} <= set(gates) and at_zero:
-        obj = read_bodies(obj, file)
+        obj = read_bodies(obj, file, package_roots)
     return obj, gates
 
 
@@ -213,11 +218,13 @@ def describe_variation(variation: Variation, origin: dict[str, Any], seed: int) 
     }
 
 
-def _load_others(obj: ArticulatedObject, paths: Sequence[str | Path]) -> list[ArticulatedObject]:
+def _load_others(
+    obj: ArticulatedObject, paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None
+) -> list[ArticulatedObject]:
     """Other objects of the category; those of other categories, and the object itself, are left out."""
     if not paths:
         return []
-    found = [load_with_bodies(source.path)[0] for source in find_sources(paths)]
+    found = [load_with_bodies(source.path, package_roots)[0] for source in find_sources(paths, package_roots)]
     donors = [other for other in found if other.category == obj.category and other.sha256 != obj.sha256]
     if not donors:
         raise AssetError(
@@ -257,7 +264,7 @@ def _write(
     folder, part = out / str(seed), out / f".{seed}.{os.getpid()}.part"
     try:
         write_variation(variation, part, formats, notes)
-        problems = [problem for name in file_gates for problem in _FILE_GATES[name](part)] if "urdf" in formats else []
+        problems = [problem for name in file_gates for problem in _FILE_GATES[name](part, None)] if "urdf" in formats else []
         if problems:
             raise AssetError(f"its file is not as strict as that of the original: {problems[0]}", f"variation {seed}")
         if folder.exists():  # of another version, or of other objects
