@@ -10,13 +10,13 @@ import numpy as np
 from lxml import etree
 
 from artsim.common.products import matmul
-from artsim.loading.bodies import RigidBody, join_screws, merge_fixed_links
+from artsim.loading.bodies import RigidBody, merge_fixed_links
 from artsim.loading.meshes import LoadLimits, MeshReader
 from artsim.loading.partnet import read_side_files
 from artsim.loading.urdf import find_urdf, read_urdf
 from artsim.loading.urdf_xml import parse_robot, safe_xml
 from artsim.model.kinematics import Array, transform_points
-from artsim.model.objects import ArticulatedObject, Body, Mesh, Part
+from artsim.model.objects import ArticulatedObject, Body, Mesh, Part, Repair
 
 
 def read_bodies(
@@ -51,8 +51,10 @@ def read_bodies(
         for visual in link.findall("visual"):
             link.remove(visual)
     side = read_side_files(file.parent)
-    robot, repairs = parse_robot(etree.tostring(root), file, limits.max_links, side.helpers)
-    bodies = join_screws(merge_fixed_links(robot, file, repairs), side.helpers, repairs)
+    repairs: list[Repair] = []
+    robot, _ = parse_robot(etree.tostring(root), file, limits.max_links, side.helpers)
+    bodies = merge_fixed_links(robot, file, repairs)
+    names = {part.name for part in obj.parts}
     shapes = {link.name: link.shapes for link in robot.links}
     reader = MeshReader(file.parent, dict(package_roots or {}), limits)
     T_rest_base = np.linalg.inv(obj.T_base_rest)
@@ -69,7 +71,10 @@ def read_bodies(
     def with_body(part: Part) -> Part:
         body = next(body for body in bodies if part.name in body.links)
         volume = float(trimesh.Trimesh(part.vertices, part.faces, process=False).volume)
-        mass = sum(masses[link] for link in body.links)
+        links = list(body.links)
+        if body.parent is not None and not names & set(body.parent.links):  # a screw's helper, which is one part with it
+            links += body.parent.links
+        mass = sum(masses[link] for link in links if link in masses)
         return replace(part, body=Body(tuple(pieces(body)), mass / volume))
 
     return replace(obj, parts=tuple(with_body(part) for part in obj.parts))

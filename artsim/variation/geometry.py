@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from manifold3d import Manifold
@@ -62,21 +63,27 @@ def stretched(obj: ArticulatedObject, axis: int, along: AxisMap) -> ArticulatedO
         moved[..., axis] = along(points[..., axis])
         return moved
 
-    def surface(mesh: Mesh) -> Mesh:
+    def cut(mesh: Mesh) -> Mesh:
         for knot in along.knots[1:-1]:
             mesh = cut_at(mesh, axis, float(knot))
-        return place(mesh[0]), mesh[1]
+        return mesh
 
-    def pieces(piece: Mesh) -> tuple[Mesh, ...]:
-        whole = surface(piece)
-        (points, faces) = place(piece[0]), piece[1]
-        if abs(_volume(points, faces) - _volume(*whole)) <= _EXACT * abs(_volume(*whole)):
-            return ((points, faces),)  # a box stays a box
-        coordinate = whole[0][:, axis]
-        slabs = np.concatenate([[-np.inf], along.goals[1:-1], [np.inf]])
-        inside = ((coordinate >= low) & (coordinate <= high) for low, high in zip(slabs[:-1], slabs[1:], strict=True))
-        hulls = (Manifold.hull_points(whole[0][chosen]) for chosen in inside if chosen.sum() > 3)
-        return tuple(_mesh(solid) for solid in hulls if not solid.is_empty())
+    def surface(mesh: Mesh) -> Mesh:
+        vertices, faces = cut(mesh)
+        return place(vertices), faces
+
+    def pieces(piece: Mesh) -> list[Mesh]:
+        vertices, faces = cut(piece)
+        whole = _volume(place(vertices), faces)
+        mapped = place(piece[0]), piece[1]
+        hull = Manifold.hull_points(place(vertices))
+        if max(abs(_volume(*mapped) - whole), abs(hull.volume() - whole)) <= _EXACT * abs(whole):
+            return [mapped]  # a box stays a box
+        coordinate, slack = vertices[:, axis], _ON_PLANE * float(np.ptp(vertices[:, axis]))
+        ends = np.concatenate([[-np.inf], along.knots[1:-1], [np.inf]])
+        slabs = [(coordinate >= a - slack) & (coordinate <= b + slack) for a, b in pairwise(ends)]
+        hulls = [Manifold.hull_points(place(vertices[slab])) for slab in slabs if slab.sum() > 3]
+        return [_mesh(solid) for solid in hulls if solid.volume() > _EXACT * abs(whole)]
 
     joints = [
         joint if k == 0 else replace(joint, origin=_triple(place(np.asarray(joint.origin))))
