@@ -1,4 +1,4 @@
-"""The program ``artsim``: generate, families, generate-objects, vary, record, scene, view, inspect, verify, repair, doctor."""
+"""The program ``artsim``: datasets, procedural objects, variations, motions and scenes; checks and pictures of them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Do variations of real objects hold what their originals hold? ``python -m benchmarks.variation``.
 
-Takes objects of ``ARTSIM_PARTNET_DIR``, categories in turn, and writes variations of each as ``artsim vary`` does, parts
-of the category's other objects at hand. Each file is loaded again and passed through the gates that the original
+Takes objects of ``ARTSIM_PARTNET_DIR``, categories in turn, and writes variations of each as ``artsim vary`` does, with
+parts of the category's other objects at hand. Each file is loaded again and passed through the gates that the original
 passes. The last line is one JSON object: the shares of variations that pass (``passed``) and that did so at the first
 draw (``first_draw``), and the numbers of different trees and topologies.
 """
@@ -66,20 +66,15 @@ def main(options: Options) -> None:
             total.rejected += summary.rejected
             total.trees |= summary.trees
             total.topologies |= {f"{name} {topology}" for topology in summary.topologies}
-    result = {
-        "objects": len(sources),
-        "variations": asked,
-        "passed": passed / max(1, asked),
-        "first_draw": total.first / max(1, asked),
-        "trees": len(total.trees),
-        "topologies": len(total.topologies),
-        "operations": dict(total.operations),
-        "rejected": dict(total.rejected),
-    }
-    print(f"\n{len(sources)} objects, {asked} variations: {100 * result['passed']:.1f} % pass the gates of their original, "
-          f"{100 * result['first_draw']:.1f} % at the first draw")  # fmt: skip
-    print(f"{result['trees']} different trees, {result['topologies']} topologies; {time.perf_counter() - start:.0f} s")
-    print(json.dumps(result))
+    shares = {"passed": passed / max(1, asked), "first_draw": total.first / max(1, asked)}
+    print(
+        f"\n{len(sources)} objects, {asked} variations: {100 * shares['passed']:.1f} % pass the gates of their "
+        f"original, {100 * shares['first_draw']:.1f} % at the first draw"
+    )
+    trees, topologies = len(total.trees), len(total.topologies)
+    print(f"{trees} different trees, {topologies} topologies; {time.perf_counter() - start:.0f} s")
+    counts = {"operations": dict(total.operations), "rejected": dict(total.rejected)}
+    print(json.dumps({"variations": asked, **shares, "trees": trees, "topologies": topologies, **counts}))
 
 
 def in_turn(sources: list[FileSource]) -> list[FileSource]:

@@ -23,7 +23,7 @@ from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.families import FAMILIES, make_constrained
-from artsim.families.constraints import Constraints
+from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 
 INDEX = "index.csv"
 _MAX_META = 1_000_000
@@ -48,7 +48,7 @@ def generate_objects(
     formats: Sequence[str] = ("urdf",),
     workers: int = 2,
     progress: bool = True,
-    constraints: Constraints = Constraints(),
+    constraints: Constraints = NO_CONSTRAINTS,
 ) -> ObjectsResult:
     """Write procedural objects as files, or go on with a run that was stopped.
 
@@ -127,9 +127,7 @@ def _remove_leftovers(out: Path) -> None:
         shutil.rmtree(leftover, ignore_errors=True)
 
 
-def _whole(
-    out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints
-) -> dict[str, Any] | None:
+def _whole(out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints) -> dict[str, Any] | None:
     """Content of an object's ``meta.json`` if this version of artsim wrote it so in these formats.
 
     A folder is whole if it is there at all.

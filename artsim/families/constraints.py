@@ -106,6 +106,9 @@ class Constraints:
         )
 
 
+NO_CONSTRAINTS = Constraints()
+
+
 def count_parts(obj: ArticulatedObject, kind: str) -> int:
     """How many moving parts are of a kind: their label has its words, as ``temple_left`` has ``temple``."""
     return sum(f"_{kind}_" in f"_{part.label}_" for part in obj.parts[1:])
@@ -160,7 +163,8 @@ def _wanted(name: str, value: Given) -> Wanted:
         types = frozenset([value] if isinstance(value, str) else value)  # type: ignore[arg-type]
         if not types or not types <= set(JOINT_TYPES[1:]):
             raise ConfigError(
-                f"joint_types is {'+'.join(map(str, types)) or 'empty'}", fix=f"use some of {', '.join(JOINT_TYPES[1:])}"
+                f"joint_types is {'+'.join(map(str, types)) or 'empty'}",
+                fix=f"use some of {', '.join(JOINT_TYPES[1:])}",
             )
         return types  # type: ignore[return-value]
     ends = value if isinstance(value, (tuple, list)) else (value, value)
@@ -210,10 +214,10 @@ def _text(value: float | Wanted) -> str:
 def _reached(name: str, values: Sequence[float | bool | frozenset[str]]) -> str:
     """What values were drawn, and how often."""
     if name in LENGTHS:
-        return f"{name} {min(values):.3g} to {max(values):.3g} m"  # type: ignore[type-var]
+        return f"{name} {min(values):.3g} to {max(values):.3g} m"
     counts = Counter(values)
     by_number = sorted(counts, key=lambda value: -counts[value])[:_SHOWN]
     if not isinstance(values[0], frozenset):
-        by_number = sorted(by_number)  # type: ignore[type-var]
+        by_number = sorted(by_number)
     listed = ", ".join(f"{_text(value)} ({counts[value]} times)" for value in by_number)
     return f"{name} {listed}" + (f" and {len(counts) - _SHOWN} more" if len(counts) > _SHOWN else "")

@@ -72,7 +72,9 @@ def read_bodies(
         body = next(body for body in bodies if part.name in body.links)
         volume = float(trimesh.Trimesh(part.vertices, part.faces, process=False).volume)
         links = list(body.links)
-        if body.parent is not None and not names & set(body.parent.links):  # a screw's helper, which is one part with it
+        if body.parent is not None and not names & set(
+            body.parent.links
+        ):  # a screw's helper, which is one part with it
             links += body.parent.links
         mass = sum(masses[link] for link in links if link in masses)
         return replace(part, body=Body(tuple(pieces(body)), mass / volume))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make_constrained, source_name
-from artsim.families.constraints import Constraints
+from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.urdf import find_urdf, load, read_urdf
 from artsim.model.objects import ArticulatedObject
@@ -57,7 +57,7 @@ class FamilySource:
 
     category: str
     seed: int
-    constraints: Constraints = Constraints()
+    constraints: Constraints = NO_CONSTRAINTS
 
     @staticmethod
     def named(name: str) -> FamilySource | None:
@@ -67,7 +67,9 @@ class FamilySource:
             return None
         try:
             source = FamilySource(
-                found["category"], int(found["seed"]), Constraints.parse(found["constraints"].split(",") if found["constraints"] else [])
+                found["category"],
+                int(found["seed"]),
+                Constraints.parse(found["constraints"].split(",") if found["constraints"] else []),
             )
         except ConfigError:
             return None
@@ -97,7 +99,7 @@ def family_sources(
     categories: Sequence[str],
     objects_per_category: int,
     first_seed: int = 0,
-    constraints: Constraints = Constraints(),
+    constraints: Constraints = NO_CONSTRAINTS,
 ) -> list[FamilySource]:
     """The same number of procedural objects of each category, seeds counting up from ``first_seed``.
 

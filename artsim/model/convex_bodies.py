@@ -26,7 +26,9 @@ def add_bodies(obj: ArticulatedObject) -> ArticulatedObject:
     without volume, a thin box around it, or a speck at its joint.
     """
     parts = [_add_body(obj, k) for k in range(len(obj))]
-    return replace(obj, parts=tuple(parts), native_tree=at_zero(obj.native_tree, [f"joint{k}" for k in range(len(obj))]))
+    return replace(
+        obj, parts=tuple(parts), native_tree=at_zero(obj.native_tree, [f"joint{k}" for k in range(len(obj))])
+    )
 
 
 def add_surface_bodies(obj: ArticulatedObject) -> ArticulatedObject:

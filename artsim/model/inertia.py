@@ -50,8 +50,8 @@ class Inertia:
 def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     """Mass, centre of mass and inertia tensor of part k, at rest, at the object's scale.
 
-    They are those of its body's solid, else of the solid that the part's surface encloses (integrals over a polyhedron in closed form), filled
-    with its body's density.
+    They are those of its body's solid, else of the solid that the part's surface encloses (integrals over a polyhedron
+    in closed form), filled with its body's density.
 
     Raises
     ------

@@ -264,7 +264,9 @@ def _write(
     folder, part = out / str(seed), out / f".{seed}.{os.getpid()}.part"
     try:
         write_variation(variation, part, formats, notes)
-        problems = [problem for name in file_gates for problem in _FILE_GATES[name](part, None)] if "urdf" in formats else []
+        problems = (
+            [problem for name in file_gates for problem in _FILE_GATES[name](part, None)] if "urdf" in formats else []
+        )
         if problems:
             raise AssetError(f"its file is not as strict as that of the original: {problems[0]}", f"variation {seed}")
         if folder.exists():  # of another version, or of other objects

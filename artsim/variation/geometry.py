@@ -35,9 +35,13 @@ def cut_at(mesh: Mesh, axis: int, value: float) -> Mesh:
         return mesh
     touched, their = faces[crossing], sides[crossing]
     touching = (their == 0).any(axis=1)
-    lone = np.where(touching, np.argmax(their == 0, axis=1), np.argmax(their == -np.sign(their.sum(axis=1))[:, None], 1))
+    lone = np.where(
+        touching, np.argmax(their == 0, axis=1), np.argmax(their == -np.sign(their.sum(axis=1))[:, None], 1)
+    )
     a, b, c = (np.take_along_axis(touched, ((lone + i) % 3)[:, None], axis=1)[:, 0].astype(np.int64) for i in range(3))
-    ends = np.concatenate([np.stack([b, c], 1)[touching], np.stack([a, b], 1)[~touching], np.stack([a, c], 1)[~touching]])
+    ends = np.concatenate(
+        [np.stack([b, c], 1)[touching], np.stack([a, b], 1)[~touching], np.stack([a, c], 1)[~touching]]
+    )
     ends = np.where(side[ends[:, :1]] < 0, ends, ends[:, ::-1])  # from below upwards, as every neighbour does
     edges, index = np.unique(ends, axis=0, return_inverse=True)
     low, high = vertices[edges[:, 0]], vertices[edges[:, 1]]
@@ -86,7 +90,7 @@ def stretched(obj: ArticulatedObject, axis: int, along: AxisMap) -> ArticulatedO
         return [_mesh(solid) for solid in hulls if solid.volume() > _EXACT * abs(whole)]
 
     joints = [
-        joint if k == 0 else replace(joint, origin=_triple(place(np.asarray(joint.origin))))
+        joint if k == 0 else replace(joint, origin=triple(place(np.asarray(joint.origin))))
         for k, joint in enumerate(obj.native_tree.joints)
     ]
     parts = [_mapped(part, surface, lambda body: [new for piece in body.pieces for new in pieces(piece)])
@@ -113,8 +117,8 @@ def resized(obj: ArticulatedObject, factors: Array) -> ArticulatedObject:
             mimic = Mimic(mimic.source, mimic.multiplier * share, mimic.offset * float(unit[k]))
         return replace(
             joint,
-            axis=_triple(tree.axes[k] * factors / grown[k]),
-            origin=_triple(tree.origins[k] * factors),
+            axis=triple(tree.axes[k] * factors / grown[k]),
+            origin=triple(tree.origins[k] * factors),
             lower=joint.lower * float(unit[k]),
             upper=joint.upper * float(unit[k]),
             rest=joint.rest * float(unit[k]),
@@ -127,8 +131,9 @@ def resized(obj: ArticulatedObject, factors: Array) -> ArticulatedObject:
     return replace(obj, parts=tuple(parts), native_tree=KinematicTree(joints))
 
 
-def fitted(part: Part, low: Array, high: Array, mirrored: NDArray[np.bool_]) -> Part:
-    """The part with its box moved and stretched onto another, reflected along some axes."""
+def fitted(part: Part, bounds: Array, mirrored: NDArray[np.bool_]) -> Part:
+    """The part with its box moved and stretched onto another (2, 3), reflected along some axes (3,)."""
+    low, high = bounds
     own_low, own_high = part.bounds
     factor = (high - low) / np.maximum(own_high - own_low, 1e-12) * np.where(mirrored, -1.0, 1.0)
     center, goal = 0.5 * (own_low + own_high), 0.5 * (low + high)
@@ -146,7 +151,7 @@ def centered(obj: ArticulatedObject) -> ArticulatedObject:
     bounds = np.stack([part.bounds for part in obj.parts if len(part.faces)])
     center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
     joints = [
-        joint if k == 0 else replace(joint, origin=_triple(np.asarray(joint.origin) - center))
+        joint if k == 0 else replace(joint, origin=triple(np.asarray(joint.origin) - center))
         for k, joint in enumerate(obj.native_tree.joints)
     ]
     return replace(obj, parts=tuple(part.moved(-center) for part in obj.parts), native_tree=KinematicTree(joints))
@@ -168,6 +173,7 @@ def _mesh(solid: Manifold) -> Mesh:
     return np.array(mesh.vert_properties, dtype=np.float64)[:, :3], np.array(mesh.tri_verts, dtype=np.int32)
 
 
-def _triple(vector: Array) -> tuple[float, float, float]:
+def triple(vector: Array) -> tuple[float, float, float]:
+    """A (3,) array as a joint holds it."""
     x, y, z = vector.tolist()
     return x, y, z

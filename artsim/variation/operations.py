@@ -11,12 +11,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artsim.making.solids import rotation_about
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.model.stretching import APART, SIDEWAYS, AxisMap, coupled_axes, draw_axis_map, stretchable_axes
-from artsim.variation.geometry import fitted, resized, stretched
+from artsim.variation.geometry import fitted, resized, stretched, triple
 
 Change = tuple[ArticulatedObject, dict[str, Any]]
 Operation = Callable[[ArticulatedObject, np.random.Generator, float, Sequence[ArticulatedObject]], Change | None]
@@ -51,8 +52,8 @@ def stretch(
     factors = np.ones(3)
     for group in coupled_axes(tree.axes, tree.types):
         factors[group] = np.exp(strength * _WHOLE * np.clip(rng.standard_normal(), -2.5, 2.5))
-    for axis, record in maps.items():
-        obj = stretched(obj, "xyz".index(axis), AxisMap(np.array(record["from"]), np.array(record["to"])))
+    for name, record in maps.items():
+        obj = stretched(obj, "xyz".index(name), AxisMap(np.array(record["from"]), np.array(record["to"])))
     return resized(obj, factors), {"between_edges": maps, "factors": factors.tolist()}
 
 
@@ -95,7 +96,7 @@ def move_axes(
     shift = strength * _SHIFT * obj.diagonal / obj.scale * float(rng.standard_normal()) * _across(axis, rng)
     shift = np.zeros(3) if joint.type == "prismatic" else shift
     new = rotation_about(across, lean) @ axis
-    moved = replace(joint, axis=_triple(new / np.linalg.norm(new)), origin=_triple(tree.origins[k] + shift))
+    moved = replace(joint, axis=triple(new / np.linalg.norm(new)), origin=triple(tree.origins[k] + shift))
     joints = [moved if i == k else other for i, other in enumerate(tree.joints)]
     record = {"part": obj.parts[k].name, "lean_deg": float(np.rad2deg(lean)), "shift": shift.tolist()}
     return replace(obj, native_tree=KinematicTree(joints)), record
@@ -119,7 +120,7 @@ def exchange_part(
         return None
     k, number, j, mirrored = pairs[rng.integers(len(pairs))]
     own, other = obj.parts[k], others[number].parts[j]
-    new = replace(fitted(other, *own.bounds, mirrored), name=own.name, label=own.label)
+    new = replace(fitted(other, own.bounds, mirrored), name=own.name, label=own.label)
     new = new if own.body is not None else replace(new, body=None)
     parts = tuple(new if i == k else part for i, part in enumerate(obj.parts))
     record = {
@@ -177,7 +178,7 @@ def _leaves(tree: KinematicTree) -> list[int]:
     return [k for k in range(1, len(tree)) if k not in carrying]
 
 
-def _fit(obj: ArticulatedObject, k: int, other: ArticulatedObject, j: int) -> Array | None:
+def _fit(obj: ArticulatedObject, k: int, other: ArticulatedObject, j: int) -> NDArray[np.bool_] | None:
     """(3,) along which axes part j of another object is reflected to stand for part k; None where it cannot."""
     own, new = obj.parts[k], other.parts[j]
     if own.label != new.label or obj.tree.types[k] != other.tree.types[j] or not (len(own.faces) and len(new.faces)):
@@ -198,7 +199,7 @@ def _fit(obj: ArticulatedObject, k: int, other: ArticulatedObject, j: int) -> Ar
     place = (obj.tree.origins[k] - obj.box_center[k]) / (0.5 * size)
     its_place = (other.tree.origins[j] - other.box_center[j]) / (0.5 * its_size)
     beside = (np.abs(axis) < 0.5) & (np.abs(place) > 0.5) & (np.abs(its_place) > 0.5)
-    mirrored: Array = beside & (place * its_place < 0)
+    mirrored: NDArray[np.bool_] = beside & (place * its_place < 0)
     return mirrored
 
 
@@ -207,8 +208,3 @@ def _across(axis: Array, rng: np.random.Generator) -> Array:
     drawn = np.cross(axis, rng.standard_normal(3))
     across: Array = drawn / np.linalg.norm(drawn)
     return across
-
-
-def _triple(vector: Array) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z

@@ -61,7 +61,7 @@ def test_bodies_of_a_stretched_object_are_convex_and_their_union_is_its_surface(
 def test_a_fitted_part_fills_the_box_and_stays_right_side_out(mirrored: tuple[bool, ...]) -> None:
     part = artsim.make("laptop", 3).parts[1]
     low, high = np.array([-1.0, 2.0, 0.0]), np.array([1.0, 3.0, 0.1])
-    new = fitted(part, low, high, np.array(mirrored))
+    new = fitted(part, np.stack([low, high]), np.array(mirrored))
     np.testing.assert_allclose(new.bounds, [low, high], atol=1e-12)
     before, after = mesh_of(part.vertices, part.faces), mesh_of(new.vertices, new.faces)
     share = np.prod(high - low) / np.prod(part.bounds[1] - part.bounds[0])
