@@ -33,6 +33,7 @@ def build(rng: np.random.Generator) -> Assembly:
     seat_low = sleeve + rng.uniform(0.05, 0.1)
 
     chair = Assembly()
+    chair.record(legs=True)
     chair.add("base", _star(rng, legs, span, floor, hub, column, piston, sleeve, castors), density=1500.0)
     if castors:
         _castors(rng, chair, legs, span, floor, wheel)

@@ -163,3 +163,29 @@ def test_no_description_of_an_unknown_category_or_of_nothing() -> None:
         describe_family("lapdog")
     with pytest.raises(ConfigError, match="count"):
         describe_family("laptop", 0)
+
+
+def feet(obj: artsim.ArticulatedObject) -> int:
+    """How many separate things an object stands on: pieces of a level cut a centimetre above the floor."""
+    from manifold3d import Manifold, Mesh64
+
+    body = obj.parts[0]
+    solid = Manifold(Mesh64(body.vertices, body.faces.astype(np.uint64)))
+    return len(solid.slice(float(body.bounds[0, 2]) + 0.01).decompose())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_furniture_stands_on_legs_and_has_handles_where_that_is_asked_for(seed: int) -> None:
+    for category in ("drawer", "storage_furniture"):
+        with_legs = make(category, seed, legs=True, handles=False)
+        assert with_legs.features == ("legs",)
+        assert feet(with_legs) >= 4
+        without = make(category, seed, legs=False, handles=True)
+        assert without.features == ("handles",)
+    assert make("microwave", seed, handles=False).features == ()
+
+
+def test_handles_that_are_parts_count_as_handles() -> None:
+    assert make("bucket", 0, handles=True).sha256 == make("bucket", 0).sha256
+    with pytest.raises(ConfigError, match=r"handles yes \(300 times\)"):
+        make("bucket", 0, handles=False)
