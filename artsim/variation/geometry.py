@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from itertools import pairwise
 
@@ -59,8 +59,11 @@ def cut_at(mesh: Mesh, axis: int, value: float) -> Mesh:
     return np.concatenate([vertices, added]), np.concatenate([faces[~crossing], new]).astype(np.int32)
 
 
-def stretched(obj: ArticulatedObject, axis: int, along: AxisMap) -> ArticulatedObject:
-    """The object with one coordinate mapped; no joint may mind (:func:`artsim.model.stretching.stretchable_axes`)."""
+def stretched(obj: ArticulatedObject, axis: int, along: AxisMap, carried: Collection[int] = ()) -> ArticulatedObject:
+    """The object with one coordinate mapped; carried parts keep their shape, and go where the middle of their box goes.
+
+    No joint of another part may mind (:func:`artsim.model.stretching.stretchable_axes`).
+    """
 
     def place(points: Array) -> Array:
         moved = points.copy()
@@ -89,23 +92,42 @@ def stretched(obj: ArticulatedObject, axis: int, along: AxisMap) -> ArticulatedO
         hulls = [Manifold.hull_points(place(vertices[slab])) for slab in slabs if slab.sum() > 3]
         return [_mesh(solid) for solid in hulls if solid.volume() > _EXACT * abs(whole)]
 
+    def move(points: Array, k: int) -> Array:
+        if k not in carried:
+            return place(points)
+        center = obj.parts[k].bounds.mean(axis=0)
+        return points + (place(center) - center)
+
     joints = [
-        joint if k == 0 else replace(joint, origin=triple(place(np.asarray(joint.origin))))
+        joint if k == 0 else replace(joint, origin=triple(move(np.asarray(joint.origin), k)))
         for k, joint in enumerate(obj.native_tree.joints)
     ]
-    parts = [_mapped(part, surface, lambda body: [new for piece in body.pieces for new in pieces(piece)])
-             for part in obj.parts]  # fmt: skip
+    parts = [
+        part.moved(move(np.zeros(3), k))
+        if k in carried
+        else _mapped(part, surface, lambda body: [new for piece in body.pieces for new in pieces(piece)])
+        for k, part in enumerate(obj.parts)
+    ]
     return replace(obj, parts=tuple(parts), native_tree=KinematicTree(joints))
 
 
-def resized(obj: ArticulatedObject, factors: Array) -> ArticulatedObject:
-    """The object times (3,) positive factors; they are equal on axes that a joint turns into one another."""
+def resized(obj: ArticulatedObject, factors: Array, carried: Collection[int] = ()) -> ArticulatedObject:
+    """The object times (3,) positive factors; carried parts keep their proportions, and grow by the least factor.
 
-    def surface(mesh: Mesh) -> Mesh:
-        return mesh[0] * factors, mesh[1]
+    Factors are equal on axes that a joint of another part turns into one another.
+    """
+    tree, least = obj.native_tree, float(factors.min())
 
-    tree = obj.native_tree
+    def place(points: Array, k: int) -> Array:
+        if k not in carried:
+            return points * factors
+        center = obj.parts[k].bounds.mean(axis=0)
+        return (points - center) * least + center * factors
+
     grown = np.linalg.norm(tree.axes * factors, axis=1)
+    axes = tree.axes * factors / grown[:, None]
+    for k in carried:
+        grown[k], axes[k] = least, tree.axes[k]
     unit = np.where([kind == "prismatic" for kind in tree.types], grown, 1.0)
 
     def joint_of(k: int, joint: Joint) -> Joint:
@@ -117,8 +139,8 @@ def resized(obj: ArticulatedObject, factors: Array) -> ArticulatedObject:
             mimic = Mimic(mimic.source, mimic.multiplier * share, mimic.offset * float(unit[k]))
         return replace(
             joint,
-            axis=triple(tree.axes[k] * factors / grown[k]),
-            origin=triple(tree.origins[k] * factors),
+            axis=triple(axes[k]),
+            origin=triple(place(tree.origins[k], k)),
             lower=joint.lower * float(unit[k]),
             upper=joint.upper * float(unit[k]),
             rest=joint.rest * float(unit[k]),
@@ -126,9 +148,15 @@ def resized(obj: ArticulatedObject, factors: Array) -> ArticulatedObject:
             mimic=mimic,
         )
 
+    def part_of(k: int, part: Part) -> Part:
+        def surface(mesh: Mesh) -> Mesh:
+            return place(mesh[0], k), mesh[1]
+
+        return _mapped(part, surface, lambda body: [surface(piece) for piece in body.pieces])
+
     joints = [joint_of(k, joint) for k, joint in enumerate(tree.joints)]
-    parts = [_mapped(part, surface, lambda body: [surface(piece) for piece in body.pieces]) for part in obj.parts]
-    return replace(obj, parts=tuple(parts), native_tree=KinematicTree(joints))
+    parts = tuple(part_of(k, part) for k, part in enumerate(obj.parts))
+    return replace(obj, parts=parts, native_tree=KinematicTree(joints))
 
 
 def fitted(part: Part, bounds: Array, mirrored: NDArray[np.bool_]) -> Part:

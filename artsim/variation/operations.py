@@ -24,6 +24,8 @@ Operation = Callable[[ArticulatedObject, np.random.Generator, float, Sequence[Ar
 
 _WHOLE = 0.2
 """Standard deviation of the logarithm of the factors of the whole object's sides."""
+_SMALL = 0.15
+"""Diagonal of a part over the object's, below which it is carried instead of stretched."""
 _RANGE, _RANGE_BOUNDS = 0.3, (0.4, 1.25)
 """Standard deviation of the logarithm of a joint's range, and between which factors it stays."""
 _LEAN, _SHIFT = np.deg2rad(1.5), 0.004
@@ -37,24 +39,31 @@ _MOST, _OUT_OF_SHAPE = 2.5, 2.0
 def stretch(
     obj: ArticulatedObject, rng: np.random.Generator, strength: float, others: Sequence[ArticulatedObject]
 ) -> Change | None:
-    """Stretch between the edges of parts where no joint minds, and the whole object along every axis."""
-    tree = obj.native_tree
-    boxes = np.stack([part.bounds for part in obj.parts if len(part.faces)])
-    apart = APART * obj.diagonal / obj.scale
+    """Stretch between the edges of parts where no joint minds, and the whole object along every axis.
+
+    Small parts that carry none, such as dials and buttons, keep their shape: their joints mind nothing.
+    """
+    tree, size = obj.native_tree, obj.diagonal / obj.scale
+    carried = [k for k in _leaves(tree) if np.linalg.norm(np.ptp(obj.parts[k].bounds, axis=0)) < _SMALL * size]
+    boxes = np.stack([part.bounds for k, part in enumerate(obj.parts) if len(part.faces) and k not in carried])
+    others_axes = np.delete(tree.axes, carried, axis=0)
+    types = [kind for k, kind in enumerate(tree.types) if k not in carried]
     maps = {}
-    for axis in stretchable_axes(tree.axes, tree.types):
-        drawn = draw_axis_map(boxes[:, :, axis].ravel(), apart, axis == SIDEWAYS, rng)
+    for axis in stretchable_axes(others_axes, types):
+        drawn = draw_axis_map(boxes[:, :, axis].ravel(), APART * size, axis == SIDEWAYS, rng)
         if len(drawn.knots) > 2:
             maps["xyz"[axis]] = {
                 "from": drawn.knots.tolist(),
                 "to": (drawn.knots + strength * (drawn.goals - drawn.knots)).tolist(),
             }
     factors = np.ones(3)
-    for group in coupled_axes(tree.axes, tree.types):
+    for group in coupled_axes(others_axes, types):
         factors[group] = np.exp(strength * _WHOLE * np.clip(rng.standard_normal(), -2.5, 2.5))
     for name, record in maps.items():
-        obj = stretched(obj, "xyz".index(name), AxisMap(np.array(record["from"]), np.array(record["to"])))
-    return resized(obj, factors), {"between_edges": maps, "factors": factors.tolist()}
+        along = AxisMap(np.array(record["from"]), np.array(record["to"]))
+        obj = stretched(obj, "xyz".index(name), along, carried)
+    record = {"between_edges": maps, "factors": factors.tolist(), "carried": [obj.parts[k].name for k in carried]}
+    return resized(obj, factors, carried), record
 
 
 def change_limits(

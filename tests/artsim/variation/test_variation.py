@@ -19,7 +19,7 @@ from artsim.making.assembly import Assembly, prismatic
 from artsim.making.solids import box
 from artsim.model.objects import ArticulatedObject
 from artsim.variation import draw_variation, vary
-from artsim.variation.operations import change_limits, exchange_part, leave_out, move_axes
+from artsim.variation.operations import change_limits, exchange_part, leave_out, move_axes, stretch
 from artsim.variation.standard import Standard, colliding_parts, part_gaps
 from tests.conftest import ASSETS, rigid, valve
 
@@ -166,3 +166,21 @@ def test_what_cannot_be_varied_is_refused() -> None:
         vary(valve(), -1)
     with pytest.raises(ConfigError, match="parts of box do not fit a laptop"):
         vary(artsim.make("laptop", 0), 0, [artsim.make("box", 0)])
+
+
+def test_stretching_keeps_dials_round_and_puts_them_where_their_front_goes() -> None:
+    obj = next(o for o in (artsim.make("oven", seed) for seed in range(20)) if any("knob" in p.name for p in o.parts))
+    change = stretch(obj, rng(3), 1.0, ())
+    assert change is not None
+    new, factors = change[0], np.array(change[1]["factors"])
+    knobs = [k for k, part in enumerate(obj.parts) if "knob" in part.name]
+    assert {obj.parts[k].name for k in knobs} <= set(change[1]["carried"])
+    assert np.ptp(factors) > 0.01
+    for k in knobs:
+        growth = new.box_size[k] / obj.box_size[k]
+        np.testing.assert_allclose(growth, factors.min(), rtol=1e-9)
+        low, high = new.part_bounds[0]
+        assert (new.box_center[k][1:] > low[1:]).all()
+        assert (new.box_center[k][1:] < high[1:]).all()
+        np.testing.assert_allclose(new.tree.origins[k] - new.box_center[k],
+                                   factors.min() * (obj.tree.origins[k] - obj.box_center[k]), atol=1e-9)  # fmt: skip
