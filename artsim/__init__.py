@@ -15,7 +15,7 @@ Rooms, from the ground up. Each imports only rooms that come before it (import-l
 - datasets, then stream: samples to disk and back, or without end.
 - scenes: several objects. checks: gates for simulators.
 - export: objects as URDF, MJCF and USD.
-- physics: objects that move. drawing: pictures.
+- variation: objects out of a given one. physics: objects that move. drawing: pictures.
 - envs: reinforcement learning. doctor, cli: programs.
 """
 
@@ -43,6 +43,7 @@ from artsim.observing.capture import observe
 from artsim.observing.sample import ARTSIM_VERSION, Sample
 from artsim.observing.sensor import SENSORS, Sensor
 from artsim.renderers import make_renderer, render, render_cameras
+from artsim.variation import vary
 
 __version__ = ARTSIM_VERSION
 
@@ -76,6 +77,7 @@ __all__ = [
     "sample_state",
     "sample_view",
     "stream",
+    "vary",
     "verify",
 ]
 

@@ -1,4 +1,4 @@
-"""The program ``artsim``: generate, generate-objects, record, scene, view, inspect, verify, repair, doctor."""
+"""The program ``artsim``: datasets, procedural objects, variations, motions and scenes; checks and pictures of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ import tyro
 from artsim.common.extras import import_failure, is_own_module
 from artsim.common.names import PrintableStream, printable
 from artsim.datasets.plan import SampleOptions
-from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError
+from artsim.families.constraints import Constraints
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
 from artsim.renderers import RendererName
@@ -30,6 +31,18 @@ _LISTED = 50
 def _cores() -> int:
     """Processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
+Having = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        metavar="NAME=VALUE",
+        help="What every procedural object must have: a number or a range of parts (doors=2 drawers=1..3), of joints "
+        "(joints=2..), of metres (size height width depth: size=0.4..0.8), joint types (joint_types=revolute), "
+        "handles and legs (handles=no).",
+    ),
+]
+"""Constraints of :func:`artsim.make`."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +67,7 @@ class Generate:
     """Procedural objects of each category."""
     first_object: int = 0
     """Seed of the first procedural object; the others count up from it."""
+    having: Having = ()
     objects: tuple[Path, ...] = ()
     """URDF files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
     num_samples: int = 1000
@@ -83,7 +97,9 @@ class Generate:
         from artsim.loading.sources import Source, family_sources, find_sources
 
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
-        sources += family_sources(_categories(self.categories), self.objects_per_category, self.first_object)
+        sources += family_sources(
+            _categories(self.categories), self.objects_per_category, self.first_object, _constraints(self.having)
+        )
         try:
             result = generate(
                 sources,
@@ -138,6 +154,7 @@ class GenerateObjects:
     """File formats: mobility.urdf, mobility.xml, mobility.usda."""
     seed: int = 0
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
+    having: Having = ()
     workers: int = field(default_factory=_cores)
     """Worker processes; by default one for each core."""
 
@@ -146,7 +163,13 @@ class GenerateObjects:
 
         try:
             result = generate_objects(
-                _categories(self.category), self.out, self.count, self.seed, self.formats, self.workers
+                _categories(self.category),
+                self.out,
+                self.count,
+                self.seed,
+                self.formats,
+                self.workers,
+                constraints=_constraints(self.having),
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")
@@ -156,6 +179,50 @@ class GenerateObjects:
             return
         rate = result.made / result.seconds
         print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")
+
+
+@dataclass(frozen=True)
+class Vary:
+    """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
+
+    Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
+    a meta.json that says what was done. Stop it at any moment: the same command goes on where it stopped.
+
+    Example: artsim vary path/to/StorageFurniture/45162 --others path/to/StorageFurniture --count 20 --out out/varied
+    """
+
+    path: tyro.conf.Positional[Path]
+    """URDF file or its folder."""
+    out: Path
+    """Folder to write to; made if missing."""
+    count: int = 10
+    """Variations."""
+    seed: int = 0
+    """Seed of the first variation; the others count up from it."""
+    others: tuple[Path, ...] = ()
+    """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
+    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+
+    def run(self) -> None:
+        from artsim.variation.folder import write_variations
+
+        try:
+            summary = write_variations(
+                self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
+            )
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole variations are kept in {self.out}: the same command goes on from there")
+            raise
+        for failure in summary.failed[:_LISTED]:
+            print(failure)
+        if len(summary.failed) > _LISTED:
+            print(f"... and {len(summary.failed) - _LISTED} more")
+        print(f"{summary.folder}: {summary.whole} variations of {self.path}\n{summary}")
+        if not summary.whole:
+            raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")
 
 
 @dataclass(frozen=True)
@@ -276,6 +343,7 @@ class Gallery:
     """Objects of each category."""
     first_object: int = 0
     """Seed of the first object of each."""
+    having: Having = ()
     states: int = 3
     """Pictures of each object."""
     out: Path = Path("gallery.png")
@@ -286,9 +354,32 @@ class Gallery:
         from artsim.drawing.gallery import draw_gallery
         from artsim.loading.sources import family_sources
 
-        sources = family_sources(_categories(self.categories), self.objects, self.first_object)
+        sources = family_sources(
+            _categories(self.categories), self.objects, self.first_object, _constraints(self.having)
+        )
         write_atomic(self.out, draw_gallery([source.load() for source in sources], self.states))
         print(f"wrote {self.out}")
+
+
+@dataclass(frozen=True)
+class Families:
+    """Print what each procedural category is: parameters, joint types, numbers of parts, handles and legs.
+
+    Numbers and kinds are those seen over the first seeds. Any of them may be asked for with --having.
+
+    Example: artsim families storage_furniture
+    """
+
+    names: tyro.conf.Positional[tuple[str, ...]] = ()
+    """Categories; by default all of them."""
+    objects: int = 20
+    """Objects of each that are looked at, seeds counting up from 0."""
+
+    def run(self) -> None:
+        from artsim.families.catalogue import describe_family
+
+        for name in _categories(self.names or ("all",)):
+            print(describe_family(name, self.objects))
 
 
 @dataclass(frozen=True)
@@ -398,10 +489,17 @@ def _categories(named: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(FAMILIES)) if "all" in named else named
 
 
+def _constraints(having: tuple[str, ...]) -> Constraints:
+    """Constraints out of texts."""
+    return Constraints.parse(having)
+
+
 Verb = (
     Annotated[Generate, tyro.conf.subcommand("generate")]
     | Annotated[Gallery, tyro.conf.subcommand("gallery")]
+    | Annotated[Families, tyro.conf.subcommand("families")]
     | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
+    | Annotated[Vary, tyro.conf.subcommand("vary")]
     | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Scene, tyro.conf.subcommand("scene")]
     | Annotated[View, tyro.conf.subcommand("view")]

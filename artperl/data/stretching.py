@@ -7,23 +7,15 @@ that axis, and slides do not run along it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from artsim.model.kinematics import Array
+from artsim.model.stretching import APART, SIDEWAYS, draw_axis_map, stretchable_axes
 from artsim.observing.sample import Sample
 
-_SPREAD = 0.35
-"""Standard deviation of the logarithm of a factor: of two drawers one is, commonly, half as wide again."""
-_APART = 0.01
-"""Edges that are nearer than that, in diagonals, are stretched together."""
-_SIDEWAYS = 1
-"""Axis of the rest frame along which furniture is, commonly, the same from either end."""
-_PARALLEL = 1e-3
-"""Sine of the angle within which directions are the same."""
 _NEIGHBOURS = 12
 """Of a point in the image, which tell how much its place has grown."""
 _MOST_GROWTH = 4.0
@@ -52,7 +44,7 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
     moved = rest.copy()
     for axis in stretchable(sample):
         edges = np.concatenate([low[:, axis], high[:, axis]])
-        along = _stretching(edges, _APART * sample.diagonal, axis == _SIDEWAYS, rng)
+        along = draw_axis_map(edges, APART * sample.diagonal, axis == SIDEWAYS, rng)
         for values in (low, high, moved):
             values[:, axis] = along(values[:, axis])
     center, whole = 0.5 * (low + high), high - low
@@ -70,12 +62,7 @@ def stretch(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
 
 def stretchable(sample: Sample) -> list[int]:
     """Axes of the rest frame along which stretching commutes with every joint."""
-    along = np.abs(sample.joint_axis)
-    slides, turns = along > _PARALLEL, np.sqrt(np.clip(1.0 - along**2, 0.0, 1.0)) > _PARALLEL
-    minds = np.zeros_like(slides)
-    for k, kind in enumerate(sample.joint_type):
-        minds[k] = {"free": False, "prismatic": slides[k], "screw": True}.get(kind, turns[k])
-    return np.flatnonzero(~minds.any(axis=0)).tolist()
+    return stretchable_axes(sample.joint_axis, sample.joint_type)
 
 
 def _spread_of_neighbours(before: Array, after: Array) -> Array:
@@ -88,27 +75,3 @@ def _spread_of_neighbours(before: Array, after: Array) -> Array:
         return np.sqrt(np.linalg.det(np.einsum("nki,nkj->nij", offset, offset)).clip(1e-18))
 
     return np.clip(area(after) / area(before), 1.0 / _MOST_GROWTH, _MOST_GROWTH)
-
-
-def _stretching(edges: Array, apart: float, mirrored: bool, rng: np.random.Generator) -> Callable[[Array], Array]:
-    """A map of one coordinate that keeps the outermost edges, and is linear between the others and beyond.
-
-    With ``mirrored``, edges that are the same from either end stay so.
-    """
-    edges = np.sort(edges)
-    knots = edges[np.concatenate([[True], np.diff(edges) > apart])]
-    if len(knots) < 2:
-        return lambda values: values
-    logarithms = _SPREAD * rng.standard_normal(len(knots) - 1)
-    if mirrored and np.ptp(knots + knots[::-1]) < 2 * apart:
-        half = len(logarithms) // 2
-        logarithms[len(logarithms) - half :] = logarithms[:half][::-1]
-    lengths = np.diff(knots) * np.exp(logarithms)
-    lengths *= (knots[-1] - knots[0]) / lengths.sum()
-    goals = knots[0] + np.concatenate([[0.0], np.cumsum(lengths)])
-
-    def along(values: Array) -> Array:
-        inside: Array = np.interp(values, knots, goals) + values - np.clip(values, knots[0], knots[-1])
-        return inside
-
-    return along

@@ -132,7 +132,6 @@ _PART_FINISHES: Mapping[str, str] = {
     "blade": "steel", "button": "rubber", "carafe": "gloss", "handwheel": "enamel", "magazine": "steel",
     "caster": "rubber", "globe": "enamel", "wheel": "rubber", "knob": "chrome", "dial": "chrome", "handle": "",
     "temple": "", "temple_left": "", "temple_right": "", "hand": "", "lens": "shell", "pendulum": "chrome", "pump": "",
-
     "connector": "steel", "key": "", "keys": "",
 }  # fmt: skip
 """Finishes of parts by their label; "" stands for that of the details."""

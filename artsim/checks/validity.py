@@ -5,7 +5,7 @@ Every gate fails closed: what cannot be checked has failed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,10 +51,14 @@ class Gate:
         return f"{self.name}: {shown}{more}" if self.problems else f"{self.name}: passed"
 
 
-def check(obj: ArticulatedObject) -> list[Gate]:
-    """All gates of a procedural object that need no file: the physics is that of its parts' bodies."""
+def check(obj: ArticulatedObject, names: Collection[str] | None = None) -> list[Gate]:
+    """All gates of a procedural object that need no file, or those of these names.
+
+    The physics is that of the parts' bodies.
+    """
     physics = {"convex collision geometry": lambda: _collision_geometry(obj), "inertia": lambda: _inertia(obj)}
-    return _run({**_geometry(obj), **physics})
+    gates = {**_geometry(obj), **physics}
+    return _run({name: gate for name, gate in gates.items() if names is None or name in names})
 
 
 def check_file(

@@ -15,7 +15,6 @@ from artsim.datasets import json_values
 from artsim.datasets.description import write_if_other
 from artsim.datasets.plan import PlannedObject
 from artsim.errors import ArtsimError, AssetError, DatasetError
-from artsim.families import FAMILIES
 from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
 
 ORIGINS = ".sources.json"
@@ -57,11 +56,9 @@ class Origins:
 
     def of(self, planned: PlannedObject) -> list[Source]:
         """Sources that may be that of an object; only what comes of them tells."""
-        category, _, seed = planned.source.rpartition(":")
-        if category in FAMILIES and seed.isdecimal() and len(seed) < 20:
-            made = FamilySource(category, int(seed))
-            if made.sha256 == planned.source_sha256:
-                return [made]
+        made = FamilySource.named(planned.source)
+        if made is not None and made.sha256 == planned.source_sha256:
+            return [made]
         return list(self._files[planned.source_sha256])
 
 

@@ -11,7 +11,7 @@ say so themselves, in a ``<mujoco>`` element that other programs ignore, and the
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,12 @@ FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usd
 """File written in each format."""
 
 
-def export(obj: ArticulatedObject, folder: str | Path, formats: Sequence[str] = ("urdf",)) -> dict[str, Any]:
+def export(
+    obj: ArticulatedObject,
+    folder: str | Path,
+    formats: Sequence[str] = ("urdf",),
+    notes: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Write a procedural object into a folder.
 
     ``meta.json`` and, for URDF and MJCF, ``meshes/*.obj`` are shared by all formats; URDF comes with
@@ -39,6 +44,8 @@ def export(obj: ArticulatedObject, folder: str | Path, formats: Sequence[str] = 
         Made if missing.
     formats : sequence of str
         Keys of ``FORMATS``.
+    notes : mapping, optional
+        Further entries of ``meta.json``: how the object came about.
 
     Returns
     -------
@@ -71,7 +78,7 @@ def export(obj: ArticulatedObject, folder: str | Path, formats: Sequence[str] = 
         from artsim.export.usd import usd_text
 
         (folder / FORMATS["usd"]).write_text(usd_text(robot))
-    meta = describe(robot, formats)
+    meta = {**describe(robot, formats), **(notes or {})}
     (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n")
     return meta
 

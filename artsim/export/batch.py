@@ -22,7 +22,8 @@ from artsim.common.progress import track
 from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
-from artsim.families import FAMILIES, make
+from artsim.families import FAMILIES, make_constrained
+from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 
 INDEX = "index.csv"
 _MAX_META = 1_000_000
@@ -47,6 +48,7 @@ def generate_objects(
     formats: Sequence[str] = ("urdf",),
     workers: int = 2,
     progress: bool = True,
+    constraints: Constraints = NO_CONSTRAINTS,
 ) -> ObjectsResult:
     """Write procedural objects as files, or go on with a run that was stopped.
 
@@ -66,6 +68,8 @@ def generate_objects(
         Processes. The result does not depend on it.
     progress : bool
         Show a progress bar.
+    constraints : Constraints
+        Of :func:`artsim.make`; they hold of every object.
 
     Raises
     ------
@@ -85,13 +89,13 @@ def generate_objects(
     wanted = [(category, number) for category in dict.fromkeys(categories) for number in range(seed, seed + count)]
     with folder_lock(folder):
         _remove_leftovers(folder)
-        found = {key: meta for key in wanted if (meta := _whole(_folder(folder, *key), formats)) is not None}
+        found = {key: meta for key in wanted if (meta := _whole(folder, key, formats, constraints))}
         missing = [key for key in wanted if key not in found]
         with (
             track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
             WorkerPool(folder, workers) as team,
         ):
-            tasks = ((key, (folder, *key, tuple(formats))) for key in missing)
+            tasks = ((key, (folder, *key, tuple(formats), constraints)) for key in missing)
             for key, answer in team.run(write_object, tasks):
                 if isinstance(answer, WorkerLost):
                     raise AssetError(answer.why, f"{key[0]} {key[1]}", "use fewer --workers; the same command resumes")
@@ -123,31 +127,37 @@ def _remove_leftovers(out: Path) -> None:
         shutil.rmtree(leftover, ignore_errors=True)
 
 
-def _whole(folder: Path, formats: Sequence[str]) -> dict[str, Any] | None:
-    """Content of an object's ``meta.json`` if this version of artsim wrote it in these formats.
+def _whole(out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints) -> dict[str, Any] | None:
+    """Content of an object's ``meta.json`` if this version of artsim wrote it so in these formats.
 
     A folder is whole if it is there at all.
     """
+    folder = _folder(out, *key)
     try:
         meta: dict[str, Any] = read_json(folder / "meta.json", "meta.json", max_bytes=_MAX_META)
         own = meta["artsim"]
         same = own["version"] == version("artsim") and set(own["formats"]) == set(formats)
-        _row((folder.parent.name, 0), meta)  # what index.csv takes from it
+        same = same and meta.get("constraints", "") == str(constraints)
+        _row(key, meta)  # what index.csv takes from it
     except (AssetError, ValueError, KeyError, TypeError):
         return None
     return meta if same and all((folder / FORMATS[name]).is_file() for name in formats) else None
 
 
-def write_object(out: Path, category: str, seed: int, formats: tuple[str, ...]) -> dict[str, Any]:
+def write_object(
+    out: Path, category: str, seed: int, formats: tuple[str, ...], constraints: Constraints
+) -> dict[str, Any]:
     """Make an object and write its folder; returns the content of its ``meta.json``."""
     folder = _folder(out, category, seed)
     part = folder.with_name(f".{seed}.{os.getpid()}.part")
     try:
-        obj = make(category, seed)
+        obj = make_constrained(category, seed, constraints)
+    except ConfigError:
+        raise
     except Exception as error:  # whatever a family stumbles on, the seed is what one needs to know
         raise AssetError(f"cannot be made ({type(error).__name__}: {error})", f"{category} {seed}") from error
     try:
-        meta = export(obj, part, formats)
+        meta = export(obj, part, formats, {"constraints": str(constraints)} if constraints else {})
         if folder.exists():  # of another version, or in other formats
             shutil.rmtree(folder)
         part.rename(folder)

@@ -207,7 +207,7 @@ def _link(obj: ArticulatedObject, k: int, origin: Array, inertia: Inertia) -> Li
         k,
         origin,
         inertia,
-        MeshShape(part.name, part.vertices * obj.scale, part.faces),
+        MeshShape(part.name, part.vertices * obj.scale, part.faces) if len(part.faces) else None,
         tuple(_convex(f"{part.name}-hull{i}", piece, obj.scale) for i, piece in enumerate(pieces)),
     )
 

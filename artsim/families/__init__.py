@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 
 from artsim.errors import ConfigError
+from artsim.families.constraints import Constraints, Given
 from artsim.making.assembly import Assembly
 from artsim.model.objects import ArticulatedObject
 
@@ -129,8 +131,15 @@ PARTNET_MOBILITY: dict[str, tuple[str, ...]] = {
 """The families that stand for each category of PartNet-Mobility, the nearest first."""
 
 
-def make(category: str, seed: int = 0) -> ArticulatedObject:
-    """A new procedural object: the same for the same category and seed, different for every other seed.
+DRAWS = 300
+"""Objects that are drawn at most until one meets the constraints: what one in a hundred has is found 19 times of 20."""
+
+
+def make(category: str, seed: int = 0, **constraints: Given) -> ArticulatedObject:
+    """A new procedural object: the same for the same category, seed and constraints, different for every other seed.
+
+    Without constraints, the object that the seed stands for. With some, that object if it meets them; else the first
+    that does of others, which depend on the category and the seed alone.
 
     Parameters
     ----------
@@ -138,6 +147,13 @@ def make(category: str, seed: int = 0) -> ArticulatedObject:
         A key of ``FAMILIES``.
     seed : int
         Not negative.
+    **constraints
+        A number, or a range (least, greatest) in which None leaves an end open:
+
+        - ``joints``: how many joints; ``joint_types``: exactly which types, such as ``{"revolute"}``;
+        - ``size`` (the diagonal), ``height``, ``width``, ``depth``: metres at rest; a single number is met within 5 %;
+        - ``handles``, ``legs``: True or False;
+        - any kind of moving part: ``doors=2``, ``drawers=(1, 3)``, ``buttons=0``.
 
     Returns
     -------
@@ -147,11 +163,40 @@ def make(category: str, seed: int = 0) -> ArticulatedObject:
     Raises
     ------
     ConfigError
-        When there is no such category, or the seed is negative.
+        When there is no such category, the seed is negative, a constraint makes no sense, or no object of ``DRAWS``
+        that are drawn meets the constraints: the error tells what values are drawn.
+
+    Examples
+    --------
+    >>> artsim.make("storage_furniture", 7, doors=2, drawers=(1, 3), handles=False)
     """
+    return make_constrained(category, seed, Constraints.of(constraints))
+
+
+def make_constrained(category: str, seed: int, constraints: Constraints) -> ArticulatedObject:
+    """The object that :func:`make` makes under constraints; see there."""
     if category not in FAMILIES:
         raise ConfigError(f"there is no category {category!r}", fix=f"use one of {', '.join(sorted(FAMILIES))}")
     if seed < 0:
         raise ConfigError(f"seed {seed} is negative", fix="use 0 or more")
-    rng = np.random.default_rng([zlib.crc32(category.encode()), seed])
-    return FAMILIES[category](rng).build(category, str(seed))
+    drawn = []
+    for draw in range(DRAWS):
+        drawn.append(FAMILIES[category](_generator(category, seed, draw)).build(category, str(seed)))
+        if constraints.met_by(drawn[-1]):
+            return replace(drawn[-1], source=source_name(category, seed, constraints))
+    raise constraints.refusal(category, drawn)
+
+
+def source_name(category: str, seed: int, constraints: Constraints) -> str:
+    """What names an object among all procedural ones: ``laptop:3``, ``drawer[drawer=2..4]:3``."""
+    return f"{category}[{constraints}]:{seed}" if constraints else f"{category}:{seed}"
+
+
+def _generator(category: str, seed: int, draw: int) -> np.random.Generator:
+    """Of a draw for a seed; the first is that of the seed's own object."""
+    own = zlib.crc32(category.encode())
+    return np.random.default_rng([own, seed] if draw == 0 else [own, _FURTHER, draw, seed])
+
+
+_FURTHER = zlib.crc32(b"further draws")
+"""Keeps the generators of further draws apart from those of seeds."""

@@ -38,13 +38,14 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     body += _bands(rng, x, y, 0.0, height, band, wall, radius)
     body += _interior(rng, x, y, height, wall, radius)
     body += _feet(rng, x, y, wall)
-    if height > 0.12 and rng.random() < 0.25:
-        body += _side_handles(rng, x, y, height)
+    grips = _side_handles(rng, x, y, height) if height > 0.12 and rng.random() < 0.25 else Solid()
+    body += grips
 
     chest = Assembly()
     chest.add("body", body, density=700.0)
     halves = rng.random() < 0.12 and radius == 0.0
     if halves:  # two lids, hinged at the left and the right
+        chest.record(handles=True)
         limit = np.deg2rad(rng.uniform(80.0, 175.0))
         thick = wall * rng.uniform(0.6, 1.2)
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
@@ -59,8 +60,9 @@ def _rigid(rng: np.random.Generator) -> Assembly:
         return chest
     lid, top, domed = _lid(rng, x, y, seam, height, wall, radius, band == 0.0)
     lid += _bands(rng, x, y, seam, top, band, wall, radius) if top - seam > 3 * wall else Solid()
-    if not domed:
-        lid += _lid_handle(rng, x, y, top)
+    grip = Solid() if domed else _lid_handle(rng, x, y, top)
+    lid += grip
+    chest.record(handles=bool(grips.pieces or grip.pieces))
     barrel = max(0.002, 0.25 * wall)
     axis_x = back + barrel
     spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]

@@ -36,6 +36,7 @@ def build(rng: np.random.Generator) -> Assembly:
     seat_low = sleeve + rng.uniform(0.05, 0.1)
 
     chair = Assembly()
+    chair.record(legs=True)
     base = _star(rng, legs, span, floor, hub, column, piston, sleeve, castors)
     if not lifted:
         base += cylinder((0, 0, hub - 0.01), (0, 0, seat_low - 0.002), column, sections=18)

@@ -94,7 +94,7 @@ def build(rng: np.random.Generator) -> Assembly:
     machine.add("body", body, density=300.0)
     opening = 0.5 * np.pi if rng.random() < 0.7 else np.deg2rad(rng.uniform(75.0, 90.0))
     hinge = (shape.hinge_x, 0.0, shape.hinge_z)
-    machine.add("door", _door(rng, shape, strip > 0.05), revolute("body", (0, -1, 0), hinge, 0.0, opening))
+    machine.add("door", _door(rng, shape, strip > 0.05, machine), revolute("body", (0, -1, 0), hinge, 0.0, opening))
     if strip > 0.05 and rng.random() < 0.6:
         _controls(rng, machine, shape)
     if racks == "sliding":
@@ -127,11 +127,11 @@ def _drawers(rng: np.random.Generator) -> Assembly:
         z = plinth + tall
         body += box((shape.front, -half + 0.002, z - 0.5 * wall), (depth, half - 0.002, z + 0.5 * wall))
     low, inside, back = plinth + wall + 0.004, half - wall - 0.005, depth - wall - rng.uniform(0.01, 0.08)
-    drawer = _door(rng, shape, True)
+    machine = Assembly()
+    drawer = _door(rng, shape, True, machine)
     drawer += tray((-0.004, -inside, low), (back, inside, low + rng.uniform(0.6, 0.85) * (tall - 2 * wall)), 0.008)
     if rng.random() < 0.6:
         drawer += _rack(rng, 0.02, back - 0.03, inside - 0.02, low + 0.006)
-    machine = Assembly()
     machine.add("body", body, density=300.0)
     travel = rng.uniform(0.6, 0.9) * back
     for number in range(count):
@@ -216,9 +216,10 @@ def _controls(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
         machine.add("dial", dial(foot, (-1, 0, 0), 0.02, radius), continuous("body", (-1, 0, 0), foot))
 
 
-def _door(rng: np.random.Generator, s: Shape, controls_above: bool) -> Solid:
+def _door(rng: np.random.Generator, s: Shape, controls_above: bool, machine: Assembly) -> Solid:
     half, tall, x = s.half_door, s.top - s.bottom, -s.thick
     kind = str(rng.choice(["bar", "bow", "flat", "pocket", "edge", "none"], p=[0.24, 0.24, 0.16, 0.18, 0.1, 0.08]))
+    machine.record(handles=kind in ("bar", "bow", "flat", "edge"))
     band = rng.uniform(0.08, 0.14) if not controls_above and rng.random() < 0.5 else 0.0
     z = s.top - band - rng.uniform(0.03, 0.1)  # height of the handle
     if kind == "pocket":

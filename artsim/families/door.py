@@ -46,6 +46,7 @@ def build(rng: np.random.Generator) -> Assembly:
     depth, jamb = rng.uniform(0.07, 0.3), rng.uniform(0.03, 0.2)
     style = _style(rng, kind)
     door = Assembly()
+    door.record(handles=True)
     if kind == "sliding":
         depth = max(depth, 2 * style.thickness + 0.025)
     body = _frame(rng, width, height, depth, jamb, style, kind)

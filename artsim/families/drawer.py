@@ -44,6 +44,7 @@ class _Furniture:
     style: _Style
     body: Solid = field(default_factory=Solid)
     drawers: list[tuple[Solid, float, float]] = field(default_factory=list)
+    on_legs: bool = False
 
     def add_case(
         self,
@@ -109,6 +110,7 @@ class _Furniture:
     def build(self) -> Assembly:
         """Body and drawers, the highest drawer first."""
         furniture = Assembly()
+        furniture.record(handles=self.style.handle != "none", legs=self.on_legs)
         furniture.add("body", self.body, density=650.0)
         for number, (drawer, direction, travel) in enumerate(self.drawers):
             low, high = drawer.bounds()
@@ -165,6 +167,7 @@ def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
     if raised:
         size = rng.uniform(0.02, 0.06)
         furniture.body += _legs(rng, x0, x1, y, legs + 0.001, size)
+        furniture.on_legs = True
     elif legs > 0.005:
         recess = rng.uniform(0.0, 0.05)
         furniture.body += frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
@@ -183,6 +186,7 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
     apron = max(height * rng.uniform(0.11, 0.25), 0.075)
     wall = rng.uniform(0.012, 0.02)
     furniture.body += _top(rng, depth, width, top, height) + _legs(rng, x0, x1, y, top + 0.001, leg)
+    furniture.on_legs = True
     between = y - leg + 0.002  # the apron reaches into the legs
     inset = rng.uniform(0.0, 0.4) * leg
     span = max(between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9)), _NARROWEST / 2)
@@ -254,6 +258,7 @@ def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
     left = -outer + (pedestal if -1 in sides else wall) - 0.002
     right = outer - (pedestal if 1 in sides else wall) + 0.002
     if on_legs:
+        furniture.on_legs = True
         furniture.body += _legs(rng, x0, x1, y, top + 0.001, leg)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y

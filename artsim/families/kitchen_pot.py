@@ -36,6 +36,7 @@ def build(rng: np.random.Generator) -> Assembly:
     lid, lid_radius, top = _lid(rng, radius, height, wall, hinged)
 
     assembly = Assembly()
+    assembly.record(handles=True)
     if hinged:
         r = 0.005
         x, z = lid_radius + 1.6 * r, height + GAP + r

@@ -49,7 +49,9 @@ def build(rng: np.random.Generator) -> Assembly:
         body += rounded_box(panel_low, panel_high + (0.01, 0, 0), 0.004, axis=1)
     opener = bool(has_panel and not drops and rng.random() < 0.35)
     controls, movers = _controls(rng, panel_low, panel_high, opener) if has_panel else (Solid(), [])
-    door = _door(rng, low, high, drops, "none" if opener else str(rng.choice(["bar", "bow", "flat", "none"])))
+    handle = "none" if opener else str(rng.choice(["bar", "bow", "flat", "none"]))
+    oven.record(handles=handle != "none")
+    door = _door(rng, low, high, drops, handle)
 
     def placed(solid: Solid) -> Solid:
         return solid.mirrored(1) if mirrored else solid

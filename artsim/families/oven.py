@@ -35,6 +35,7 @@ def build(rng: np.random.Generator) -> Assembly:
     ceiling = height - strip
 
     oven = Assembly()
+    oven.record(handles=True)
     body = _shell(half, depth, plinth, height, wall)
     body += rounded_box((-thick, -half, ceiling), (0.02, half, height), 0.004, axis=1)
     feet = ((x, y) for x in (0.05, depth - 0.05) for y in (0.05 - half, half - 0.05))

@@ -74,6 +74,7 @@ def build(rng: np.random.Generator) -> Assembly:
         fronts += [(0, -half, half, a, b) for a, b in pairwise(lower)]
 
     fridge = Assembly()
+    fridge.record(handles=style.handle != "none")
     fridge.add("body", _body(rng, half, depth, foot, top, style, fronts, small), density=120.0)
     opening = np.deg2rad(rng.uniform(90.0, 179.0))
     doors = drawers = 0

@@ -80,6 +80,7 @@ def build(rng: np.random.Generator) -> Assembly:
         return solid if left else solid.mirrored(1)
 
     safe = Assembly()
+    safe.record(handles=True)
     safe.add("body", placed(_body(rng, shape)), density=2500.0)
     x, y = shape.hinge
     upper = np.deg2rad(rng.uniform(100.0, 176.0))

@@ -50,9 +50,9 @@ def build(rng: np.random.Generator) -> Assembly:
             inside, parts = fronts.shelves(rng, cell, style)
         body += inside
         moving += parts
-    body += _carcass(rng, kind, width, depth, height, stand, style)
-
     furniture = Assembly()
+    body += _carcass(rng, kind, width, depth, height, stand, style, furniture)
+    furniture.record(handles=style.handle != "none")
     furniture.add("body", body, density=650.0)
     count: dict[str, int] = {}
     for label, solid, joint in moving:
@@ -155,7 +155,14 @@ def _fill(
 
 
 def _carcass(
-    rng: np.random.Generator, kind: str, width: float, depth: float, height: float, stand: float, style: Style
+    rng: np.random.Generator,
+    kind: str,
+    width: float,
+    depth: float,
+    height: float,
+    stand: float,
+    style: Style,
+    furniture: Assembly,
 ) -> Solid:
     """Outer boards, top and what it stands on."""
     x0, x1, y, board = style.face, depth / 2, width / 2, style.board
@@ -182,7 +189,7 @@ def _carcass(
     if to_floor:
         setback = x0 + rng.uniform(0.02, 0.07)
         return solid + box((setback, -y + 0.001, 0), (setback + board, y - 0.001, stand + 0.001))
-    return solid + (_stand(rng, kind, x0, x1, y, stand, board) if stand > 0 else Solid())
+    return solid + (_stand(rng, kind, x0, x1, y, stand, board, furniture) if stand > 0 else Solid())
 
 
 def _top(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
@@ -201,7 +208,16 @@ def _top(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, to
     return solid
 
 
-def _stand(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, height: float, board: float) -> Solid:
+def _stand(
+    rng: np.random.Generator,
+    kind: str,
+    x0: float,
+    x1: float,
+    y: float,
+    height: float,
+    board: float,
+    furniture: Assembly,
+) -> Solid:
     """Plinth or legs below the body."""
     if kind == "base" or (height < 0.1 and rng.random() < 0.6):
         setback = rng.uniform(0.03, 0.08) if kind == "base" else rng.uniform(-0.015, 0.03)
@@ -218,6 +234,7 @@ def _stand(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, 
                   for u in (0.0, du) for v in (0.0, dv)])
             for a, b, sx, sy in ends for du, dv in ((arm, thick), (thick, arm))
         )  # fmt: skip
+    furniture.record(legs=True)
     radius = rng.uniform(0.012, 0.03)
     taper = rng.uniform(0.45, 1.0)
     splay = rng.choice([0.0, rng.uniform(0.0, 0.25)]) * height

@@ -82,6 +82,7 @@ def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
     bowl = rng.uniform(0.03, 0.06)
     tub = _drum(s, z, drum, hole, plate, bowl if turning else -plate / 2)
     machine = Assembly()
+    machine.record(handles=True)
     machine.add("body", body if turning else body + tub, density=350.0)
 
     outer = hole + rng.uniform(0.03, 0.055)

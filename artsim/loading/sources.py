@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from artsim.errors import AssetError, ConfigError
-from artsim.families import FAMILIES, make
+from artsim.families import FAMILIES, make_constrained, source_name
+from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.urdf import find_urdf, load, read_urdf
 from artsim.model.objects import ArticulatedObject
@@ -49,15 +51,34 @@ class FamilySource:
     ----------
     category : str
     seed : int
+    constraints : Constraints
+        Of :func:`artsim.make`.
     """
 
     category: str
     seed: int
+    constraints: Constraints = NO_CONSTRAINTS
+
+    @staticmethod
+    def named(name: str) -> FamilySource | None:
+        """The source of this name; None where it is none of a procedural object."""
+        found = _NAME.fullmatch(name)
+        if found is None or found["category"] not in FAMILIES:
+            return None
+        try:
+            source = FamilySource(
+                found["category"],
+                int(found["seed"]),
+                Constraints.parse(found["constraints"].split(",") if found["constraints"] else []),
+            )
+        except ConfigError:
+            return None
+        return source if source.name == name else None
 
     @property
     def name(self) -> str:
-        """Category and seed."""
-        return f"{self.category}:{self.seed}"
+        """Category, constraints and seed."""
+        return source_name(self.category, self.seed, self.constraints)
 
     @property
     def sha256(self) -> str:
@@ -66,14 +87,23 @@ class FamilySource:
 
     def load(self) -> ArticulatedObject:
         """The object."""
-        return make(self.category, self.seed)
+        return make_constrained(self.category, self.seed, self.constraints)
 
+
+_NAME = re.compile(r"(?P<category>[a-z_]+)(\[(?P<constraints>[^\[\]]{1,1000})\])?:(?P<seed>[0-9]{1,19})")
 
 Source = FileSource | FamilySource
 
 
-def family_sources(categories: Sequence[str], objects_per_category: int, first_seed: int = 0) -> list[FamilySource]:
+def family_sources(
+    categories: Sequence[str],
+    objects_per_category: int,
+    first_seed: int = 0,
+    constraints: Constraints = NO_CONSTRAINTS,
+) -> list[FamilySource]:
     """The same number of procedural objects of each category, seeds counting up from ``first_seed``.
+
+    Constraints are those of :func:`artsim.make`, and hold of every object.
 
     Raises
     ------
@@ -88,7 +118,7 @@ def family_sources(categories: Sequence[str], objects_per_category: int, first_s
     if objects_per_category < 1:
         raise ConfigError(f"{objects_per_category} is not a count", "objects_per_category", "use 1 or more")
     seeds = range(first_seed, first_seed + objects_per_category)
-    return [FamilySource(category, seed) for category in dict.fromkeys(categories) for seed in seeds]
+    return [FamilySource(category, seed, constraints) for category in dict.fromkeys(categories) for seed in seeds]
 
 
 def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None) -> list[FileSource]:

@@ -64,6 +64,11 @@ class Assembly:
     def __init__(self) -> None:
         self._parts: list[Part] = []
         self._joints: list[JointSpec | None] = []
+        self._features: dict[str, bool] = {}
+
+    def record(self, **features: bool) -> None:
+        """Note whether the object has handles or legs, which are no parts of their own: ``record(handles=True)``."""
+        self._features.update(features)
 
     def add(
         self, name: str, solid: Solid, joint: JointSpec | None = None, label: str | None = None, density: float = 600.0
@@ -129,6 +134,7 @@ class Assembly:
             sha256=content_sha256([repr(tree.to_dict()).encode(), *content]),
             source=f"{category}:{object_id}",
             source_joints={joint.name: (k, 1.0) for k, joint in enumerate(joints) if k > 0},
+            features=tuple(sorted(name for name, there in self._features.items() if there)),
         )
 
     def _joint(self, k: int, spec: JointSpec | None, index: dict[str, int], center: Any) -> Joint:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,24 +25,67 @@ def add_bodies(obj: ArticulatedObject) -> ArticulatedObject:
     Parts with a body keep it. A part of a loaded object, whose surface need not be closed, becomes its convex hull; one
     without volume, a thin box around it, or a speck at its joint.
     """
+    parts = [_add_body(obj, k) for k in range(len(obj))]
+    return replace(
+        obj, parts=tuple(parts), native_tree=at_zero(obj.native_tree, [f"joint{k}" for k in range(len(obj))])
+    )
+
+
+def add_surface_bodies(obj: ArticulatedObject) -> ArticulatedObject:
+    """The object with its surfaces as they are, a body for every part, proper names, and joints that are 0 at rest.
+
+    Parts with a body keep it. A part of a loaded object collides as its source file says of its surface: as it is. Its
+    mass is that of its convex hull (see :func:`add_bodies`).
+    """
+    used: set[str] = set()
+    joints = [_proper_name(joint.name, used) for joint in obj.native_tree.joints]
+    parts = []
+    for k, part in enumerate(obj.parts):
+        body = part.body
+        if body is None:
+            hull = _hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
+            pieces = ((part.vertices, part.faces),) if len(part.faces) else ()
+            body = Body(pieces, DEFAULT_DENSITY, hull)
+        parts.append(
+            replace(part, name=_proper_name(part.name, used), label=_proper_name(part.label, set()), body=body)
+        )
+    return replace(obj, parts=tuple(parts), native_tree=at_zero(obj.native_tree, joints))
+
+
+def at_zero(tree: KinematicTree, names: Sequence[str]) -> KinematicTree:
+    """The tree with joints of these names, that are 0 at rest."""
     joints = []
-    for k, joint in enumerate(obj.native_tree.joints):
+    for joint, name in zip(tree.joints, names, strict=True):
         mimic, rest = joint.mimic, joint.rest
         if mimic is not None:
-            source_rest = obj.native_tree.joints[mimic.source].rest
+            source_rest = tree.joints[mimic.source].rest
             mimic = replace(mimic, offset=mimic.offset + mimic.multiplier * source_rest - rest)
         lower, upper = joint.lower - rest, joint.upper - rest
-        joints.append(replace(joint, name=f"joint{k}", lower=lower, upper=upper, rest=0.0, mimic=mimic))
-    parts = [_add_body(obj, k) for k in range(len(obj))]
-    return replace(obj, parts=tuple(parts), native_tree=KinematicTree(joints))
+        joints.append(replace(joint, name=name, lower=lower, upper=upper, rest=0.0, mimic=mimic))
+    return KinematicTree(joints)
+
+
+def _proper_name(name: str, used: set[str]) -> str:
+    """A name of letters, digits and _, as any file can hold it, that is not yet used."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    name = name if re.match(r"[A-Za-z_]", name) else f"_{name}"
+    while name in used:
+        name += "_"
+    used.add(name)
+    return name
+
+
+def _points(obj: ArticulatedObject, k: int) -> Array:
+    """Corners of part k's surface; without one, the origin of its joint."""
+    part = obj.parts[k]
+    return part.vertices[np.unique(part.faces)] if len(part.faces) else obj.native_tree.origins[k : k + 1]
 
 
 def _add_body(obj: ArticulatedObject, k: int) -> Part:
     part = replace(obj.parts[k], name=f"part{k}", label=f"part{k}")
     if part.body is not None:
         return part
-    points = part.vertices[np.unique(part.faces)] if len(part.faces) else obj.native_tree.origins[k : k + 1]
-    vertices, faces = _hull(points, _SPECK * obj.diagonal / obj.scale)
+    vertices, faces = _hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
     return replace(part, vertices=vertices, faces=faces, body=Body(((vertices, faces),), DEFAULT_DENSITY))
 
 

@@ -50,8 +50,8 @@ class Inertia:
 def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     """Mass, centre of mass and inertia tensor of part k, at rest, at the object's scale.
 
-    They are those of the solid that the part's surface encloses (integrals over a polyhedron in closed form), filled
-    with its body's density.
+    They are those of its body's solid, else of the solid that the part's surface encloses (integrals over a polyhedron
+    in closed form), filled with its body's density.
 
     Raises
     ------
@@ -64,7 +64,8 @@ def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     where = f"{obj.category} {obj.object_id}: part {part.name!r}"
     if part.body is None:
         raise AssetError("has no body, so no density", where, "only procedural objects (artsim.make) have one")
-    triangles = (part.vertices * obj.scale)[part.faces]
+    vertices, faces = part.body.solid or (part.vertices, part.faces)
+    triangles = (vertices * obj.scale)[faces]
     with np.errstate(divide="ignore", invalid="ignore"):  # without a volume, which is looked at below
         found = trimesh.triangles.mass_properties(triangles, density=part.body.density, skip_inertia=False)
     inertia = Inertia(float(found.mass), np.asarray(found.center_mass), np.asarray(found.inertia))

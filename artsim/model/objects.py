@@ -60,13 +60,17 @@ class Body:
     Attributes
     ----------
     pieces : tuple of Mesh
-        Convex collision geometry in the rest frame, at rest, native units. Their union is the part's surface.
+        Collision geometry in the rest frame, at rest, native units. That of procedural objects is convex, and its union
+        is the part's surface.
     density : float
         kg/m^3.
+    solid : Mesh or None
+        Closed surface of what has the mass, where the part's own surface need not be closed.
     """
 
     pieces: tuple[Mesh, ...]
     density: float
+    solid: Mesh | None = None
 
     __repr__ = brief
 
@@ -123,7 +127,9 @@ class Part:
         """The part translated by (3,) metres."""
         body = self.body
         if body is not None:
-            body = replace(body, pieces=tuple((vertices + offset, faces) for vertices, faces in body.pieces))
+            pieces = tuple((vertices + offset, faces) for vertices, faces in body.pieces)
+            solid = None if body.solid is None else (body.solid[0] + offset, body.solid[1])
+            body = replace(body, pieces=pieces, solid=solid)
         return replace(self, vertices=self.vertices + offset, body=body)
 
 
@@ -153,6 +159,8 @@ class ArticulatedObject:
     source_joints : mapping
         For each joint of the source file: (part index, multiplier), so that the file's own joint value is
         ``multiplier * q[part]``. Screw parts list two file joints.
+    features : tuple of str
+        What the family of a procedural object records of it besides its parts: "handles", "legs".
     """
 
     object_id: str
@@ -165,6 +173,7 @@ class ArticulatedObject:
     repairs: tuple[Repair, ...] = ()
     source: str = ""
     source_joints: Mapping[str, tuple[int, float]] = None  # type: ignore[assignment]  # empty, set below
+    features: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.T_base_rest is None:

@@ -39,7 +39,7 @@ def test_help_teaches() -> None:
     ):
         assert word in result.stdout
     result = run(ARTSIM, "--help")
-    for verb in ("generate", "view", "inspect", "verify"):
+    for verb in ("generate", "families", "vary", "view", "inspect", "verify"):
         assert verb in result.stdout
 
 
@@ -107,3 +107,42 @@ def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     assert view.returncode == 0, view.stderr
     assert (out / "contact_sheet.png").stat().st_size > 10_000
     assert (tmp_path / "r.rrd").stat().st_size > 10_000
+
+
+def test_families_tells_what_a_category_is_and_what_varies() -> None:
+    told = run(ARTSIM, "families", "laptop", "drawer", "--objects", "3")
+    assert told.returncode == 0, told.stderr
+    for text in ("Laptops: a base with keyboard", "What varies", "of 3 objects", "revolute", "drawer", "handles"):
+        assert text in told.stdout
+    refused = run(ARTSIM, "families", "lapdog")
+    assert refused.returncode == 2
+    assert "no category 'lapdog'" in refused.stderr
+
+
+def test_constraints_are_met_and_impossible_ones_refused(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    options = ("--category", "storage_furniture", "--count", "2", "--workers", "1", "--out", out)
+    made = run(ARTSIM, "generate-objects", *options, "--having", "doors=2", "drawers=1..3")
+    assert made.returncode == 0, made.stderr
+    rows = (tmp_path / "out" / "index.csv").read_text().splitlines()[1:]
+    assert all("door_1" in row and "door_2" not in row and "drawer_0" in row for row in rows)
+    again = run(ARTSIM, "generate-objects", *options, "--having", "doors=2", "drawers=1..3")
+    assert "already complete" in again.stdout
+    other = run(ARTSIM, "generate-objects", *options, "--having", "doors=1")
+    assert "2 of them made now" in other.stdout
+    for having in ("doors=90", "doors", "handles=perhaps"):
+        refused = run(ARTSIM, "generate-objects", *options, "--having", having)
+        assert refused.returncode == 2
+        assert "Fix:" in refused.stderr
+        assert "Traceback" not in refused.stderr
+
+
+def test_vary_writes_objects_that_inspect_reads_and_says_how_it_went(tmp_path: Path) -> None:
+    made = run(ARTSIM, "vary", LAPTOP, "--count", "3", "--out", str(tmp_path / "out"))
+    assert made.returncode == 0, made.stderr
+    for text in ("3 variations", "passed at the first draw", "different trees", "operation: stretch"):
+        assert text in made.stdout
+    assert "2 parts" in run(ARTSIM, "inspect", str(tmp_path / "out" / "1")).stdout
+    refused = run(ARTSIM, "vary", "urdf_assets/quirks/zero_axis", "--out", str(tmp_path / "none"))
+    assert refused.returncode == 2
+    assert "no joint can move" in refused.stderr

@@ -1,0 +1,279 @@
+"""Runs of ``artsim vary``: many variations of one object as files, resumably.
+
+Each variation has a folder of its own, named by its seed, which is made under another name and renamed once it is
+whole. Its ``meta.json`` says from what and how it was varied.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from artsim.checks.strict_urdf import convex_collision_geometry, strict_inertia, strict_urdf
+from artsim.common.files import read_json, write_error
+from artsim.common.progress import track
+from artsim.common.tables import plural, table
+from artsim.datasets.worker_pool import folder_lock
+from artsim.errors import AssetError, ConfigError
+from artsim.export import FORMATS, check_formats, export
+from artsim.loading.collision_bodies import read_bodies
+from artsim.loading.sources import find_sources
+from artsim.loading.urdf import find_urdf, load
+from artsim.model.convex_bodies import add_surface_bodies
+from artsim.model.objects import ArticulatedObject
+from artsim.variation.operations import OPERATIONS
+from artsim.variation.search import Variation, draw_variation
+from artsim.variation.standard import Standard
+
+_MAX_META = 10_000_000
+_FILE_GATES: dict[str, Callable[[Path, Mapping[str, Path] | None], list[str]]] = {
+    "strict URDF": strict_urdf,
+    "convex collision geometry": convex_collision_geometry,
+    "inertia": lambda path, package_roots: strict_inertia(path),
+}
+"""Gates of a file that stand besides those of the object that it describes."""
+
+
+@dataclass
+class VariationSummary:
+    """What a run has come to.
+
+    Attributes
+    ----------
+    made : int
+        Variations that were made now.
+    first : int
+        Those that passed at the first draw.
+    draws : int
+        Draws over all variations.
+    rejected : Counter of str
+        Gates that draws failed.
+    operations : Counter of str
+        Variations that each operation was part of.
+    trees, topologies : set of str
+        Different trees with all their numbers, and as parents and types of joints alone.
+    failed : list of str
+        Variations that no draw of passes, and why.
+    """
+
+    folder: Path
+    gates: tuple[str, ...]
+    made: int = 0
+    whole: int = 0
+    first: int = 0
+    draws: int = 0
+    rejected: Counter[str] = field(default_factory=Counter)
+    operations: Counter[str] = field(default_factory=Counter)
+    trees: set[str] = field(default_factory=set)
+    topologies: set[str] = field(default_factory=set)
+    failed: list[str] = field(default_factory=list)
+
+    def count(self, notes: dict[str, Any]) -> None:
+        """Take in a variation by what its ``meta.json`` says of it."""
+        self.whole += 1
+        self.draws += 1 + len(notes["rejected"])
+        self.first += not notes["rejected"]
+        self.rejected.update(notes["rejected"])
+        self.operations.update({step["operation"] for step in notes["operations"]})
+        self.trees.add(notes["tree"])
+        self.topologies.add(notes["topology"])
+
+    def __str__(self) -> str:
+        rows = [
+            ("variations", str(self.whole)),
+            ("made now", str(self.made)),
+            ("passed at the first draw", f"{self.first} ({100 * self.first / max(1, self.whole):.0f} %)"),
+            ("draws", str(self.draws)),
+            *((f"rejected: {gate}", str(number)) for gate, number in sorted(self.rejected.items())),
+            *((f"operation: {name}", str(self.operations[name])) for name in OPERATIONS if self.operations[name]),
+            ("different trees", str(len(self.trees))),
+            ("different topologies", str(len(self.topologies))),
+            ("without a variation", str(len(self.failed))),
+        ]
+        return "\n".join([f"gates: {', '.join(self.gates)}", *table([("", "number"), *rows])])
+
+
+def write_variations(
+    path: str | Path,
+    out: str | Path,
+    count: int = 10,
+    seed: int = 0,
+    others: Sequence[str | Path] = (),
+    formats: Sequence[str] = ("urdf",),
+    package_roots: Mapping[str, Path] | None = None,
+    progress: bool = True,
+) -> VariationSummary:
+    """Write variations of an object as files, or go on with a run that was stopped.
+
+    Parameters
+    ----------
+    path : path
+        URDF file or its folder.
+    out : path
+        Folder; made if missing. Each variation goes to a folder of its own, named by its seed.
+    count : int
+        Variations.
+    seed : int
+        Of the first; the others count up from it.
+    others : sequence of path
+        Objects of the same category, or folders of them, whose parts may be exchanged for the object's.
+    formats : sequence of str
+        Keys of ``artsim.export.FORMATS``.
+    package_roots : mapping, optional
+        As for :func:`artsim.load`.
+    progress : bool
+        Show progress.
+
+    Raises
+    ------
+    AssetError
+        When an object cannot be loaded or has no joint that can move, or there is no other of its category.
+    ConfigError
+        When an option makes no sense, or the folder cannot be written to.
+    DatasetError
+        When another run is writing there.
+    KeyboardInterrupt
+        On Ctrl-C; the same call resumes.
+    """
+    if count < 1:
+        raise ConfigError(f"{count} is not a count", "count", "use 1 or more")
+    if seed < 0:
+        raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
+    check_formats(formats)
+    obj, file_gates = load_with_bodies(path, package_roots)
+    if obj.is_rigid:
+        raise AssetError("no joint can move: there is no articulated object to vary", path, "give it a moving joint")
+    donors = _load_others(obj, others, package_roots)
+    standard = Standard.of(obj)
+    folder = Path(out)
+    summary = VariationSummary(folder, tuple(dict.fromkeys([*standard.gates, *file_gates])))
+    origin = {
+        "category": obj.category,
+        "object_id": obj.object_id,
+        "sha256": obj.sha256,
+        "others": hashlib.sha256(" ".join(donor.sha256 for donor in donors).encode()).hexdigest() if donors else "",
+    }
+    with folder_lock(folder), track("variations", total=count, unit="object", shown=progress) as bar:
+        for leftover in folder.glob(".*.part"):
+            shutil.rmtree(leftover, ignore_errors=True)
+        for number in range(seed, seed + count):
+            notes = _whole(folder / str(number), origin, number, formats)
+            if notes is None:
+                try:
+                    notes = _write(obj, folder, number, donors, standard, file_gates, formats, origin)
+                    summary.made += 1
+                except AssetError as error:
+                    summary.failed.append(str(error))
+            if notes is not None:
+                summary.count(notes)
+            bar.update()
+    return summary
+
+
+def load_with_bodies(
+    path: str | Path, package_roots: Mapping[str, Path] | None = None
+) -> tuple[ArticulatedObject, tuple[str, ...]]:
+    """An object with the bodies that its file describes, and the gates of a file that the file passes.
+
+    Where the collision geometry or the inertia of the file fails its gate, parts have no body.
+    """
+    obj = load(path, package_roots=package_roots)
+    file = find_urdf(Path(path))
+    if file.suffix == ".npz":
+        return obj, ()
+    gates = tuple(name for name, gate in _FILE_GATES.items() if not gate(file, package_roots))
+    at_zero = not np.any(obj.tree.rest)
+    if {"convex collision geometry", "inertia"} <= set(gates) and at_zero:
+        obj = read_bodies(obj, file, package_roots)
+    return obj, gates
+
+
+def write_variation(variation: Variation, folder: Path, formats: Sequence[str], notes: dict[str, Any]) -> None:
+    """Write one variation: parts without a body collide as their surface, and weigh as their convex hull."""
+    export(add_surface_bodies(variation.obj), folder, formats, {"variation": notes})
+
+
+def describe_variation(variation: Variation, origin: dict[str, Any], seed: int) -> dict[str, Any]:
+    """What ``meta.json`` says of a variation."""
+    tree = variation.obj.native_tree
+    topology = " ".join(f"{joint.type}:{joint.parent}" for joint in tree.joints)
+    return {
+        "of": origin,
+        "seed": seed,
+        "version": version("artsim"),
+        "operations": list(variation.operations),
+        "rejected": list(variation.rejected),
+        "gates": list(variation.gates),
+        "tree": hashlib.sha256(repr(tree.to_dict()).encode()).hexdigest(),
+        "topology": topology,
+    }
+
+
+def _load_others(
+    obj: ArticulatedObject, paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None
+) -> list[ArticulatedObject]:
+    """Other objects of the category; those of other categories, and the object itself, are left out."""
+    if not paths:
+        return []
+    found = [load_with_bodies(source.path, package_roots)[0] for source in find_sources(paths, package_roots)]
+    donors = [other for other in found if other.category == obj.category and other.sha256 != obj.sha256]
+    if not donors:
+        raise AssetError(
+            f"none of {plural(len(found), 'object')} is another {obj.category}",
+            ", ".join(map(str, paths)),
+            "name a folder with objects of the same category",
+        )
+    return donors
+
+
+def _whole(folder: Path, origin: dict[str, Any], seed: int, formats: Sequence[str]) -> dict[str, Any] | None:
+    """What a variation's ``meta.json`` says, if this version of artsim made it of the same objects and seed."""
+    try:
+        meta: dict[str, Any] = read_json(folder / "meta.json", "meta.json", max_bytes=_MAX_META)
+        notes: dict[str, Any] = meta["variation"]
+        same = (notes["of"], notes["seed"], notes["version"]) == (origin, seed, version("artsim"))
+        same = same and set(meta["artsim"]["formats"]) == set(formats)
+        VariationSummary(folder, ()).count(notes)  # what the summary takes from it
+    except (AssetError, ValueError, KeyError, TypeError):
+        return None
+    return notes if same and all((folder / FORMATS[name]).is_file() for name in formats) else None
+
+
+def _write(
+    obj: ArticulatedObject,
+    out: Path,
+    seed: int,
+    others: Sequence[ArticulatedObject],
+    standard: Standard,
+    file_gates: Sequence[str],
+    formats: Sequence[str],
+    origin: dict[str, Any],
+) -> dict[str, Any]:
+    """Make a variation and write its folder; returns what its ``meta.json`` says of it."""
+    variation = draw_variation(obj, seed, others, standard)
+    notes = describe_variation(variation, origin, seed)
+    folder, part = out / str(seed), out / f".{seed}.{os.getpid()}.part"
+    try:
+        write_variation(variation, part, formats, notes)
+        problems = (
+            [problem for name in file_gates for problem in _FILE_GATES[name](part, None)] if "urdf" in formats else []
+        )
+        if problems:
+            raise AssetError(f"its file is not as strict as that of the original: {problems[0]}", f"variation {seed}")
+        if folder.exists():  # of another version, or of other objects
+            shutil.rmtree(folder)
+        part.rename(folder)
+    except OSError as error:
+        raise write_error(error, folder) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return notes

@@ -1,0 +1,124 @@
+"""The search for a variation that passes the gates that its original passes: drawn again, ever more gently."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from artsim.errors import ArtsimError, AssetError, ConfigError
+from artsim.model.objects import ArticulatedObject, content_sha256
+from artsim.variation.geometry import centered
+from artsim.variation.operations import OPERATIONS
+from artsim.variation.standard import Standard
+
+DRAWS = 12
+"""Draws at most for one variation."""
+_GENTLER = 0.7
+"""Strength of a draw over that of the one before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """A variation and how it came about.
+
+    Attributes
+    ----------
+    obj : ArticulatedObject
+    operations : tuple of dict
+        What was done, in order: the operation's name, and its numbers in the units of the original.
+    rejected : tuple of str
+        Gates that earlier draws failed, one entry for each draw.
+    gates : tuple of str
+        Those that the original passes, and the variation with it.
+    """
+
+    obj: ArticulatedObject
+    operations: tuple[dict[str, Any], ...]
+    rejected: tuple[str, ...]
+    gates: tuple[str, ...]
+
+
+def draw_variation(
+    obj: ArticulatedObject,
+    seed: int = 0,
+    others: Sequence[ArticulatedObject] = (),
+    standard: Standard | None = None,
+) -> Variation:
+    """A variation with its record; see :func:`artsim.vary`.
+
+    Parameters
+    ----------
+    standard : Standard, optional
+        That of the object, where it is known.
+    """
+    _check(obj, seed, others)
+    standard = standard or Standard.of(obj)
+    rejected: list[str] = []
+    for draw in range(DRAWS):
+        rng = np.random.default_rng([int(obj.sha256[:16], 16), seed, draw])
+        made, operations = _draw(obj, rng, _GENTLER**draw, others)
+        if not operations:
+            continue
+        made = _named(made, obj, seed, operations)
+        failed = standard.failed(made)
+        if not failed:
+            return Variation(made, tuple(operations), tuple(rejected), standard.gates)
+        rejected.append(failed[0])
+    counts = ", ".join(f"{gate} {number} times" for gate, number in Counter(rejected).items())
+    raise AssetError(
+        f"none of {DRAWS} draws of variation {seed} passes the gates that the object passes: {counts} failed",
+        f"{obj.category} {obj.object_id}",
+        "use another seed",
+    )
+
+
+def _check(obj: ArticulatedObject, seed: int, others: Sequence[ArticulatedObject]) -> None:
+    where = f"{obj.category} {obj.object_id}"
+    if seed < 0:
+        raise ConfigError(f"seed {seed} is negative", fix="use 0 or more")
+    if obj.is_rigid:
+        raise AssetError("no joint can move: there is no articulated object to vary", where, "give it a moving joint")
+    strange = sorted({other.category for other in others} - {obj.category})
+    if strange:
+        raise ConfigError(
+            f"parts of {', '.join(strange)} do not fit a {obj.category}", "others", "name objects of the same category"
+        )
+
+
+def _draw(
+    obj: ArticulatedObject, rng: np.random.Generator, strength: float, others: Sequence[ArticulatedObject]
+) -> tuple[ArticulatedObject, list[dict[str, Any]]]:
+    """Some operations, one after the other; those that cannot be done are left out."""
+    done = []
+    chosen = [name for name, (_, share) in OPERATIONS.items() if rng.random() < share]
+    for name in chosen or ["stretch"]:
+        change = OPERATIONS[name][0](obj, rng, strength, others)
+        if change is not None:
+            obj, record = change
+            done.append({"operation": name, **record})
+    return obj, done
+
+
+def _named(
+    made: ArticulatedObject, original: ArticulatedObject, seed: int, operations: list[dict[str, Any]]
+) -> ArticulatedObject:
+    """The variation in a rest frame of its own, with a digest of what it came from."""
+    made = centered(made)
+    try:
+        content = json.dumps(operations, sort_keys=True).encode()
+    except ValueError as error:  # a number that is not finite
+        raise ArtsimError(f"an operation has no numbers ({error})", original.object_id) from error
+    return replace(
+        made,
+        object_id=f"{original.object_id}_{seed}",
+        sha256=content_sha256([original.sha256.encode(), content]),
+        T_base_rest=np.eye(4),
+        repairs=(),
+        source=f"variation {seed} of {original.source}",
+        source_joints={joint.name: (k, 1.0) for k, joint in enumerate(made.native_tree.joints) if k > 0},
+    )
