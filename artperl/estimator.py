@@ -16,7 +16,6 @@ import torch
 from safetensors.torch import load as load_tensors
 from torch import Tensor, nn
 
-from artperl.agent.policy import Agent
 from artperl.boxes.network import Boxes
 from artperl.core.estimate import Calibration
 from artperl.core.tensor_files import write_tensors
@@ -38,7 +37,7 @@ from artsim.model.objects import MAX_PARTS
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 2
+_FORMAT = 3
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
@@ -59,13 +58,10 @@ def save_estimator(estimator: Estimator | ArtPERL, folder: Path, about: Mapping[
         _write(folder, estimator.networks(), estimator.base, {"method": estimator.name, **estimator.settings()}, about)
         return
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
-    if estimator.agent is not None:
-        networks["agent"] = estimator.agent
     if estimator.boxes is not None:
         networks["boxes"] = estimator.boxes
     settings = {
         "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
-        "agent": None if estimator.agent is None else {"width": estimator.agent.width},
         "boxes": None
         if estimator.boxes is None
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
@@ -150,7 +146,6 @@ def load_estimator(
     try:
         sizes = _Sizes(
             from_json_values(_PerceptionSize, settings.get("perception")),
-            None if settings.get("agent") is None else from_json_values(_AgentSize, settings["agent"]),
             None if settings.get("boxes") is None else from_json_values(_BoxesSize, settings["boxes"]),
         )
         options = replace(from_json_values(EstimatorOptions, settings.get("options")), **changes)
@@ -169,11 +164,10 @@ def load_estimator(
     base = read_shape_base(folder / _BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
         raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
-    perception, agent, boxes = networks["perception"], networks.get("agent"), networks.get("boxes")
+    perception, boxes = networks["perception"], networks.get("boxes")
     assert isinstance(perception, Perception)
-    assert isinstance(agent, Agent | None)
     assert isinstance(boxes, Boxes | None)
-    return Estimator(perception, base, agent, options, calibration, boxes)
+    return Estimator(perception, base, options, calibration, boxes)
 
 
 def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping[str, Any]) -> ArtPERL:
@@ -239,14 +233,6 @@ class _PerceptionSize:
 
 
 @dataclass(frozen=True)
-class _AgentSize:
-    width: int = 64
-
-    def __post_init__(self) -> None:
-        _check_size(self.width, _MAX_WIDTH, "width")
-
-
-@dataclass(frozen=True)
 class _BoxesSize:
     num_rows: int
     width: int = 80
@@ -261,7 +247,6 @@ class _Sizes:
     """Sizes of an estimator's networks."""
 
     perception: _PerceptionSize
-    agent: _AgentSize | None
     boxes: _BoxesSize | None
 
     @property
@@ -269,8 +254,6 @@ class _Sizes:
         """Shape of a tensor of each network that is among its largest, by its name."""
         wide = 8 * self.perception.width
         shapes = {"perception.backbone.whole.0.weight": (wide, wide)}
-        if self.agent is not None:
-            shapes["agent.observed.2.weight"] = 2 * self.agent.width, self.agent.width
         if self.boxes is not None:
             shapes["boxes.among.0.weight"] = self.boxes.width, 6 * self.boxes.width
         return shapes
@@ -278,8 +261,6 @@ class _Sizes:
     def networks(self) -> dict[str, nn.Module]:
         """New networks of these sizes, by name."""
         networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
-        if self.agent is not None:
-            networks["agent"] = Agent(**asdict(self.agent))
         if self.boxes is not None:
             networks["boxes"] = Boxes(**asdict(self.boxes))
         return networks

@@ -11,13 +11,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from artperl.agent.actions import expected_action
-from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.agent.policy import Agent
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta
@@ -49,7 +45,6 @@ class Context:
         The same at a common place and size.
     perceived : Perceived
     references : References
-    agent : Agent, optional
     options : EstimatorOptions
     """
 
@@ -57,7 +52,6 @@ class Context:
     clouds: Clouds
     perceived: Perceived
     references: References
-    agent: Agent | None
     options: EstimatorOptions
 
     @cached_property
@@ -85,26 +79,18 @@ class Hypotheses:
         H rows.
     row : list of int, length H
         Of the base.
-    path : list of list of Theta, length H
-        States that led to each, one row each, from the first on.
     """
 
     shapes: Shapes
     theta: Theta
     row: list[int]
-    path: list[list[Theta]]
-
-    @staticmethod
-    def of(shapes: Shapes, theta: Theta, row: list[int]) -> Hypotheses:
-        """Hypotheses that no other state led to."""
-        return Hypotheses(shapes, theta, row, [[theta[i : i + 1]] for i in range(len(theta))])
 
     @staticmethod
     def join(several: Sequence[Hypotheses]) -> Hypotheses:
         """All of several sets, in their order."""
         return Hypotheses(
             concatenate([h.shapes for h in several]), concatenate([h.theta for h in several]),
-            [row for h in several for row in h.row], [path for h in several for path in h.path],
+            [row for h in several for row in h.row],
         )  # fmt: skip
 
 
@@ -118,10 +104,10 @@ class Best(Protocol):
     def theta(self) -> Theta: ...
 
     @property
-    def path(self) -> list[Theta]: ...
+    def row(self) -> int: ...
 
     @property
-    def row(self) -> int: ...
+    def outside(self) -> bool: ...
 
 
 class Generator(Protocol):
@@ -135,7 +121,7 @@ class Generator(Protocol):
 def perceived_pose(context: Context, best: Best | None) -> Hypotheses:
     """References where perception places the points in the rest frame."""
     shapes, theta = context.start
-    return Hypotheses.of(shapes, theta, context.references.row.tolist())
+    return Hypotheses(shapes, theta, context.references.row.tolist())
 
 
 def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
@@ -163,51 +149,24 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
     if best is None or not context.options.beam:
         return None
     states = beam_search.half_turns(best.shapes, best.theta)
-    return None if states is None else Hypotheses.of(best.shapes.repeat(len(states)), states, [best.row] * len(states))
+    return None if states is None else Hypotheses(best.shapes.repeat(len(states)), states, [best.row] * len(states))
 
 
-def views_around(context: Context, best: Best | None) -> Hypotheses | None:
-    """The reference as seen from several sides, as it was found but turned round, and where the agent leads it."""
-    options = context.options
-    if best is None:
-        first, row = context.start[0][:1], int(context.references.row[0])
-    else:
-        first, row = best.shapes, best.row
-    shapes = first.repeat(len(options.azimuths))
-    middle = np.mean(options.seen_from or (0.0, 0.0))
-    theta = initial_pose.starts_from_sides(
-        shapes, context.clouds.center, middle + np.array(options.azimuths), options.elevation
-    )  # fmt: skip
-    if best is not None:
-        shapes = concatenate([shapes, first.repeat(2)])
-        theta = concatenate([theta, best.path[0], half_turn_about_vertical(best.theta)])
-    starts = Hypotheses.of(shapes, theta, [row] * len(shapes))
-    if context.agent is None or not options.agent_steps:
-        return starts
-    few = context.observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
-    steps = [theta, *agent_steps(context.agent, shapes, few, theta, options.agent_steps)]
-    paths = [[step[i : i + 1] for step in steps] for i in range(len(shapes))]
-    return Hypotheses.join([starts, Hypotheses(shapes, steps[-1], starts.row, paths)])
+def other_side(context: Context, best: Best | None) -> Hypotheses | None:
+    """The best fit by half a turn about its vertical, if as it is it would be seen from where the camera is not."""
+    if best is None or not best.outside:
+        return None
+    return Hypotheses(best.shapes, half_turn_about_vertical(best.theta), [best.row])
 
 
 def _of_first(context: Context, shapes: Shapes, states: Theta) -> Hypotheses:
     """The first reference in several states."""
-    return Hypotheses.of(shapes.repeat(len(states)), states, [int(context.references.row[0])] * len(states))
+    return Hypotheses(shapes.repeat(len(states)), states, [int(context.references.row[0])] * len(states))
 
 
 def half_turn_about_vertical(theta: Theta) -> Theta:
     """Objects that stand where they stood, by half a turn about their verticals."""
     return replace(theta, rotation=theta.rotation * theta.rotation.new_tensor([-1.0, -1.0, 1.0]))
-
-
-def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
-    """States after each of the agent's actions."""
-    fitting = Fitting(shapes, observed, theta, FittingOptions(steps=steps))
-    path = []
-    while not fitting.done:
-        fitting.step(expected_action(agent(fitting.view())[0]))
-        path.append(fitting.theta)
-    return path
 
 
 def part_weights(part: Tensor) -> Tensor:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.data.categories import objects_of
 from artperl.evaluation.samples import TEST_SEEDS, frozen_samples
@@ -16,11 +17,12 @@ from artperl.fitting.hypotheses import (
     chain_states,
     half_turn,
     hinged_root,
+    other_side,
     part_weights,
     perceived_pose,
-    views_around,
 )
 from artperl.fitting.options import EstimatorOptions
+from artperl.fitting.search import find_fit
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.references import retrieve_references
@@ -37,7 +39,7 @@ def test_only_chains_of_joints_are_searched_for_down_the_tree(estimator: Estimat
         clouds = Clouds.of(cloud)
         perceived = oracle(clouds.points)
         found = retrieve_references(base, perceived, 1)
-        context = Context(cloud, clouds, perceived, found, None, EstimatorOptions())
+        context = Context(cloud, clouds, perceived, found, EstimatorOptions())
         proposed = chain_states(context, None)
         assert (proposed is not None) == (shown is seen)
         assert chain_states(replace(context, options=EstimatorOptions(beam=0)), None) is None
@@ -56,14 +58,17 @@ def test_each_generator_proposes_hypotheses_of_its_own_reference(estimator: Esti
     clouds = Clouds.of(cloud)
     perceived = Oracle(sample, 2)(clouds.points)
     found = retrieve_references(estimator.base, perceived, 3)
-    context = Context(cloud, clouds, perceived, found, None, EstimatorOptions())
+    context = Context(cloud, clouds, perceived, found, EstimatorOptions())
     proposed = perceived_pose(context, None)
     assert proposed.row == found.row.tolist()
-    around = views_around(context, None)
-    assert around is not None
-    assert around.row == [int(found.row[0])] * len(context.options.azimuths)
     assert hinged_root(context, None) is None  # the base of the laptop shows
     assert half_turn(context, None) is None
-    both = Hypotheses.join([proposed, around])
-    assert len(both.shapes) == len(both.theta) == len(both.path) == len(both.row) == 6
-    assert torch.equal(both.path[4][0].rotation, around.theta.rotation[1:2])
+    best = find_fit(context, Clock())
+    assert other_side(context, best) is None  # the camera may be anywhere
+    (round_there,) = [other_side(context, replace(best, outside=True))]
+    assert round_there is not None
+    assert round_there.row == [best.row]
+    both = Hypotheses.join([proposed, round_there])
+    assert len(both.shapes) == len(both.theta) == len(both.row) == 4
+    back = both.theta.rotation[3].T @ best.theta.rotation[0]
+    torch.testing.assert_close(back, torch.diag(torch.tensor([-1.0, -1.0, 1.0])), atol=1e-6, rtol=0.0)
