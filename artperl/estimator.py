@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any, Literal, cast, overload
 
 import torch
-from safetensors.torch import load as load_tensors
 from torch import Tensor, nn
 
 from artperl.boxes.network import Boxes
 from artperl.core.estimate import Calibration
-from artperl.core.tensor_files import write_tensors
+from artperl.core.tensor_files import MAX_BYTES, read_tensors, write_tensors
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods import method_of
 from artperl.methods.artperl import ArtPERL
@@ -152,7 +151,7 @@ def load_estimator(
         calibration = from_json_values(Calibration, settings.get("calibration"))
     except ValueError as error:
         raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
-    tensors = read_tensors(folder / _TENSORS)
+    tensors, _ = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
     for key, shape in sizes.largest.items():  # a forged width takes no memory before it is that of the weights
         if key not in tensors or tensors[key].shape != shape:
             raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, _AGAIN)
@@ -183,7 +182,7 @@ def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, "artperl", folder)
-    base, tensors = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS)
+    base, (tensors, _) = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
     try:
         with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
             networks = ArtPERL.of_settings(settings, base).networks()
@@ -316,26 +315,6 @@ def read_settings(folder: Path) -> dict[str, Any]:
 
 
 _MAX_SETTINGS_BYTES = 16_000_000
-_MAX_TENSOR_BYTES = 4_000_000_000
-_MAX_TENSOR_HEADER = 4_000_000
-"""Bytes of JSON that name the tensors: some hundred of them take a tenth."""
-
-
-def read_tensors(path: Path) -> dict[str, Tensor]:
-    """Tensors of a safetensors file.
-
-    Raises
-    ------
-    DatasetError
-        When the file is missing, damaged or too large.
-    """
-    data = read_bounded(path, _MAX_TENSOR_BYTES, "weights", DatasetError, fix=_AGAIN)
-    if int.from_bytes(data[:8], "little") > _MAX_TENSOR_HEADER:
-        raise DatasetError("weights cannot be read (the header says that it is huge)", path, _AGAIN)
-    try:
-        return load_tensors(data)
-    except Exception as error:  # safetensors raises what its parser and torch stumble on in bytes that are not theirs
-        raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
 def weights_sha256(folder: Path) -> str:
@@ -346,7 +325,7 @@ def weights_sha256(folder: Path) -> str:
     DatasetError
         When there are none.
     """
-    return hashlib.sha256(read_bounded(folder / _TENSORS, _MAX_TENSOR_BYTES, "weights", DatasetError)).hexdigest()
+    return hashlib.sha256(read_bounded(folder / _TENSORS, MAX_BYTES, "weights", DatasetError)).hexdigest()
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -31,6 +31,8 @@ _HINGE_STATES = 8
 """States of a joint by which a root that hardly shows is placed."""
 _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
+_HALF_TURNS = torch.tensor([[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+"""(3, 3) diagonals of the half turns about x, y and z."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,21 +154,21 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
     return None if states is None else Hypotheses(best.shapes.repeat(len(states)), states, [best.row] * len(states))
 
 
-def other_side(context: Context, best: Best | None) -> Hypotheses | None:
-    """The best fit by half a turn about its vertical, if as it is it would be seen from where the camera is not."""
+def other_sides(context: Context, best: Best | None) -> Hypotheses | None:
+    """The best fit by half a turn about each axis of its rest frame, if it is seen from where the camera is not.
+
+    A shut cabinet looks much the same from behind, and upside down.
+    """
     if best is None or not best.outside:
         return None
-    return Hypotheses(best.shapes, half_turn_about_vertical(best.theta), [best.row])
+    theta = best.theta.repeat(len(_HALF_TURNS))
+    theta = replace(theta, rotation=theta.rotation * _HALF_TURNS.to(theta.rotation)[:, None])
+    return Hypotheses(best.shapes.repeat(len(theta)), theta, [best.row] * len(theta))
 
 
 def _of_first(context: Context, shapes: Shapes, states: Theta) -> Hypotheses:
     """The first reference in several states."""
     return Hypotheses(shapes.repeat(len(states)), states, [int(context.references.row[0])] * len(states))
-
-
-def half_turn_about_vertical(theta: Theta) -> Theta:
-    """Objects that stand where they stood, by half a turn about their verticals."""
-    return replace(theta, rotation=theta.rotation * theta.rotation.new_tensor([-1.0, -1.0, 1.0]))
 
 
 def part_weights(part: Tensor) -> Tensor:

@@ -24,7 +24,7 @@ from artperl.fitting.hypotheses import (
     chain_states,
     half_turn,
     hinged_root,
-    other_side,
+    other_sides,
     perceived_pose,
 )
 from artperl.fitting.levenberg_marquardt import refine
@@ -90,7 +90,7 @@ def score(residual: Values, outside: Values) -> Values:
     return residual + _NEVER * outside
 
 
-ROUNDS = (perceived_pose, hinged_root, chain_states), (half_turn, other_side)
+ROUNDS = (perceived_pose, hinged_root, chain_states), (half_turn, other_sides)
 """Generators whose hypotheses compete: those of perception, then those of the best fit of these."""
 
 

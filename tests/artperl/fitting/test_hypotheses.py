@@ -17,7 +17,7 @@ from artperl.fitting.hypotheses import (
     chain_states,
     half_turn,
     hinged_root,
-    other_side,
+    other_sides,
     part_weights,
     perceived_pose,
 )
@@ -64,11 +64,13 @@ def test_each_generator_proposes_hypotheses_of_its_own_reference(estimator: Esti
     assert hinged_root(context, None) is None  # the base of the laptop shows
     assert half_turn(context, None) is None
     best = find_fit(context, Clock())
-    assert other_side(context, best) is None  # the camera may be anywhere
-    (round_there,) = [other_side(context, replace(best, outside=True))]
-    assert round_there is not None
-    assert round_there.row == [best.row]
-    both = Hypotheses.join([proposed, round_there])
-    assert len(both.shapes) == len(both.theta) == len(both.row) == 4
-    back = both.theta.rotation[3].T @ best.theta.rotation[0]
-    torch.testing.assert_close(back, torch.diag(torch.tensor([-1.0, -1.0, 1.0])), atol=1e-6, rtol=0.0)
+    assert other_sides(context, best) is None  # the camera may be anywhere
+    sides = other_sides(context, replace(best, outside=True))
+    assert sides is not None
+    both = Hypotheses.join([proposed, sides])
+    assert both.row == [*found.row.tolist(), *[best.row] * 3]
+    assert len(both.shapes) == len(both.theta) == 6
+    turns = best.theta.rotation.mT @ both.theta.rotation[3:]
+    assert torch.linalg.det(turns).allclose(torch.ones(3))
+    for axis, turn in zip(torch.eye(3), turns, strict=True):  # half a turn leaves its axis, and turns the others round
+        torch.testing.assert_close(turn, 2.0 * axis[:, None] * axis - torch.eye(3), atol=1e-6, rtol=0.0)
