@@ -53,7 +53,7 @@ class View(Batch):
     joint : (B, P, 6) float
         Axis, and anchor of each part's joint.
     kind : (B, P) int64
-        Index into ``artperl.core.pose.KINDS``.
+        Index into ``artperl.core.trees.KINDS``.
     parent : (B, P) int64
     valid : (B, P) bool
     state : (B, P, 2) float

@@ -13,7 +13,7 @@ from torch.nn import functional
 
 from artperl.agent.actions import NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import View
-from artperl.core.pose import KINDS
+from artperl.core.trees import KINDS
 
 _HEADS = {"free": 0, "revolute": 1, "continuous": 1, "prismatic": 2, "screw": 1, "fixed": 3}
 """Head of each kind of joint."""

@@ -17,7 +17,8 @@ from artperl.agent.actions import MOVE, SCALE, TURN
 from artperl.agent.decision_process import Fitting, View
 from artperl.agent.policy import Policy
 from artperl.core.batch import concatenate
-from artperl.core.pose import KINDS, Theta
+from artperl.core.pose import Theta
+from artperl.core.trees import KINDS
 
 _PRISMATIC = KINDS.index("prismatic")
 

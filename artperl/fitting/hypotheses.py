@@ -17,6 +17,7 @@ from torch import Tensor
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta
+from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting import beam_search, initial_pose
 from artperl.fitting.options import EstimatorOptions
@@ -31,8 +32,8 @@ _HINGE_STATES = 8
 """States of a joint by which a root that hardly shows is placed."""
 _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
-_HALF_TURNS = torch.tensor([[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
-"""(3, 3) diagonals of the half turns about x, y and z."""
+_TURNS = rotation_from_vector(0.5 * torch.pi * torch.tensor([[2, 0, 0], [0, 2, 0], [0, 0, 2], [0, 0, 1], [0, 0, -1]]))
+"""(5, 3, 3) half turns about x, y and z, and quarter turns about z."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +156,14 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
 
 
 def other_sides(context: Context, best: Best | None) -> Hypotheses | None:
-    """The best fit by half a turn about each axis of its rest frame, if it is seen from where the camera is not.
+    """The best fit turned about axes of its rest frame, if it is seen from where the camera is not.
 
-    A shut cabinet looks much the same from behind, and upside down.
+    A shut cabinet looks much the same from behind, from its side, and upside down.
     """
     if best is None or not best.outside:
         return None
-    theta = best.theta.repeat(len(_HALF_TURNS))
-    theta = replace(theta, rotation=theta.rotation * _HALF_TURNS.to(theta.rotation)[:, None])
+    theta = best.theta.repeat(len(_TURNS))
+    theta = replace(theta, rotation=theta.rotation @ _TURNS.to(theta.rotation))
     return Hypotheses(best.shapes.repeat(len(theta)), theta, [best.row] * len(theta))
 
 

@@ -19,7 +19,7 @@ with needs("artperl.training.gym_env", extra="train"):
 
 from artperl.agent.actions import NOTHING, NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.core.pose import KINDS
+from artperl.core.trees import KINDS
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
 from artperl.data.sources import DataOptions

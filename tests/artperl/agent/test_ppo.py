@@ -25,7 +25,8 @@ from artperl.agent.ppo import (
     rollout,
     update,
 )
-from artperl.core.pose import KINDS, Theta
+from artperl.core.pose import Theta
+from artperl.core.trees import KINDS
 from tests.artperl.worlds import small_problem
 from tests.conftest import installed
 

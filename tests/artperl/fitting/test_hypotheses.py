@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
@@ -68,9 +70,10 @@ def test_each_generator_proposes_hypotheses_of_its_own_reference(estimator: Esti
     sides = other_sides(context, replace(best, outside=True))
     assert sides is not None
     both = Hypotheses.join([proposed, sides])
-    assert both.row == [*found.row.tolist(), *[best.row] * 3]
-    assert len(both.shapes) == len(both.theta) == 6
-    turns = best.theta.rotation.mT @ both.theta.rotation[3:]
-    assert torch.linalg.det(turns).allclose(torch.ones(3))
-    for axis, turn in zip(torch.eye(3), turns, strict=True):  # half a turn leaves its axis, and turns the others round
-        torch.testing.assert_close(turn, 2.0 * axis[:, None] * axis - torch.eye(3), atol=1e-6, rtol=0.0)
+    assert both.row == [*found.row.tolist(), *[best.row] * 5]
+    assert len(both.shapes) == len(both.theta) == 8
+    turns = (best.theta.rotation.mT @ both.theta.rotation[3:]).double().numpy()
+    angle = np.rad2deg(Rotation.from_matrix(turns).as_rotvec())
+    np.testing.assert_allclose(np.linalg.norm(angle, axis=1), [180.0, 180.0, 180.0, 90.0, 90.0], atol=0.1)
+    np.testing.assert_allclose(abs(angle[:3]), 180.0 * np.eye(3), atol=0.1)  # about each axis once
+    np.testing.assert_allclose(angle[3:], [[0.0, 0.0, 90.0], [0.0, 0.0, -90.0]], atol=0.1)
