@@ -42,16 +42,16 @@ class Policy(nn.Module):
         self.width = width
         features = 2 * width
         described = 6 * features + 16 + _OF_JOINT
-        self.encoder = nn.Sequential(
-            nn.Linear(3, width), nn.ReLU(), nn.Linear(width, features), nn.ReLU(), nn.Linear(features, features),
-            nn.ReLU(),
-        )  # fmt: skip
         self.kind = nn.Embedding(len(KINDS), 16)
         self.part = nn.Sequential(nn.Linear(described, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU())
         self.whole = nn.Sequential(nn.Linear(128, 128), nn.ReLU())
         self.local = nn.Sequential(nn.Linear(384, 128), nn.ReLU())
         self.heads = nn.Linear(128, (max(_HEADS.values()) + 1) * NUM_AXES * NUM_BINS)
         self.value = nn.Sequential(nn.Linear(128, 64), nn.ReLU(), nn.Linear(64, 1))
+        self.encoder = nn.Sequential(
+            nn.Linear(3, width), nn.ReLU(), nn.Linear(width, features), nn.ReLU(), nn.Linear(features, features),
+            nn.ReLU(),
+        )  # fmt: skip
         self.register_buffer("head_of", torch.tensor([_HEADS[kind] for kind in KINDS]), persistent=False)
 
     def forward(self, view: View) -> tuple[Tensor, Tensor]:

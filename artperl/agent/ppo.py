@@ -173,8 +173,8 @@ def update(
             cloning = cloning_loss(logits, buffer.expert[rows], mask, buffer.view.kind[rows], options)
             loss = cloning
             if phase.reinforcement:
-                loss = loss + losses["policy"] + options.lambda_value * losses["value"]
-                loss = loss - options.lambda_entropy * losses["entropy"]
+                reinforcement = losses["policy"] + options.lambda_value * losses["value"]
+                loss = reinforcement - options.lambda_entropy * losses["entropy"] + cloning
             optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), options.max_gradient)
