@@ -17,7 +17,7 @@ from torch import Tensor
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta
-from artperl.core.rotations import rotation_from_vector
+from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting import beam_search, initial_pose
 from artperl.fitting.options import EstimatorOptions
@@ -32,8 +32,10 @@ _HINGE_STATES = 8
 """States of a joint by which a root that hardly shows is placed."""
 _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
-_TURNS = rotation_from_vector(0.5 * torch.pi * torch.tensor([[2, 0, 0], [0, 2, 0], [0, 0, 2], [0, 0, 1], [0, 0, -1]]))
-"""(5, 3, 3) half turns about x, y and z, and quarter turns about z."""
+_QUARTERS = rotation_from_vector(0.5 * torch.pi * torch.tensor([[0, 0, 0], [0, 0, 1], [0, 0, 2], [0, 0, 3]]))
+"""(4, 3, 3) quarter turns about the vertical."""
+_FLIP = torch.diag(torch.tensor([1.0, -1.0, -1.0]))
+"""Half a turn about x: what is upside down stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,15 +158,22 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
 
 
 def other_sides(context: Context, best: Best | None) -> Hypotheses | None:
-    """The best fit turned about axes of its rest frame, if it is seen from where the camera is not.
+    """The best fit, standing, by quarter turns about its vertical, if it is seen from where the camera is not.
 
-    A shut cabinet looks much the same from behind, from its side, and upside down.
+    A shut cabinet looks much the same from behind, from its side, and upside down. Its box stays where it is: a quarter
+    turn swaps width and depth.
     """
     if best is None or not best.outside:
         return None
-    theta = best.theta.repeat(len(_TURNS))
-    theta = replace(theta, rotation=theta.rotation @ _TURNS.to(theta.rotation))
-    return Hypotheses(best.shapes.repeat(len(theta)), theta, [best.row] * len(theta))
+    from_camera = rotate(best.theta.rotation.mT, best.theta.translation)
+    stand = _FLIP if from_camera[0, 2] > 0.0 else torch.eye(3)
+    turns = (stand @ _QUARTERS).to(best.theta.rotation)
+    points = initial_pose.adapt_shapes(best.shapes, best.theta).points[best.shapes.has_surface].flatten(0, 1)
+    extent = (points.amax(0) - points.amin(0)).log()
+    swapped = torch.stack([torch.zeros_like(extent), extent[[1, 0, 2]] - extent]).repeat(2, 1)
+    theta = best.theta.repeat(len(turns))
+    theta = replace(theta, rotation=theta.rotation @ turns, log_scale=theta.log_scale + swapped)
+    return Hypotheses(best.shapes.repeat(len(turns)), theta, [best.row] * len(turns))
 
 
 def _of_first(context: Context, shapes: Shapes, states: Theta) -> Hypotheses:
