@@ -160,19 +160,15 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
 def other_sides(context: Context, best: Best | None) -> Hypotheses | None:
     """The best fit, standing, by quarter turns about its vertical, if it is seen from where the camera is not.
 
-    A shut cabinet looks much the same from behind, from its side, and upside down. Its box stays where it is: a quarter
-    turn swaps width and depth.
+    A shut cabinet looks much the same from behind, from its side, and upside down.
     """
     if best is None or not best.outside:
         return None
     from_camera = rotate(best.theta.rotation.mT, best.theta.translation)
     stand = _FLIP if from_camera[0, 2] > 0.0 else torch.eye(3)
     turns = (stand @ _QUARTERS).to(best.theta.rotation)
-    points = initial_pose.adapt_shapes(best.shapes, best.theta).points[best.shapes.has_surface].flatten(0, 1)
-    extent = (points.amax(0) - points.amin(0)).log()
-    swapped = torch.stack([torch.zeros_like(extent), extent[[1, 0, 2]] - extent]).repeat(2, 1)
     theta = best.theta.repeat(len(turns))
-    theta = replace(theta, rotation=theta.rotation @ turns, log_scale=theta.log_scale + swapped)
+    theta = replace(theta, rotation=theta.rotation @ turns)
     return Hypotheses(best.shapes.repeat(len(turns)), theta, [best.row] * len(turns))
 
 
