@@ -39,7 +39,6 @@ bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 	$(PY) -m benchmarks.retrieval
 	$(PY) -m benchmarks.errors
 	$(PY) -m benchmarks.legacy_iou
-	$(PY) -m benchmarks.joint
 	$(PY) -m benchmarks.robot_arm
 
 audit: $(VENV)/.ready-dev  ## test 10,000 procedural objects, and those in ARTSIM_PARTNET_DIR, for simulators

@@ -13,13 +13,11 @@ from pathlib import Path
 from typing import Any, Literal, cast, overload
 
 import torch
-from safetensors.torch import load as load_tensors
 from torch import Tensor, nn
 
-from artperl.agent.policy import Agent
 from artperl.boxes.network import Boxes
 from artperl.core.estimate import Calibration
-from artperl.core.tensor_files import write_tensors
+from artperl.core.tensor_files import MAX_BYTES, read_tensors, write_tensors
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods import method_of
 from artperl.methods.artperl import ArtPERL
@@ -38,7 +36,7 @@ from artsim.model.objects import MAX_PARTS
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 2
+_FORMAT = 3
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
@@ -59,13 +57,10 @@ def save_estimator(estimator: Estimator | ArtPERL, folder: Path, about: Mapping[
         _write(folder, estimator.networks(), estimator.base, {"method": estimator.name, **estimator.settings()}, about)
         return
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
-    if estimator.agent is not None:
-        networks["agent"] = estimator.agent
     if estimator.boxes is not None:
         networks["boxes"] = estimator.boxes
     settings = {
         "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
-        "agent": None if estimator.agent is None else {"width": estimator.agent.width},
         "boxes": None
         if estimator.boxes is None
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
@@ -150,14 +145,13 @@ def load_estimator(
     try:
         sizes = _Sizes(
             from_json_values(_PerceptionSize, settings.get("perception")),
-            None if settings.get("agent") is None else from_json_values(_AgentSize, settings["agent"]),
             None if settings.get("boxes") is None else from_json_values(_BoxesSize, settings["boxes"]),
         )
         options = replace(from_json_values(EstimatorOptions, settings.get("options")), **changes)
         calibration = from_json_values(Calibration, settings.get("calibration"))
     except ValueError as error:
         raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
-    tensors = read_tensors(folder / _TENSORS)
+    tensors, _ = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
     for key, shape in sizes.largest.items():  # a forged width takes no memory before it is that of the weights
         if key not in tensors or tensors[key].shape != shape:
             raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, _AGAIN)
@@ -169,11 +163,10 @@ def load_estimator(
     base = read_shape_base(folder / _BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
         raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
-    perception, agent, boxes = networks["perception"], networks.get("agent"), networks.get("boxes")
+    perception, boxes = networks["perception"], networks.get("boxes")
     assert isinstance(perception, Perception)
-    assert isinstance(agent, Agent | None)
     assert isinstance(boxes, Boxes | None)
-    return Estimator(perception, base, agent, options, calibration, boxes)
+    return Estimator(perception, base, options, calibration, boxes)
 
 
 def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping[str, Any]) -> ArtPERL:
@@ -189,7 +182,7 @@ def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, "artperl", folder)
-    base, tensors = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS)
+    base, (tensors, _) = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
     try:
         with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
             networks = ArtPERL.of_settings(settings, base).networks()
@@ -239,14 +232,6 @@ class _PerceptionSize:
 
 
 @dataclass(frozen=True)
-class _AgentSize:
-    width: int = 64
-
-    def __post_init__(self) -> None:
-        _check_size(self.width, _MAX_WIDTH, "width")
-
-
-@dataclass(frozen=True)
 class _BoxesSize:
     num_rows: int
     width: int = 80
@@ -261,7 +246,6 @@ class _Sizes:
     """Sizes of an estimator's networks."""
 
     perception: _PerceptionSize
-    agent: _AgentSize | None
     boxes: _BoxesSize | None
 
     @property
@@ -269,8 +253,6 @@ class _Sizes:
         """Shape of a tensor of each network that is among its largest, by its name."""
         wide = 8 * self.perception.width
         shapes = {"perception.backbone.whole.0.weight": (wide, wide)}
-        if self.agent is not None:
-            shapes["agent.observed.2.weight"] = 2 * self.agent.width, self.agent.width
         if self.boxes is not None:
             shapes["boxes.among.0.weight"] = self.boxes.width, 6 * self.boxes.width
         return shapes
@@ -278,8 +260,6 @@ class _Sizes:
     def networks(self) -> dict[str, nn.Module]:
         """New networks of these sizes, by name."""
         networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
-        if self.agent is not None:
-            networks["agent"] = Agent(**asdict(self.agent))
         if self.boxes is not None:
             networks["boxes"] = Boxes(**asdict(self.boxes))
         return networks
@@ -335,26 +315,6 @@ def read_settings(folder: Path) -> dict[str, Any]:
 
 
 _MAX_SETTINGS_BYTES = 16_000_000
-_MAX_TENSOR_BYTES = 4_000_000_000
-_MAX_TENSOR_HEADER = 4_000_000
-"""Bytes of JSON that name the tensors: some hundred of them take a tenth."""
-
-
-def read_tensors(path: Path) -> dict[str, Tensor]:
-    """Tensors of a safetensors file.
-
-    Raises
-    ------
-    DatasetError
-        When the file is missing, damaged or too large.
-    """
-    data = read_bounded(path, _MAX_TENSOR_BYTES, "weights", DatasetError, fix=_AGAIN)
-    if int.from_bytes(data[:8], "little") > _MAX_TENSOR_HEADER:
-        raise DatasetError("weights cannot be read (the header says that it is huge)", path, _AGAIN)
-    try:
-        return load_tensors(data)
-    except Exception as error:  # safetensors raises what its parser and torch stumble on in bytes that are not theirs
-        raise DatasetError(f"weights cannot be read ({error})", path, _AGAIN) from error
 
 
 def weights_sha256(folder: Path) -> str:
@@ -365,7 +325,7 @@ def weights_sha256(folder: Path) -> str:
     DatasetError
         When there are none.
     """
-    return hashlib.sha256(read_bounded(folder / _TENSORS, _MAX_TENSOR_BYTES, "weights", DatasetError)).hexdigest()
+    return hashlib.sha256(read_bounded(folder / _TENSORS, MAX_BYTES, "weights", DatasetError)).hexdigest()
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -20,7 +20,7 @@ from torch import nn
 
 from artperl.agent.actions import NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.agent.policy import Agent
+from artperl.agent.policy import Policy
 from artperl.agent.ppo import JOINT, PPOOptions, rollout, update
 from artperl.data.batches import batches
 from artperl.data.categories import objects_of
@@ -145,7 +145,7 @@ class _Timed(Fitting):
 def learning_to_fit(problems: Problems, options: Options) -> tuple[float, Shares]:
     """States a second that the agent learns from by Algorithm 1, as in training."""
     torch.manual_seed(0)
-    agent, shares, ppo = Agent(), Shares(), PPOOptions()
+    agent, shares, ppo = Policy(), Shares(), PPOOptions()
     optimizer = torch.optim.AdamW(agent.parameters())
     generator = torch.Generator().manual_seed(0)
     done, begun = 0, time.perf_counter()

@@ -1,11 +1,9 @@
 """The paper's robot arm (table 3): ``python -m benchmarks.robot_arm``.
 
 A Franka Panda of seven parts and six joints, one instance: the estimator for any tree learns on from it for a few
-minutes, perception alone, and is then tested in states and from sides that it has not seen, with the same joint agent
-that fits cabinets. The published images are real and not public; here PyBullet's model of the arm is seen by a
-simulated camera. A second row does without the beam search, which tells how round links have rolled; a third one
-without rest-frame coordinates, so that the agent has to find the arm, and a fourth one without the agent, too. The last
-line is one JSON object.
+minutes, and is then tested in states and from sides that it has not seen. The published images are real and not public;
+here PyBullet's model of the arm is seen by a simulated camera. A second row does without the beam search, which tells
+how round links have rolled. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -65,20 +63,14 @@ def main(options: Options) -> None:
     sample = SampleOptions(noise=options.noise)
     learning = replace(
         PRESETS["joint"], categories=(), files=(str(arm),), parts="any", start_from=str(options.start_from),
-        perception_steps=options.perception_steps, agent_rollouts=0, test_objects=40, sample=sample,
+        perception_steps=options.perception_steps, test_objects=40, sample=sample,
     )  # fmt: skip
     training = Training(learning, options.out / "run")
     training.run()
     estimator = load_estimator(options.out / "run" / "best")
     samples = samples_of([load(arm)], options.views, sample)
     without_beam = replace(estimator, options=replace(estimator.options, beam=0))
-    without_coordinates = replace(estimator, options=replace(estimator.options, perceived_start=False))
-    variants = {
-        "whole": estimator,
-        "no beam search": without_beam,
-        "no rest-frame coordinates": without_coordinates,
-        "the same, refinement only": replace(without_coordinates, agent=None),
-    }
+    variants = {"whole": estimator, "no beam search": without_beam}
     result: dict[str, Any] = {}
     for name, variant in variants.items():
         (result[name],) = summary(evaluate(variant, samples, progress=True)).values()

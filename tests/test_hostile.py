@@ -163,12 +163,12 @@ def made(root: Path) -> dict[str, tuple[str, Path, str | None]]:
         ),
         "weights with a forged header": (
             "estimator", changed_estimator(root / "header", weights__safetensors=huge_header()),
-            "weights cannot be read",
+            "the file of weights is damaged",
         ),
         "weights with an endless header": (
             "estimator",
             changed_estimator(root / "endless", weights__safetensors=b"\xff" * 8 + b"{"),
-            "the header says that it is huge",
+            "its header cannot be so large",
         ),
     }  # fmt: skip
 
@@ -194,7 +194,10 @@ def shared(root: Path) -> dict[str, tuple[str, Path, str | None]]:
     (compiled,) = CASES.glob("fuzz_npzobj_*")
     cases["object"] = ("load", compiled, "64 bits")
     (forged,) = CASES.glob("fuzz_settings_*")
-    cases["settings"] = ("estimator", changed_estimator(root / "e", estimator__json=forged.read_bytes()), "references")
+    references = {"references": json.loads(forged.read_bytes())["options"]["references"]}
+    cases["settings"] = (
+        "estimator", changed_estimator(root / "e", estimator__json=settings(options=references)), "references"
+    )  # fmt: skip
     (description,) = CASES.glob("fuzz_dsjson_*")
     cases["description"] = ("dataset", folder_with(root / "d", dataset__json=description.read_bytes()), "")
     (mesh,) = CASES.glob("fuzz_mesh_*")

@@ -13,9 +13,10 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from artperl.core.pose import Theta, Trees, clamp_state, reach
+from artperl.core.pose import Theta, clamp_state, reach
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Shapes
+from artperl.core.trees import Trees
 
 MAGNITUDES = (0.0033, 0.01, 0.03, 0.09, 0.27)
 """Radians, and units of an observed cloud of unit radius (as ReAgent, Bauer et al. 2021)."""
@@ -92,15 +93,13 @@ def residual(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor) -> Tenso
     return steps * action_mask(trees)
 
 
-def expert(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor, greedy: bool = False) -> Tensor:
+def expert(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor) -> Tensor:
     """(B, P, 9) int64: the action of an expert that knows the goal (the labels of equation 4).
 
-    Steady, it takes on each axis the largest step that does not overshoot; greedy, the nearest.
+    It is steady: on each axis it takes the largest step that does not overshoot.
     """
     missing = residual(shapes, theta, goal, radius)
-    size = missing.abs()[..., None]
-    magnitudes = STEPS[NOTHING:].to(missing)
-    bin_of = (size - magnitudes).abs().argmin(-1) if greedy else (size >= magnitudes).sum(-1) - 1
+    bin_of = (missing.abs()[..., None] >= STEPS[NOTHING:].to(missing)).sum(-1) - 1
     return NOTHING + torch.where(missing < 0, -bin_of, bin_of)
 
 

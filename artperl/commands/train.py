@@ -35,7 +35,7 @@ class Train:
     To make an estimator that comes with the package: artperl train --recipe laptop
 
     For a robot of your own, from the estimator for any tree:
-    python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000 --agent-rollouts 0
+    python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000
 
     What is not given is as the preset or the recipe has it.
     """
@@ -82,7 +82,7 @@ class Train:
     perception_rate: float | None = None
     """Highest learning rate of perception; a lower one changes less of what --start-from brings along."""
     agent_rollouts: int | None = None
-    """Batches of episodes that the agent learns from, 0 for no agent."""
+    """Batches of episodes that the agent of the method artperl learns from."""
     box_views: int | None = None
     """Fresh views whose estimates teach where boxes end, 0 to keep those of the references."""
     box_width: int | None = None
@@ -95,8 +95,6 @@ class Train:
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     device: Literal["cpu", "cuda"] | None = None
     """Where the networks learn."""
-    learning: Literal["both", "cloning", "reinforcement"] | None = None
-    """How the agent learns: behaviour cloning and PPO, or one of them alone."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] | None = None
     """Depth sensor of the clouds."""
     states: StateMode | None = None

@@ -12,8 +12,9 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.core.listing import full_text, short_text
-from artperl.core.pose import KINDS, Posed, Theta, joint_axes, joint_states, pose_parts, reach
+from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
+from artperl.core.trees import KINDS
 
 Array = NDArray[np.float64]
 

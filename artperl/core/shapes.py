@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.core.batch import Batch
-from artperl.core.pose import Trees
+from artperl.core.trees import Trees
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array, Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject

@@ -67,7 +67,7 @@ def read_tensors(path: Path, what: str, fix: str) -> tuple[dict[str, Tensor], st
     except Exception as error:  # safetensors raises what its parser and torch stumble on in bytes that are not theirs
         raise DatasetError(f"{what} is damaged ({error})", path, fix) from error
     digest = tensors_sha256(tensors)
-    if told is not None and told != digest:  # files of earlier versions tell none
+    if told != digest:
         raise DatasetError(f"{what} is damaged (its checksum differs)", path, fix)
     return tensors, digest
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -11,43 +10,21 @@ from torch import Tensor
 
 from artperl.agent.actions import MOVE, NUM_AXES, SCALE, STATE, TURN, move
 from artperl.core.batch import Batch
-from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.data.sources import DataOptions
-from artperl.fitting.initial_pose import adapt_shapes, resize_shapes
-from artperl.perception.network import Perception
-from artperl.perception.part_grouping import perceive
+from artperl.fitting.initial_pose import resize_shapes
 from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.observing.sample import Sample
 
-References = Literal["retrieved", "deformed"]
-"""What is fitted: one of the objects of the base that are most like the observed one; or the observed object itself,
-stretched at random, which has the right tree where no base could hold all that there are."""
-
-Labels = Literal["perceived", "true"]
-"""Which part each point is said to be of: what perception says; or the truth, for an agent that is to learn more trees
-than its perception can tell apart yet."""
-
 _CHOICES = 4
 """Nearest references among which one is drawn: in use, too, the nearest is seldom the best."""
-_STRETCH = (0.25, 0.1)
-"""Half-widths of the logarithms by which deformed references are stretched: as a whole, and each part on its own."""
-_SHIFT = 0.03
-"""Half-width, in diagonals, of what joints of deformed references are off by."""
 
-
-@dataclass(frozen=True)
-class StartOptions:
-    """How far from the goal episodes begin: half-widths of uniform distributions."""
-
-    rotation: float = 1.0
-    """Radians, about a random axis."""
-    translation: float = 0.3
-    """Radii of the observed cloud."""
-    scale: float = 0.15
-    """Logarithm, along each axis."""
+_VIEWS = 2
+"""Problems in a row of the same object: an object takes longer to make than a view of it."""
+_TURN, _MOVE, _SCALE = 1.0, 0.3, 0.15
+"""Half-widths of what starts are off by: radians about a random axis, radii of the cloud, logarithm along each axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,23 +55,13 @@ class Problems:
         References are drawn from the few that are most like the object.
     batch_size, num_points : int
     seed : int
-    start : StartOptions, optional
-    perception : Perception, optional
-        Labels the points; without one, they carry their true labels. What is drawn for batch ``n`` does not depend on
-        it.
-    views_per_object : int
-        Problems in a row of the same object.
-    references : References
     """
 
     def __init__(
-        self, data: DataOptions, base: ShapeBase, batch_size: int = 64, num_points: int = 512, seed: int = 0,
-        start: StartOptions | None = None, perception: Perception | None = None, views_per_object: int = 2,
-        references: References = "retrieved",
+        self, data: DataOptions, base: ShapeBase, batch_size: int = 64, num_points: int = 512, seed: int = 0
     ):  # fmt: skip
-        self.samples = data.source(base.shapes.trees.num_rows, num_points, seed, views_per_object)
+        self.samples = data.source(base.shapes.trees.num_rows, num_points, seed, _VIEWS)
         self.base, self.batch_size, self.seed = base, batch_size, seed
-        self.start, self.perception, self.references = start or StartOptions(), perception, references
 
     def __getitem__(self, n: int) -> Problem:
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + n)
@@ -102,28 +69,19 @@ class Problems:
         rows = self.base.shapes.trees.num_rows
         truth = [part_truth(sample, rows) for sample in samples]
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
-        if self.references == "deformed":
-            objects = [self.samples.object(i) for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
-            shapes = deform(Shapes.from_objects(objects, self.base.shapes.points.shape[2], rows), generator)
-        else:
-            query = box_embedding(valid, box_center, box_size)
-            nearest, _ = self.base.nearest_objects(query, min(_CHOICES, len(self.base)))
-            pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
-            shapes = self.base.shapes[nearest.gather(1, pick)[:, 0]]
-        shapes = resize_shapes(shapes, torch.tensor([sample.diagonal for sample in samples]))
+        query = box_embedding(valid, box_center, box_size)
+        nearest, _ = self.base.nearest_objects(query, min(_CHOICES, len(self.base)))
+        pick = torch.randint(nearest.shape[1], (len(nearest), 1), generator=generator)
+        shapes = resize_shapes(
+            self.base.shapes[nearest.gather(1, pick)[:, 0]], torch.tensor([sample.diagonal for sample in samples])
+        )
         goal = theta_from_parts(shapes.trees, shapes.box_center, shapes.box_size, rotation, center, size)
         goal = Theta(**{**vars(goal), "state": clamp_state(shapes.trees, goal.state)})
         points = torch.from_numpy(np.stack([s.points for s in samples]))
         part = torch.from_numpy(np.stack([s.part for s in samples]).astype(np.int64))
-        observed = Observed.of(points, part if self.perception is None else self._labels(points))
+        observed = Observed.of(points, part)
         radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
-        return Problem(shapes, observed, draw_starts(shapes, goal, radius, self.start, generator), goal)
-
-    @torch.inference_mode()
-    def _labels(self, points: Tensor) -> Tensor:
-        assert self.perception is not None
-        clouds = Clouds.of(points.to(self.perception.device))
-        return perceive(self.perception.eval(), clouds.points).part.to("cpu", copy=True)
+        return Problem(shapes, observed, draw_starts(shapes, goal, radius, generator), goal)
 
 
 def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
@@ -146,24 +104,7 @@ def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
     return torch.arange(rows) < K, rotation, pad(center), pad(sample.box_size), *boxes
 
 
-def deform(shapes: Shapes, generator: torch.Generator) -> Shapes:
-    """Other objects with the same trees: stretched as a whole and part by part, their joints somewhere else."""
-    B, P = shapes.trees.valid.shape
-
-    def drawn(*size: int) -> Tensor:
-        return 2.0 * torch.rand(*size, generator=generator) - 1.0
-
-    whole, own = _STRETCH
-    shift = _SHIFT * shapes.diagonal[:, None, None] * drawn(B, P, 3)
-    return adapt_shapes(
-        shapes,
-        replace(Theta.at_rest(shapes.trees), log_scale=whole * drawn(B, 3), stretch=own * drawn(B, P, 3), shift=shift),
-    )
-
-
-def draw_starts(
-    shapes: Shapes, goal: Theta, radius: Tensor, options: StartOptions, generator: torch.Generator
-) -> Theta:
+def draw_starts(shapes: Shapes, goal: Theta, radius: Tensor, generator: torch.Generator) -> Theta:
     """Starts around goals, with the reference's own shape, and joint states anywhere in their limits."""
     B, P = shapes.trees.valid.shape
     plain = Theta(
@@ -172,9 +113,9 @@ def draw_starts(
     )  # fmt: skip
     step = 2.0 * torch.rand(B, P, NUM_AXES, generator=generator) - 1.0
     axis = torch.nn.functional.normalize(torch.randn(B, 3, generator=generator), dim=-1)
-    step[:, 0, TURN] = axis * (options.rotation * step[:, 0, :1])
-    step[:, 0, MOVE] *= options.translation
-    step[:, 0, SCALE] *= options.scale
+    step[:, 0, TURN] = axis * (_TURN * step[:, 0, :1])
+    step[:, 0, MOVE] *= _MOVE
+    step[:, 0, SCALE] *= _SCALE
     step[:, 1:, MOVE] = 0.0
     step[:, 1:, STATE] = 0.0
     moved = move(shapes, plain, step, radius)

@@ -1,4 +1,4 @@
-"""Confidence and retry threshold of an estimator, fitted to its scores on a validation set."""
+"""Confidence of an estimator, fitted to its scores on a validation set."""
 
 from __future__ import annotations
 
@@ -12,15 +12,6 @@ from artperl.core.estimate import Calibration
 from artperl.evaluation.scoring import Scored
 
 Array = NDArray[np.float64]
-
-_FITS_WELL = 0.75
-"""Share of estimates that are not looked for again."""
-
-
-def retry_residual(scored: Sequence[Scored]) -> float:
-    """Residual above which an estimate is looked for again: that of the quarter that fits worst."""
-    residuals = [s.residual for s in scored if np.isfinite(s.residual)]
-    return float(np.quantile(residuals, _FITS_WELL)) if residuals else 0.0
 
 
 def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calibration:

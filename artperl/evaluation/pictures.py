@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_COLUMNS = 4
+"""Of a sheet of overlays."""
 _CORNERS = np.array([[i & 1, i & 2, i & 4] for i in range(8)], dtype=bool) - 0.5
 _EDGES = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
 _CURVES = (
@@ -74,19 +76,18 @@ def curves(events: Path) -> bytes:
     return _png(figure)
 
 
-def overlays(estimator: Method, samples: Sequence[Sample], columns: int = 4) -> bytes:
+def overlays(estimator: Method, samples: Sequence[Sample]) -> bytes:
     """PNG of clouds with the boxes of their parts: true ones grey and dashed, estimated ones in the part's colour.
 
     Parameters
     ----------
     estimator : Method
     samples : sequence of Sample
-    columns : int
     """
-    rows = -(-len(samples) // columns)
-    figure = _figure(3.4 * columns, 3.0 * rows)
+    rows = -(-len(samples) // _COLUMNS)
+    figure = _figure(3.4 * _COLUMNS, 3.0 * rows)
     for number, sample in enumerate(samples):
-        axes = figure.add_subplot(rows, columns, number + 1)
+        axes = figure.add_subplot(rows, _COLUMNS, number + 1)
         try:
             _overlay(axes, sample, estimator(sample.points))
         except ArtsimError as error:

@@ -13,9 +13,10 @@ import torch
 from torch import Tensor
 
 from artperl.core.batch import Batch, concatenate
-from artperl.core.pose import Posed, Theta, Trees, pose_parts
+from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
+from artperl.core.trees import Trees
 from artperl.fitting.correspondence import Target, match
 from artperl.fitting.levenberg_marquardt import refine, robust_mean
 from artperl.fitting.refine_options import RefineOptions

@@ -11,16 +11,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from artperl.agent.actions import expected_action
-from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.agent.policy import Agent
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta
+from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting import beam_search, initial_pose
 from artperl.fitting.options import EstimatorOptions
@@ -35,6 +32,10 @@ _HINGE_STATES = 8
 """States of a joint by which a root that hardly shows is placed."""
 _MOST_WEIGHT = 8.0
 """Weight of a point of a hardly visible part against one of the part with most points."""
+_QUARTERS = rotation_from_vector(0.5 * torch.pi * torch.tensor([[0, 0, 0], [0, 0, 1], [0, 0, 2], [0, 0, 3]]))
+"""(4, 3, 3) quarter turns about the vertical."""
+_FLIP = torch.diag(torch.tensor([1.0, -1.0, -1.0]))
+"""Half a turn about x: what is upside down stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,6 @@ class Context:
         The same at a common place and size.
     perceived : Perceived
     references : References
-    agent : Agent, optional
     options : EstimatorOptions
     """
 
@@ -57,7 +57,6 @@ class Context:
     clouds: Clouds
     perceived: Perceived
     references: References
-    agent: Agent | None
     options: EstimatorOptions
 
     @cached_property
@@ -85,26 +84,18 @@ class Hypotheses:
         H rows.
     row : list of int, length H
         Of the base.
-    path : list of list of Theta, length H
-        States that led to each, one row each, from the first on.
     """
 
     shapes: Shapes
     theta: Theta
     row: list[int]
-    path: list[list[Theta]]
-
-    @staticmethod
-    def of(shapes: Shapes, theta: Theta, row: list[int]) -> Hypotheses:
-        """Hypotheses that no other state led to."""
-        return Hypotheses(shapes, theta, row, [[theta[i : i + 1]] for i in range(len(theta))])
 
     @staticmethod
     def join(several: Sequence[Hypotheses]) -> Hypotheses:
         """All of several sets, in their order."""
         return Hypotheses(
             concatenate([h.shapes for h in several]), concatenate([h.theta for h in several]),
-            [row for h in several for row in h.row], [path for h in several for path in h.path],
+            [row for h in several for row in h.row],
         )  # fmt: skip
 
 
@@ -118,10 +109,10 @@ class Best(Protocol):
     def theta(self) -> Theta: ...
 
     @property
-    def path(self) -> list[Theta]: ...
+    def row(self) -> int: ...
 
     @property
-    def row(self) -> int: ...
+    def outside(self) -> bool: ...
 
 
 class Generator(Protocol):
@@ -135,7 +126,7 @@ class Generator(Protocol):
 def perceived_pose(context: Context, best: Best | None) -> Hypotheses:
     """References where perception places the points in the rest frame."""
     shapes, theta = context.start
-    return Hypotheses.of(shapes, theta, context.references.row.tolist())
+    return Hypotheses(shapes, theta, context.references.row.tolist())
 
 
 def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
@@ -163,51 +154,27 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
     if best is None or not context.options.beam:
         return None
     states = beam_search.half_turns(best.shapes, best.theta)
-    return None if states is None else Hypotheses.of(best.shapes.repeat(len(states)), states, [best.row] * len(states))
+    return None if states is None else Hypotheses(best.shapes.repeat(len(states)), states, [best.row] * len(states))
 
 
-def views_around(context: Context, best: Best | None) -> Hypotheses | None:
-    """The reference as seen from several sides, as it was found but turned round, and where the agent leads it."""
-    options = context.options
-    if best is None:
-        first, row = context.start[0][:1], int(context.references.row[0])
-    else:
-        first, row = best.shapes, best.row
-    shapes = first.repeat(len(options.azimuths))
-    middle = np.mean(options.seen_from or (0.0, 0.0))
-    theta = initial_pose.starts_from_sides(
-        shapes, context.clouds.center, middle + np.array(options.azimuths), options.elevation
-    )  # fmt: skip
-    if best is not None:
-        shapes = concatenate([shapes, first.repeat(2)])
-        theta = concatenate([theta, best.path[0], half_turn_about_vertical(best.theta)])
-    starts = Hypotheses.of(shapes, theta, [row] * len(shapes))
-    if context.agent is None or not options.agent_steps:
-        return starts
-    few = context.observed.map(lambda tensor: tensor[:, : options.early_points]).repeat(len(shapes))
-    steps = [theta, *agent_steps(context.agent, shapes, few, theta, options.agent_steps)]
-    paths = [[step[i : i + 1] for step in steps] for i in range(len(shapes))]
-    return Hypotheses.join([starts, Hypotheses(shapes, steps[-1], starts.row, paths)])
+def other_sides(context: Context, best: Best | None) -> Hypotheses | None:
+    """The best fit, standing, by quarter turns about its vertical, if it is seen from where the camera is not.
+
+    A shut cabinet looks much the same from behind, from its side, and upside down.
+    """
+    if best is None or not best.outside:
+        return None
+    from_camera = rotate(best.theta.rotation.mT, best.theta.translation)
+    stand = _FLIP if from_camera[0, 2] > 0.0 else torch.eye(3)
+    turns = (stand @ _QUARTERS).to(best.theta.rotation)
+    theta = best.theta.repeat(len(turns))
+    theta = replace(theta, rotation=theta.rotation @ turns)
+    return Hypotheses(best.shapes.repeat(len(turns)), theta, [best.row] * len(turns))
 
 
 def _of_first(context: Context, shapes: Shapes, states: Theta) -> Hypotheses:
     """The first reference in several states."""
-    return Hypotheses.of(shapes.repeat(len(states)), states, [int(context.references.row[0])] * len(states))
-
-
-def half_turn_about_vertical(theta: Theta) -> Theta:
-    """Objects that stand where they stood, by half a turn about their verticals."""
-    return replace(theta, rotation=theta.rotation * theta.rotation.new_tensor([-1.0, -1.0, 1.0]))
-
-
-def agent_steps(agent: Agent, shapes: Shapes, observed: Observed, theta: Theta, steps: int) -> list[Theta]:
-    """States after each of the agent's actions."""
-    fitting = Fitting(shapes, observed, theta, FittingOptions(steps=steps))
-    path = []
-    while not fitting.done:
-        fitting.step(expected_action(agent(fitting.view())[0]))
-        path.append(fitting.theta)
-    return path
+    return Hypotheses(shapes.repeat(len(states)), states, [int(context.references.row[0])] * len(states))
 
 
 def part_weights(part: Tensor) -> Tensor:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -14,7 +12,6 @@ from artperl.core.pose import Theta, clamp_state, parent_pose, pose_parts, theta
 from artperl.core.rotations import rotate
 from artperl.core.shapes import Shapes
 from artperl.perception.network import Perceived
-from artsim.model.camera import look_at_transform
 
 _ROUNDS = 4
 _LEAST = 8.0
@@ -183,36 +180,6 @@ def _follow(shapes: Shapes, theta: Theta, source: Tensor, target: Tensor, weight
         state = torch.where(told & (trees.depth == depth), clamp_state(trees, state), theta.state)
         theta = replace(theta, state=state)
     return theta
-
-
-def starts_from_sides(shapes: Shapes, center: Tensor, azimuths: Sequence[float], elevation: float) -> Theta:
-    """References that stand where a cloud is and are seen from one side each, their joints half-way.
-
-    Parameters
-    ----------
-    shapes : Shapes
-        One for each azimuth.
-    center : (1, 3) float
-        Mean of the cloud.
-    azimuths : sequence of float
-        Degrees about the vertical of the rest frame, 0 for a view of its front.
-    elevation : float
-        Degrees above the horizon.
-    """
-    side, up = np.deg2rad(np.asarray(azimuths)), np.deg2rad(elevation)
-    away = np.stack([-np.cos(side) * np.cos(up), -np.sin(side) * np.cos(up), np.full(len(side), np.sin(up))], axis=1)
-    turned = np.stack([look_at_transform(eye, np.zeros(3))[:3, :3].T for eye in away])
-    trees, plain = shapes.trees, Theta.at_rest(shapes.trees)
-    middle = torch.where(torch.isfinite(trees.upper - trees.lower), 0.5 * (trees.lower + trees.upper), trees.rest)
-    theta = replace(
-        plain, rotation=torch.from_numpy(turned).to(center), translation=center.expand(len(shapes), -1),
-        state=torch.where(trees.free, middle, plain.state),
-    )  # fmt: skip
-    posed = pose_parts(trees, theta, shapes.box_center)
-    points, normals = posed.points(shapes.points, shapes.box_center), posed.normals(shapes.normals)
-    seen = ((points * normals).sum(-1) < 0.0) & shapes.has_surface[..., None]
-    share = seen.to(points.dtype)[..., None] / seen.sum((1, 2)).clamp(min=1)[:, None, None, None]
-    return replace(theta, translation=2.0 * center - (points * share).sum((1, 2)))
 
 
 def adapt_shapes(shapes: Shapes, theta: Theta) -> Shapes:

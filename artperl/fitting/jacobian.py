@@ -13,9 +13,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from artperl.core.pose import Posed, Theta, Trees, clamp_state, complete_state, joint_axes, parent_pose
+from artperl.core.pose import Posed, Theta, clamp_state, complete_state, joint_axes, parent_pose
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Shapes
+from artperl.core.trees import Trees
 from artperl.fitting.correspondence import Matches
 
 

@@ -9,8 +9,9 @@ from torch import Tensor
 from torch.nn import functional
 
 from artperl.core.batch import Batch
-from artperl.core.pose import Theta, Trees
+from artperl.core.pose import Theta
 from artperl.core.shapes import Shapes
+from artperl.core.trees import Trees
 from artperl.fitting.correspondence import TANGENT_WEIGHT, Matches, Target
 from artperl.fitting.jacobian import Columns, part_rates, residual_rates
 from artperl.fitting.shape_prior import ShapePrior

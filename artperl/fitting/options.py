@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from artperl.fitting.refine_options import RefineOptions
 from artsim.errors import ConfigError
 
 _COUNTS = ("num_points", "early_points", "fit_points", "references"), 1, 1_000_000
-
-
-_STEPS = ("early_iterations", "beam", "agent_steps"), 0, 10_000
+_STEPS = ("early_iterations", "beam"), 0, 10_000
 """Options, and their least and largest values: larger ones take memory, or time, without end."""
 
 
@@ -32,18 +28,8 @@ class EstimatorOptions:
     """References that are tried, the nearest first."""
     early_iterations: int = 6
     """Iterations of every start, before the best one is kept."""
-    perceived_start: bool = True
-    """Start from where perception places the points in the rest frame; without, from views all round alone."""
     beam: int = 64
     """Mixes of joint states that are followed down a tree with chains of three joints and more; 0 goes without."""
-    retry_residual: float = 0.006
-    """Estimates with a larger residual are looked for again, from other starts; infinite for never, 0 for always."""
-    azimuths: tuple[float, ...] = (-50.0, 0.0, 50.0)
-    """Of these other starts, degrees about the object's vertical, from the middle of :attr:`seen_from`."""
-    elevation: float = 35.0
-    """Degrees from which the other starts are seen."""
-    agent_steps: int = 16
-    """Steps of the agent from each of them; 0 goes without it."""
     refine: RefineOptions = field(default_factory=RefineOptions)
     """The last refinement."""
     occluded_parts: bool = True
@@ -61,7 +47,5 @@ class EstimatorOptions:
             for name in names:
                 if not least <= getattr(self, name) <= most:
                     raise ConfigError(f"{getattr(self, name)} is not within {least} to {most}", name)
-        if not self.azimuths or not np.isfinite([*self.azimuths, self.elevation]).all():
-            raise ConfigError("starts need finite azimuths and an elevation", "azimuths", "write -50 0 50")
         if self.seen_from is not None and not self.seen_from[0] <= self.seen_from[1]:
             raise ConfigError(f"{self.seen_from} is not a range", "seen_from", "write LOW HIGH, such as -75 75")

@@ -8,9 +8,10 @@ import torch
 from torch import Tensor
 
 from artperl.core.batch import Batch
-from artperl.core.pose import Posed, Theta, Trees, clamp_state, pose_parts
+from artperl.core.pose import Posed, Theta, clamp_state, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes, faces_camera
+from artperl.core.trees import Trees
 
 
 @dataclass(frozen=True, eq=False)

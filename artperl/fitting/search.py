@@ -1,12 +1,11 @@
-"""The search for the pose that explains a cloud: hypotheses, one score, one fit, one gate.
+"""The search for the pose that explains a cloud: hypotheses, one score, one fit.
 
-The hypotheses of a round are refined on few points. The one with the best score is fitted to all points. A later round
-runs only where the gate asks for it, and its fit replaces the best one only with a better score.
+The hypotheses of a round are refined on few points. The one with the best score is fitted to all points. The second
+round turns the best fit, and its fit replaces the best one only with a better score.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -21,26 +20,18 @@ from artperl.core.rotations import rotate
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.hypotheses import (
     Context,
-    Generator,
     Hypotheses,
     chain_states,
     half_turn,
     hinged_root,
+    other_sides,
     perceived_pose,
-    views_around,
 )
 from artperl.fitting.levenberg_marquardt import refine
-from artperl.fitting.options import EstimatorOptions
 from artperl.perception.network import Perceived
 
 Values = TypeVar("Values", float, Tensor)
 
-_DISAGREEMENT = 0.3
-"""Weight of the disagreement with perception against the residual: a flat part fits a wrong pose just as well, but
-perception does not agree with that."""
-_CLEARLY = 0.8
-"""Share of the best score below which a hypothesis that perception did not propose wins: most others that fit are
-wrong."""
 _NEVER = 100.0
 """Added to the score of an object that would be seen from where the camera is not. It is far above any residual. It is
 low enough for single precision to tell residuals apart where all hypotheses have it."""
@@ -59,9 +50,8 @@ class Fit:
     shapes : Shapes
     observed : Observed
         The cloud, labelled by perception and by how near the fitted parts are.
-    theta : Theta
-    path : list of Theta
-        The start, the agent's steps, and the end.
+    start, theta : Theta
+        The hypothesis, and where it ends.
     row : int
         Of the base.
     residual : float
@@ -74,8 +64,8 @@ class Fit:
 
     shapes: Shapes
     observed: Observed
+    start: Theta
     theta: Theta
-    path: list[Theta]
     row: int
     residual: float
     disagreement: float
@@ -84,82 +74,40 @@ class Fit:
     def to(self, device: torch.device | str) -> Fit:
         """The fit on another device."""
         return replace(
-            self, shapes=self.shapes.to(device), observed=self.observed.to(device), theta=self.theta.to(device),
-            path=[theta.to(device) for theta in self.path],
+            self, shapes=self.shapes.to(device), observed=self.observed.to(device), start=self.start.to(device),
+            theta=self.theta.to(device),
         )  # fmt: skip
 
-    def with_end(self, theta: Theta) -> Fit:
-        """The fit with another end."""
-        return replace(self, theta=theta, path=[*self.path[:-1], theta])
 
-
-def score(residual: Values, outside: Values, disagreement: float = 0.0) -> Values:
+def score(residual: Values, outside: Values) -> Values:
     """What is to be low, of every hypothesis and of every fit.
 
     Parameters
     ----------
     residual, outside
         Numbers, or one of each for every hypothesis: see :class:`Fit`.
-    disagreement : float
-        With perception, as far as it counts: see :class:`Round`.
     """
-    return residual + disagreement + _NEVER * outside
+    return residual + _NEVER * outside
 
 
-@dataclass(frozen=True)
-class Round:
-    """Generators whose hypotheses compete.
-
-    Attributes
-    ----------
-    generators : tuple of Generator
-    wanted : callable
-        Whether the round runs, given the best fit so far.
-    share : float
-        Of the best score, below which the round's fit replaces the best one.
-    disagreement_weight : float
-        Of the disagreement with perception against the residual. Where perception proposes every hypothesis, it has
-        its say already: a weight there makes scissors and eyeglasses worse.
-    """
-
-    generators: tuple[Generator, ...]
-    wanted: Callable[[Fit | None, EstimatorOptions], bool]
-    share: float = 1.0
-    disagreement_weight: float = 0.0
-
-    def score(self, fit: Fit) -> float:
-        """The score by which fits of this round compete with the best one."""
-        return score(fit.residual, fit.outside, self.disagreement_weight * fit.disagreement)
-
-
-def fits_badly(best: Fit | None, options: EstimatorOptions) -> bool:
-    """The gate: there is no fit, its residual is large, or the camera is elsewhere."""
-    return best is None or best.residual > options.retry_residual or best.outside
-
-
-ROUNDS = (
-    Round((perceived_pose, hinged_root, chain_states), lambda best, options: options.perceived_start),
-    Round((half_turn,), lambda best, options: best is not None),
-    Round((views_around,), fits_badly, _CLEARLY, _DISAGREEMENT),
-)
+ROUNDS = (perceived_pose, hinged_root, chain_states), (half_turn, other_sides)
+"""Generators whose hypotheses compete: those of perception, then those of the best fit of these."""
 
 
 def find_fit(context: Context, clock: Clock) -> Fit:
     """The best fit to a cloud, its points labelled anew."""
     best: Fit | None = None
-    for stage in ROUNDS:
-        if not stage.wanted(best, context.options):
-            continue
+    for generators in ROUNDS:
         some = []
-        for generate in stage.generators:
+        for generate in generators:
             with clock(generate.__name__.replace("_", " ")):
                 hypotheses = generate(context, best)
             some += [] if hypotheses is None else [hypotheses]
         if some:
             fit = settle(Hypotheses.join(some), context, clock)
-            if best is None or stage.score(fit) < stage.share * stage.score(best):
+            if best is None or score(fit.residual, fit.outside) < score(best.residual, best.outside):
                 best = fit
-    assert best is not None  # the gate runs the last round where there is none
+    assert best is not None  # perception always proposes some
     with clock("labels"):
         observed = Observed.of(context.cloud, context.perceived.part)
         part = labels_by_surface(best.shapes, observed, best.theta, context.perceived.part_logits)
@@ -180,6 +128,7 @@ def settle(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
         )  # fmt: skip
         best = int(score(_residual(early.energy), outside(early.theta, options.seen_from)).argmin())
         shapes, theta, row = hypotheses.shapes[best : best + 1], early.theta[best : best + 1], hypotheses.row[best]
+        start = hypotheses.theta[best : best + 1]
     with clock("labels"):
         part = labels_by_surface(shapes, observed, theta, perceived.part_logits)
         observed = replace(observed, part=part)
@@ -188,7 +137,7 @@ def settle(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
         shapes = replace(shapes, trees=replace(shapes.trees, axis=refined.axis))
     end = refined.theta
     return Fit(
-        shapes, observed, end, [*hypotheses.path[best], end], row, float(_residual(refined.energy)[0]),
+        shapes, observed, start, end, row, float(_residual(refined.energy)[0]),
         disagreement(shapes, observed, end, perceived), bool(outside(end, options.seen_from)[0]),
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.agent.policy import StatePolicy
+from artperl.agent.policy import Policy
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
@@ -51,11 +51,7 @@ class ArtPERLOptions:
     """Its first step, in radians and diagonals."""
     start: MeanView = field(default_factory=MeanView)
     """View that the reference is turned to before the agent's first step."""
-    fitting: FittingOptions = field(
-        default_factory=lambda: FittingOptions(
-            steps=12, observed_points=128, reference_points=48, distance="both", facing=True, order="root first"
-        )
-    )
+    fitting: FittingOptions = field(default_factory=FittingOptions)
     """The decision process of the agent."""
 
 
@@ -83,7 +79,7 @@ def networks_of(sizes: Sizes) -> dict[str, nn.Module]:
     return {
         "segmentation": Segmentation(sizes.num_rows, sizes.segmentation),
         "siamese": Siamese(sizes.num_rows, sizes.siamese),
-        "policy": StatePolicy(sizes.policy),
+        "policy": Policy(sizes.policy),
     }
 
 
@@ -94,7 +90,7 @@ class ArtPERL:
     ----------
     segmentation : Segmentation
     siamese : Siamese
-    policy : StatePolicy
+    policy : Policy
     base : ShapeBase
         References with their embeddings by ``siamese``.
     options : ArtPERLOptions, optional
@@ -103,7 +99,7 @@ class ArtPERL:
     name: ClassVar[str] = "artperl"
 
     def __init__(
-        self, segmentation: Segmentation, siamese: Siamese, policy: StatePolicy, base: ShapeBase,
+        self, segmentation: Segmentation, siamese: Siamese, policy: Policy, base: ShapeBase,
         options: ArtPERLOptions | None = None,
     ):  # fmt: skip
         self.segmentation, self.siamese, self.policy = segmentation, siamese, policy

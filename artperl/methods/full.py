@@ -11,7 +11,6 @@ from typing import ClassVar
 import torch
 from numpy.typing import ArrayLike
 
-from artperl.agent.policy import Agent
 from artperl.boxes.evidence import BoxContext, Evidence
 from artperl.boxes.network import Boxes
 from artperl.boxes.placement import place_boxes
@@ -47,8 +46,6 @@ class Estimator:
     ----------
     perception : Perception
     base : ShapeBase
-    agent : Agent, optional
-        Without one, references are refined from where perception puts them.
     options : EstimatorOptions, optional
     calibration : Calibration, optional
     boxes : Boxes, optional
@@ -58,7 +55,6 @@ class Estimator:
     name: ClassVar[str] = "full"
     perception: Perception
     base: ShapeBase
-    agent: Agent | None = None
     options: EstimatorOptions = field(default_factory=EstimatorOptions)
     calibration: Calibration = field(default_factory=Calibration)
     boxes: Boxes | None = None
@@ -113,19 +109,19 @@ class Estimator:
         perceived = self.perceive(clouds, clock)
         with clock("retrieval"):
             found = retrieve_references(self.base, perceived, options.references)
-        fit = find_fit(Context(seen, clouds, perceived, found, self.agent, options), clock).to("cpu")
+        fit = find_fit(Context(seen, clouds, perceived, found, options), clock).to("cpu")
         with clock("labels"):
             part = cloud.for_every_point(fit.observed.part[0].numpy(), -1)
             some = cloud.some(_LATE_POINTS)
             late = cloud.points[some], part[some]
         if options.occluded_parts:
             with clock("occluded parts"):
-                fit = fit.with_end(pose_occluded_parts(fit.shapes, fit.theta, *late))
+                fit = replace(fit, theta=pose_occluded_parts(fit.shapes, fit.theta, *late))
         if options.normal_alignment:
             with clock("normals"):
-                fit = fit.with_end(align_normals(fit.shapes, fit.theta, *late))
+                fit = replace(fit, theta=align_normals(fit.shapes, fit.theta, *late))
         with clock("report"):
-            estimate = estimate_of_fit(fit.shapes, fit.observed, fit.path, part)
+            estimate = estimate_of_fit(fit.shapes, fit.observed, [fit.start, fit.theta], part)
             center, size = widen(estimate.rotation, estimate.translation, estimate.size, cloud.points, part)
             estimate = replace(
                 estimate,

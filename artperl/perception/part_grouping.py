@@ -18,7 +18,7 @@ from torch import Tensor
 
 from artperl.core.labels import label_log_odds
 from artperl.core.part_order import visible_order
-from artperl.perception.network import Perceived, Perception, Votes
+from artperl.perception.network import Perceived, Votes
 
 Array = NDArray[np.float64]
 
@@ -56,12 +56,6 @@ class PerceivedTree(Perceived):
 
     joint: Tensor
     parent: Tensor
-
-
-def perceive(perception: Perception, points: Tensor) -> Perceived:
-    """What is perceived of clouds (B, N, 3), the parts found by votes if those are what the network gives."""
-    seen = perception(points)
-    return group_votes(seen) if isinstance(seen, Votes) else seen
 
 
 def group_votes(votes: Votes) -> PerceivedTree:

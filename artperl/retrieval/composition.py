@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from artperl.core.pose import Trees
 from artperl.core.shapes import Shapes
+from artperl.core.trees import Trees
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.model.kinematics import Joint, KinematicTree
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from artperl.core.pose import KINDS
 from artperl.core.shapes import Shapes
+from artperl.core.trees import KINDS
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ArtsimError
 from artsim.families import FAMILIES, make

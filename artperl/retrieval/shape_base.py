@@ -11,8 +11,9 @@ import torch
 from torch import Tensor
 
 from artperl.core.clouds import joint_rows
-from artperl.core.pose import KINDS, AxisPrior
+from artperl.core.pose import AxisPrior
 from artperl.core.shapes import Shapes
+from artperl.core.trees import KINDS
 from artsim.errors import ConfigError
 from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject

@@ -12,8 +12,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from artperl.core.pose import Trees
 from artperl.core.shapes import Shapes
+from artperl.core.trees import Trees
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.files import atomic_file, parse_json, read_npz
 from artsim.errors import DatasetError, KinematicsError

@@ -19,7 +19,7 @@ with needs("artperl.training.gym_env", extra="train"):
 
 from artperl.agent.actions import NOTHING, NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.core.pose import KINDS
+from artperl.core.trees import KINDS
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
 from artperl.data.sources import DataOptions
@@ -36,9 +36,9 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
     """Move a reference onto the cloud of an object that has never been seen before.
 
     Observations are the fields of :class:`artperl.agent.decision_process.View` of one object. An action names a bin for
-    each of 9 axes of each part; axes that a part does not have do nothing. The reward is that of equation 3; episodes
-    are truncated after ``options.steps`` steps. ``info`` holds the chamfer distance and the action of the expert, for
-    imitation.
+    each of 9 axes of each part. Only parts of the tree's level whose turn it is act, along the axes that they have. The
+    reward is that of equation 3; episodes are truncated when each level has had its turn ``options.steps`` times.
+    ``info`` holds the chamfer distance and the action of the expert, for imitation.
 
     Parameters
     ----------
@@ -60,9 +60,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
             {
                 "observed": _anything(N, 3),
                 "part": spaces.MultiDiscrete(np.full(N, P), dtype=np.int64),
-                "offset": _anything(N, 3),
                 "reference": _anything(P, M, 3),
-                "back": _anything(P, M, 3),
                 "shown": spaces.MultiBinary((P, M)),
                 "joint": _anything(P, 6),
                 "kind": spaces.MultiDiscrete(np.full(P, len(KINDS)), dtype=np.int64),

@@ -10,10 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, Literal, TypeVar
 
-from artperl.agent.decision_process import FittingOptions
-from artperl.agent.ppo import CLONING, JOINT, REINFORCEMENT, Phase, PPOOptions
+from artperl.agent.ppo import CLONING, JOINT, Phase, PPOOptions
 from artperl.data.categories import Parts
-from artperl.data.fitting_problems import Labels, References, StartOptions
 from artsim.common.json_records import from_json_values
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
@@ -24,7 +22,7 @@ _MOST = 1_000_000_000
 _SHARES = ("stretched", "noisy", "cloning_share")
 _AT_LEAST_ONE = (
     "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "episodes", "box_width",
-    "validate_every", "validate_rollouts", "test_objects", "validation_views", "test_views",
+    "validate_every", "test_objects", "validation_views", "test_views",
 )  # fmt: skip
 _AT_LEAST_ZERO = (
     "perception_steps", "dense_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
@@ -89,29 +87,21 @@ class TrainOptions:
     batch_size: int = 32
     num_points: int = 1024
     """Points of a cloud."""
-    agent_rollouts: int = 150
-    """Batches of episodes of stage 2; 0 goes without an agent."""
+    agent_rollouts: int = 0
+    """Batches of episodes that the agent of the method artperl learns from."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
-    learning: Literal["both", "cloning", "reinforcement"] = "both"
-    """How the agent learns: behaviour cloning, then that and PPO; or one of them alone."""
-    references: References = "retrieved"
-    """What the agent learns to fit."""
-    labels: Labels = "perceived"
-    """Which part the agent is told that each point is of."""
     agent_rate: float = 1e-3
     episodes: int = 64
     """Episodes of a rollout."""
     box_views: int = 2500
-    """Fresh views of stage 3, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
+    """Fresh views of the last stage, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
     box_steps: int = 12000
     """Batches that boxes are learnt in."""
     box_width: int = 80
     """Channels of the network that they are learnt by."""
     validate_every: int = 1000
-    """Steps of stage 1 between tests."""
-    validate_rollouts: int = 50
-    """Rollouts of stage 2 between tests."""
+    """Steps of perception between tests."""
     test_objects: int = 40
     """Unseen objects of each category, others for validation than for the test at the end; files share so many."""
     foreign_categories: int = 12
@@ -122,8 +112,6 @@ class TrainOptions:
     """Views of each object when the best estimator is tested."""
     sample: SampleOptions = field(default_factory=SampleOptions)
     ppo: PPOOptions = field(default_factory=PPOOptions)
-    fitting: FittingOptions = field(default_factory=FittingOptions)
-    start: StartOptions = field(default_factory=StartOptions)
 
     def __post_init__(self) -> None:
         for names, least in ((_AT_LEAST_ONE, 1), (_AT_LEAST_ZERO, 0)):
@@ -140,15 +128,17 @@ class TrainOptions:
             raise ConfigError("clouds that have their noise get no other", "noisy", "use one of noise, dataset, noisy")
         if self.dataset is not None and (self.real or self.files):
             raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
+        if self.method == "full" and (self.agent_rollouts or self.retrieval_steps):
+            raise ConfigError(
+                "the method full has no agent, and no network for retrieval", "agent_rollouts, retrieval_steps",
+                "leave them out, or use the method artperl",
+            )  # fmt: skip
         if not self.categories and not self.files:
             raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
 
     def phase(self, rollout: int) -> Phase:
         """The phase of Algorithm 1 that a rollout is in."""
-        if self.learning == "reinforcement":
-            return REINFORCEMENT
-        early = rollout < self.cloning_share * self.agent_rollouts
-        return CLONING if early or self.learning == "cloning" else JOINT
+        return CLONING if rollout < self.cloning_share * self.agent_rollouts else JOINT
 
     @property
     def votes(self) -> bool:
@@ -185,18 +175,15 @@ def changed(options: T, changes: Mapping[str, Any]) -> T:
 PRESETS = {
     "quick": TrainOptions(
         base_objects=32, width=32, perception_steps=500, dense_steps=0, batch_size=24, num_points=768,
-        agent_rollouts=12, episodes=48, box_views=0, validate_every=250, validate_rollouts=12, test_objects=20,
-        validation_views=2,
+        box_views=0, validate_every=250, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
     "gpu": TrainOptions(
-        device="cuda", width=64, perception_steps=20000, dense_steps=5000, batch_size=64, agent_rollouts=1000,
-        episodes=256,
+        device="cuda", width=64, perception_steps=20000, dense_steps=5000, batch_size=64,
     ),
     "joint": TrainOptions(
-        parts="any", max_parts=10, base_objects=16, references="deformed", labels="true", reference_points=64, width=40,
-        perception_steps=9000, dense_steps=0, denser=1, agent_rollouts=300, cloning_share=1.0, box_views=0,
-        box_width=40, validate_every=2000, test_objects=8, validation_views=2,
+        parts="any", max_parts=10, base_objects=16, reference_points=64, width=40, perception_steps=9000,
+        dense_steps=0, denser=1, box_views=0, box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: the

@@ -5,7 +5,7 @@ Each goes on where it stopped: its batches, rates and actions are functions of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from artperl.agent.actions import expected_action, rotation_vector
 from artperl.agent.decision_process import Fitting
-from artperl.agent.ppo import CLONING, Phase, algorithm_1
+from artperl.agent.ppo import algorithm_1
 from artperl.agent.start import mean_start
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
@@ -34,9 +34,6 @@ _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
 _SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
 """Steps and rollouts after which a run is saved, against a stop that nobody asked for."""
-_GUIDED_CLONING, _GUIDED_JOINT = 0.7, 0.5
-"""Shares of the steps that the expert takes. Actions on nine axes that are drawn apart stray in a few steps to where
-nothing can be learnt; quick runs that drew all actions of the second phase ended worse than they began."""
 _ALONE_EVERY, _ALONE = 10, 48
 """Rollouts between tests of the agent without an expert, and episodes of such a test, always the same ones."""
 _CHOICES = 4
@@ -145,11 +142,7 @@ class AgentStage:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             return fitting_episodes(method, samples, options.episodes, options.seed, n)
 
-        def phase(n: int) -> Phase:
-            own = options.phase(n)
-            return replace(own, guided=_GUIDED_CLONING if own is CLONING else _GUIDED_JOINT)
-
-        rounds = algorithm_1(method.policy, optimizer, episodes, phase, options.ppo, options.seed, first, total)
+        rounds = algorithm_1(method.policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
         bar = track(self.name, total=total, initial=first, smoothing=0.1, shown=context.progress)
         policy.train()
         for n, figures in enumerate(rounds, first):

@@ -23,7 +23,7 @@ from artsim.common.files import parse_json, read_bounded, write_atomic, write_er
 from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import DatasetError
 
-_FORMAT = 2
+_FORMAT = 3
 _MAX_JSON = 64_000_000
 _SHOWN = 6
 """Differing options that are named."""

@@ -8,12 +8,10 @@ from typing import Protocol
 
 from torch import nn
 
-from artperl.agent.policy import Agent
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
-from artperl.training.agent import AgentStage
 from artperl.training.boxes import BoxStage
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
@@ -67,25 +65,21 @@ def perception_stages(options: TrainOptions) -> list[Stage]:
 
 
 def _full_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
-    return {"perception": Perception(num_rows, options.width, options.votes), "agent": Agent()}
+    return {"perception": Perception(num_rows, options.width, options.votes)}
 
 
 def _full_stages(options: TrainOptions) -> list[Stage]:
-    return [*perception_stages(options), AgentStage(), Calibration(), BoxStage()]
+    return [*perception_stages(options), Calibration(), BoxStage()]
 
 
 def _full_estimator(context: Context) -> Estimator:
-    """Without an agent until it has learnt; with the parent's boxes, if parts are found as the parent finds them."""
-    networks, parent, options = context.state.networks, context.parent, context.options
+    """With the parent's boxes, if parts are found as the parent finds them."""
+    perception, parent, options = context.state.networks["perception"], context.parent, context.options
     assert isinstance(parent, Estimator | None)
-    perception, agent = networks["perception"], networks["agent"]
     assert isinstance(perception, Perception)
-    assert isinstance(agent, Agent)
-    knows = context.state.done["agent"] or (parent is not None and parent.agent is not None)
     alike = parent is not None and parent.perception.votes == perception.votes
     return Estimator(
-        perception, context.objects.base, agent if knows else None,
-        EstimatorOptions(num_points=options.denser * options.num_points),
+        perception, context.objects.base, EstimatorOptions(num_points=options.denser * options.num_points),
         boxes=parent.boxes if parent is not None and alike else None,
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from artperl.estimator import read_settings, save_estimator
-from artperl.evaluation.calibration import calibrate, retry_residual
+from artperl.evaluation.calibration import calibrate
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, VALIDATION_SEEDS, frozen_samples, samples_of
 from artperl.evaluation.scoring import evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
@@ -67,7 +67,6 @@ def validate(context: Context) -> None:
         judge = evaluate if options.votes else evaluate_foreign
         foreign = judge(estimator, _foreign_samples(context))
         best = replace(estimator, calibration=calibrate(scored, foreign))
-        best.options = replace(best.options, retry_residual=retry_residual(scored))
         save_estimator(best, context.folder.best, context.about({"validation": figures}))
     context.save()
     say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")

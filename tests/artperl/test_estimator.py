@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.agent.policy import Agent
 from artperl.core.estimate import Calibration
 from artperl.estimator import load_estimator, save_estimator
 from artperl.fitting.options import EstimatorOptions
@@ -21,8 +20,8 @@ from artsim.observing.sample import Sample
 
 def test_an_estimator_comes_back_from_its_folder(base: ShapeBase, sample: Sample, tmp_path: Path) -> None:
     torch.manual_seed(0)
-    options = EstimatorOptions(references=2, agent_steps=2)
-    made = Estimator(Perception(2, 16), base, Agent(16), options, Calibration(1.0, -2.0, -3.0, 4.0))
+    options = EstimatorOptions(references=2)
+    made = Estimator(Perception(2, 16), base, options, Calibration(1.0, -2.0, -3.0, 4.0))
     save_estimator(made, tmp_path / "made", {"note": "untrained"})
     back = load_estimator(tmp_path / "made")
     assert (back.options, back.calibration) == (options, made.calibration)

@@ -11,7 +11,6 @@ from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings
 from artperl.evaluation import metrics
 from artperl.evaluation.artimage import real_objects
-from artperl.evaluation.basin import basin_problem, run_basin
 from artperl.evaluation.samples import frozen_samples, samples_of
 from artperl.evaluation.scoring import evaluate
 from artsim.datasets.plan import SampleOptions
@@ -94,11 +93,3 @@ def test_a_folder_of_the_same_name_does_not_hide_an_estimator(tmp_path: Path, mo
     for name in ("any", "laptop"):
         assert folder_of(name) == WEIGHTS / name
     assert folder_of("out/mine") == Path("out/mine")
-
-
-def test_the_joint_agent_turns_cabinets_of_any_mix_where_refinement_alone_is_lost() -> None:
-    estimator = load_estimator("any")
-    problem = basin_problem(estimator, ["storage_furniture"], "any", 32, "deformed", "true")
-    assert len({tuple(kind) for kind in problem.shapes.trees.kind.tolist()}) >= 4
-    far = next(row for row in run_basin(estimator, problem) if row["start_deg"] == 60.0)
-    assert far["agent and refinement"] > far["refinement"] + 0.3

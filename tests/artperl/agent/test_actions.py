@@ -105,18 +105,15 @@ def test_nothing_moves_along_axes_that_a_part_does_not_have(shapes: Shapes, radi
     assert not mask[~shapes.trees.valid].any()
 
 
-@pytest.mark.parametrize("greedy", [False, True])
-def test_the_expert_comes_within_the_smallest_step_of_the_goal(
-    shapes: Shapes, radius: torch.Tensor, greedy: bool
-) -> None:
+def test_the_expert_comes_within_the_smallest_step_of_the_goal(shapes: Shapes, radius: torch.Tensor) -> None:
     theta, goal = some_theta(shapes, 5), some_theta(shapes, 6)
     for _ in range(80):
-        theta = apply(shapes, theta, expert(shapes, theta, goal, radius, greedy), radius)
+        theta = apply(shapes, theta, expert(shapes, theta, goal, radius), radius)
     left = residual(shapes, theta, goal, radius).abs()
     assert left.max() < MAGNITUDES[0]
 
 
-def test_the_steady_expert_never_oversteps(shapes: Shapes, radius: torch.Tensor) -> None:
+def test_the_expert_never_oversteps(shapes: Shapes, radius: torch.Tensor) -> None:
     theta, goal = some_theta(shapes, 7), some_theta(shapes, 8)
     theta = replace(theta, log_scale=goal.log_scale)  # a slide's lengths change with the scale
     before = residual(shapes, theta, goal, radius)

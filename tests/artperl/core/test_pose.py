@@ -11,7 +11,6 @@ import artsim
 from artperl.core.pose import (
     Posed,
     Theta,
-    Trees,
     clamp_state,
     complete_state,
     joint_axes,
@@ -20,7 +19,7 @@ from artperl.core.pose import (
     theta_from_parts,
 )
 from artperl.core.rotations import rotation_from_vector
-from artsim.errors import KinematicsError
+from artperl.core.trees import Trees
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Joint, KinematicTree, Mimic
 
@@ -213,10 +212,3 @@ def test_rows_can_be_chosen_repeated_and_merged() -> None:
     mixed = theta.where(first, theta[[1, 1, 1, 1, 1]])
     assert mixed.state[0].eq(theta.state[0]).all()
     assert mixed.rotation[2].eq(theta.rotation[1]).all()
-
-
-def test_trees_that_do_not_fit_are_refused() -> None:
-    with pytest.raises(KinematicsError, match="rows"):
-        Trees.stack([random_tree(np.random.default_rng(0), 5)], num_rows=3)
-    with pytest.raises(KinematicsError, match="at least one"):
-        Trees.stack([])

@@ -7,7 +7,7 @@ import torch
 
 from artperl.agent.actions import residual
 from artperl.core.pose import pose_parts
-from artperl.data.fitting_problems import Problems, StartOptions, part_truth
+from artperl.data.fitting_problems import Problems, part_truth
 from artperl.data.sources import DataOptions
 from artperl.evaluation import metrics
 from artperl.retrieval.box_embedding import box_embedding
@@ -58,17 +58,16 @@ def test_batch_n_is_always_the_same() -> None:
     assert not torch.equal(first.start.rotation, one[5].start.rotation)
 
 
-def test_starts_are_as_far_from_the_goal_as_asked() -> None:
-    options = StartOptions(rotation=0.4, translation=0.1, scale=0.05)
-    problems = Problems(DataOptions(["laptop"]), small_base("laptop"), 16, 64, start=options)
+def test_starts_are_off_by_as_much_as_is_said() -> None:
+    problems = Problems(DataOptions(["laptop"]), small_base("laptop"), 16, 64)
     problem = problems[0]
     points = problem.observed.points
     radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
     steps = residual(problem.shapes, problem.start, problem.goal, radius)
     angle = torch.linalg.vector_norm(steps[:, 0, :3], dim=-1)
-    assert 0.2 < angle.max() <= 0.4 + 1e-3
-    assert 0.05 < steps[:, 0, 3:6].abs().max() <= 0.1 + 1e-3
-    assert steps[:, 0, 6:].abs().max() <= 0.05 + 1e-4
+    assert 0.5 < angle.max() <= 1.0 + 1e-3
+    assert 0.15 < steps[:, 0, 3:6].abs().max() <= 0.3 + 1e-3
+    assert steps[:, 0, 6:].abs().max() <= 0.15 + 1e-4
     trees = problem.shapes.trees
     assert ((problem.start.state >= trees.lower) & (problem.start.state <= trees.upper))[trees.free].all()
 
@@ -89,30 +88,3 @@ def test_an_object_with_as_many_parts_is_nearer_than_one_with_the_same_boxes() -
     rows, _ = base.nearest_objects(query, 3)
     parts = shapes.trees.valid.sum(1)
     assert (parts[rows] == parts[:, None]).all()
-
-
-def test_deformed_references_have_the_objects_own_trees_and_lead_to_the_truth() -> None:
-    categories = ["storage_furniture", "robot_arm"]
-    problems = Problems(
-        DataOptions(categories, "any"),
-        small_base(*categories),
-        4,
-        64,
-        seed=4,
-        views_per_object=1,
-        references="deformed",
-    )
-    problem = problems[0]
-    trees = problem.shapes.trees
-    posed = pose_parts(trees, problem.goal, problem.shapes.box_center)
-    for b in range(4):
-        obj, sample = problems.samples.object(b), problems.samples[b]
-        K = len(obj)
-        assert int(trees.valid[b].sum()) == K
-        assert trees.parent[b, 1:K].tolist() == list(obj.tree.parents[1:])
-        _, rotation, _, size, *_ = part_truth(sample, K)
-        torch.testing.assert_close((problem.shapes.box_size * posed.scale)[b, :K], size, atol=1e-5, rtol=1e-4)
-        assert metrics.rotation_error(posed.rotation[b, :K], rotation).max() < 0.5
-        own = obj.box_size / obj.diagonal
-        other = problem.shapes.box_size[b, :K].numpy() / sample.diagonal
-        assert not (abs(own - other) < 1e-3).all()

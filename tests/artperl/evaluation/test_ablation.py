@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.agent.policy import Agent
 from artperl.estimator import save_estimator
 from artperl.evaluation.ablation import (
     MARGINS,
@@ -41,7 +40,7 @@ def test_a_shuffled_base_finds_other_objects_of_the_same_tree() -> None:
 def test_every_stage_can_be_taken_away() -> None:
     (sample,) = frozen_samples(["laptop"], 1, 1)
     torch.manual_seed(0)
-    whole = Estimator(Oracle(sample, 2), small_base("laptop"), Agent(16))
+    whole = Estimator(Oracle(sample, 2), small_base("laptop"))
     for stage, change in STAGES.items():
         without = change(whole)
         assert without.perception is whole.perception, stage
@@ -50,14 +49,15 @@ def test_every_stage_can_be_taken_away() -> None:
 
 def test_an_ablation_goes_on_from_its_file(tmp_path: Path) -> None:
     torch.manual_seed(0)
-    save_estimator(Estimator(Perception(2, 16), small_base("laptop"), Agent(16)), tmp_path / "laptop", {})
+    save_estimator(Estimator(Perception(2, 16), small_base("laptop")), tmp_path / "laptop", {})
     out, lines = tmp_path / "record.json", list[str]()
-    stages = {name: STAGES[name] for name in ("agent", "normal alignment")}
-    first = run_ablation(["laptop"], tmp_path, None, 2, out, say=lines.append, stages={"agent": STAGES["agent"]})
+    stages = {name: STAGES[name] for name in ("beam search", "normal alignment")}
+    one = {"beam search": STAGES["beam search"]}
+    first = run_ablation(["laptop"], tmp_path, None, 2, out, say=lines.append, stages=one)
     assert list(first) == [f"laptop procedural {view} {noise}" for view in ("artimage", "sphere") for noise in
                            ("none", "d435")]  # fmt: skip
     done = out.read_text()
-    again = run_ablation(["laptop"], tmp_path, None, 2, out, say=lines.append, stages={"agent": STAGES["agent"]})
+    again = run_ablation(["laptop"], tmp_path, None, 2, out, say=lines.append, stages=one)
     assert (again, out.read_text()) == (first, done)
     more = run_ablation(["laptop"], tmp_path, None, 2, out, say=lines.append, stages=stages)
     assert json.loads(out.read_text()) == more

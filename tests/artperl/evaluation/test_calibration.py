@@ -1,4 +1,4 @@
-"""Confidence is calibrated; estimates that fit worst are looked for again."""
+"""Confidence is calibrated."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from artperl.core.estimate import Calibration
-from artperl.evaluation.calibration import calibrate, retry_residual
+from artperl.evaluation.calibration import calibrate
 from artperl.evaluation.samples import frozen_samples
 from artperl.evaluation.scoring import Scored, evaluate
 from artperl.methods.full import Estimator
@@ -18,13 +18,6 @@ from artsim.observing.sample import Sample
 def _off(scored: Scored, degrees: float) -> Scored:
     """The same with a rotation error of every part."""
     return replace(scored, errors=scored.errors | {"rotation_deg": np.full(len(scored.rotation), degrees)})
-
-
-def test_a_quarter_is_looked_for_again(estimator: Estimator, sample: Sample) -> None:
-    one = evaluate(estimator, [sample])[0]
-    scored = [replace(one, residual=r) for r in np.linspace(0.0, 0.1, 101)] + [replace(one, residual=np.inf)]
-    assert retry_residual(scored) == pytest.approx(0.075)
-    assert retry_residual([]) == 0.0
 
 
 def test_confidence_is_calibrated(estimator: Estimator, sample: Sample) -> None:

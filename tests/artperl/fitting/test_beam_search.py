@@ -13,9 +13,10 @@ import torch
 from torch import Tensor
 
 import artsim
-from artperl.core.pose import Theta, Trees, pose_parts
+from artperl.core.pose import Theta, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
+from artperl.core.trees import Trees
 from artperl.fitting.beam_search import _grid, _joint_order, beam, half_turns
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
+from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.data.categories import objects_of
 from artperl.evaluation.samples import TEST_SEEDS, frozen_samples
@@ -16,11 +18,12 @@ from artperl.fitting.hypotheses import (
     chain_states,
     half_turn,
     hinged_root,
+    other_sides,
     part_weights,
     perceived_pose,
-    views_around,
 )
 from artperl.fitting.options import EstimatorOptions
+from artperl.fitting.search import find_fit
 from artperl.methods.full import Estimator
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.references import retrieve_references
@@ -37,7 +40,7 @@ def test_only_chains_of_joints_are_searched_for_down_the_tree(estimator: Estimat
         clouds = Clouds.of(cloud)
         perceived = oracle(clouds.points)
         found = retrieve_references(base, perceived, 1)
-        context = Context(cloud, clouds, perceived, found, None, EstimatorOptions())
+        context = Context(cloud, clouds, perceived, found, EstimatorOptions())
         proposed = chain_states(context, None)
         assert (proposed is not None) == (shown is seen)
         assert chain_states(replace(context, options=EstimatorOptions(beam=0)), None) is None
@@ -56,14 +59,33 @@ def test_each_generator_proposes_hypotheses_of_its_own_reference(estimator: Esti
     clouds = Clouds.of(cloud)
     perceived = Oracle(sample, 2)(clouds.points)
     found = retrieve_references(estimator.base, perceived, 3)
-    context = Context(cloud, clouds, perceived, found, None, EstimatorOptions())
+    context = Context(cloud, clouds, perceived, found, EstimatorOptions())
     proposed = perceived_pose(context, None)
     assert proposed.row == found.row.tolist()
-    around = views_around(context, None)
-    assert around is not None
-    assert around.row == [int(found.row[0])] * len(context.options.azimuths)
     assert hinged_root(context, None) is None  # the base of the laptop shows
     assert half_turn(context, None) is None
-    both = Hypotheses.join([proposed, around])
-    assert len(both.shapes) == len(both.theta) == len(both.path) == len(both.row) == 6
-    assert torch.equal(both.path[4][0].rotation, around.theta.rotation[1:2])
+    best = find_fit(context, Clock())
+    assert other_sides(context, best) is None  # the camera may be anywhere
+    sides = other_sides(context, replace(best, outside=True))
+    assert sides is not None
+    both = Hypotheses.join([proposed, sides])
+    assert both.row == [*found.row.tolist(), *[best.row] * 4]
+    assert len(both.shapes) == len(both.theta) == 7
+
+
+@pytest.mark.parametrize("flip", [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]])
+def test_other_sides_stand_however_the_fit_lies(estimator: Estimator, sample: Sample, flip: list[float]) -> None:
+    """From a camera above the horizon all four sides are seen from above, a quarter turn apart."""
+    cloud = torch.from_numpy(sample.points)[None]
+    clouds = Clouds.of(cloud)
+    perceived = Oracle(sample, 2)(clouds.points)
+    found = retrieve_references(estimator.base, perceived, 1)
+    context = Context(cloud, clouds, perceived, found, EstimatorOptions())
+    best = find_fit(context, Clock())
+    theta = replace(best.theta, rotation=best.theta.rotation * torch.tensor(flip))
+    sides = other_sides(context, replace(best, theta=theta, outside=True))
+    assert sides is not None
+    x, y, z = (sides.theta.rotation.mT @ sides.theta.translation[:, :, None])[..., 0].double().numpy().T
+    assert (z < 0.0).all()  # from the camera down to the object
+    azimuth = np.rad2deg(np.unwrap(np.arctan2(y, x)))
+    np.testing.assert_allclose(abs(np.diff(azimuth)), 90.0, atol=0.1)

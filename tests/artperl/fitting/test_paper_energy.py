@@ -9,9 +9,10 @@ import pytest
 import torch
 
 import artsim
-from artperl.core.pose import Theta, Trees, clamp_state, pose_parts
+from artperl.core.pose import Theta, clamp_state, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
+from artperl.core.trees import Trees
 from artperl.data.fitting_problems import Problem
 from artperl.fitting.paper_energy import joint_energy, part_energy, refine_by_gradient, total_energy
 from tests.artperl.worlds import small_problem

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 SIGNS = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 """Of the faces' outward normals."""
 STAGE = TrainOptions(
-    base_objects=3, reference_points=48, perception_steps=0, dense_steps=0, agent_rollouts=0, box_views=4,
+    base_objects=3, reference_points=48, perception_steps=0, dense_steps=0, box_views=4,
     box_steps=3, test_objects=2, foreign_categories=1, validation_views=1, test_views=1, start_from="laptop",
 )  # fmt: skip
 """Nothing but the stage for boxes."""

@@ -12,6 +12,7 @@ from artperl.training.gym_env import ENV_ID, PoseFittingEnv, nothing
 from tests.conftest import installed
 
 OPTIONS = FittingOptions(steps=4, observed_points=64, reference_points=32)
+STEPS = 2 * OPTIONS.steps  # a laptop has two levels
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +32,12 @@ def test_an_episode_is_that_of_the_batched_process(env: PoseFittingEnv) -> None:
     problem = env._problem
     assert problem is not None
     fitting = Fitting(problem.shapes, problem.observed, problem.start, OPTIONS)
-    for step in range(OPTIONS.steps):
+    for step in range(STEPS):
         action = fitting.expert(problem.goal)
         _, reward, ended, truncated, info = env.step(action.flatten().numpy())
         assert reward == fitting.step(action).item()
         assert info["chamfer"] == fitting.distance.item()
-        assert (ended, truncated) == (False, step == OPTIONS.steps - 1)
+        assert (ended, truncated) == (False, step == STEPS - 1)
 
 
 def test_following_the_expert_of_info_pays(env: PoseFittingEnv) -> None:
@@ -44,10 +45,10 @@ def test_following_the_expert_of_info_pays(env: PoseFittingEnv) -> None:
     for kind in returns:
         for seed in range(5):
             _, info = env.reset(seed=seed)
-            for _ in range(OPTIONS.steps):
+            for _ in range(STEPS):
                 _, reward, _, _, info = env.step(info["expert"] if kind == "expert" else nothing(env))
                 returns[kind] += reward
-    assert returns["nothing"] == pytest.approx(-0.05 * OPTIONS.steps * 5)
+    assert returns["nothing"] == pytest.approx(-0.05 * STEPS * 5)
     assert returns["expert"] > 5.0
 
 

@@ -71,7 +71,7 @@ def test_an_estimator_says_which_recipe_made_it_and_from_what(
 ) -> None:
     """Its recipe's and its parent's digests are those of the files; the command leaves a finished run as it is."""
     recipe = tmp_path / "tiny.json"
-    lengths = {"perception_steps": 0, "agent_rollouts": 0, "box_views": 0}
+    lengths = {"perception_steps": 0, "box_views": 0}
     options = {
         "categories": ["laptop"], "start_from": "laptop", "width": 48, "base_objects": 3, "test_objects": 1,
         "foreign_categories": 1, "validation_views": 2,

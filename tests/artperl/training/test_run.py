@@ -15,8 +15,6 @@ import torch
 from safetensors.torch import load_file
 
 from artperl import cli
-from artperl.agent.decision_process import FittingOptions
-from artperl.agent.ppo import PPOOptions
 from artperl.boxes.network import Boxes
 from artperl.data.sources import Given
 from artperl.estimator import load_estimator, read_settings, save_estimator
@@ -37,9 +35,8 @@ pytestmark = pytest.mark.slow
 
 TINY = TrainOptions(
     base_objects=3, reference_points=48, width=16, perception_steps=3, dense_steps=2, stretched=0.5, batch_size=4,
-    num_points=96, agent_rollouts=3, episodes=3, box_views=0, validate_every=2, validate_rollouts=2, test_objects=2,
-    foreign_categories=1, validation_views=1, test_views=1,
-    ppo=PPOOptions(minibatch=4), fitting=FittingOptions(steps=2, observed_points=48, reference_points=16),
+    num_points=96, box_views=0, validate_every=2, test_objects=2, foreign_categories=1, validation_views=1,
+    test_views=1,
 )  # fmt: skip
 
 
@@ -60,18 +57,18 @@ def test_a_run_leaves_an_estimator_a_table_and_curves(whole: Path) -> None:
     points = np.random.default_rng(0).normal(size=(200, 3)) * 0.1 + [0.0, 0.0, 1.0]
     assert np.isfinite(estimator(points).T_camera_part).all()
     history = json.loads((whole / "state.json").read_text())["history"]
-    stages = ("perception", "dense", "agent")
+    stages = ("perception", "dense")
     assert [tuple(h["done"].get(stage, 0) for stage in stages) for h in history] == [
-        (2, 0, 0), (3, 0, 0), (3, 2, 0), (3, 2, 2), (3, 2, 3),
+        (2, 0), (3, 0), (3, 2),
     ]  # fmt: skip
-    assert [h["step"] for h in history] == [2, 3, 5, 7, 8]
+    assert [h["step"] for h in history] == [2, 3, 5]
 
 
 def test_an_estimator_looks_at_twice_the_points_of_a_learnt_cloud(whole: Path) -> None:
     assert load_estimator(whole / "best").options.num_points == 2 * TINY.num_points
 
 
-@pytest.mark.parametrize("stop", [("perception", 2), ("dense", 1), ("agent", 1)], ids=str)
+@pytest.mark.parametrize("stop", [("perception", 2), ("dense", 1)], ids=str)
 def test_a_stopped_run_ends_as_if_it_had_not_been(whole: Path, tmp_path: Path, stop: tuple[str, int]) -> None:
     stage, after = stop
     with pytest.raises(KeyboardInterrupt):
@@ -111,7 +108,7 @@ def _interrupt(stage: str, after: int) -> Report:
 
 def test_families_with_any_parts_are_learnt_by_votes_and_learnt_on_by_number(tmp_path: Path) -> None:
     """An estimator of any parts begins one for files: what both have is taken over, heads are their own."""
-    options = replace(TINY, categories=("drawer",), parts="any", max_parts=5, dense_steps=0, agent_rollouts=0)
+    options = replace(TINY, categories=("drawer",), parts="any", max_parts=5, dense_steps=0)
     Training(options, tmp_path / "any", workers=0, progress=False).run()
     best = load_estimator(tmp_path / "any" / "best")
     learnt = best.perception

@@ -27,7 +27,7 @@ from tests.artperl.training.test_run import TINY, ends_alike
 from tests.conftest import ASSETS
 
 ROOT = ASSETS.parent
-OPTIONS = replace(TINY, perception_steps=2, dense_steps=0, agent_rollouts=0, validate_every=1)
+OPTIONS = replace(TINY, perception_steps=2, dense_steps=0, validate_every=1)
 CHILD = """
 import os, signal, sys
 from pathlib import Path
