@@ -1,10 +1,12 @@
 """Buckets and pails: a vessel with a bail on two pins.
 
 Round or oval, tapered, straight or bulging; rims, hoops, ribs, feet and spouts, round or D-shaped bails with or without
-a grip, and how far the bail swings vary. The bail stands upright at rest.
+a grip, and how far the bail swings to either side vary. At rest the bail stands upright, leans, lies or hangs down.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +23,7 @@ SIDES = 20
 def build(rng: np.random.Generator) -> Assembly:
     """A bucket whose bail swings to both sides."""
     top = rng.uniform(0.09, 0.18)
-    height = top * rng.uniform(1.2, 2.4)
+    height = top * rng.uniform(0.9, 2.9)
     wall = rng.uniform(0.0018, 0.004)
     profile = _profile(rng, top, height)
     body = vessel(profile, wall, sections=SIDES) + _rim(rng, top, height, wall, profile)
@@ -30,7 +32,7 @@ def build(rng: np.random.Generator) -> Assembly:
     rim_z = height + 0.004
 
     pin = rng.uniform(0.003, 0.005)
-    pivot = height * rng.uniform(0.88, 0.95)
+    pivot = height * (rng.uniform(0.88, 0.97) if rng.random() < 0.6 else rng.uniform(0.72, 0.88))
     wire = rng.uniform(0.0022, 0.0045)
     outer = top + 0.012  # beyond the rim
     bail_y = outer + 0.0015 + max(wire, 0.0025)
@@ -40,14 +42,59 @@ def build(rng: np.random.Generator) -> Assembly:
         body += _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
     # In every position a point of a round bail lies this far from the middle of the pins; the rim keeps within.
     reach = hypot(outer, rim_z - pivot) + 2 * wire + 0.006
-    bail = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
+    path, grip = _bail_path(rng, bail_y, max(reach, bail_y), pivot, pin)
+    bail = _bail(path, grip, (bail_y, pivot), pin, wire)
 
-    narrowing = profile[0, 0] < 0.85 * profile[-1, 0]  # so that the bail may hang below the rim
-    limit = np.deg2rad(rng.choice([80.0, 90.0, 103.0 if narrowing else 85.0]))
+    outline = profile + (0.007, 0.0)  # rims and hoops stand out
+    most = _clear_swing(path, wire + 0.003, grip + 0.003, outline, pivot, rim_z)
+    limits = most * np.where(rng.random(2) < 0.6, 1.0, rng.uniform(0.55, 1.0, 2))
+    rest = _rest(rng, limits)
+    bail = bail.turned((0, 1, 0), rest, (0, 0, pivot))
+    swing = revolute("body", (0, 1, 0), (0, 0, pivot), -limits[0] - rest, limits[1] - rest)
     bucket = Assembly()
     bucket.add("body", body, density=1500.0)
-    bucket.add("handle", bail, revolute("body", (0, 1, 0), (0, 0, pivot), -limit, limit), density=3000.0)
+    bucket.add("handle", bail, swing, density=3000.0)
     return bucket
+
+
+def _rest(rng: np.random.Generator, limits: Array) -> float:
+    """Angle of the bail from upright at rest: upright, leaning, or at one of its limits."""
+    kind = str(rng.choice(["upright", "lean", "end"], p=[0.45, 0.2, 0.35]))
+    side = int(rng.integers(2))
+    if kind == "upright":
+        return 0.0
+    share = 1.0 if kind == "end" else rng.uniform(0.1, 0.9)
+    return float((2 * side - 1) * share * limits[side])
+
+
+def _clear_swing(path: Array, wire: float, grip: float, outline: Array, pivot: float, rim: float) -> float:
+    """Largest angle from upright at which a bail beside the vessel still keeps clear of it.
+
+    Parameters
+    ----------
+    path : (N, 3) float
+        The bail's wire, upright.
+    wire, grip : float
+        Distance that the wire and its middle third keep.
+    outline : (N, 2) float
+        Radius and height of the vessel.
+    """
+    shares = np.linspace(0.0, 1.0, 8)[:, None]
+    points = np.concatenate([a + shares * (b - a) for a, b in pairwise(path[:, 1:])])
+    room = np.full(len(points), wire)
+    if grip > wire:
+        half = 0.36 * np.abs(points[:, 0]).max()
+        points = np.concatenate([points, [(-half, points[:, 1].max()), (half, points[:, 1].max())]])
+        room = np.append(np.where(np.abs(points[:-2, 0]) < half, grip, wire), [grip, grip])
+    across, lift = points[:, 0], points[:, 1] - pivot
+    far = lift > 0.1 * lift.max()  # the eyes hang beside the rim in any case
+    for angle in np.deg2rad(np.arange(85.0, 165.0, 2.5)):
+        out, z = lift * sin(angle), pivot + lift * cos(angle)
+        radius = np.max([np.interp(z + d * room, outline[:, 1], outline[:, 0]) for d in (-2, -1, 0, 1, 2)], axis=0)
+        beside = (z - room > rim) | (hypot(out, across) > radius + room)
+        if not beside[far].all():
+            return float(angle - np.deg2rad(3.0))
+    return float(np.deg2rad(160.0))
 
 
 def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
@@ -95,8 +142,8 @@ def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float
     return solid + cylinder((0, tip, pivot), (0, tip + side * 0.002, pivot), 1.6 * pin, sections=12)
 
 
-def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin: float, wire: float) -> Solid:
-    """Wire from eye to eye over the opening, with a grip in the middle."""
+def _bail_path(rng: np.random.Generator, half: float, reach: float, pivot: float, pin: float) -> tuple[Array, float]:
+    """(17, 3) or (6, 3) middle of the wire from eye to eye over the opening; and the grip's radius, 0 for none."""
     curved = rng.random() < 0.85
     height = reach * rng.uniform(1.0, 1.35)
     if curved:  # from a half circle to a rounded rectangle
@@ -112,11 +159,16 @@ def _bail(rng: np.random.Generator, half: float, reach: float, pivot: float, pin
     lift = (2.2 * pin) / norm(path[1] - path[0])
     path[0] += (path[1] - path[0]) * lift
     path[-1] += (path[-2] - path[-1]) * lift
+    return path, rng.uniform(0.007, 0.013) if rng.random() < 0.6 else 0.0
+
+
+def _bail(path: Array, grip: float, eye: tuple[float, float], pin: float, wire: float) -> Solid:
+    """Wire along a path with an eye around either pin, at a Y and Z, and perhaps a grip in the middle."""
+    half, pivot = eye
     solid = tube(path, wire, 8)
     for side_y in (-half, half):
         solid += ring((0, side_y, pivot), (0, 1, 0), 1.1 * pin, 2.0 * pin + wire, 0.004, 10)
-    if rng.random() < 0.6:
-        z = path[:, 2].max()
-        radius, length = rng.uniform(0.007, 0.013), 0.35 * half
-        solid += cylinder((0, -length, z), (0, length, z), radius, sections=16)
+    if grip > 0:
+        z, length = path[:, 2].max(), 0.35 * half
+        solid += cylinder((0, -length, z), (0, length, z), grip, sections=16)
     return solid
