@@ -1,6 +1,6 @@
 """Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever.
 
-Drip trays slide out; portafilters, levers, lids and steam wands turn; knobs turn freely; buttons travel; carafes and
+Drip trays slide out; portafilters, levers, lids and steam wands turn; lids of drip machines lift off, too; knobs turn freely; buttons travel; carafes and
 water tanks come out. Sizes, round or square bodies, and which of these there are vary.
 """
 
@@ -148,10 +148,10 @@ def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, h
 
 
 def _drip(rng: np.random.Generator) -> Assembly:
-    y = rng.uniform(0.085, 0.11)
+    y = rng.uniform(0.075, 0.125)
     pot = y - rng.uniform(0.01, 0.02)  # radius of the carafe
     x = pot + rng.uniform(0.05, 0.07)
-    height = rng.uniform(0.29, 0.38)
+    height = rng.uniform(0.27, 0.42)
     base, head = rng.uniform(0.025, 0.04), rng.uniform(0.07, 0.1)
     radius = rng.uniform(0.01, 0.5 * y)
     center = -x + pot + 0.012
@@ -166,19 +166,24 @@ def _drip(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.5:  # gauge of the water tank
         body += box((x - 0.01, -y - 0.002, base + 0.03), (x + 0.004, -y + 0.002, head_low - 0.02))
     machine = Assembly()
-    machine.add("body", body, density=700.0)
-    _carafe(rng, machine, center, pot, base + 0.003 + GAP, head_low - GAP)
+    plain = rng.random() < 0.35  # nothing but the lid moves
+    carafe = _carafe(rng, center, pot, base + 0.003 + GAP, head_low - GAP)
+    machine.add("body", body + carafe.moved((0, 0, -GAP - 0.0005)) if plain else body, density=700.0)
+    if not plain:
+        draw = prismatic("body", OUT, 0.0, rng.uniform(1.0, 2.4) * pot, (center, 0, base))
+        machine.add("carafe", carafe, draw, density=1500.0)
 
-    seam, thick = height + GAP, rng.uniform(0.012, 0.025)
+    seam, thick = height + GAP, rng.uniform(0.012, 0.06)
     hinge = x + 0.018
     low, high = (reach, shrink - y), (hinge, y - shrink)
     lid = _tapered(low, high, (seam, seam + thick), radius, rng.choice([0.0, 0.5, 1.0]) * thick)
-    machine.add(
-        "lid",
-        lid,
-        revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, np.deg2rad(rng.uniform(60.0, 95.0))),
-        density=700.0,
-    )
+    if rng.random() < (0.6 if plain else 0.15):
+        joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.02, 0.2), (0.5 * (reach + hinge), 0, seam))
+    else:
+        joint = revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, np.deg2rad(rng.uniform(50.0, 115.0)))
+    machine.add("lid", lid, joint, density=700.0)
+    if plain:
+        return machine
     z = 0.5 * (height + head_low)
     if rng.random() < 0.5:
         _controls(rng, machine, reach, 0.7 * (y - shrink), head_low, height)
@@ -199,8 +204,8 @@ def _tapered(
     return hull(np.concatenate(outlines))
 
 
-def _carafe(rng: np.random.Generator, machine: Assembly, center: float, pot: float, low: float, high: float) -> None:
-    """Glass jug with a handle in front, drawn out from below the head."""
+def _carafe(rng: np.random.Generator, center: float, pot: float, low: float, high: float) -> Solid:
+    """Glass jug with a handle in front, between the base and the head."""
     rise = (high - low) * rng.uniform(0.8, 0.97)
     lid = 0.014
     shares = np.array([0.0, 0.12, 0.45, 0.85, 1.0])
@@ -214,8 +219,7 @@ def _carafe(rng: np.random.Generator, machine: Assembly, center: float, pot: flo
     grip = [(center - radii[3] + 0.002, 0, top - 0.016), (center - radii[3] - 0.04, 0, top - 0.012),
             (center - radii[3] - 0.055, 0, top - 0.03), (center - pot - 0.02, 0, low + 0.35 * rise),
             (center - 0.97 * pot, 0, low + 0.3 * rise)]  # fmt: skip
-    solid += tube(np.array(grip), 0.007, 10)
-    machine.add("carafe", solid, prismatic("body", OUT, 0.0, 2.2 * pot, (center, 0, low)), density=1500.0)
+    return solid + tube(np.array(grip), 0.007, 10)
 
 
 def _pod(rng: np.random.Generator) -> Assembly:
