@@ -1,7 +1,9 @@
-"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever.
+"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever, and
+percolators whose lid lifts off.
 
-Drip trays slide out; portafilters, levers, lids and steam wands turn; lids of drip machines lift off, too; knobs turn freely; buttons travel; carafes and
-water tanks come out. Sizes, round or square bodies, and which of these there are vary.
+Drip trays slide out; portafilters, levers, lids and steam wands turn; lids of drip machines lift off, too; knobs turn
+freely; buttons travel; carafes and water tanks come out. Sizes, round or square bodies, and which of these there are
+vary.
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ OUT = (-1.0, 0.0, 0.0)
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """An espresso, a drip or a pod machine."""
-    return (_espresso, _drip, _pod)[int(rng.choice(3, p=[0.4, 0.4, 0.2]))](rng)
+    """An espresso, a drip or a pod machine, or a percolator."""
+    return (_espresso, _drip, _pod, _percolator)[int(rng.choice(4, p=[0.35, 0.35, 0.18, 0.12]))](rng)
 
 
 def _drip_tray(
@@ -190,6 +192,47 @@ def _drip(rng: np.random.Generator) -> Assembly:
     else:
         key = rounded_box((reach - 0.010, -0.012, z - 0.008), (reach - 0.0032, 0.012, z + 0.008), 0.002)
         machine.add("button", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, (reach, 0, z)), density=900.0)
+    return machine
+
+
+def _percolator(rng: np.random.Generator) -> Assembly:
+    """A tall jug with a handle, on a heated foot; its lid lifts off or swings up."""
+    foot, tall, radius = rng.uniform(0.03, 0.11), rng.uniform(0.14, 0.3), rng.uniform(0.045, 0.085)
+    narrow, half = rng.uniform(0.6, 1.05) * radius, rng.uniform(0.95, 1.35) * radius
+    waist = rng.uniform(0.0, 0.25) * tall  # a collar between the foot and the jug
+    levels = [(half, 0.0), (rng.uniform(0.75, 1.0) * half, foot)]
+    if rng.random() < 0.6:
+        corner = rng.uniform(0.005, 0.03)
+        rings = [np.column_stack([rounded_rectangle((-w, -w), (w, w), corner, 3), np.full(16, z)]) for w, z in levels]
+        body = hull(np.concatenate(rings))
+    else:
+        body = cylinder((0, 0, 0), (0, 0, foot), levels[0][0], levels[1][0])
+    body += cylinder((0, 0, foot - 0.002), (0, 0, foot + waist + 0.002), 0.95 * narrow, 0.85 * narrow)
+    low, top = foot + waist, foot + waist + tall
+    body += vessel([(narrow, low), (radius, top)], 0.004, sections=20)
+    turn = float(rng.choice([0.5, -0.5, 0.0, 1.0])) * np.pi  # where the handle points
+    reach, r = rng.uniform(0.03, 0.06), rng.uniform(0.005, 0.009)
+    out = radius + reach
+    grip = [
+        (narrow, 0, low + 0.2 * tall),
+        (out, 0, low + 0.3 * tall),
+        (out, 0, top - 0.03),
+        (radius - 0.002, 0, top - 0.02),
+    ]
+    body += tube(np.array(grip), r, 10).turned((0, 0, 1), turn)
+    machine = Assembly()
+    machine.add("body", body, density=900.0)
+    seam, rise = top + GAP, rng.uniform(0.006, 0.03)
+    lid = cylinder((0, 0, seam), (0, 0, seam + rise), radius + 0.003, rng.uniform(0.5, 1.0) * radius)
+    knob_top = seam + rise + rng.uniform(0.008, 0.03)
+    lid += cylinder((0, 0, seam), (0, 0, knob_top), rng.uniform(0.15, 0.45) * radius, sections=16)
+    if rng.random() < 0.75:
+        lid += cylinder((0, 0, seam - rng.uniform(0.004, 0.02)), (0, 0, seam + 0.001), 0.45 * radius, 0.75 * radius)
+        joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.02, 0.8) * tall, (0, 0, seam))
+    else:
+        hinge = (radius + 0.004, 0.0, seam)
+        joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
+    machine.add("lid", lid, joint, density=900.0)
     return machine
 
 
