@@ -2,7 +2,8 @@
 
 Trolleys have a shell that opens at one side, a telescopic handle of one or two stages (the second follows the first),
 and two wheels or four casters that also swivel. Briefcases open downward to the front and have a handle that folds.
-Bags have one or two bails, on the crown or on the sides. Sizes, corners, ribs, where the shells meet and how far they open vary.
+Bags have one or two bails, on the crown or on the sides. Sizes, corners, ribs, where the shells meet and how far they
+open vary.
 """
 
 from __future__ import annotations
