@@ -95,7 +95,8 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
             (x - 0.006 - size.taper, -0.8 * half, size.height - 0.14), (x + 0.014, 0.8 * half, size.height - 0.02)
         )
     falls = rng.random() < 0.35  # over the back, past the upright, as far as the hinge lets it
-    limit = np.deg2rad(rng.uniform(110.0, 205.0) if falls else rng.uniform(60.0, 110.0))
+    turned_over = 180.0 if rng.random() < 0.5 else rng.uniform(110.0, 205.0)  # many real lids turn by half a turn
+    limit = np.deg2rad(turned_over if falls else rng.uniform(60.0, 110.0))
     joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
     if rng.random() < (0.7 if falls else 0.25):  # no pedal, perhaps a lip to lift it by
         if rng.random() < 0.6:
