@@ -1,7 +1,9 @@
-"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever, urns.
+"""Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever,
+percolators whose lid lifts off, and urns.
 
-Drip trays slide out; portafilters, levers, lids and steam wands turn; knobs turn freely; buttons travel; carafes and
-water tanks come out. Sizes, round or square bodies, and which of these there are vary.
+Drip trays slide out; portafilters, levers, lids and steam wands turn; lids of drip machines lift off, too; knobs turn
+freely; buttons travel; carafes and water tanks come out. Sizes, round or square bodies, and which of these there are
+vary.
 """
 
 from __future__ import annotations
@@ -31,8 +33,8 @@ OUT = (-1.0, 0.0, 0.0)
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """An espresso, a drip, a pod or an urn-like machine."""
-    return (_espresso, _drip, _pod, _urn)[int(rng.choice(4, p=[0.3, 0.3, 0.15, 0.25]))](rng)
+    """An espresso, a drip or a pod machine, a percolator or an urn."""
+    return (_espresso, _drip, _pod, _percolator, _urn)[int(rng.choice(5, p=[0.29, 0.29, 0.14, 0.14, 0.14]))](rng)
 
 
 def _drip_tray(
@@ -150,10 +152,10 @@ def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, h
 
 
 def _drip(rng: np.random.Generator) -> Assembly:
-    y = rng.uniform(0.085, 0.11)
+    y = rng.uniform(0.075, 0.125)
     pot = y - rng.uniform(0.01, 0.02)  # radius of the carafe
     x = pot + rng.uniform(0.05, 0.07)
-    height = rng.uniform(0.29, 0.38)
+    height = rng.uniform(0.27, 0.42)
     base, head = rng.uniform(0.025, 0.04), rng.uniform(0.07, 0.1)
     radius = rng.uniform(0.01, 0.5 * y)
     center = -x + pot + 0.012
@@ -168,25 +170,71 @@ def _drip(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.5:  # gauge of the water tank
         body += box((x - 0.01, -y - 0.002, base + 0.03), (x + 0.004, -y + 0.002, head_low - 0.02))
     machine = Assembly()
-    machine.add("body", body, density=700.0)
-    _carafe(rng, machine, center, pot, base + 0.003 + GAP, head_low - GAP)
+    plain = rng.random() < 0.35  # nothing but the lid moves
+    carafe = _carafe(rng, center, pot, base + 0.003 + GAP, head_low - GAP)
+    machine.add("body", body + carafe.moved((0, 0, -GAP - 0.0005)) if plain else body, density=700.0)
+    if not plain:
+        draw = prismatic("body", OUT, 0.0, rng.uniform(1.0, 2.4) * pot, (center, 0, base))
+        machine.add("carafe", carafe, draw, density=1500.0)
 
-    seam, thick = height + GAP, rng.uniform(0.012, 0.025)
+    seam, thick = height + GAP, rng.uniform(0.012, 0.06)
     hinge = x + 0.018
     low, high = (reach, shrink - y), (hinge, y - shrink)
     lid = _tapered(low, high, (seam, seam + thick), radius, rng.choice([0.0, 0.5, 1.0]) * thick)
-    machine.add(
-        "lid",
-        lid,
-        revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, np.deg2rad(rng.uniform(60.0, 95.0))),
-        density=700.0,
-    )
+    if rng.random() < (0.6 if plain else 0.15):
+        joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.02, 0.2), (0.5 * (reach + hinge), 0, seam))
+    else:
+        joint = revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, np.deg2rad(rng.uniform(50.0, 115.0)))
+    machine.add("lid", lid, joint, density=700.0)
+    if plain:
+        return machine
     z = 0.5 * (height + head_low)
     if rng.random() < 0.5:
         _controls(rng, machine, reach, 0.7 * (y - shrink), head_low, height)
     else:
         key = rounded_box((reach - 0.010, -0.012, z - 0.008), (reach - 0.0032, 0.012, z + 0.008), 0.002)
         machine.add("button", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, (reach, 0, z)), density=900.0)
+    return machine
+
+
+def _percolator(rng: np.random.Generator) -> Assembly:
+    """A tall jug with a handle, on a heated foot; its lid lifts off or swings up."""
+    foot, tall, radius = rng.uniform(0.03, 0.11), rng.uniform(0.14, 0.3), rng.uniform(0.045, 0.085)
+    narrow, half = rng.uniform(0.6, 1.05) * radius, rng.uniform(0.95, 1.35) * radius
+    waist = rng.uniform(0.0, 0.25) * tall  # a collar between the foot and the jug
+    levels = [(half, 0.0), (rng.uniform(0.75, 1.0) * half, foot)]
+    if rng.random() < 0.6:
+        corner = rng.uniform(0.005, 0.03)
+        rings = [np.column_stack([rounded_rectangle((-w, -w), (w, w), corner, 3), np.full(16, z)]) for w, z in levels]
+        body = hull(np.concatenate(rings))
+    else:
+        body = cylinder((0, 0, 0), (0, 0, foot), levels[0][0], levels[1][0])
+    body += cylinder((0, 0, foot - 0.002), (0, 0, foot + waist + 0.002), 0.95 * narrow, 0.85 * narrow)
+    low, top = foot + waist, foot + waist + tall
+    body += vessel([(narrow, low), (radius, top)], 0.004, sections=20)
+    turn = float(rng.choice([0.5, -0.5, 0.0, 1.0])) * np.pi  # where the handle points
+    reach, r = rng.uniform(0.03, 0.06), rng.uniform(0.005, 0.009)
+    out = radius + reach
+    grip = [
+        (narrow, 0, low + 0.2 * tall),
+        (out, 0, low + 0.3 * tall),
+        (out, 0, top - 0.03),
+        (radius - 0.002, 0, top - 0.02),
+    ]
+    body += tube(np.array(grip), r, 10).turned((0, 0, 1), turn)
+    machine = Assembly()
+    machine.add("body", body, density=900.0)
+    seam, rise = top + GAP, rng.uniform(0.006, 0.03)
+    lid = cylinder((0, 0, seam), (0, 0, seam + rise), radius + 0.003, rng.uniform(0.5, 1.0) * radius)
+    knob_top = seam + rise + rng.uniform(0.008, 0.03)
+    lid += cylinder((0, 0, seam), (0, 0, knob_top), rng.uniform(0.15, 0.45) * radius, sections=16)
+    if rng.random() < 0.75:
+        lid += cylinder((0, 0, seam - rng.uniform(0.004, 0.02)), (0, 0, seam + 0.001), 0.45 * radius, 0.75 * radius)
+        joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.02, 0.8) * tall, (0, 0, seam))
+    else:
+        hinge = (radius + 0.004, 0.0, seam)
+        joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
+    machine.add("lid", lid, joint, density=900.0)
     return machine
 
 
@@ -201,8 +249,8 @@ def _tapered(
     return hull(np.concatenate(outlines))
 
 
-def _carafe(rng: np.random.Generator, machine: Assembly, center: float, pot: float, low: float, high: float) -> None:
-    """Glass jug with a handle in front, drawn out from below the head."""
+def _carafe(rng: np.random.Generator, center: float, pot: float, low: float, high: float) -> Solid:
+    """Glass jug with a handle in front, between the base and the head."""
     rise = (high - low) * rng.uniform(0.8, 0.97)
     lid = 0.014
     shares = np.array([0.0, 0.12, 0.45, 0.85, 1.0])
@@ -216,8 +264,7 @@ def _carafe(rng: np.random.Generator, machine: Assembly, center: float, pot: flo
     grip = [(center - radii[3] + 0.002, 0, top - 0.016), (center - radii[3] - 0.04, 0, top - 0.012),
             (center - radii[3] - 0.055, 0, top - 0.03), (center - pot - 0.02, 0, low + 0.35 * rise),
             (center - 0.97 * pot, 0, low + 0.3 * rise)]  # fmt: skip
-    solid += tube(np.array(grip), 0.007, 10)
-    machine.add("carafe", solid, prismatic("body", OUT, 0.0, 2.2 * pot, (center, 0, low)), density=1500.0)
+    return solid + tube(np.array(grip), 0.007, 10)
 
 
 def _pod(rng: np.random.Generator) -> Assembly:

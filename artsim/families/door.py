@@ -39,11 +39,11 @@ class Style:
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """A door, closed at rest."""
+    """A door, mostly closed at rest."""
     kind = str(rng.choice(["single", "double", "sliding"], p=[0.62, 0.23, 0.15]))
-    width = rng.uniform(0.5, 1.25) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
+    width = rng.uniform(0.5, 1.4) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
     height = rng.uniform(1.6, 3.0)
-    depth, jamb = rng.uniform(0.07, 0.3), rng.uniform(0.03, 0.2)
+    depth, jamb = rng.uniform(0.07, 0.42), rng.uniform(0.03, 0.25)
     style = _style(rng, kind)
     door = Assembly()
     door.record(handles=True)
@@ -54,7 +54,8 @@ def build(rng: np.random.Generator) -> Assembly:
         _sliding(rng, door, body, width, height, depth, style)
         return door
     door.add("frame", body, density=700.0)
-    limit = float(np.deg2rad(rng.choice([85.0, 100.0, 130.0, 170.0])))
+    limit = float(np.deg2rad(rng.uniform(60.0, 175.0)))
+    ajar = rng.uniform(0.1, 0.75) * limit if rng.random() < 0.25 else 0.0
     both = rng.random() < 0.5
     sides = [float(rng.choice([-1.0, 1.0]))] if kind == "single" else [1.0, -1.0]
     for number, side in enumerate(sides):
@@ -63,8 +64,10 @@ def build(rng: np.random.Generator) -> Assembly:
         low = np.array([-depth / 2, min(edge, inner), 0.008])
         high = np.array([-depth / 2 + style.thickness, max(edge, inner), height - 0.005])
         name = "door" if kind == "single" else f"door_{number}"
-        turning = style.handle != "pull" and (number == 0 or both)
+        turning = style.handle in ("lever", "knob") and (number == 0 or both)
         _leaf(rng, door, name, side, (low, high), style, limit, turning)
+        if ajar > 0 and number == 0:
+            door.open_at_rest(name, ajar)
     return door
 
 
@@ -105,7 +108,7 @@ def _style(rng: np.random.Generator, kind: str) -> Style:
         layouts: list[tuple[float, ...]] = [(), (0.45,), (0.42, 0.5), (0.3, 0.62), (0.4, 0.75), (0.2, 0.4, 0.6, 0.8)]
         shares = layouts[int(rng.integers(len(layouts)))]
     boards = {"flush": thickness, "panels": 0.012, "glass": 0.006, "half": 0.012}
-    handles = ["lever", "knob", "pull"]
+    handles = ["lever", "knob", "pull", "none"]
     return Style(
         thickness=thickness,
         stile=rng.uniform(0.085, 0.14),
@@ -113,7 +116,7 @@ def _style(rng: np.random.Generator, kind: str) -> Style:
         rows=shares,
         board=boards[look],
         raised=look == "panels" and rng.random() < 0.6,
-        handle="pull" if kind == "sliding" else str(rng.choice(handles, p=[0.5, 0.35, 0.15])),
+        handle="pull" if kind == "sliding" else str(rng.choice(handles, p=[0.42, 0.3, 0.13, 0.15])),
         handle_z=rng.uniform(0.95, 1.1),
     )
 
@@ -130,7 +133,9 @@ def _frame(
         if stop + 0.012 < x1:
             bars = [0.014, 0.014, 0.0, 0.014]
             solid += frame((stop, -y - 0.002, 0), (stop + 0.011, y + 0.002, height + 0.002), bars, 1, 2)
-    extra = str(rng.choice(["none", "casing", "fanlight", "side light", "arch"], p=[0.4, 0.25, 0.15, 0.1, 0.1]))
+    extra = str(
+        rng.choice(["none", "casing", "fanlight", "side light", "arch", "wall"], p=[0.27, 0.2, 0.12, 0.11, 0.1, 0.2])
+    )
     if extra == "casing":
         wide = rng.uniform(0.05, 0.1)
         for face in (x0 - 0.009, x1 - 0.002):
@@ -148,6 +153,11 @@ def _frame(
         solid += grid_panel(
             (x0, ends[0], 0), (x1, ends[1], height + jamb), [0.05, 0.05, 0.1, jamb], [], lights, 0.03, 0.006
         )
+    elif extra == "wall":  # or fixed panels, beside and above
+        left, right = rng.uniform(0.0, 1.0, 2) * rng.uniform(0.2, 2.0) * width + 0.02
+        above = rng.uniform(0.02, 0.6)
+        solid += frame((x0 + 0.004, -y - jamb - left, 0.0), (x1 - 0.003, y + jamb + right, height + jamb + above),
+                       [left + 0.002, right + 0.002, 0.0, above + 0.002], 1, 2)  # fmt: skip
     elif extra == "arch":
         angles = np.linspace(0.0, np.pi, 17)
         radius, base = y + jamb, height + jamb - 0.002
@@ -211,7 +221,8 @@ def _leaf(
     edge = high[1] if side > 0 else low[1]
     width = high[1] - low[1]
     stile = min(style.stile, 0.22 * width)
-    y, z = edge - side * (width - stile / 2), style.handle_z
+    # A knob nearer to the edge would strike the jamb as it swings out.
+    y, z = edge - side * (width - max(stile / 2, 0.055)), style.handle_z
     leaf = _face(low, high, style, (y, z, 0.0105) if turning else None) + _knuckles(low, high, edge, side)
     reach = 0.0
     if turning:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.common.elementary import cos, hypot, power, sin
+from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
@@ -22,7 +22,7 @@ def build(rng: np.random.Generator) -> Assembly:
     """A pot with its lid on at rest; it faces -X."""
     radius = rng.uniform(0.08, 0.16)
     shape = str(rng.choice(["straight", "flared", "bellied", "round"], p=[0.4, 0.2, 0.2, 0.2]))
-    height = radius * (rng.uniform(0.45, 0.9) if rng.random() < 0.4 else rng.uniform(0.9, 1.9))
+    height = radius * (rng.uniform(0.3, 0.9) if rng.random() < 0.4 else rng.uniform(0.9, 2.1))
     wall = rng.uniform(0.003, 0.006)
     profile = _profile(rng, shape, radius, height)
     pot = vessel(profile, wall, sections=24)
@@ -33,7 +33,8 @@ def build(rng: np.random.Generator) -> Assembly:
         pot += cylinder((0, 0, -0.005), (0, 0, 0.003), foot, sections=24)
     hinged = rng.random() < 0.2
     pot += _handles(rng, radius, height, hinged)
-    lid, lid_radius, top = _lid(rng, radius, height, wall, hinged)
+    mouth = float(np.interp(height - 0.009, profile[:, 1], profile[:, 0])) - wall  # clear radius where a lid dips in
+    lid, lid_radius, top = _lid(rng, radius, height, wall, mouth, hinged)
 
     assembly = Assembly()
     assembly.record(handles=True)
@@ -53,8 +54,8 @@ def build(rng: np.random.Generator) -> Assembly:
         joint = revolute("pot", (0, 1, 0), (x, 0, z), 0.0, np.deg2rad(rng.uniform(80, 105)))
     else:
         assembly.add("pot", pot, density=STEEL)
-        rise = radius * power(150.0, rng.uniform(-1.0, 0.03))  # files lift lids by hardly anything
-        joint = prismatic("pot", (0, 0, 1), 0.0, rise, (0, 0, top))
+        share = rng.uniform(0.15, 1.0)  # cubed, as lids of real files rise by 1 % of the diagonal, those in use by half
+        joint = prismatic("pot", (0, 0, 1), 0.0, 1.3 * share * share * share * radius, (0, 0, top))
     assembly.add("lid", lid, joint, density=STEEL)
     return assembly
 
@@ -123,14 +124,14 @@ def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Soli
 
 
 def _lid(
-    rng: np.random.Generator, radius: float, height: float, wall: float, hinged: bool
+    rng: np.random.Generator, radius: float, height: float, wall: float, mouth: float, hinged: bool
 ) -> tuple[Solid, float, float]:
     """The lid, its radius, and the height of its top."""
     lid_radius = radius + rng.uniform(-0.5 * wall, 0.004)
     z = height + GAP
     rim = rng.uniform(0.003, 0.008)
     solid = cylinder((0, 0, z), (0, 0, z + rim), lid_radius, sections=24)
-    dome = lid_radius * rng.choice([0.03, rng.uniform(0.08, 0.3)])
+    dome = lid_radius * rng.choice([0.03, rng.uniform(0.08, 0.5)])
     spread = rng.uniform(0.86, 0.99)
     heights, shares = np.array([0.0, 0.45, 0.75, 0.93, 1.0]), np.array([1.0, 0.86, 0.66, 0.42, 0.15])
     low = z + rim - 0.0005
@@ -138,12 +139,12 @@ def _lid(
              for h, s in zip(heights, shares, strict=True)]  # fmt: skip
     solid += hull_of(*discs)
     if not hinged and rng.random() < 0.6:  # a rim that dips into the pot
-        inner = radius - wall - 0.002
+        inner = min(radius - wall, mouth) - 0.002
         solid += ring((0, 0, z - 0.003), (0, 0, 1), inner - 0.004, inner, 0.008, 24)
     top = low + dome
     foot = np.array([0.0, 0.0, top])
     kind = rng.choice(["knob", "bow", "disc", "bridge"], p=[0.4, 0.25, 0.2, 0.15])
-    size = radius * rng.uniform(0.13, 0.2)
+    size = radius * rng.uniform(0.1, 0.25)
     if kind == "knob":
         solid += knob(foot, np.array([0.0, 0.0, 1.0]), 0.9 * size, size)
     elif kind == "disc":

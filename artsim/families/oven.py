@@ -1,4 +1,4 @@
-"""Ovens: cookers with a hob, and ovens to build in.
+"""Ovens: cookers with a hob, ovens to build in, and cooktops whose knobs alone turn.
 
 What varies: one door or two that drop down, or one that opens sideways; a drawer below; a hob with gas grates, coils or
 a glass top; a guard at the back; dials in front or on the guard, with or without stops; window, handle, racks, feet.
@@ -21,6 +21,8 @@ GAP = 0.002
 
 def build(rng: np.random.Generator) -> Assembly:
     """An oven, closed at rest. The back of its doors is the plane x = 0."""
+    if rng.random() < 0.12:
+        return _cooktop(rng)
     built_in = rng.random() < 0.25
     half = 0.5 * (rng.uniform(0.54, 0.62) if built_in else rng.uniform(0.48, 0.78))
     depth = rng.uniform(0.5, 0.66)
@@ -77,16 +79,50 @@ def build(rng: np.random.Generator) -> Assembly:
     return oven
 
 
+def _cooktop(rng: np.random.Generator) -> Assembly:
+    """A hob to stand on a worktop or to sink into it: a slab with a row of dials, at one side or in front."""
+    half, depth, height = rng.uniform(0.14, 0.46), rng.uniform(0.28, 0.56), rng.uniform(0.02, 0.12)
+    strip = rng.uniform(0.06, 0.1)  # for the dials
+    beside = rng.random() < 0.6
+    front = 0.004
+    side = float(rng.choice([-1.0, 1.0]))
+    body = _hob(rng, half, depth, height, front, 0.008) + rounded_box((-front, -half, 0), (depth, half, height), 0.008)
+    level = height + 0.008
+    if beside:
+        ends = sorted((side * (half - 0.01), side * (half + strip)))
+        body += rounded_box((-front, ends[0], 0.0), (depth, ends[1], level), 0.006)
+    cooktop = Assembly()
+    count, room = int(rng.integers(1, 7)), (depth if beside else 1.8 * half)
+    gap = min(room / (count + 1), rng.uniform(0.05, 0.12))
+    radius = min(rng.uniform(0.014, 0.028), 0.42 * gap, 0.26 * strip)
+    start = rng.uniform(0.5 * gap, room - (count - 0.5) * gap)
+    feet = []
+    for share in start + gap * np.arange(count):
+        middle = side * (half + 0.02 + 0.5 * (strip - 0.02))
+        feet.append((float(share), middle, level) if beside else (-0.5 * strip, float(share) - 0.5 * room, level))
+    if not beside:
+        body += rounded_box((-strip, -half, 0), (0.01, half, level), 0.006)
+    cooktop.add("body", body, density=350.0)
+    reach, axis = rng.uniform(0.015, 0.035), (0, 0, float(rng.choice([-1.0, 1.0])))
+    stops = rng.random() < 0.25
+    for number, foot in enumerate(feet, 1):
+        turn = revolute("body", axis, foot, 0.0, 5.0) if stops else continuous("body", axis, foot)
+        cooktop.add(f"knob_{number}", dial(foot, (0, 0, 1), reach, radius), turn)
+    return cooktop
+
+
 def _shell(half: float, depth: float, low: float, high: float, wall: float) -> Solid:
     return tray((GAP, -half, low), (depth, half, high), wall, 0.02, axis=0, side=-1)
 
 
-def _hob(rng: np.random.Generator, half: float, depth: float, z: float, thick: float) -> Solid:
-    """Worktop with four to six burners."""
-    top = z + rng.uniform(0.008, 0.03)
+def _hob(
+    rng: np.random.Generator, half: float, depth: float, z: float, thick: float, rise: float | None = None
+) -> Solid:
+    """Worktop with two to six burners, ``rise`` above the height ``z``."""
+    top = z + (rng.uniform(0.008, 0.03) if rise is None else rise)
     over = rng.uniform(0.0, 0.012)
     solid = rounded_box((-thick - over, -half - over, z - 0.001), (depth, half + over, top), 0.004)
-    columns = 3 if half > 0.34 else 2
+    columns = 3 if half > 0.34 else 2 if half > 0.22 else 1
     ys = (np.arange(columns) - 0.5 * (columns - 1)) * (1.9 * half / columns)
     kind = str(rng.choice(["gas", "coil", "glass"], p=[0.5, 0.25, 0.25]))
     if kind == "glass":
@@ -95,7 +131,7 @@ def _hob(rng: np.random.Generator, half: float, depth: float, z: float, thick: f
         )
     for x in np.array([0.24, 0.68]) * depth:
         for y in ys:
-            radius = rng.uniform(0.06, 0.1) if kind != "gas" else rng.uniform(0.025, 0.045)
+            radius = min(rng.uniform(0.06, 0.1), 0.2 * depth) if kind != "gas" else rng.uniform(0.025, 0.045)
             if kind == "glass":
                 solid += cylinder((x, y, top), (x, y, top + 0.0045), radius, sections=28)
             elif kind == "coil":

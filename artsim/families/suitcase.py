@@ -1,16 +1,16 @@
 """Suitcases: trolleys, briefcases and bags; upright, closed at rest.
 
 Trolleys have a shell that opens at one side, a telescopic handle of one or two stages (the second follows the first),
-and two wheels or four casters that also swivel. Briefcases open downward to the front and have a handle that folds or
-stands. Bags have one or two bails, on top or on their faces. Sizes, corners, ribs, where the shells meet and how far
-they open vary.
+and two wheels or four casters that also swivel. Briefcases open downward to the front and have a handle that folds.
+Bags have one or two bails, on the crown or on the sides. Sizes, corners, ribs, where the shells meet and how far they
+open vary.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from artsim.common.elementary import cos, power, sin
+from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, rounded_box, rounded_rectangle, tube, union
@@ -97,7 +97,7 @@ def _trolley(rng: np.random.Generator) -> Assembly:
                     (wheel_x + 0.022, s * (y - 0.04) + cheek + 0.004, lift + 0.01),
                 )
     case.add("body", back, density=300.0)
-    limit = np.deg2rad(rng.choice([90.0, 120.0, 175.0]))
+    limit = np.deg2rad(rng.uniform(60.0, 175.0))
     case.add("lid", front, revolute("body", (0, 0, -side), (seam, hinge_y, high / 2), 0.0, limit), density=300.0)
     _telescope(rng, case, x, half, lift, high)
     for number, (px, py, parent) in enumerate(places):
@@ -165,9 +165,9 @@ def _caster(case: Assembly, number: int, x: float, y: float, top: float, parent:
 
 
 def _briefcase(rng: np.random.Generator) -> Assembly:
-    y, z = rng.uniform(0.17, 0.32), rng.uniform(0.26, 0.5)
-    x = rng.uniform(0.035, 0.11)
-    seam = float(rng.choice([0.0, -0.5 * x, 0.2 * x]))
+    y, z = rng.uniform(0.16, 0.34), rng.uniform(0.24, 0.6)
+    x = rng.uniform(0.035, 0.14)
+    seam = float(rng.uniform(-0.55, 0.35)) * x
     front, back = _shells(rng, x, y, 0.0, z, seam)
     barrel = 0.003
     for share in (-0.6, 0.6):
@@ -184,13 +184,13 @@ def _briefcase(rng: np.random.Generator) -> Assembly:
             cylinder((0.6 * x, s * 0.8 * y, -0.008), (0.6 * x, s * 0.8 * y, 0.003), 0.008, 0.01, 12) for s in (-1, 1)
         )
     case = Assembly()
-    folds = rng.random() < 0.65  # the handle, or else it stands
-    case.add("body", back + lugs if folds else back + lugs + handle, density=300.0)
-    limit = np.deg2rad(rng.choice([80.0, 110.0, rng.uniform(90.0, 178.0)]))
+    fixed = rng.random() < 0.35  # the handle
+    case.add("body", back + lugs + handle if fixed else back + lugs, density=300.0)
+    limit = np.deg2rad(rng.uniform(45.0, 175.0))
     case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, -barrel - 0.001), 0.0, limit), density=300.0)
-    if not folds:
-        return case
-    case.add("handle", handle, revolute("body", (0, 1, 0), (middle, 0, z + 0.0085), -1.35, 1.35), density=900.0)
+    if not fixed:
+        most = rng.uniform(0.9, 1.35)
+        case.add("handle", handle, revolute("body", (0, 1, 0), (middle, 0, z + 0.0085), -most, most), density=900.0)
     return case
 
 
@@ -224,7 +224,7 @@ def _bail(
 def _bag(rng: np.random.Generator) -> Assembly:
     """Bag with a closed body and one or two bails."""
     y = rng.uniform(0.13, 0.26)
-    z, x = y * rng.uniform(0.8, 2.0), y * rng.uniform(0.25, 0.65)
+    z, x = y * rng.uniform(0.8, 1.8), y * rng.uniform(0.22, 0.7)
     kind = int(rng.integers(3))
     top = rng.uniform(0.25, 0.7) if kind == 0 else 1.0
     flare = rng.uniform(0.75, 1.0)
@@ -244,30 +244,27 @@ def _bag(rng: np.random.Generator) -> Assembly:
             rings += [_outline(0.75 * x, 0.85 * flare * y, 1.1 * z), _outline(0.3 * x, 0.6 * flare * y, 1.16 * z)]
         body = loft(rings)
     bag = Assembly()
-    two = rng.random() < 0.6 and kind != 2
+    upright = kind == 2 or rng.random() < 0.45  # one bail on the crown, instead of bails on the sides
     wire = rng.uniform(0.004, 0.007)
-    half = rng.uniform(0.35, 0.6) * y
-    height = rng.uniform(0.6, 2.6) * half
-    if kind == 2 or not two:
-        crown = body.bounds()[1, 2]
+    half = rng.uniform(0.35, 0.92 if kind == 0 else 0.6) * (flare if kind == 0 else 1.0) * y
+    height = rng.uniform(0.5, 1.9) * half
+    if upright:
+        crown, most = body.bounds()[1, 2], rng.uniform(1.0, 1.57)
         handle, lugs = _bail((0.0, 0.0, crown + wire + 0.004), half, height, wire, (0, 0, -1), wire + 0.02)
         bag.add("body", body + lugs, density=150.0)
-        limit = rng.uniform(1.2, 1.57)
-        bag.add(
-            "handle", handle, revolute("body", (0, 1, 0), (0, 0, crown + wire + 0.004), -limit, limit), density=500.0
-        )
+        bag.add("handle", handle, revolute("body", (0, 1, 0), (0, 0, crown + wire + 0.004), -most, most), density=500.0)
         return bag
-    pivot = 0.8 * z
-    face = x * (1.0 + (top - 1.0) * (0.8 - 0.12) / 0.88)
+    pivot = rng.uniform(0.62, 0.8) * z
+    face = x * (1.0 + (top - 1.0) * (pivot / z - 0.12) / 0.88)
+    slope = float(arctan2((1.0 - top) * x, 0.88 * z))  # of the sides, which the bails hang down to
+    limit = rng.uniform(0.55, 1.0) * (np.pi - 0.15 - slope)
     solids = []
-    for s in (-1.0, 1.0) if rng.random() < 0.7 else (1.0,):
+    for s in ((-1.0, 1.0), (-1.0,), (1.0,))[int(rng.choice(3, p=[0.55, 0.3, 0.15]))]:
         place = (s * (face + wire + 0.004), 0.0, pivot)
         handle, lugs = _bail(place, half, height, wire, (-s, 0, 0), wire + 0.02)
         body += lugs
         solids.append((handle, place, s))
     bag.add("body", body, density=150.0)
-    # Along upright faces a bail may hang straight down; faces that lean stand in its way.
-    limit = rng.uniform(2.0, 2.6) if top < 1.0 else rng.uniform(2.4, 3.05)
     for number, (handle, place, s) in enumerate(solids):
         bag.add(f"handle_{number}", handle, revolute("body", (0, s, 0), place, 0.0, limit), density=500.0)
     return bag

@@ -18,12 +18,13 @@ GAP = 0.0007
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """A switch on a wall at x = 0; its front faces -X. A switch is off, its upper half out, at rest."""
+    """A switch on a wall at x = 0; its front faces -X. A switch is off, its upper half out, or
+    in the middle at rest."""
     kind = str(rng.choice(["rocker", "toggle", "dimmer"], p=[0.65, 0.25, 0.1]))
     count = int(rng.choice([1, 2, 3, 4], p=[0.35, 0.35, 0.18, 0.12]))
     upright = kind == "rocker" and count > 1 and rng.random() < 0.2
-    depth = rng.uniform(0.008, 0.013)
-    height = rng.uniform(0.078, 0.12)
+    depth = rng.uniform(0.007, 0.022)
+    height = rng.uniform(0.065, 0.15)
     border = height * rng.uniform(0.08, 0.2)
     pitch = {"rocker": rng.uniform(0.022, 0.045), "toggle": rng.uniform(0.036, 0.046), "dimmer": 0.06}[kind]
     width = max(count * pitch + 2 * border, 0.06 if upright else 0.07)
@@ -42,13 +43,19 @@ def build(rng: np.random.Generator) -> Assembly:
     else:
         plate += rounded_box((-depth, -width / 2, -height / 2), (0, width / 2, height / 2), 0.004)
     buttons: list[tuple[Solid, JointSpec]] = []
-    tilt, style = np.deg2rad(rng.uniform(3.0, 7.0)), int(rng.integers(1 << 30))
-    for cell in cells:
+    tilt, style = np.deg2rad(rng.uniform(2.0, 8.0)), int(rng.integers(1 << 30))
+    level = rng.random() < 0.35  # rockers rest in the middle and tip either way
+    live = int(rng.integers(1, count + 1)) if rng.random() < 0.3 else count  # how many move; the others are set
+    order = rng.permutation(count)
+    for cell, place in zip(cells, order, strict=True):
         center = cell.mean(axis=0)
         alike = np.random.default_rng(style)
         if kind == "rocker":
             solid = _rocker(alike, cell, depth, tilt)
-            joint = revolute("frame", (0, 1, 0), (-0.8 * depth, *center), 0.0, 2 * tilt)
+            lower = -tilt if level else 0.0
+            if level:
+                solid = solid.turned((0, 1, 0), tilt, (-0.8 * depth, *center))
+            joint = revolute("frame", (0, 1, 0), (-0.8 * depth, *center), lower, lower + 2 * tilt)
         elif kind == "toggle":
             low, high = center - (0.0095, 0.013), center + (0.0095, 0.013)
             plate += frame((-depth - 0.0025, *low), (-depth + 0.001, *high), [0.002, 0.002, 0.003, 0.003])
@@ -58,7 +65,10 @@ def build(rng: np.random.Generator) -> Assembly:
         else:
             solid = _dimmer(alike, center, depth, min(0.4 * pitch, 0.35 * height))
             joint = revolute("frame", (-1, 0, 0), (-depth, *center), 0.0, alike.uniform(3.5, 5.2))
-        buttons.append((solid, joint))
+        if place < live:
+            buttons.append((solid, joint))
+        else:
+            plate += solid
     switch.add("frame", plate, density=1200.0)
     for number, (solid, joint) in enumerate(buttons):
         switch.add(f"button_{number}", solid, joint, density=1200.0)

@@ -31,11 +31,11 @@ def build(rng: np.random.Generator) -> Assembly:
     """A toaster with its levers up at rest. The slots run along X, the levers are at -X."""
     kind = str(rng.choice(["two", "four", "long"], p=[0.6, 0.2, 0.2]))
     count = {"two": 2, "four": 4, "long": int(rng.integers(1, 3))}[kind]
-    length = rng.uniform(0.36, 0.42) if kind == "long" else rng.uniform(0.25, 0.32)
-    wide = rng.uniform(0.028, 0.038)  # of a slot
+    length = rng.uniform(0.34, 0.5) if kind == "long" else rng.uniform(0.23, 0.36)
+    wide = rng.uniform(0.024, 0.044)  # of a slot
     pitch = wide + rng.uniform(0.02, 0.035)
-    half = 0.5 * (count - 1) * pitch + 0.5 * wide + rng.uniform(0.028, 0.05)
-    foot, height = rng.uniform(0.006, 0.02), rng.uniform(0.16, 0.21)
+    half = 0.5 * (count - 1) * pitch + 0.5 * wide + rng.uniform(0.024, 0.065)
+    foot, height = rng.uniform(0.005, 0.025), rng.uniform(0.13, 0.25)
     low, high = np.array([0.0, -half, foot]), np.array([length, half, foot + height])
     shape = str(rng.choice(["box", "arch", "loaf", "block"]))
     block = _block(rng, shape, low, high, count, pitch, wide)
@@ -60,8 +60,8 @@ def build(rng: np.random.Generator) -> Assembly:
     toaster = Assembly()
     levers = 2 if count == 4 else 1
     places = [-0.5 * half, 0.5 * half] if levers == 2 else [rng.choice([0.0, rng.uniform(-0.35, 0.35)]) * half]
-    top = foot + height * rng.uniform(0.68, 0.76)
-    travel = min(rng.uniform(0.05, 0.085), top - foot - 0.06)
+    top = foot + height * rng.uniform(0.62, 0.78)
+    travel = rng.uniform(0.25, 1.0) * min(0.11, top - foot - 0.055)
     guided = rng.random() < 0.8
     for y in places if guided else []:
         body += frame((-0.0035, y - 0.012, top - travel - 0.014), (0.005, y + 0.012, top + 0.014), [0.007] * 4)
@@ -71,6 +71,8 @@ def build(rng: np.random.Generator) -> Assembly:
         name = f"lever_{number}" if levers == 2 else "lever"
         solid = grip.moved((0, y, top))
         toaster.add(name, solid, prismatic("body", (0, 0, -1), 0.0, travel, (0, y, top)), density=1000.0)
+    if rng.random() < 0.3:  # nothing but the levers moves
+        return toaster
     _controls(rng, toaster, places, half, top - travel - 0.02, foot)
     if not base and rng.random() < 0.4:
         side = 0.75 * half - 0.017

@@ -49,14 +49,14 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _size(rng: np.random.Generator) -> Bin:
-    x, y = rng.uniform(0.1, 0.2), rng.uniform(0.1, 0.24)
+    x, y = rng.uniform(0.09, 0.24), rng.uniform(0.09, 0.28)
     radius = rng.uniform(0.015, 0.5) * min(x, y)
     if round_one := rng.random() < 0.35:
         y, radius = x, 0.999 * x
     return Bin(
         x=x,
         y=y,
-        height=min(rng.uniform(1.2, 5.0) * max(x, y), 0.9),
+        height=min(rng.uniform(1.3, 4.2) * max(x, y), 0.8),
         radius=radius,
         taper=float(rng.choice([0.0, rng.uniform(0.02, 0.16)])) * min(x, y),
         foot=rng.uniform(0.02, 0.05),
@@ -83,7 +83,7 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
     x, seam = size.x, size.height + GAP
     hinge = (x + 0.013, 0.0, seam)
     half = 0.4 * (size.y - 0.5 * size.radius)
-    rise = rng.uniform(0.12, 0.45) * min(size.x, size.y)
+    rise = rng.uniform(0.08, 0.6) * min(size.x, size.y)
     inset = rng.choice([0.25, 0.7, 1.0]) * rise
     profile = [(0.0, inset), (0.12, 0.45 * inset), (0.5, 0.06 * inset), (1.0, 0.0)]
     lid = rounded_tray((-x - 0.003, -size.y - 0.003, seam), (x + 0.003, size.y + 0.003, seam + rise), 0.003,
@@ -94,12 +94,14 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
         body += box(
             (x - 0.006 - size.taper, -0.8 * half, size.height - 0.14), (x + 0.014, 0.8 * half, size.height - 0.02)
         )
-    # The hinge stands off the back, so that a lid may fall over until it hangs behind the bin.
-    limit = np.deg2rad(rng.choice([rng.uniform(70.0, 100.0), rng.uniform(100.0, 180.0), 180.0], p=[0.65, 0.2, 0.15]))
+    falls = rng.random() < 0.35  # over the back, past the upright, as far as the hinge lets it
+    turned_over = 180.0 if rng.random() < 0.5 else rng.uniform(110.0, 205.0)  # many real lids turn by half a turn
+    limit = np.deg2rad(turned_over if falls else rng.uniform(60.0, 110.0))
     joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
-    if rng.random() < 0.25:  # a lip to lift it by, instead of a pedal
-        lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
-        lid += rounded_box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), 0.003)
+    if rng.random() < (0.7 if falls else 0.25):  # no pedal, perhaps a lip to lift it by
+        if rng.random() < 0.6:
+            lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
+            lid += rounded_box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), 0.003)
         can.add("body", body, density=500.0)
         can.add("lid", lid, joint, density=500.0)
         return
@@ -181,7 +183,7 @@ def _wheelie(rng: np.random.Generator) -> Assembly:
     lid = rounded_tray((-x - 0.02, -y - 0.012, seam), (x, y + 0.012, seam + rise), 0.005, radius, shape, side=-1)
     lid += box((x - 0.02, -0.6 * y, seam), (hinge[0], 0.6 * y, seam + 0.009))
     lid += cylinder((hinge[0], -0.6 * y, seam + 0.002), (hinge[0], 0.6 * y, seam + 0.002), 0.008, sections=12)
-    limit = np.deg2rad(rng.uniform(85.0, 108.0))
+    limit = np.deg2rad(rng.uniform(75.0, 108.0) if rng.random() < 0.6 else rng.uniform(108.0, 205.0))
     can.add("lid", lid, revolute("body", (0, 1, 0), hinge, 0.0, limit), density=600.0)
     for number, s in enumerate((1.0, -1.0)):
         near, far = s * inner, s * (inner + wide)

@@ -1,7 +1,7 @@
 """Windows: one to three sashes in a frame, hinged at a side, at the top or bottom, or sliding sideways or upward.
 
-Sashes open towards -X, the room; hinged ones have a handle that turns. Sizes, glazing bars, mullions, fixed lights,
-sills, the surrounding wall, and how far the sashes open vary.
+Sashes open towards -X, the room; hinged ones mostly have a handle that turns, and some stand ajar. Sizes, glazing bars,
+mullions, fixed lights, sills, the surrounding wall, and how far the sashes open vary.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HINGES = {
 
 
 def build(rng: np.random.Generator) -> Assembly:
-    """A window, closed at rest."""
+    """A window, mostly closed at rest."""
     kind = str(rng.choice(["hinged", "sliding", "hung"], p=[0.6, 0.22, 0.18]))
     count = int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2]))
     if kind == "sliding":
@@ -33,7 +33,7 @@ def build(rng: np.random.Generator) -> Assembly:
     width = rng.uniform(0.35, 1.0) * (count if kind != "hung" else 1)
     height = rng.uniform(0.5, 1.8) if kind != "hung" else width * rng.uniform(1.3, 2.0)
     bar = rng.uniform(0.035, 0.065)
-    depth = rng.uniform(0.06, 0.12)
+    depth = rng.uniform(0.05, 0.22)
     sash = float(rng.uniform(0.03, 0.045))
     if kind != "hinged":
         sash = min(sash, 0.035)
@@ -66,12 +66,12 @@ def _frame(rng: np.random.Generator, width: float, height: float, depth: float, 
         solid += frame(
             (x0, -y - bar - wide, -bar - wide), (x0 + 0.018, y + bar + wide, height + bar + wide), [wide + 0.001] * 4
         )
-    elif around < 0.45:  # wall
-        wide = rng.uniform(0.1, 0.35)
+    elif around < 0.55:  # a piece of wall, on each side as wide as it happens to be
+        left, right, below, above = rng.uniform(0.05, 0.35 if around < 0.4 else 1.0, 4)
         solid += frame(
-            (x0 + 0.005, -y - bar - wide, -bar - wide),
-            (x1 - 0.004, y + bar + wide, height + bar + wide),
-            [wide + 0.002] * 4,
+            (x0 + 0.005, -y - bar - left, -bar - below),
+            (x1 - 0.004, y + bar + right, height + bar + above),
+            [w + 0.002 for w in (left, right, below, above)],
         )
     return solid
 
@@ -98,9 +98,11 @@ def _hinged(
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sideways = rng.random() < 0.65 or meeting
     own = str(rng.choice(["left", "right"] if sideways else ["top", "top", "bottom"]))
-    limit = np.deg2rad(rng.choice([60.0, 85.0, 110.0, 160.0] if sideways else [25.0, 45.0, 70.0]))
+    limit = np.deg2rad(rng.uniform(40.0, 178.0) if sideways else rng.uniform(20.0, 75.0))
+    ajar = rng.uniform(0.1, 0.6) if rng.random() < 0.25 else 0.0
     fixed = int(rng.integers(count)) if count > 1 and not meeting and rng.random() < 0.35 else -1
     leaves = []
+    lever_turns = rng.random() < 0.7
     for k in range(count):
         first = edges[k] + (mullion / 2 if k > 0 and not meeting else 0.0)
         last = edges[k + 1] - (mullion / 2 if k < count - 1 and not meeting else 0.0)
@@ -120,14 +122,16 @@ def _hinged(
     window.add("frame", body, density=700.0)
     for number, (hinge, low, high, outer) in enumerate(leaves):
         name = "sash" if len(leaves) == 1 else f"sash_{number}"
-        _leaf(window, name, hinge, low, high, rail, glazing, limit, outer)
+        _leaf(window, name, hinge, low, high, rail, glazing, limit, outer, lever_turns)
+        if ajar > 0 and number == 0:
+            window.open_at_rest(name, ajar * min(limit, 1.2))
 
 
 def _leaf(
     window: Assembly, name: str, hinge: str, low: Array, high: Array, rail: float, glazing: tuple[int, int],
-    limit: float, outer: bool,
+    limit: float, outer: bool, lever_turns: bool,
 ) -> None:  # fmt: skip
-    """A hinged sash and the handle that turns on it, on the edge that opens."""
+    """A hinged sash, mostly with a handle that turns on it, on the edge that opens."""
     across, end, axis = HINGES[hinge]
     along = 3 - across
     edge = high[across] if end > 0 else low[across]
@@ -143,6 +147,8 @@ def _leaf(
     angle = min(limit, most if outer else stay)
     window.add(name, solid, revolute("frame", axis, tuple(origin), 0.0, angle), label="sash", density=900.0)
 
+    if not lever_turns:
+        return
     # The lever lies along the rail at rest and turns towards the glass.
     reach = 0.042
     tip = foot.copy()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from artsim.common.products import unit
+from artsim.common.products import apply, unit
 from artsim.errors import AssetError, KinematicsError
-from artsim.making.solids import Solid, Vector
+from artsim.making.solids import Solid, Vector, rotation_about
 from artsim.model.kinematics import Joint, KinematicTree, Mimic
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 
@@ -62,7 +62,10 @@ class Assembly:
     """
 
     def __init__(self) -> None:
-        self._parts: list[Part] = []
+        self._names: list[str] = []
+        self._labels: list[str] = []
+        self._solids: list[Solid] = []
+        self._densities: list[float] = []
         self._joints: list[JointSpec | None] = []
         self._features: dict[str, bool] = {}
 
@@ -100,16 +103,50 @@ class Assembly:
         AssetError
             When a piece of the solid is empty.
         """
-        if any(part.name == name for part in self._parts):
+        if name in self._names:
             raise KinematicsError(f"two parts are called {name!r}")
         if not solid.pieces or any(piece.is_empty() for piece in solid.pieces):
             raise AssetError("a piece of its solid encloses nothing", name, "look for swapped corners or flat outlines")
         stem, _, number = name.rpartition("_")
-        vertices, faces = solid.union()
-        body = Body(solid.piece_meshes(), density)
-        self._parts.append(Part(name, label or (stem if number.isdigit() else name), vertices, faces, body))
+        self._names.append(name)
+        self._labels.append(label or (stem if number.isdigit() else name))
+        self._solids.append(solid)
+        self._densities.append(density)
         self._joints.append(joint)
         return name
+
+    def open_at_rest(self, name: str, angle: float) -> None:
+        """Let a part that is there rest turned about its hinge; what hangs on it turns with it.
+
+        Parameters
+        ----------
+        name : str
+            Of a part with a revolute joint.
+        angle : float
+            Radians from where the part stands; the limits move the other way, so that the range stays.
+
+        Raises
+        ------
+        KinematicsError
+            When the part has no revolute joint.
+        """
+        first = self._names.index(name)
+        hinge = self._joints[first]
+        if hinge is None or hinge.type != "revolute":
+            raise KinematicsError("only a part with a revolute joint can be opened at rest", name)
+        about = np.asarray(hinge.origin, dtype=np.float64)
+        rotation = rotation_about(hinge.axis, angle)
+        turning = {name}
+        for k in range(first, len(self._names)):
+            joint = self._joints[k]
+            if k > first and (joint is None or joint.parent not in turning):
+                continue
+            turning.add(self._names[k])
+            self._solids[k] = self._solids[k].turned(hinge.axis, angle, about)
+            if k > first and joint is not None:
+                origin = about + apply(rotation, np.asarray(joint.origin) - about)
+                self._joints[k] = replace(joint, axis=apply(rotation, np.asarray(joint.axis)), origin=origin)
+        self._joints[first] = replace(hinge, lower=hinge.lower - angle, upper=hinge.upper - angle)
 
     def build(self, category: str, object_id: str) -> ArticulatedObject:
         """The object, in its rest frame.
@@ -119,11 +156,12 @@ class Assembly:
         KinematicsError
             When the joints do not form a tree.
         """
-        bounds = np.stack([part.bounds for part in self._parts])
+        whole = [self._part(k) for k in range(len(self._names))]
+        bounds = np.stack([part.bounds for part in whole])
         center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
-        index = {part.name: k for k, part in enumerate(self._parts)}
+        index = {name: k for k, name in enumerate(self._names)}
         joints = tuple(self._joint(k, spec, index, center) for k, spec in enumerate(self._joints))
-        parts = tuple(part.moved(-center) for part in self._parts)
+        parts = tuple(part.moved(-center) for part in whole)
         tree = KinematicTree(joints)
         content = [part.vertices.tobytes() + part.faces.tobytes() for part in parts]
         return ArticulatedObject(
@@ -137,10 +175,15 @@ class Assembly:
             features=tuple(sorted(name for name, there in self._features.items() if there)),
         )
 
+    def _part(self, k: int) -> Part:
+        vertices, faces = self._solids[k].union()
+        body = Body(self._solids[k].piece_meshes(), self._densities[k])
+        return Part(self._names[k], self._labels[k], vertices, faces, body)
+
     def _joint(self, k: int, spec: JointSpec | None, index: dict[str, int], center: Any) -> Joint:
         if spec is None:
             return Joint("root", "free", -1)
-        name = self._parts[k].name
+        name = self._names[k]
         if spec.parent not in index:
             raise KinematicsError(f"no part is called {spec.parent!r}", f"joint of {name!r}")
         x, y, z = unit(spec.axis).tolist()
