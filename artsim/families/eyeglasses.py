@@ -24,7 +24,7 @@ STEEPEST = np.deg2rad(8.5)
 """Largest tilt of the hinges from the vertical."""
 SLIM = 0.4
 """Share of the glasses whose temples are slim."""
-APART = 0.25
+APART = 0.12
 """Share of the glasses whose temples stay each on its own side: their hinges are upright, and their ends may hang."""
 
 
