@@ -1,7 +1,7 @@
 """Which objects look the same turned round: ``python -m benchmarks.symmetry``.
 
-For each category, the share of procedural objects that have a symmetry (:mod:`artsim.checks.symmetry` says what counts
-as one), and the share with each: half and quarter turns by their axis, with parts exchanged or not. Estimates of such
+For each category, the share of procedural objects that have a symmetry, and the share with each: half and quarter turns
+by their axis, with parts exchanged or not (:mod:`artsim.observing.symmetry` says what counts as one). Estimates of such
 objects are judged with and without symmetry. The last line is one JSON object.
 """
 
@@ -18,9 +18,9 @@ import tyro
 from scipy.spatial.transform import Rotation
 
 from artsim import make
-from artsim.checks.symmetry import Symmetry, symmetries
 from artsim.common.progress import track
 from artsim.families import FAMILIES
+from artsim.observing.symmetry import Symmetry, symmetries
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from scipy.optimize import linear_sum_assignment
 
 from artperl.core.estimate import Estimate
 from artperl.evaluation.metrics import METRICS, rotation_error, translation_error, true_poses
-from artsim.checks.symmetry import Symmetry, equivalent_sample, symmetries
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
+from artsim.observing.symmetry import Symmetry, equivalent_sample, symmetries
 
 Array = NDArray[np.float64]
 Estimating = Callable[[NDArray[Any]], Estimate]

@@ -36,7 +36,7 @@ def build(rng: np.random.Generator) -> Assembly:
     wire = rng.uniform(0.0012, 0.0045)
     outer = top + 0.012  # beyond the rim
     bail_y = outer + 0.0015 + max(wire, 0.0025)
-    across = float(np.sqrt(1.0 - (ahead / (oval * top)) ** 2))
+    across = float(np.sqrt(1.0 - np.square(ahead / (oval * top))))
     wall_y = across * float(np.interp(pivot, profile[:, 1], profile[:, 0])) - 0.7 * wall
     half, boxy = rng.uniform(0.008, 0.016), rng.random() < 0.5
     for side in (-1.0, 1.0):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.common.elementary import arctan2, cos, sin
+from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, rounded_box, union
@@ -198,14 +198,14 @@ def _under(rng: np.random.Generator) -> Assembly:
         solid = union(bar.between((x, t * y, knee), (foot_x, t * y, 0.0)) for t in (-1, 1))
         z = knee * rng.uniform(0.15, 0.6)
         solid += bar.across(x + ahead * slant * (knee - z), z, y)
-        length = float(np.hypot(knee, ahead * slant * knee))
+        length = float(hypot(knee, ahead * slant * knee))
         legs.append((name, solid, way, (x, 0.0, knee), length, ahead * slant))
         for t in (-1, 1):  # lugs
             seat += box((x - 0.02, t * y - bar.thick, under + 0.001), (x + 0.02, t * y + bar.thick, seat_z + 0.002))
     chair.add("seat", seat, density=600.0)
     for name, solid, way, at, length, slope in legs:
         # They stop a little below the seat; those in front fold back, those behind fold forward, to the inside.
-        stop = np.pi / 2 + way * float(np.arctan(slope)) * -1.0 - 0.12 - 2.0 * rail / length
+        stop = np.pi / 2 + way * float(arctan2(slope, 1.0)) * -1.0 - 0.12 - 2.0 * rail / length
         other = 0.45 * stop
         limit = other if rng.random() < 0.7 else other * rng.uniform(0.5, 1.0)
         chair.add(name, solid, revolute("seat", -way * SIDE, at, 0.0, limit), density=900.0)

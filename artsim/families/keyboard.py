@@ -151,7 +151,8 @@ def _plate(rng: np.random.Generator, face: Face, low: Array, high: Array, bottom
     if kind < 0.3:  # bowed front or back edges
         bow = rng.uniform(0.03, 0.3, 2) * size[1] * rng.choice([0.0, 1.0], 2)
         u = np.linspace(-0.9, 0.9, 9)
-        arcs = [np.column_stack([0.5 * size[0] * u + 0.5 * (low[0] + high[0]), np.full(9, edge) + s * b * (1 - u**2)])
+        across, bulge = 0.5 * size[0] * u + 0.5 * (low[0] + high[0]), 1 - np.square(u)
+        arcs = [np.column_stack([across, np.full(9, edge) + s * b * bulge])
                 for edge, s, b in ((low[1], -1, bow[0]), (high[1], 1, bow[1]))]  # fmt: skip
         outline = np.concatenate([outline, *arcs])
     elif kind < 0.45:  # wider at the front

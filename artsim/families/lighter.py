@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin
+from artsim.common.elementary import power as raised
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, rounded_box, tube, union
 from artsim.model.kinematics import Array
@@ -52,7 +53,7 @@ def _outline(rng: np.random.Generator, half_x: float, half_y: float) -> Array:
     angles = np.arange(count) * 2.0 * np.pi / count
     c, s = cos(angles), sin(angles)
     return np.column_stack(
-        [np.sign(c) * np.abs(c) ** (2.0 / power) * half_x, np.sign(s) * np.abs(s) ** (2.0 / power) * half_y]
+        [np.sign(c) * raised(np.abs(c), 2.0 / power) * half_x, np.sign(s) * raised(np.abs(s), 2.0 / power) * half_y]
     )
 
 

@@ -148,13 +148,15 @@ def _draw_dome(rng: np.random.Generator) -> _Dome:
     top = rng.uniform(0.35, 0.8)
     front, back = rng.uniform(0.3, 0.85), rng.uniform(0.15, 0.8)
     before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
-    profile = 1.0 - (1.0 - front) * before**2 - (1.0 - back) * behind**2 * np.sqrt(behind)
+    profile = 1.0 - (1.0 - front) * np.square(before) - (1.0 - back) * np.square(behind) * np.sqrt(behind)
     ends = rng.uniform(0.1, 0.75, 2)
     widths = (
-        1.0 - ends[0] * np.maximum(1.0 - share / 0.35, 0.0) ** 2 - ends[1] * np.maximum((share - 0.6) / 0.4, 0.0) ** 2
+        1.0
+        - ends[0] * np.square(np.maximum(1.0 - share / 0.35, 0.0))
+        - ends[1] * np.square(np.maximum((share - 0.6) / 0.4, 0.0))
     )
-    waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - ((share - 0.42) / 0.3) ** 2, 0.0)
-    slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half * np.maximum(1.0 - ((share - 0.5) / 0.5) ** 2, 0.0)
+    waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
+    slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half * np.maximum(1.0 - np.square((share - 0.5) / 0.5), 0.0)
     return _Dome(length * (share - 0.5), height * profile, half * (widths - waist), slant, rng.uniform(0.0, 1.0),
                  rng.uniform(0.15, 0.55))  # fmt: skip
 

@@ -76,7 +76,7 @@ def _barrel(rng: np.random.Generator, low: float, high: float, first: float, las
     shares = np.linspace(0.0, 1.0, count)
     radii = first + shares * (last - first)
     swell = rng.uniform(-0.3, 0.45)
-    radii = radii * (1.0 + swell * sin(np.pi * shares) ** 2)
+    radii = radii * (1.0 + swell * np.square(sin(np.pi * shares)))
     return np.column_stack([radii, low + shares * (high - low)])
 
 

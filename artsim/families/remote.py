@@ -74,9 +74,9 @@ def _draw_body(rng: np.random.Generator) -> _Body:
     if kind == "tapered":
         widths = 1.0 - amount * (share if rng.random() < 0.5 else 1.0 - share)
     elif kind == "waisted":
-        widths = 1.0 - amount * sin(np.pi * np.clip((share - rng.uniform(0.0, 0.2)) / 0.8, 0.0, 1.0)) ** 2
+        widths = 1.0 - amount * np.square(sin(np.pi * np.clip((share - rng.uniform(0.0, 0.2)) / 0.8, 0.0, 1.0)))
     elif kind == "oval":
-        widths = np.sqrt(1.0 - (0.9 + 0.08 * amount) * (2.0 * share - 1.0) ** 2)
+        widths = np.sqrt(1.0 - (0.9 + 0.08 * amount) * np.square(2.0 * share - 1.0))
     else:
         widths = np.ones(len(levels))
     round_end = rng.uniform(0.0, 0.6) if kind != "oval" else 0.0
@@ -84,11 +84,11 @@ def _draw_body(rng: np.random.Generator) -> _Body:
     # Ends of the front bend back or forward beyond the keys; the back has humps.
     bends = rng.uniform(-0.1, 0.3, 2) * length * rng.choice([0.0, 1.0], p=[0.35, 0.65])
     below, above = np.clip((low - share) / low, 0.0, 1.0), np.clip((share - high) / (1 - high), 0.0, 1.0)
-    fronts = bends[0] * low * 2.0 * below**2 + 0.15 * bends[1] * above**2
+    fronts = bends[0] * low * 2.0 * np.square(below) + 0.15 * bends[1] * np.square(above)
     hump, spot = rng.uniform(0.0, 1.2) * rng.choice([0.0, 1.0]), rng.uniform(0.1, 0.9)
     wide = rng.uniform(0.15, 0.4)
     slim = rng.uniform(0.45, 1.0)
-    depth = thick * (slim + (1.0 - slim) * share + hump * exp(-(((share - spot) / wide) ** 2)))
+    depth = thick * (slim + (1.0 - slim) * share + hump * exp(-np.square((share - spot) / wide)))
     backs = fronts + depth * np.where((levels == 0) | (levels == length), rng.uniform(0.6, 1.0), 1.0)
     backs = np.maximum(backs, np.maximum(fronts, 0.0) + 0.004)
     roundness = rng.uniform(0.1, 0.95)

@@ -48,7 +48,7 @@ def screen(rng: np.random.Generator, panel: Panel, chin: float) -> Solid:
     solid = Solid()
     if panel.bend:
         edges = np.linspace(-half, half, 8)
-        forward = panel.bend * (edges / half) ** 2
+        forward = panel.bend * np.square(edges / half)
         for k in range(7):
             corners = list(zip(edges[k : k + 2], forward[k : k + 2], strict=True))
             for x0, x1, z0, z1 in (

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.common.elementary import cos, sin
+from artsim.common.elementary import cos, hypot, power, sin
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube, union, vessel
 
@@ -96,7 +96,7 @@ def _foot(
     top = rng.uniform(0.6, 0.85) * height
     shares = np.linspace(0.0, 1.0, 8)
     belly, waist = rng.uniform(0.5, 1.0) * wide, rng.uniform(0.2, 0.5) * wide
-    radii = waist + (belly - waist) * sin(np.pi * (0.15 + 0.85 * shares)) ** rng.uniform(0.7, 2.5)
+    radii = waist + (belly - waist) * power(sin(np.pi * (0.15 + 0.85 * shares)), rng.uniform(0.7, 2.5))
     radii[-1] = max(1.3 * radius, 0.3 * waist)
     path = np.column_stack([np.zeros(8), np.zeros(8), shares * top])
     return tube(path, radii.tolist(), 20), top
@@ -140,7 +140,7 @@ def spotlight(rng: np.random.Generator) -> Assembly:
     """A head that tips in a yoke, which turns on a mount."""
     radius, long = rng.uniform(0.03, 0.09), rng.uniform(0.06, 0.2)
     thick = 0.08 * radius + 0.002
-    reach = float(np.hypot(radius, 0.6 * long)) + 0.012
+    reach = float(hypot(radius, 0.6 * long)) + 0.012
     mount = str(rng.choice(["disc", "pole", "legs"]))
     high = rng.uniform(0.01, 0.04) if mount == "disc" else rng.uniform(0.1, 1.1)
     wide = radius * rng.uniform(1.0, 1.8)

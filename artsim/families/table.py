@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.common.elementary import power as raised
 from artsim.families.fronts import Style
 from artsim.families.table_parts import GAP, Table, drop_leaves, four_legs, keyboard_tray, table_top, wheels
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
@@ -233,7 +234,7 @@ def _column(rng: np.random.Generator, table: Table) -> None:
     c, s = cos(angles), sin(angles)
     long = wide * rng.choice([1.0, rng.uniform(1.0, 2.2)])
     outline = np.column_stack(
-        [np.sign(c) * np.abs(c) ** (2.0 / power) * wide, np.sign(s) * np.abs(s) ** (2.0 / power) * long]
+        [np.sign(c) * raised(np.abs(c), 2.0 / power) * wide, np.sign(s) * raised(np.abs(s), 2.0 / power) * long]
     )
 
     def slab(z: float) -> Solid:

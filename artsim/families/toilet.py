@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.common.elementary import power as raised
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, rounded_box, tray, tube, union
 from artsim.model.kinematics import Array
@@ -72,8 +73,8 @@ def _oval(length: float, width: float, power: float, z: float, shift: float = 0.
     """(N, 3) outline, a superellipse about x = shift, longer towards the front."""
     angles = np.arange(_AROUND) * 2.0 * np.pi / _AROUND
     c, s = cos(angles), sin(angles)
-    x = np.sign(c) * np.abs(c) ** (2.0 / power) * 0.5 * length
-    y = np.sign(s) * np.abs(s) ** (2.0 / power) * 0.5 * width
+    x = np.sign(c) * raised(np.abs(c), 2.0 / power) * 0.5 * length
+    y = np.sign(s) * raised(np.abs(s), 2.0 / power) * 0.5 * width
     return np.column_stack([x + shift, y, np.full(_AROUND, z)])
 
 

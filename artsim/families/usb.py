@@ -206,7 +206,7 @@ def _swivel(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     corners = np.array(
         [(-stick.plug.reach, stick.plug.half), (0.0, half), (back + (1.5 if eyelet.pieces else 0.0) * half, half)]
     )
-    reach = float(np.sqrt(((corners - (pivot, 0.0)) ** 2).sum(axis=1)).max()) + GAP
+    reach = float(np.sqrt(np.square(corners - (pivot, 0.0)).sum(axis=1)).max()) + GAP
     tail = half * rng.uniform(0.5, 1.0)
     wide = half * rng.uniform(0.7, 1.1)
     end = key_outline("round", (2.0 * tail, 2.0 * wide), 16) + (pivot, 0.0)

@@ -12,11 +12,11 @@ from artperl.evaluation.samples import frozen_samples, samples_of
 from artperl.evaluation.scoring import compare, evaluate, evaluate_foreign, headline, match_share, object_symmetries
 from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
-from artsim.checks.symmetry import equivalent_sample
 from artsim.errors import ArtsimError
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import box
 from artsim.observing.sample import Sample
+from artsim.observing.symmetry import equivalent_sample
 
 
 def test_a_perfect_estimate_has_no_error(estimator: Estimator, sample: Sample) -> None:

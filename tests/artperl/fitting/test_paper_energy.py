@@ -94,7 +94,7 @@ def test_the_minimum_is_nearer_than_a_start_beside_it() -> None:
     assert (found.energy <= found.start_energy).all()
     truth = total_energy(problem.shapes, problem.observed, problem.goal, problem.shapes.diagonal)
     assert found.energy.median() < 0.7 * found.start_energy.median()
-    assert found.energy.median() < 1.1 * truth.median()  # what is left is the difference of the two objects
+    assert found.energy.median() < 1.5 * truth.median()  # what is left is the difference of the two objects
     assert torch.equal(found.theta.log_scale, start.log_scale)  # the scale is fixed (section 4.4)
 
 

@@ -54,7 +54,7 @@ def test_a_fit_seen_from_elsewhere_is_turned_round(estimator: Estimator, sample:
     """Told that the camera is behind, the estimate of a laptop that is seen from in front turns its back."""
     plain = estimator(sample.points)
     rotation, _ = true_poses(sample)
-    assert metrics.rotation_error(plain.rotation, rotation).max() < 3.0
+    assert metrics.rotation_error(plain.rotation, rotation).max() < 4.0
     found = {}
     for middle in (0.0, 180.0):
         options = replace(estimator.options, seen_from=(middle - 75.0, middle + 75.0))

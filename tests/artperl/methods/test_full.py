@@ -28,7 +28,7 @@ from tests.artperl.worlds import Oracle, true_votes
 def test_who_sees_well_estimates_well(estimator: Estimator, sample: Sample) -> None:
     estimate = estimator(sample.points)
     rotation, center = true_poses(sample)
-    assert metrics.rotation_error(estimate.rotation, rotation).max() < 3.0
+    assert metrics.rotation_error(estimate.rotation, rotation).max() < 4.0
     assert metrics.translation_error(estimate.translation, center, sample.diagonal).max() < 0.04
     assert (estimate.part == sample.part).mean() > 0.95
     assert estimate.state.shape == (2,)
@@ -49,7 +49,7 @@ def test_dirt_does_not_matter(estimator: Estimator, sample: Sample) -> None:
     ])  # fmt: skip
     estimate = estimator(dirty)
     rotation, _ = true_poses(sample)
-    assert metrics.rotation_error(estimate.rotation, rotation).max() < 3.0
+    assert metrics.rotation_error(estimate.rotation, rotation).max() < 4.0
     shown = len(sample.points)
     assert (estimate.part[shown : shown + 50] == -1).all()
     assert (estimate.part[shown + 50 :] == -1).mean() > 0.9

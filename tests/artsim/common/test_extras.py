@@ -49,6 +49,8 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "inspect": [("box.urdf", ""), ("box.urdf --gates", "sim")],
         "verify": [("made", "")],
         "repair": [("made", "")],
+        "families": [("globe", "")],
+        "vary": [("box.urdf --count 1 --out varied", "sim")],
         "doctor": [("warp", "")],
     },
     "artperl": {

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.checks.symmetry import equivalent_sample, symmetries
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import box
 from artsim.model.camera import Camera
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
+from artsim.observing.symmetry import equivalent_sample, symmetries
 
 
 def shears(second: float = 0.2) -> ArticulatedObject:
