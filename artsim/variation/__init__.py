@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from artsim.model.objects import ArticulatedObject
-from artsim.variation.search import Variation, draw_variation
 
-__all__ = ["Variation", "draw_variation", "vary"]
+__all__ = ["vary"]
 
 
 def vary(obj: ArticulatedObject, seed: int = 0, others: Sequence[ArticulatedObject] = ()) -> ArticulatedObject:
@@ -36,6 +35,9 @@ def vary(obj: ArticulatedObject, seed: int = 0, others: Sequence[ArticulatedObje
     AssetError
         When no joint of the object can move, or no draw passes the gates.
     ConfigError
-        When the seed is negative, or one of the others is of another category.
+        When the seed is negative, one of the others is of another category, or the extra ``sim`` is missing.
     """
+    # Gates need the extra "sim", which "import artsim" does without.
+    from artsim.variation.search import draw_variation
+
     return draw_variation(obj, seed, others).obj

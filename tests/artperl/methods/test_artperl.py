@@ -73,7 +73,7 @@ def test_its_own_object_is_fitted_from_a_near_start() -> None:
         method.options, start=MeanView(azimuth + 8.0, elevation + 6.0), refine_iterations=200, refine_rate=0.02
     )
     estimate = method(sample.points)
-    assert rotation_error(estimate.rotation, rotation.numpy()).max() < 4.0
+    assert rotation_error(estimate.rotation, rotation.numpy()).max() < 6.0
     assert (estimate.part == sample.part).mean() > 0.99
     assert len(estimate.trajectory) == 1 + 12 * 2 + 1  # start, the agent's steps of both levels, refinement
     start = rotation_error(estimate.trajectory[0][:, :3, :3], rotation.numpy())

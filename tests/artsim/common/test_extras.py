@@ -67,6 +67,7 @@ CALLS = {
     **{f"import artsim; artsim.make_renderer({name!r})": name.partition("-")[0] for name in list(RENDERERS)[1:]},
     "import artperl; artperl.load_estimator('laptop')": "train",
     "import artsim.envs": "envs",
+    "import artsim; artsim.vary(artsim.make('globe'))": "sim",
     "import artperl.training.gym_env": "train",
     "import artperl.training.run": "train",
     "import artsim.model.collision": "sim",

@@ -14,8 +14,8 @@ from artsim.errors import AssetError, ConfigError
 from artsim.export import export
 from artsim.families import make
 from artsim.loading.urdf import load
-from artsim.variation import draw_variation
 from artsim.variation.folder import describe_variation, load_with_bodies, write_variation, write_variations
+from artsim.variation.search import draw_variation
 from artsim.variation.standard import Standard
 from tests.conftest import ASSETS
 

@@ -18,8 +18,9 @@ from artsim.families import FAMILIES
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.solids import box
 from artsim.model.objects import ArticulatedObject
-from artsim.variation import draw_variation, vary
+from artsim.variation import vary
 from artsim.variation.operations import change_limits, exchange_part, leave_out, move_axes, stretch
+from artsim.variation.search import draw_variation
 from artsim.variation.standard import Standard, colliding_parts, part_gaps
 from tests.conftest import ASSETS, rigid, valve
 
