@@ -9,7 +9,7 @@ import tyro
 from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
 from artperl.commands.train import Train
-from artsim.cli import run_program
+from artsim.common.program import run_program
 
 Verb = (
     Annotated[Train, tyro.conf.subcommand("train")]

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
-import inspect
-import io
 import os
 import sys
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 
-from artsim.common.extras import import_failure, is_own_module
-from artsim.common.names import PrintableStream, printable
+from artsim.common.program import run_program
 from artsim.datasets.plan import SampleOptions
-from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError
+from artsim.errors import ConfigError, DatasetError
 from artsim.families.constraints import Constraints
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
 from artsim.renderers import RendererName
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
+from artsim.variation.command import Vary
 
 _LISTED = 50
 """Lines of a list before the rest is only counted."""
@@ -179,50 +175,6 @@ class GenerateObjects:
             return
         rate = result.made / result.seconds
         print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")
-
-
-@dataclass(frozen=True)
-class Vary:
-    """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
-
-    Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
-    a meta.json that says what was done. Stop it at any moment: the same command goes on where it stopped.
-
-    Example: artsim vary path/to/StorageFurniture/45162 --others path/to/StorageFurniture --count 20 --out out/varied
-    """
-
-    path: tyro.conf.Positional[Path]
-    """URDF file or its folder."""
-    out: Path
-    """Folder to write to; made if missing."""
-    count: int = 10
-    """Variations."""
-    seed: int = 0
-    """Seed of the first variation; the others count up from it."""
-    others: tuple[Path, ...] = ()
-    """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
-    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
-    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
-
-    def run(self) -> None:
-        from artsim.variation.folder import write_variations
-
-        try:
-            summary = write_variations(
-                self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
-            )
-        except KeyboardInterrupt:
-            print(f"\nstopped; whole variations are kept in {self.out}: the same command goes on from there")
-            raise
-        for failure in summary.failed[:_LISTED]:
-            print(failure)
-        if len(summary.failed) > _LISTED:
-            print(f"... and {len(summary.failed) - _LISTED} more")
-        print(f"{summary.folder}: {summary.whole} variations of {self.path}\n{summary}")
-        if not summary.whole:
-            raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")
 
 
 @dataclass(frozen=True)
@@ -518,33 +470,3 @@ def main() -> None:
 def generate_main() -> None:
     """Entry point of ``generate.py``."""
     run_program(Generate, "generate.py")
-
-
-def _told(verb: Any, description: str | None) -> str:
-    """What ``--help`` begins with."""
-    return f"{inspect.cleandoc(description or verb.__doc__ or '')}\n\n--version prints the version."
-
-
-def run_program(verb: Any, program: str, description: str | None = None) -> None:
-    """Read the command line as one of some verbs, and run it; errors are one line, and exit with 2."""
-    if sys.argv[1:] == ["--version"]:
-        print(f"{program} {version('artsim')}")
-        return
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not know every character
-        sys.stdout.reconfigure(errors="backslashreplace")
-    try:
-        chosen = tyro.cli(verb, prog=program, description=_told(verb, description))
-        with contextlib.redirect_stdout(PrintableStream(sys.stdout)):  # names out of files are in what is printed
-            chosen.run()
-    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
-        sys.stderr.close()
-    except ImportError as error:  # the net below every import of an optional dependency
-        if is_own_module(error):
-            raise
-        print(f"error: {printable(import_failure(error, program), 4000)}", file=sys.stderr)
-        sys.exit(2)
-    except (ArtsimError, OSError) as error:
-        print(f"error: {printable(error, 4000)}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        sys.exit(130)

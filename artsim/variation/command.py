@@ -1,0 +1,59 @@
+"""The verb ``artsim vary``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from artsim.errors import AssetError
+from artsim.loading.roots import PackageRoots
+
+_LISTED = 50
+"""Failures that are printed before the rest is only counted."""
+
+
+@dataclass(frozen=True)
+class Vary:
+    """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
+
+    Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
+    a meta.json that says what was done. Stop it at any moment: the same command goes on where it stopped.
+
+    Example: artsim vary path/to/StorageFurniture/45162 --others path/to/StorageFurniture --count 20 --out out/varied
+    """
+
+    path: tyro.conf.Positional[Path]
+    """URDF file or its folder."""
+    out: Path
+    """Folder to write to; made if missing."""
+    count: int = 10
+    """Variations."""
+    seed: int = 0
+    """Seed of the first variation; the others count up from it."""
+    others: tuple[Path, ...] = ()
+    """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
+    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+
+    def run(self) -> None:
+        from artsim.variation.folder import write_variations
+
+        try:
+            summary = write_variations(
+                self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
+            )
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole variations are kept in {self.out}: the same command goes on from there")
+            raise
+        for failure in summary.failed[:_LISTED]:
+            print(failure)
+        if len(summary.failed) > _LISTED:
+            print(f"... and {len(summary.failed) - _LISTED} more")
+        print(f"{summary.folder}: {summary.whole} variations of {self.path}\n{summary}")
+        if not summary.whole:
+            raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")
