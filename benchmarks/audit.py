@@ -28,7 +28,7 @@ from scipy.spatial import cKDTree
 from artsim import make
 from artsim.checks.validity import check_file
 from artsim.common.progress import track
-from artsim.errors import ArtsimError
+from artsim.errors import ArtsimError, ConfigError
 from artsim.export import export
 from artsim.families import FAMILIES
 from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
@@ -48,6 +48,8 @@ class Options:
 
     objects: int = 10_000
     """Procedural objects over all categories."""
+    categories: list[str] = field(default_factory=lambda: sorted(FAMILIES))
+    """Which of ours."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
     """Real objects to pass through the same gates."""
@@ -66,7 +68,10 @@ def main(options: Options) -> None:
     """Print tables, failures by seed, and the JSON line."""
     start = time.perf_counter()
     print(f"{platform.processor() or platform.machine()}, {options.workers} processes")
-    categories = sorted(FAMILIES)
+    categories = options.categories
+    for category in categories:
+        if category not in FAMILIES:
+            raise ConfigError(f"unknown category {category!r}", "categories", f"use {', '.join(sorted(FAMILIES))}")
     sources = [FamilySource(categories[i % len(categories)], i // len(categories)) for i in range(options.objects)]
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(options.workers, context) as team:

@@ -19,6 +19,9 @@ from artsim.model.objects import ArticulatedObject
 BEYOND = 0.5
 """How far a family has to reach beyond the real range at each end, over the width of that range."""
 
+ROUNDING = 0.003
+"""How far short of a range a family may end: a finite sample seldom meets the ends of the range that it draws from."""
+
 _AXES = "xyz"
 _FULL_TURN = 2.0 * np.pi
 
@@ -129,12 +132,15 @@ class Reach:
     @property
     def holds_real(self) -> bool:
         """Whether every real object lies within the family."""
-        return self.family[0] <= self.real[0] and self.real[1] <= self.family[1]
+        return self._covers(self.real)
 
     @property
     def reaches(self) -> bool:
         """Whether the family reaches over the whole required range."""
-        return self.family[0] <= self.required[0] and self.required[1] <= self.family[1]
+        return self._covers(self.required)
+
+    def _covers(self, values: tuple[float, float]) -> bool:
+        return self.family[0] <= values[0] + ROUNDING and values[1] <= self.family[1] + ROUNDING
 
 
 def reach(real: Mapping[str, Values], family: Iterable[Values]) -> list[Reach]:
