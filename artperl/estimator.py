@@ -36,7 +36,7 @@ from artsim.model.objects import MAX_PARTS
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 3
+_FORMAT = 4
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 

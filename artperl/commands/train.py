@@ -78,7 +78,9 @@ class Train:
     stretched: float | None = None
     """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
     noisy: float | None = None
-    """Share of perception's other training clouds that are as a depth sensor, a D435, sees them."""
+    """Share of perception's other training clouds that are as one of four depth sensors sees them."""
+    degraded: float | None = None
+    """Share of all of perception's training clouds that are cut, dirty or sparse, as detectors' masks are."""
     perception_rate: float | None = None
     """Highest learning rate of perception; a lower one changes less of what --start-from brings along."""
     agent_rollouts: int | None = None

@@ -27,6 +27,25 @@ _SEEN = 0.03
 
 
 @dataclass(frozen=True)
+class Symptoms:
+    """What an estimate says about itself, by which confidence judges it.
+
+    Attributes
+    ----------
+    residual, disagreement, doubt, foreign : float
+        As in :class:`Estimate`; the worse, the higher.
+    visibility : float
+        Of the part that shows least; the better, the higher.
+    """
+
+    residual: float = np.inf
+    disagreement: float = np.inf
+    visibility: float = 0.0
+    doubt: float = np.inf
+    foreign: float = 0.0
+
+
+@dataclass(frozen=True)
 class Calibration:
     """Confidence as a logistic function of what a fit says about itself.
 
@@ -41,9 +60,13 @@ class Calibration:
     visibility: float = 10.0
     """Weight of the share of the surface that shows, of the part that shows least: what shows of others fits as well
     where that one is wrong."""
+    doubt: float = -10.0
+    """Weight of the error that perception itself expects of the places of points."""
+    foreign: float = -3.0
+    """Weight of the share of points that are taken for something else."""
 
-    def __call__(self, residual: float, disagreement: float, visibility: float) -> float:
-        score = self.bias + self.residual * residual + self.disagreement * disagreement + self.visibility * visibility
+    def __call__(self, symptoms: Symptoms) -> float:
+        score = self.bias + sum(getattr(self, name) * value for name, value in vars(symptoms).items())
         return float(1.0 / (1.0 + np.exp(-score)))
 
 
@@ -68,7 +91,7 @@ class Estimate:
     joint_axis, joint_origin : (K, 3) float
         As posed.
     part : (N,) int64
-        Part of each given point; -1 for points that are not finite, or outliers.
+        Part of each given point; -1 for points that are not finite, outliers, or of something else.
     reference : str
         Retrieved object.
     residual : float
@@ -76,6 +99,10 @@ class Estimate:
         by the root of how many points they have.
     disagreement : float
         Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
+    doubt : float
+        Median error that perception expects of where it places the points in the rest frame, over the diagonal.
+    foreign : float
+        Share of the points that are taken for something else, such as the table.
     visibility : (K,) float
         Share of each part's surface that is seen. A part with 0 is inferred from its joint's limits, not measured.
     confidence : float
@@ -108,11 +135,19 @@ class Estimate:
     reference: str = ""
     residual: float = np.inf
     disagreement: float = np.inf
+    doubt: float = np.inf
+    foreign: float = 0.0
     confidence: float = 0.0
     milliseconds: dict[str, float] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()
     joint_limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
     warnings: tuple[str, ...] = ()
+
+    @property
+    def symptoms(self) -> Symptoms:
+        """What the estimate says about itself."""
+        least = float(self.visibility.min())
+        return Symptoms(self.residual, self.disagreement, least, self.doubt, self.foreign)
 
     @property
     def state_unit(self) -> tuple[str, ...]:

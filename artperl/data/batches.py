@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
-from typing import Final
 
 import numpy as np
 import torch
@@ -13,9 +12,11 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from artperl.core.clouds import Clouds
+from artperl.data.degrading import degrade
 from artperl.data.sources import DataOptions, Source
 from artperl.data.stretching import stretch
 from artperl.data.truth import Truth, to_batch, training_rows
+from artsim.datasets.sample_options import SensorName
 from artsim.model.kinematics import Array
 from artsim.observing.sample import Sample
 
@@ -27,8 +28,10 @@ _STRETCHING = 1
 """Begins the seed of how a view is stretched; its number is the rest."""
 _BLURRING = 2
 """Begins the seed of whether a view is as a sensor sees it."""
-SENSOR: Final = "d435"
-"""By which some training clouds are seen."""
+_DEGRADING = 3
+"""Begins the seed of whether a view is cut or dirty, and how."""
+SENSORS: tuple[SensorName, ...] = ("d435", "azure", "kinect_v1", "gaussian3mm")
+"""By which some training clouds are seen; all views of one object are by the same one."""
 _SPARE = 2
 """Times the points of a cloud that are made where some may be left out."""
 
@@ -36,15 +39,15 @@ _SPARE = 2
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch.
 
-    Some samples are stretched, and of the others some come from a source of ``noisy`` ones.
+    Some samples are stretched, of the others some come from the sources of ``noisy`` ones; of all, some are degraded.
     """
 
     def __init__(
-        self, samples: Source, noisy: Source, num_points: int, batch_size: int, first: int, stretched: float,
-        noise: float,
+        self, samples: Source, noisy: Sequence[Source], num_points: int, batch_size: int, first: int,
+        options: DataOptions,
     ):  # fmt: skip
         self.samples, self.noisy, self.num_points = samples, noisy, num_points
-        self.batch_size, self.first, self.stretched, self.noise = batch_size, first, stretched, noise
+        self.batch_size, self.first, self.options = batch_size, first, options
 
     def __iter__(self) -> Iterator[dict[str, Array]]:
         info = get_worker_info()
@@ -57,10 +60,16 @@ class _Rows(IterableDataset[dict[str, Array]]):
 
     def _sample(self, i: int) -> Sample:
         rng = np.random.default_rng([_STRETCHING, i])
-        if rng.random() < self.stretched:
-            return stretch(self.samples[i], self.num_points, rng)
-        noisy = np.random.default_rng([_BLURRING, i]).random() < self.noise
-        return (self.noisy if noisy else self.samples)[i]
+        degrading = np.random.default_rng([_DEGRADING, i])
+        degraded = degrading.random() < self.options.degraded
+        if rng.random() < self.options.stretched:
+            # A cut stretched cloud has points that come twice, since stretching takes from those that are to spare.
+            sample = stretch(self.samples[i], self.num_points, rng)
+        else:
+            noisy = np.random.default_rng([_BLURRING, i]).random() < self.options.noisy
+            # Views of one object follow one another, so that each object is made once for its views by a sensor.
+            sample = (self.noisy[i // self.batch_size % len(self.noisy)] if noisy else self.samples)[i]
+        return degrade(sample, self.num_points, degrading) if degraded else sample
 
 
 def ignore_interrupt(worker: int) -> None:
@@ -90,12 +99,12 @@ def batches(
     workers : int
         Processes that make samples; 0 makes them in this one.
     """
-    made_points = _SPARE * num_points if data.stretched and data.dataset is None else num_points
+    spare = (data.stretched or data.degraded) and data.dataset is None
+    made_points = _SPARE * num_points if spare else num_points
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
-    samples = sensed = data.source(num_rows, made_points, seed, fresh)
-    if data.noisy:
-        sensed = data.source(num_rows, made_points, seed, fresh, SENSOR)
-    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data.stretched, data.noisy)
+    samples = data.source(num_rows, made_points, seed, fresh)
+    sensed = [data.source(num_rows, made_points, seed, fresh, sensor) for sensor in SENSORS] if data.noisy else []
+    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=ignore_interrupt
     )
@@ -113,7 +122,7 @@ def _mixed(window: Sequence[dict[str, Tensor]], batch_size: int, rng: np.random.
     chosen = [*range(total - fresh, total), *rng.integers(total, size=batch_size - fresh).tolist()]
     rows = {name: torch.stack([window[i // fresh][name][i % fresh] for i in chosen]) for name in window[-1]}
     order = torch.from_numpy(rng.permuted(np.tile(np.arange(num_points), (batch_size, 1)), axis=1))
-    for name in ("points", "part", "canonical"):
+    for name in ("points", "part", "own", "canonical"):
         values = rows[name]
         rows[name] = values.gather(1, order.reshape(*order.shape, *[1] * (values.ndim - 2)).expand(values.shape))
     return rows

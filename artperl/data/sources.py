@@ -224,7 +224,10 @@ class DataOptions:
     stretched : float
         Share of the training clouds whose objects are stretched; see :func:`artperl.data.stretching.stretch`.
     noisy : float
-        Share of the other training clouds that are as a depth sensor sees them.
+        Share of the other training clouds that are as a depth sensor sees them, one of
+        :data:`artperl.data.batches.SENSORS`.
+    degraded : float
+        Share of all training clouds that are cut, dirty or sparse; see :func:`artperl.data.degrading.degrade`.
     """
 
     categories: Sequence[str] = ()
@@ -234,6 +237,7 @@ class DataOptions:
     sample: SampleOptions = field(default_factory=SampleOptions)
     stretched: float = 0.0
     noisy: float = 0.0
+    degraded: float = 0.0
 
     def source(
         self, num_rows: int, num_points: int, seed: int, views_per_object: int, noise: SensorName | None = None

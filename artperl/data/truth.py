@@ -11,6 +11,7 @@ from torch import Tensor
 from artperl.core.batch import Batch
 from artperl.core.clouds import Clouds, joint_rows
 from artsim.model.kinematics import Array
+from artsim.observing.interference import FOREIGN
 from artsim.observing.sample import Sample
 
 
@@ -21,8 +22,11 @@ class Truth(Batch):
     Attributes
     ----------
     part : (B, N) int64
+        0 for points that are not of the object.
+    own : (B, N) bool
+        Whether a point is of the object.
     canonical : (B, N, 3) float
-        Where each point lies in the rest frame, at rest.
+        Where each point lies in the rest frame, at rest; 0 for points that are not of the object.
     part_valid : (B, P) bool
     box_center, box_size : (B, P, 3) float
     joint : (B, P, 9) float
@@ -34,6 +38,7 @@ class Truth(Batch):
     """
 
     part: Tensor
+    own: Tensor
     canonical: Tensor
     part_valid: Tensor
     box_center: Tensor
@@ -51,6 +56,7 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
     """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
     K = len(sample.joint_type)
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
+    own = part != FOREIGN
     joint = joint_rows(
         sample.joint_type, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal
     )  # fmt: skip
@@ -65,8 +71,9 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
 
     return {
         "points": points.astype(np.float32),
-        "part": part,
-        "canonical": (sample.rest_points[:num_points] / sample.diagonal).astype(np.float32),
+        "part": np.where(own, part, 0),
+        "own": own,
+        "canonical": np.where(own[:, None], sample.rest_points[:num_points] / sample.diagonal, 0.0).astype(np.float32),
         "part_valid": np.arange(num_rows) < K,
         "box_center": pad(sample.box_center / sample.diagonal),
         "box_size": pad(sample.box_size / sample.diagonal),
@@ -79,5 +86,5 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
 def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
     """Collated rows of :func:`training_rows` as records."""
     clouds = Clouds.of(rows["points"])
-    names = ("part", "canonical", "part_valid", "box_center", "box_size", "joint", "level")
+    names = ("part", "own", "canonical", "part_valid", "box_center", "box_size", "joint", "level")
     return clouds, Truth(**{name: rows[name] for name in names}, diagonal=rows["diagonal"] / clouds.scale)

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from artperl.core.estimate import Estimate
+from artperl.core.estimate import Estimate, Symptoms
 from artperl.evaluation.metrics import METRICS, rotation_error, translation_error, true_poses
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.interference import FOREIGN
 from artsim.observing.sample import Sample
 from artsim.observing.symmetry import Symmetry, equivalent_sample, symmetries
 
@@ -47,9 +48,8 @@ class Scored:
     segmentation : float
         Share of points with the right part.
     failed : bool
-    residual, disagreement, confidence : float
-    visibility : float
-        Of the part that shows least.
+    symptoms : Symptoms
+    confidence : float
     milliseconds : float
     symmetric_errors : dict of (K,) float, or None
         Errors against the nearest of the truths that look the same; None where the object has no symmetry.
@@ -60,10 +60,8 @@ class Scored:
     parts_found: float
     segmentation: float
     failed: bool
-    residual: float
-    disagreement: float
+    symptoms: Symptoms
     confidence: float
-    visibility: float
     milliseconds: float
     symmetric_errors: dict[str, Array] | None = None
 
@@ -139,12 +137,10 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: 
         errors=errors,
         symmetric_errors=nearest,
         parts_found=match_share(estimate, sample),
-        segmentation=float((estimate.part == sample.part).mean()),
+        segmentation=float((estimate.part == np.where(sample.part == FOREIGN, -1, sample.part)).mean()),
         failed=False,
-        residual=estimate.residual,
-        disagreement=estimate.disagreement,
+        symptoms=estimate.symptoms,
         confidence=estimate.confidence,
-        visibility=float(estimate.visibility.min()),
         milliseconds=milliseconds,
     )
 
@@ -190,9 +186,8 @@ def mean_iou(scored: Sequence[Scored]) -> float:
 def _mismatch(sample: Sample, estimate: Estimate, milliseconds: float) -> Scored:
     """An estimate with other parts than the object has: it fails, but says how well it fits."""
     return replace(
-        _failure(sample, milliseconds), parts_found=match_share(estimate, sample), residual=estimate.residual,
-        disagreement=estimate.disagreement, confidence=estimate.confidence,
-        visibility=float(estimate.visibility.min()),
+        _failure(sample, milliseconds), parts_found=match_share(estimate, sample), symptoms=estimate.symptoms,
+        confidence=estimate.confidence,
     )  # fmt: skip
 
 
@@ -203,9 +198,7 @@ def _failure(sample: Sample, milliseconds: float) -> Scored:
         parts_found=0.0,
         segmentation=0.0,
         failed=True,
-        residual=np.inf,
-        disagreement=np.inf,
+        symptoms=Symptoms(),
         confidence=0.0,
-        visibility=0.0,
         milliseconds=milliseconds,
     )

@@ -21,7 +21,7 @@ from artperl.agent.policy import Policy
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
-from artperl.core.estimate import Calibration, Estimate, estimate_of_fit
+from artperl.core.estimate import Calibration, Estimate, Symptoms, estimate_of_fit
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.paper_energy import refine_by_gradient
@@ -201,7 +201,7 @@ class ArtPERL:
             reference=self.base.name(row),
             residual=residual,
             disagreement=0.0,
-            confidence=Calibration()(residual, 0.0, 0.0),
+            confidence=Calibration()(Symptoms(residual, 0.0, 0.0, 0.0)),
             milliseconds=milliseconds,
             part_names=part_names(self.base, row, reference),
             warnings=warnings,

@@ -24,7 +24,7 @@ from artperl.fitting.occluded_parts import pose_occluded_parts
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.search import find_fit
 from artperl.perception.cloud_checks import cloud_warnings
-from artperl.perception.label_smoothing import smooth_perceived
+from artperl.perception.label_smoothing import smooth_labels, smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.perception.part_grouping import group_votes
 from artperl.perception.preprocess import Cloud
@@ -34,6 +34,8 @@ from artperl.retrieval.shape_base import ShapeBase
 
 _LATE_POINTS = 8192
 """Points that occluded parts and normals are posed by."""
+_MOST_FOREIGN = 0.5
+"""Share of points that may be taken for something else; masks as bad as that are no masks of the object."""
 
 
 @dataclass(eq=False)
@@ -104,9 +106,8 @@ class Estimator:
         with clock("clean"):
             cloud = Cloud.of(points, options.num_points)
             warnings = cloud_warnings(cloud.points, cloud.good)
+        cloud, clouds, perceived, foreign = self._perceive_own(cloud, clock)
         seen = cloud.tensor(self.perception.device)
-        clouds = Clouds.of(seen)
-        perceived = self.perceive(clouds, clock)
         with clock("retrieval"):
             found = retrieve_references(self.base, perceived, options.references)
         fit = find_fit(Context(seen, clouds, perceived, found, options), clock).to("cpu")
@@ -130,17 +131,46 @@ class Estimator:
                 reference=self.base.name(fit.row),
                 residual=fit.residual,
                 disagreement=fit.disagreement,
-                confidence=self.calibration(fit.residual, fit.disagreement, estimate.visibility.min()),
+                doubt=float(perceived.spread.exp().median()),
+                foreign=foreign,
                 milliseconds=clock.milliseconds,
                 part_names=part_names(self.base, fit.row, fit.shapes),
                 warnings=warnings,
             )
+            estimate = replace(estimate, confidence=self.calibration(estimate.symptoms))
             return estimate, BoxContext.of(cloud, clouds, perceived)
+
+    def _perceive_own(self, cloud: Cloud, clock: Clock) -> tuple[Cloud, Clouds, Perceived, float]:
+        """The points of the object, what is perceived of them, and the share of the others.
+
+        Points of something else move the middle and the scale of the cloud, by which a network sees it. So it looks
+        again without those that it takes for something else. Where these are most of the cloud, it does not know such
+        an object, and nothing is left out.
+        """
+        clouds = Clouds.of(cloud.tensor(self.perception.device))
+        with clock("perception"):
+            first = self.perception(clouds.points)
+        foreign, share = (first.own_logits[0] < 0.0).cpu().numpy(), 0.0
+        if foreign.any():
+            with clock("label smoothing"):
+                own = first.own_logits.sigmoid()[0, :, None].double().cpu().numpy()
+                own = smooth_labels(clouds.points[0].double().cpu().numpy(), own, float(first.log_diagonal.exp()[0]))
+                foreign = own[:, 0] < 0.5
+            share = float(foreign.mean())
+        if not 0.0 < share < _MOST_FOREIGN:
+            return cloud, clouds, self._parts(clouds, first, clock), share
+        cloud = cloud.without(foreign, self.options.num_points)
+        clouds = Clouds.of(cloud.tensor(self.perception.device))
+        return cloud, clouds, self.perceive(clouds, clock), share
 
     def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
         """What is perceived of one cloud."""
         with clock("perception"):
             seen = self.perception(clouds.points)
+        return self._parts(clouds, seen, clock)
+
+    def _parts(self, clouds: Clouds, seen: Perceived | Votes, clock: Clock) -> Perceived:
+        """What a network has seen of one cloud, smoothed, its votes grouped."""
         if self.options.label_smoothing:
             with clock("label smoothing"):
                 seen = smooth_perceived(clouds, seen)

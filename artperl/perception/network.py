@@ -28,6 +28,8 @@ class Perceived(Batch):
         Where each point lies in the rest frame, at rest.
     spread : (B, N) float
         Logarithm of the expected error of ``canonical``.
+    own_logits : (B, N) float
+        Whether each point is of the object, rather than of the table or a neighbour.
     valid_logits : (B, P) float
         Whether the object has each part.
     box_center, box_size : (B, P, 3) float
@@ -38,6 +40,7 @@ class Perceived(Batch):
     part_logits: Tensor
     canonical: Tensor
     spread: Tensor
+    own_logits: Tensor
     valid_logits: Tensor
     box_center: Tensor
     box_size: Tensor
@@ -71,7 +74,7 @@ class Votes(Batch):
 
     Attributes
     ----------
-    canonical, spread, log_diagonal
+    canonical, spread, own_logits, log_diagonal
         As in :class:`Perceived`.
     box : (B, N, 6) float
         Centre and size of the part's box.
@@ -83,6 +86,7 @@ class Votes(Batch):
 
     canonical: Tensor
     spread: Tensor
+    own_logits: Tensor
     log_diagonal: Tensor
     box: Tensor
     joint: Tensor
@@ -107,7 +111,7 @@ class Perception(nn.Module):
         self.num_rows, self.width, self.votes = num_rows, width, votes
         self.backbone = PointNet2(width)
         channels, whole = self.backbone.point_channels, self.backbone.cloud_channels
-        of_point, of_cloud = (num_rows + 19, 1) if votes else (num_rows + 4, 7 * num_rows + 1)
+        of_point, of_cloud = (num_rows + 20, 1) if votes else (num_rows + 5, 7 * num_rows + 1)
         self.point_head = nn.Sequential(nn.Linear(channels, 128), nn.ReLU(), nn.Linear(128, of_point))
         self.context = nn.Linear(whole, channels)
         self.cloud_head = nn.Sequential(nn.Linear(whole, 256), nn.ReLU(), nn.Linear(256, of_cloud))
@@ -133,9 +137,10 @@ class Perception(nn.Module):
             return Votes(
                 canonical=canonical,
                 spread=point[..., P + 3] - 3.0,
+                own_logits=point[..., -1],
                 log_diagonal=whole[:, -1],
                 box=torch.cat([canonical.detach() + own[..., :3], 0.5 * functional.softplus(2.0 * own[..., 3:])], -1),
-                joint=point[..., P + 10 :],
+                joint=point[..., P + 10 : P + 19],
                 level_logits=point[..., :P],
             )
         boxes = whole[:, P : 7 * P].reshape(-1, P, 6)
@@ -143,6 +148,7 @@ class Perception(nn.Module):
             part_logits=point[..., :P],
             canonical=0.5 * point[..., P : P + 3],
             spread=point[..., P + 3] - 3.0,
+            own_logits=point[..., -1],
             valid_logits=whole[:, :P],
             box_center=0.5 * boxes[..., :3],
             box_size=0.5 * functional.softplus(boxes[..., 3:]),

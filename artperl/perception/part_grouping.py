@@ -65,7 +65,7 @@ def group_votes(votes: Votes) -> PerceivedTree:
     rows = [_group(*own) for own in zip(place, box, joint, log_softmax(level, axis=-1), strict=True)]
     fields = {name: torch.from_numpy(np.stack([row[name] for row in rows])) for name in rows[0]}
     return PerceivedTree(
-        canonical=votes.canonical, spread=votes.spread, log_diagonal=votes.log_diagonal,
+        canonical=votes.canonical, spread=votes.spread, own_logits=votes.own_logits, log_diagonal=votes.log_diagonal,
         **{name: t.to(votes.canonical) if t.is_floating_point() else t.to(votes.canonical.device)
            for name, t in fields.items()},
     )  # fmt: skip

@@ -65,6 +65,15 @@ class Cloud:
         chosen = good[draw(len(good), count, np.random.default_rng(0))]
         return Cloud(every, good, every[chosen].astype(np.float32))
 
+    def without(self, foreign: NDArray[np.bool_], count: int) -> Cloud:
+        """The cloud without seen points (M,) that show something else, and those given points that are nearest to them.
+
+        A network sees so many points of what is left.
+        """
+        good = self.good[~foreign[self._nearest]]
+        chosen = good[draw(len(good), count, np.random.default_rng(0))]
+        return Cloud(self.points, good, self.points[chosen].astype(np.float32))
+
     def tensor(self, device: torch.device) -> Tensor:
         """(1, M, 3) points that a network sees."""
         return torch.from_numpy(self.seen)[None].to(device)

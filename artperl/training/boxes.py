@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from artperl.boxes.network import Boxes
-from artperl.data.batches import SENSOR
+from artperl.data.batches import SENSORS
+from artperl.data.degrading import degrade
 from artperl.data.sources import Source
 from artperl.estimator import save_estimator
 from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS
@@ -25,6 +28,10 @@ _VIEWS = 2
 """Views in a row of the same object."""
 _NOISY_EVERY = 4
 """Views of which one is seen by a sensor: boxes go by outermost points, which suffer most."""
+_DEGRADED_EVERY = 4
+"""Views of which one is cut or dirty, where a run learns from such clouds."""
+_DEGRADING = 4
+"""Begins the seed of how a view is cut or dirty."""
 
 
 @dataclass(frozen=True)
@@ -73,14 +80,20 @@ def _samples(context: Context) -> Callable[[int], Sample]:
     options, objects = context.options, context.objects
     num_points = options.num_points if options.dataset else NUM_POINTS
     clean = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS)
-    if not _sees_noise(context):
-        return clean.__getitem__
-    noisy = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS, SENSOR)
-    return partial(_mostly_clean, clean, noisy)
+    noisy: list[Source] = []
+    if _sees_noise(context):
+        noisy = [objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS, name) for name in SENSORS]
+    return partial(_mostly_clean, clean, noisy, options.degraded > 0.0)
 
 
-def _mostly_clean(clean: Source, noisy: Source, number: int) -> Sample:
-    return (noisy if number % _NOISY_EVERY == _NOISY_EVERY - 1 else clean)[number]
+def _mostly_clean(clean: Source, noisy: Sequence[Source], degraded: bool, number: int) -> Sample:
+    """A view by its number; some are by a sensor, and some others are degraded."""
+    if noisy and number % _NOISY_EVERY == _NOISY_EVERY - 1:
+        return noisy[number // _NOISY_EVERY % len(noisy)][number]
+    sample = clean[number]
+    if not degraded or number % _DEGRADED_EVERY != 0:
+        return sample
+    return degrade(sample, len(sample.points), np.random.default_rng([_DEGRADING, number]))
 
 
 def _choose(context: Context, best: Estimator, learner: Estimator, boxes: Boxes) -> None:
@@ -91,7 +104,7 @@ def _choose(context: Context, best: Estimator, learner: Estimator, boxes: Boxes)
         validation += given_samples(context, len(validation), VALIDATION_SEEDS)
     noisy = []
     if _sees_noise(context):
-        noisy = unseen_samples(context, -(-views // _NOISY_EVERY), VALIDATION_SEEDS, SENSOR)
+        noisy = unseen_samples(context, -(-views // _NOISY_EVERY), VALIDATION_SEEDS, SENSORS[0])
     before, after = (
         evaluate(estimator, validation + noisy, context.progress)
         for estimator in (learner, replace(learner, boxes=boxes))

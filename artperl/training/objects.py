@@ -55,8 +55,9 @@ class TrainingObjects:
         given = _given_objects(options)
         base = _base_of([*procedural, *given], options)
         data = DataOptions(
-            options.categories, options.parts, given, options.dataset, options.sample, options.stretched, options.noisy
-        )
+            options.categories, options.parts, given, options.dataset, options.sample, options.stretched, options.noisy,
+            options.degraded,
+        )  # fmt: skip
         if options.dataset is not None:  # a dataset that does not fit is an error before anything is learnt
             points = options.num_points * (options.denser if options.dense_steps else 1)
             data.source(base.shapes.trees.num_rows, points, options.seed, 1)

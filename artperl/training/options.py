@@ -19,7 +19,7 @@ from artsim.errors import ConfigError
 T = TypeVar("T")
 Method = Literal["full", "artperl"]
 _MOST = 1_000_000_000
-_SHARES = ("stretched", "noisy", "cloning_share")
+_SHARES = ("stretched", "noisy", "degraded", "cloning_share")
 _AT_LEAST_ONE = (
     "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "episodes", "box_width",
     "validate_every", "test_objects", "validation_views", "test_views",
@@ -78,7 +78,10 @@ class TrainOptions:
     stretched: float = 0.0
     """Share of these clouds whose objects are stretched between the edges of their parts."""
     noisy: float = 0.0
-    """Share of the others that are as a depth sensor, a D435, sees them."""
+    """Share of the others that are as one of four depth sensors sees them."""
+    degraded: float = 0.0
+    """Share of all of them that are cut by an occluder or the image's border, have points of the table or a neighbour,
+    or are of few points."""
     retrieval_steps: int = 0
     """Batches that the Siamese network of the method artperl learns from."""
     perception_rate: float = 2e-3

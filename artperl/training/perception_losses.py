@@ -25,15 +25,17 @@ def perception_losses(perceived: Perceived | Votes, truth: Truth) -> dict[str, T
     """Losses by name; their sum is minimised.
 
     Coordinates are scored by the likelihood of a Laplace distribution of the spread that the network itself expects, so
-    that points whose place cannot be told (a lid seen edge-on) do not drown the others.
+    that points whose place cannot be told (a lid seen edge-on) do not drown the others. Points that are not of the
+    object have no place and no part: only that they are not counts.
     """
     distance = (
         functional.huber_loss(perceived.canonical, truth.canonical, reduction="none", delta=_SHARP).sum(-1) / _SHARP
     )
-    spread = perceived.spread.clamp(-6.0, 2.0)
+    spread, own = perceived.spread.clamp(-6.0, 2.0), truth.own.float() / truth.own.sum()
     losses = {
-        "canonical": 5.0 * distance.mean(),
-        "spread": 0.2 * (distance.detach() * (-spread).exp() + spread).mean(),
+        "canonical": 5.0 * (distance * own).sum(),
+        "spread": 0.2 * ((distance.detach() * (-spread).exp() + spread) * own).sum(),
+        "own": functional.binary_cross_entropy_with_logits(perceived.own_logits, truth.own.float()),
         "diagonal": 2.0 * (perceived.log_diagonal - truth.diagonal.log()).abs().mean(),
     }
     of_parts = _vote_losses(perceived, truth) if isinstance(perceived, Votes) else _number_losses(perceived, truth)
@@ -44,7 +46,7 @@ def _number_losses(perceived: Perceived, truth: Truth) -> dict[str, Tensor]:
     weight = truth.part_valid.float()
     boxes = torch.cat([perceived.box_center - truth.box_center, perceived.box_size - truth.box_size], dim=-1)
     return {
-        "part": functional.cross_entropy(perceived.part_logits.flatten(0, 1), truth.part.flatten()),
+        "part": functional.cross_entropy(perceived.part_logits[truth.own], truth.part[truth.own]),
         "valid": 0.2 * functional.binary_cross_entropy_with_logits(perceived.valid_logits, weight),
         "boxes": 2.0 * (boxes.abs().sum(-1) * weight).sum() / weight.sum(),
     }
@@ -52,8 +54,9 @@ def _number_losses(perceived: Perceived, truth: Truth) -> dict[str, Tensor]:
 
 def _vote_losses(votes: Votes, truth: Truth) -> dict[str, Tensor]:
     """A part counts by the root of how many points it has; errors of boxes are taken over their sides."""
-    count = functional.one_hot(truth.part, truth.part_valid.shape[1]).sum(1)
-    weight = truth.of_points(count).float().rsqrt()
+    own = truth.own[..., None]
+    count = (functional.one_hot(truth.part, truth.part_valid.shape[1]) * own).sum(1).clamp(min=1)
+    weight = truth.of_points(count).float().rsqrt() * truth.own
     weight = weight / weight.sum(1, keepdim=True) / len(weight)
     size = truth.of_points(truth.box_size)
     box = torch.cat([truth.of_points(truth.box_center), size], dim=-1)
@@ -76,5 +79,8 @@ def perception_figures(perceived: Perceived | Votes, truth: Truth) -> dict[str, 
         right = perceived.level_logits.argmax(-1) == truth.of_points(truth.level)
     else:
         right = perceived.part == truth.part
-    off = (perceived.canonical - truth.canonical).norm(dim=-1).median()
-    return {"accuracy": right.float().mean().item(), "coordinates": off.item()}
+    off = (perceived.canonical - truth.canonical).norm(dim=-1)[truth.own].median()
+    own = (perceived.own_logits > 0.0) == truth.own
+    return {
+        "accuracy": right[truth.own].float().mean().item(), "coordinates": off.item(), "own": own.float().mean().item(),
+    }  # fmt: skip

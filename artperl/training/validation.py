@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from artperl.data.degrading import degrade
 from artperl.estimator import read_settings, save_estimator
 from artperl.evaluation.calibration import calibrate
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, VALIDATION_SEEDS, frozen_samples, samples_of
@@ -57,8 +61,10 @@ def validate(context: Context) -> None:
     state, options = context.state, context.options
     estimator = context.estimator()
     assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves
-    scored = evaluate(estimator, unseen_samples(context, options.validation_views, VALIDATION_SEEDS), context.progress)
-    figures, score = summary(scored), headline(scored)
+    samples = unseen_samples(context, options.validation_views, VALIDATION_SEEDS)
+    scored = evaluate(estimator, samples, context.progress)
+    degraded = evaluate(estimator, _degraded(samples), context.progress) if options.degraded else []
+    figures, score = summary(scored), headline([*scored, *degraded])
     state.history.append({"step": state.step, "score": score, "done": dict(state.done)})
     context.report("validation", scalars(figures) | {"score": score}, state.step)
     if score < _AS_GOOD * state.best:
@@ -66,10 +72,18 @@ def validate(context: Context) -> None:
         # By votes, any parts are right if they are where they are.
         judge = evaluate if options.votes else evaluate_foreign
         foreign = judge(estimator, _foreign_samples(context))
-        best = replace(estimator, calibration=calibrate(scored, foreign))
+        best = replace(estimator, calibration=calibrate([*scored, *degraded], foreign))
         save_estimator(best, context.folder.best, context.about({"validation": figures}))
     context.save()
     say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
+
+
+def _degraded(samples: Sequence[Sample]) -> list[Sample]:
+    """Every other sample, cut or dirty."""
+    return [
+        degrade(sample, len(sample.points), np.random.default_rng([VALIDATION_SEEDS, number]))
+        for number, sample in enumerate(samples[::2])
+    ]
 
 
 def test(context: Context) -> dict[str, Any]:

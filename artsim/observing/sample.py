@@ -136,7 +136,10 @@ class Sample:
 
     @property
     def rest_points(self) -> Array:
-        """(N, 3) where in the rest frame, at rest, each place lies that ``npcs`` names, metres."""
-        diagonal = norm(self.box_size)
-        rest: Array = (self.npcs - 0.5) * diagonal[self.part, None] + self.box_center[self.part]
+        """(N, 3) where in the rest frame, at rest, each place lies that ``npcs`` names, metres; NaN for other things.
+
+        Points of other things are those of :func:`artsim.observing.interference.interfere`.
+        """
+        diagonal, part = norm(self.box_size), np.where(np.isnan(self.npcs[:, 0]), 0, self.part)
+        rest: Array = (self.npcs - 0.5) * diagonal[part, None] + self.box_center[part]
         return rest

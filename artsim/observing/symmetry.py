@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.interference import FOREIGN
 from artsim.observing.sample import Sample
 
 TOLERANCE = 0.01
@@ -75,6 +76,7 @@ def equivalent_sample(sample: Sample, symmetry: Symmetry) -> Sample:
     turned = np.eye(4)
     turned[:3, :3] = rotation
     edge, sign, side = _edges(sample.joint_parent, sample.joint_axis, rotation, parts)
+    number = np.append(np.argsort(parts), np.arange(len(parts), FOREIGN + 1))
     state = np.where(edge >= 0, sign * (sample.joint_state - sample.joint_rest)[edge], 0.0) + sample.joint_rest
     return replace(
         sample,
@@ -85,7 +87,7 @@ def equivalent_sample(sample: Sample, symmetry: Symmetry) -> Sample:
         joint_axis_camera=side[:, None] * sample.joint_axis_camera[edge],
         joint_origin_camera=sample.joint_origin_camera[edge],
         joint_state=state,
-        part=np.argsort(parts)[sample.part].astype(np.uint8),
+        part=number[sample.part].astype(np.uint8),
     )
 
 

@@ -21,7 +21,7 @@ from artsim.observing.sample import Sample
 def test_an_estimator_comes_back_from_its_folder(base: ShapeBase, sample: Sample, tmp_path: Path) -> None:
     torch.manual_seed(0)
     options = EstimatorOptions(references=2)
-    made = Estimator(Perception(2, 16), base, options, Calibration(1.0, -2.0, -3.0, 4.0))
+    made = Estimator(Perception(2, 16), base, options, Calibration(1.0, -2.0, -3.0, 4.0, -5.0, -6.0))
     save_estimator(made, tmp_path / "made", {"note": "untrained"})
     back = load_estimator(tmp_path / "made")
     assert (back.options, back.calibration) == (options, made.calibration)

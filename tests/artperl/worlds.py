@@ -48,7 +48,8 @@ def true_votes(truth: Truth) -> Votes:
     """What a network would say that knows everything."""
     level = torch.nn.functional.one_hot(truth.of_points(truth.level), truth.part_valid.shape[1])
     return Votes(
-        canonical=truth.canonical, spread=torch.zeros(truth.part.shape), log_diagonal=truth.diagonal.log(),
+        canonical=truth.canonical, spread=torch.zeros(truth.part.shape), own_logits=12.0 * truth.own - 6.0,
+        log_diagonal=truth.diagonal.log(),
         box=truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1)),
         joint=truth.of_points(truth.joint),
         level_logits=20.0 * level.float(),
@@ -70,6 +71,7 @@ class Oracle(Perception):
             20.0 * torch.nn.functional.one_hot(truth.part[:, nearest], self.num_rows).float(),
             truth.canonical[:, nearest],
             torch.full((1, points.shape[1]), -3.0),
+            12.0 * truth.own[:, nearest].float() - 6.0,
             2.0 * truth.part_valid.float() - 1.0,
             truth.box_center,
             truth.box_size,

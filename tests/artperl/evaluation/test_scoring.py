@@ -76,7 +76,7 @@ def test_views_count_alike_in_the_score_however_many_parts_they_have(estimator: 
 def test_whatever_is_said_of_another_category_is_wrong(estimator: Estimator) -> None:
     (scored,) = evaluate_foreign(estimator, frozen_samples(["bucket"], 1, 1))
     assert not scored.right
-    assert np.isfinite([scored.residual, scored.disagreement]).all()
+    assert np.isfinite([scored.symptoms.residual, scored.symptoms.disagreement]).all()
 
 
 def test_an_estimate_with_equal_parts_exchanged_is_right_up_to_symmetry(estimator: Estimator) -> None:

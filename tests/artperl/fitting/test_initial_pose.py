@@ -65,7 +65,8 @@ def knowing(truth: Truth) -> Perceived:
     P = truth.part_valid.shape[1]
     logits = 50.0 * torch.nn.functional.one_hot(truth.part, P).float()
     return Perceived(
-        logits, truth.canonical, torch.full(truth.part.shape, -3.0), 2.0 * truth.part_valid.float() - 1.0,
+        logits, truth.canonical, torch.full(truth.part.shape, -3.0), truth.own.float(),
+        2.0 * truth.part_valid.float() - 1.0,
         truth.box_center, truth.box_size, truth.diagonal.log(),
     )  # fmt: skip
 

@@ -78,11 +78,11 @@ def test_losses_vanish_for_what_is_true(batch: tuple[Clouds, Truth]) -> None:
     perceived = network()(clouds.points)
     sure = 50.0 * (2.0 * truth.part_valid.float() - 1.0)
     true = Perceived(
-        100.0 * torch.nn.functional.one_hot(truth.part, 4).float(), truth.canonical, perceived.spread, sure,
-        truth.box_center, truth.box_size, truth.diagonal.log(),
+        100.0 * torch.nn.functional.one_hot(truth.part, 4).float(), truth.canonical, perceived.spread,
+        100.0 * truth.own - 50.0, sure, truth.box_center, truth.box_size, truth.diagonal.log(),
     )  # fmt: skip
     losses = perception_losses(true, truth)
-    for name in ("part", "canonical", "valid", "boxes", "diagonal"):
+    for name in ("part", "canonical", "own", "valid", "boxes", "diagonal"):
         assert losses[name].item() == pytest.approx(0.0, abs=1e-6), name
 
 
@@ -98,20 +98,20 @@ def test_votes_are_learnt_and_losses_vanish_for_true_ones(batch: tuple[Clouds, T
         optimizer.zero_grad()
         torch.stack(list(seen[-1].values())).sum().backward()  # type: ignore[no-untyped-call]
         optimizer.step()
-    for name in ("canonical", "boxes", "joints", "level", "diagonal"):
+    for name in ("canonical", "own", "boxes", "joints", "level", "diagonal"):
         assert seen[-1][name] < 0.5 * seen[0][name], name
     assert isinstance(votes, Votes)
     assert (votes.box[..., 3:] > 0).all()
     level = truth.of_points(truth.level)
     box = truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1))
     true = Votes(
-        truth.canonical, votes.spread, truth.diagonal.log(), box, truth.of_points(truth.joint),
-        100.0 * torch.nn.functional.one_hot(level, 4).float(),
+        truth.canonical, votes.spread, 100.0 * truth.own - 50.0, truth.diagonal.log(), box,
+        truth.of_points(truth.joint),        100.0 * torch.nn.functional.one_hot(level, 4).float(),
     )  # fmt: skip
     losses = perception_losses(true, truth)
-    for name in ("canonical", "boxes", "joints", "level", "diagonal"):
+    for name in ("canonical", "own", "boxes", "joints", "level", "diagonal"):
         assert losses[name].item() == pytest.approx(0.0, abs=1e-6), name
-    assert perception_figures(true, truth) == {"accuracy": 1.0, "coordinates": 0.0}
+    assert perception_figures(true, truth) == {"accuracy": 1.0, "coordinates": 0.0, "own": 1.0}
 
 
 @pytest.mark.slow

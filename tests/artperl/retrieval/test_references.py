@@ -19,7 +19,7 @@ def _perceived(base: ShapeBase, row: int) -> Perceived:
     shapes = base.shapes[row : row + 1]
     one = torch.zeros(1, 1)
     return Perceived(
-        part_logits=one[..., None], canonical=one[..., None].expand(-1, -1, 3), spread=one,
+        part_logits=one[..., None], canonical=one[..., None].expand(-1, -1, 3), spread=one, own_logits=one,
         valid_logits=2.0 * shapes.trees.valid.float() - 1.0, box_center=shapes.box_center, box_size=shapes.box_size,
         log_diagonal=one[0],
     )  # fmt: skip
