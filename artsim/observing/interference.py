@@ -24,8 +24,11 @@ _BITE = (0.15, 0.85)
 """Quantiles of the object's points in the image between which the middle of a covered spot lies."""
 _RING = (0.01, 0.12)
 """How far beside the object foreign points lie in the image, over the object's extent there."""
-_BESIDE = 0.006
-"""A ray nearer to a point of the object than that, over the extent in the image, may meet the object."""
+_BESIDE = 2.0
+"""A ray nearer to a point of the object than that, over the distance of its neighbours in the image, may meet it."""
+_NEIGHBOURS = 4
+_PROBED = 512
+"""Points that tell how far apart neighbours are."""
 _REACH = 3.0
 """Farthest that a foreign point lies from the object's middle, in diagonals: detectors do not take in the horizon."""
 _TRIES = 6
@@ -112,6 +115,8 @@ def _foreign_points(
     """
     extent = float(np.ptp(image, axis=0).max())
     middle, tree = sample.points.mean(axis=0, dtype=np.float64), cKDTree(image)
+    some = image[:: max(1, len(image) // _PROBED)]
+    beside = _BESIDE * float(np.quantile(tree.query(some, [_NEIGHBOURS + 1], workers=1)[0], 0.9))
     planes = _surfaces(sample, rng)
     rng.shuffle(planes)
     # Detectors take in one side's surroundings more than others'.
@@ -119,11 +124,11 @@ def _foreign_points(
     found = np.empty((0, 3))
     near = _REACH * sample.diagonal
     for _ in range(_TRIES):
-        start = visible[rng.integers(len(visible), size=4 * count)]
+        start = visible[rng.integers(len(visible), size=8 * count)]
         outward = rng.normal(size=(len(start), 2)) + side
         outward /= np.linalg.norm(outward, axis=1, keepdims=True)
         ray = start + outward * (extent * rng.uniform(*_RING, len(start)))[:, None]
-        ray = ray[tree.query(ray, workers=1)[0] > _BESIDE * extent]
+        ray = ray[tree.query(ray, workers=1)[0] > beside]
         ray = np.concatenate([ray, np.ones((len(ray), 1))], axis=1)
         depth = np.full(len(ray), np.inf)
         for normal, offset in planes:
