@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from artperl.boxes.network import Boxes
-from artperl.core.estimate import Calibration
+from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.tensor_files import MAX_BYTES, read_tensors, write_tensors
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods import method_of
@@ -66,6 +66,7 @@ def save_estimator(estimator: Estimator | ArtPERL, folder: Path, about: Mapping[
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
         "options": _changes(asdict(estimator.options), asdict(EstimatorOptions())),
         "calibration": asdict(estimator.calibration),
+        "part_calibration": asdict(estimator.part_calibration),
     }
     _write(folder, networks, estimator.base, settings, about)
 
@@ -149,6 +150,7 @@ def load_estimator(
         )
         options = replace(from_json_values(EstimatorOptions, settings.get("options")), **changes)
         calibration = from_json_values(Calibration, settings.get("calibration"))
+        part_calibration = from_json_values(PartCalibration, settings.get("part_calibration"))
     except ValueError as error:
         raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
     tensors, _ = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
@@ -166,7 +168,7 @@ def load_estimator(
     perception, boxes = networks["perception"], networks.get("boxes")
     assert isinstance(perception, Perception)
     assert isinstance(boxes, Boxes | None)
-    return Estimator(perception, base, options, calibration, boxes)
+    return Estimator(perception, base, options, calibration, boxes, part_calibration)
 
 
 def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping[str, Any]) -> ArtPERL:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from artperl.core.confidence import PartSymptoms, Symptoms
 from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
@@ -24,50 +25,6 @@ _OUTERMOST = 0.004
 """Of a cloud's points, that lie too far out on each side of a part to say how large it is."""
 _SEEN = 0.03
 """A place of the reference's surface is seen when an observed point of its part is that near, in diagonals."""
-
-
-@dataclass(frozen=True)
-class Symptoms:
-    """What an estimate says about itself, by which confidence judges it.
-
-    Attributes
-    ----------
-    residual, disagreement, doubt, foreign : float
-        As in :class:`Estimate`; the worse, the higher.
-    visibility : float
-        Of the part that shows least; the better, the higher.
-    """
-
-    residual: float = np.inf
-    disagreement: float = np.inf
-    visibility: float = 0.0
-    doubt: float = np.inf
-    foreign: float = 0.0
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """Confidence as a logistic function of what a fit says about itself.
-
-    The defaults are guesses; :func:`artperl.evaluation.calibration.calibrate` fits them to a validation set.
-    """
-
-    bias: float = 2.0
-    residual: float = -100.0
-    """Weight of the residual, in diagonals."""
-    disagreement: float = -30.0
-    """Weight of the median distance between where perception and the fit place the points in the rest frame."""
-    visibility: float = 10.0
-    """Weight of the share of the surface that shows, of the part that shows least: what shows of others fits as well
-    where that one is wrong."""
-    doubt: float = -10.0
-    """Weight of the error that perception itself expects of the places of points."""
-    foreign: float = -3.0
-    """Weight of the share of points that are taken for something else."""
-
-    def __call__(self, symptoms: Symptoms) -> float:
-        score = self.bias + sum(getattr(self, name) * value for name, value in vars(symptoms).items())
-        return float(1.0 / (1.0 + np.exp(-score)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +63,11 @@ class Estimate:
     visibility : (K,) float
         Share of each part's surface that is seen. A part with 0 is inferred from its joint's limits, not measured.
     confidence : float
-        0 to 1.
+        That every part is within 10 degrees and 5 % of the diagonal, 0 to 1.
+    part_confidence : (K,) float
+        That each part is there, and within these bounds, 0 to 1.
+    part_symptoms : PartSymptoms
+        What it goes by.
     trajectory : (S, K, 4, 4) float
         ``T_camera_part`` at the start, after each step of the agent where it was needed, and in the end.
     milliseconds : dict
@@ -138,6 +99,8 @@ class Estimate:
     doubt: float = np.inf
     foreign: float = 0.0
     confidence: float = 0.0
+    part_confidence: Array = field(default_factory=lambda: np.zeros(0))
+    part_symptoms: PartSymptoms = field(default_factory=PartSymptoms)
     milliseconds: dict[str, float] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()
     joint_limits: Array = field(default_factory=lambda: np.zeros((0, 2)))

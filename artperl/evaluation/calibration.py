@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from artperl.core.estimate import Calibration, Symptoms
+from artperl.core.confidence import Calibration, PartCalibration, Symptoms, logistic
 from artperl.evaluation.scoring import Scored
+from artperl.methods.full import Estimator
 
 Array = NDArray[np.float64]
 
-_LOOSE = {"residual": 0.01, "disagreement": 0.03, "visibility": 0.1, "doubt": 0.03, "foreign": 0.1}
-"""How firmly the weight of each symptom is held where it was guessed: precision of the prior, over that guess."""
-_MOST = {"residual": -0.1, "disagreement": -0.1, "doubt": 0.0, "foreign": 0.0}
-"""Most that the weight of a symptom may be, over the guess's size."""
+_LOOSE = np.array([0.2, 1.0, 0.9, 1.0, 0.3, 0.3])
+"""How firmly the bias and the weight of each symptom are held where they were guessed: guesses are rough."""
+_LEAST = -0.1
+"""Highest weight of what speaks against an estimate, over the size of its guess: what is worse than all that was seen
+here is trusted less for it."""
 
 
 def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calibration:
@@ -35,28 +37,66 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
     default = Calibration()
     if not known:
         return default
-    names = [field.name for field in fields(Symptoms)]
-    prior = np.array([default.bias, *(getattr(default, name) for name in names)])
-    features = np.array([[1.0, *(getattr(s.symptoms, name) for name in names)] for s in known])
+    names = [each.name for each in fields(Symptoms)]
+    guess = np.array([getattr(default, name) for name in ("bias", *names)])
+    features = np.array([[getattr(s.symptoms, name) for name in names] for s in known])
     right = np.array([s.right for s in known], dtype=np.float64)
     count = np.array([1.0] * len(own) + [len(own) / len(others) for _ in others])
-    loose = np.array([0.1, *(_LOOSE[name] for name in names)]) ** 2
+    weights = fit_logistic(features, right, count, guess, _LOOSE)
+    return Calibration(*weights)
+
+
+def calibrated(estimator: Estimator, scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Estimator:
+    """The estimator with the confidence, of the whole and of parts, that its scores say."""
+    calibration = calibrate(scored, foreign)
+    return replace(estimator, calibration=calibration, part_calibration=calibrate_parts(scored, calibration))
+
+
+def calibrate_parts(scored: Sequence[Scored], calibration: Calibration) -> PartCalibration:
+    """Confidence of parts, fitted in the same way: of parts with confidence p, a share p is near a true one.
+
+    Parameters
+    ----------
+    scored : sequence of Scored
+    calibration : Calibration
+        Of the whole.
+    """
+    known = [s for s in scored if len(s.part_right) and np.isfinite(s.symptoms.residual)]
+    default = PartCalibration()
+    if not known:
+        return default
+    features = np.concatenate([default.features(calibration.log_odds(s.symptoms), s.part_symptoms) for s in known])
+    right = np.concatenate([s.part_right for s in known]).astype(np.float64)
+    guess = np.array([getattr(default, each.name) for each in fields(default)])
+    weights = fit_logistic(features, right, np.ones(len(right)), guess, np.full(len(guess), 0.1))
+    return PartCalibration(*weights)
+
+
+def fit_logistic(features: Array, right: Array, count: Array, guess: Array, loose: Array) -> list[float]:
+    """Bias and weights of a regularised logistic regression whose weights keep the sign of a guess, or are 0.
+
+    Parameters
+    ----------
+    features : (n, f) float
+    right : (n,) float
+        0 or 1.
+    count : (n,) float
+        How often each counts.
+    guess : (1 + f,) float
+        Bias first; none is 0. It is the mean of the prior.
+    loose : (1 + f,) float
+        Deviation of the prior, inverted, over the guess.
+    """
+    known = np.concatenate([np.ones((len(features), 1)), features], axis=1)
 
     def cost(scaled: Array) -> tuple[float, Array]:
-        weights = scaled * np.abs(prior)
-        score = features @ weights
-        chance = 1.0 / (1.0 + np.exp(-score.clip(-60.0, 60.0)))
-        off = weights - prior
-        value = count @ (np.logaddexp(0.0, score) - right * score) + 0.5 * loose @ off**2
-        slope = features.T @ (count * (chance - right)) + loose * off
-        return float(value), slope * np.abs(prior)
+        weights = scaled * np.abs(guess)
+        score = known @ weights
+        off = scaled - np.sign(guess)
+        value = count @ (np.logaddexp(0.0, score) - right * score) + 0.5 * loose**2 @ off**2
+        slope = known.T @ (count * (logistic(score) - right)) * np.abs(guess) + loose**2 * off
+        return float(value), slope
 
-    bounds = [
-        (None, None),
-        *(
-            (0.0, None) if default_weight > 0.0 else (None, _MOST[name])
-            for name, default_weight in zip(names, prior[1:], strict=True)
-        ),
-    ]
-    weights = minimize(cost, np.sign(prior), jac=True, bounds=bounds).x * np.abs(prior)
-    return Calibration(float(weights[0]), **dict(zip(names, weights[1:].tolist(), strict=True)))
+    bounds = [(None, None), *((0.0, None) if each > 0.0 else (None, _LEAST) for each in guess[1:])]
+    scaled = minimize(cost, np.sign(guess), jac=True, bounds=bounds).x
+    return [float(each) for each in scaled * np.abs(guess)]

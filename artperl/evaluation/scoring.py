@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from artperl.core.estimate import Estimate, Symptoms
+from artperl.core.confidence import PartSymptoms, Symptoms
+from artperl.core.estimate import Estimate
 from artperl.evaluation.metrics import METRICS, rotation_error, translation_error, true_poses
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
@@ -51,6 +52,11 @@ class Scored:
     symptoms : Symptoms
     confidence : float
     milliseconds : float
+    part_confidence : (E,) float
+        Of the estimated parts.
+    part_right : (E,) bool
+        Whether each estimated part has a true part of its own near it.
+    part_symptoms : PartSymptoms
     symmetric_errors : dict of (K,) float, or None
         Errors against the nearest of the truths that look the same; None where the object has no symmetry.
     """
@@ -63,6 +69,9 @@ class Scored:
     symptoms: Symptoms
     confidence: float
     milliseconds: float
+    part_confidence: Array
+    part_right: NDArray[np.bool_]
+    part_symptoms: PartSymptoms
     symmetric_errors: dict[str, Array] | None = None
 
     @property
@@ -142,6 +151,9 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: 
         symptoms=estimate.symptoms,
         confidence=estimate.confidence,
         milliseconds=milliseconds,
+        part_confidence=estimate.part_confidence,
+        part_right=match_parts(estimate, sample),
+        part_symptoms=estimate.part_symptoms,
     )
 
 
@@ -151,11 +163,19 @@ def _errors(estimate: Estimate, sample: Sample) -> dict[str, Array]:
 
 def match_share(estimate: Estimate, sample: Sample) -> float:
     """See :attr:`Scored.parts_found`."""
+    return float(match_parts(estimate, sample).sum() / max(len(estimate.rotation), len(sample.box_size)))
+
+
+def match_parts(estimate: Estimate, sample: Sample) -> NDArray[np.bool_]:
+    """See :attr:`Scored.part_right`."""
     rotation, center = true_poses(sample)
     off = rotation_error(estimate.rotation[:, None], rotation[None])
     away = translation_error(estimate.translation[:, None], center[None], sample.diagonal)
     near = (off <= _RIGHT[0]) & (away <= _RIGHT[1])
-    return float(near[linear_sum_assignment(near, maximize=True)].sum() / max(near.shape))
+    estimated, true = linear_sum_assignment(near, maximize=True)
+    right = np.zeros(len(near), dtype=bool)
+    right[estimated] = near[estimated, true]
+    return right
 
 
 def headline(scored: Sequence[Scored]) -> float:
@@ -187,7 +207,8 @@ def _mismatch(sample: Sample, estimate: Estimate, milliseconds: float) -> Scored
     """An estimate with other parts than the object has: it fails, but says how well it fits."""
     return replace(
         _failure(sample, milliseconds), parts_found=match_share(estimate, sample), symptoms=estimate.symptoms,
-        confidence=estimate.confidence,
+        confidence=estimate.confidence, part_confidence=estimate.part_confidence,
+        part_right=match_parts(estimate, sample), part_symptoms=estimate.part_symptoms,
     )  # fmt: skip
 
 
@@ -201,4 +222,7 @@ def _failure(sample: Sample, milliseconds: float) -> Scored:
         symptoms=Symptoms(),
         confidence=0.0,
         milliseconds=milliseconds,
+        part_confidence=np.zeros(0),
+        part_right=np.zeros(0, dtype=bool),
+        part_symptoms=PartSymptoms(),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artperl.evaluation.metrics import METRICS, auroc
+from artperl.evaluation.part_detection import part_figures, part_line
 from artperl.evaluation.scoring import Scored
 
 Array = NDArray[np.float64]
@@ -65,6 +66,7 @@ def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]
         "confidence_of_wrong": _median(confidence[~right]),
         "confidence_auroc": auroc(confidence, right),
         "ms_per_instance": float(np.median([s.milliseconds for s in own])),
+        "detection": part_figures(own),
         **_symmetric_summary(own),
     }
 
@@ -122,6 +124,8 @@ def table(figures: dict[str, Any]) -> str:
                 f"{'':{_NAME}s}confidence of right ones {100 * figure['confidence_of_right']:.0f} %, of wrong ones "
                 f"{100 * figure['confidence_of_wrong']:.0f} % in the median, AUROC {figure['confidence_auroc']:.2f}"
             )
+        if figure["detection"]["precision"] is not None:
+            lines.append(" " * _NAME + part_line(figure["detection"]))
     return "\n".join(lines)
 
 

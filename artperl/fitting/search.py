@@ -148,12 +148,17 @@ def _residual(energy: Tensor) -> Tensor:
 
 def disagreement(shapes: Shapes, observed: Observed, theta: Theta, perceived: Perceived) -> float:
     """See :attr:`Fit.disagreement`."""
+    return float(apart(shapes, observed, theta, perceived).median())
+
+
+def apart(shapes: Shapes, observed: Observed, theta: Theta, perceived: Perceived) -> Tensor:
+    """(N,) distance between where perception and the fit place each point in the rest frame, over the diagonal."""
     posed = pose_parts(shapes.trees, theta, shapes.box_center)
     part = observed.part[0]
     fitted = ((observed.points[0] - posed.translation[0, part])[:, None] @ posed.rotation[0, part])[:, 0]
     unit = shapes.diagonal[0] * theta.log_scale[0].mean().exp()
-    apart = torch.linalg.vector_norm(fitted / unit - perceived.canonical[0, : len(part)], dim=-1)
-    return float(apart.median())
+    off: Tensor = torch.linalg.vector_norm(fitted / unit - perceived.canonical[0, : len(part)], dim=-1)
+    return off
 
 
 def outside(theta: Theta, seen_from: tuple[float, float] | None) -> Tensor:

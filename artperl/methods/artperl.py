@@ -21,7 +21,8 @@ from artperl.agent.policy import Policy
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
-from artperl.core.estimate import Calibration, Estimate, Symptoms, estimate_of_fit
+from artperl.core.confidence import Calibration, Symptoms
+from artperl.core.estimate import Estimate, estimate_of_fit
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.paper_energy import refine_by_gradient

@@ -16,12 +16,14 @@ from artperl.boxes.network import Boxes
 from artperl.boxes.placement import place_boxes
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
-from artperl.core.estimate import Calibration, Estimate, estimate_of_fit, widen
+from artperl.core.confidence import Calibration, PartCalibration
+from artperl.core.estimate import Estimate, estimate_of_fit, widen
 from artperl.core.threads import one_thread
 from artperl.fitting.hypotheses import Context
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.occluded_parts import pose_occluded_parts
 from artperl.fitting.options import EstimatorOptions
+from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import find_fit
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.label_smoothing import smooth_labels, smooth_perceived
@@ -52,6 +54,7 @@ class Estimator:
     calibration : Calibration, optional
     boxes : Boxes, optional
         Without one, boxes are the reference's, enlarged to hold the points.
+    part_calibration : PartCalibration, optional
     """
 
     name: ClassVar[str] = "full"
@@ -60,6 +63,7 @@ class Estimator:
     options: EstimatorOptions = field(default_factory=EstimatorOptions)
     calibration: Calibration = field(default_factory=Calibration)
     boxes: Boxes | None = None
+    part_calibration: PartCalibration = field(default_factory=PartCalibration)
 
     def __post_init__(self) -> None:
         self.perception.eval()
@@ -137,7 +141,14 @@ class Estimator:
                 part_names=part_names(self.base, fit.row, fit.shapes),
                 warnings=warnings,
             )
-            estimate = replace(estimate, confidence=self.calibration(estimate.symptoms))
+            symptoms = part_symptoms(fit.shapes, fit.observed, fit.theta, perceived.to("cpu"), estimate.visibility)
+            odds = self.calibration.log_odds(estimate.symptoms)
+            estimate = replace(
+                estimate,
+                confidence=self.calibration(estimate.symptoms),
+                part_confidence=self.part_calibration(odds, symptoms),
+                part_symptoms=symptoms,
+            )
             return estimate, BoxContext.of(cloud, clouds, perceived)
 
     def _perceive_own(self, cloud: Cloud, clock: Clock) -> tuple[Cloud, Clouds, Perceived, float]:

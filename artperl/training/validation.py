@@ -11,7 +11,7 @@ import numpy as np
 
 from artperl.data.degrading import degrade
 from artperl.estimator import read_settings, save_estimator
-from artperl.evaluation.calibration import calibrate
+from artperl.evaluation.calibration import calibrated
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, VALIDATION_SEEDS, frozen_samples, samples_of
 from artperl.evaluation.scoring import evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
@@ -72,7 +72,7 @@ def validate(context: Context) -> None:
         # By votes, any parts are right if they are where they are.
         judge = evaluate if options.votes else evaluate_foreign
         foreign = judge(estimator, _foreign_samples(context))
-        best = replace(estimator, calibration=calibrate([*scored, *degraded], foreign))
+        best = calibrated(estimator, [*scored, *degraded], foreign)
         save_estimator(best, context.folder.best, context.about({"validation": figures}))
     context.save()
     say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.core.estimate import Calibration
+from artperl.core.confidence import Calibration
 from artperl.estimator import load_estimator, save_estimator
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from artperl.core.estimate import Calibration, Symptoms
+from artperl.core.confidence import Calibration, Symptoms
 from artperl.evaluation.calibration import calibrate
 from artperl.evaluation.samples import frozen_samples
 from artperl.evaluation.scoring import Scored, evaluate
