@@ -1,4 +1,4 @@
-"""The program ``artperl``: train, evaluate, estimate."""
+"""The program ``artperl``: train, evaluate, estimate, calibrate."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from artperl.commands.calibrate import Calibrate
 from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
 from artperl.commands.train import Train
@@ -15,6 +16,7 @@ Verb = (
     Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Estimate, tyro.conf.subcommand("estimate")]
+    | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
 )
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from artperl.data.categories import Parts, objects_of
+from artperl.data.degrading import degrade
 from artsim.datasets.plan import SampleOptions, draw_sample
+from artsim.families import FAMILIES
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import make_renderer
@@ -51,3 +55,17 @@ def samples_of(
         for n, obj in enumerate(objects)
         for index in range(n * views_per_object, (n + 1) * views_per_object)
     ]
+
+
+def degraded_samples(samples: Sequence[Sample]) -> list[Sample]:
+    """Every other sample, cut, dirty or sparse; see :func:`artperl.data.degrading.degrade`."""
+    return [
+        degrade(sample, len(sample.points), np.random.default_rng([VALIDATION_SEEDS, number]))
+        for number, sample in enumerate(samples[::2])
+    ]
+
+
+def foreign_samples(categories: Sequence[str], others: int) -> list[Sample]:
+    """Two objects each of so many other categories than these: confidence is to be low for them."""
+    names = [name for name in FAMILIES if name not in categories]
+    return frozen_samples(names[:others], 2, 1, None, VALIDATION_SEEDS, "any")

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from artperl.data.degrading import degrade
 from artperl.estimator import read_settings, save_estimator
 from artperl.evaluation.calibration import calibrated
-from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, VALIDATION_SEEDS, frozen_samples, samples_of
+from artperl.evaluation.samples import (
+    NUM_POINTS,
+    TEST_SEEDS,
+    VALIDATION_SEEDS,
+    degraded_samples,
+    foreign_samples,
+    frozen_samples,
+    samples_of,
+)
 from artperl.evaluation.scoring import evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
@@ -22,7 +26,6 @@ from artsim.common.files import write_atomic
 from artsim.common.progress import say
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError
-from artsim.families import FAMILIES
 from artsim.observing.sample import Sample
 
 _AS_GOOD = 1.01
@@ -63,7 +66,7 @@ def validate(context: Context) -> None:
     assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves
     samples = unseen_samples(context, options.validation_views, VALIDATION_SEEDS)
     scored = evaluate(estimator, samples, context.progress)
-    degraded = evaluate(estimator, _degraded(samples), context.progress) if options.degraded else []
+    degraded = evaluate(estimator, degraded_samples(samples), context.progress) if options.degraded else []
     figures, score = summary(scored), headline([*scored, *degraded])
     state.history.append({"step": state.step, "score": score, "done": dict(state.done)})
     context.report("validation", scalars(figures) | {"score": score}, state.step)
@@ -71,19 +74,11 @@ def validate(context: Context) -> None:
         state.best = min(score, state.best)
         # By votes, any parts are right if they are where they are.
         judge = evaluate if options.votes else evaluate_foreign
-        foreign = judge(estimator, _foreign_samples(context))
+        foreign = judge(estimator, foreign_samples(context.objects.base.categories, options.foreign_categories))
         best = calibrated(estimator, [*scored, *degraded], foreign)
         save_estimator(best, context.folder.best, context.about({"validation": figures}))
     context.save()
     say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
-
-
-def _degraded(samples: Sequence[Sample]) -> list[Sample]:
-    """Every other sample, cut or dirty."""
-    return [
-        degrade(sample, len(sample.points), np.random.default_rng([VALIDATION_SEEDS, number]))
-        for number, sample in enumerate(samples[::2])
-    ]
 
 
 def test(context: Context) -> dict[str, Any]:
@@ -134,9 +129,3 @@ def given_samples(context: Context, views: int, first_seed: int, noise: str | No
 def _as_tested(context: Context, noise: str | None) -> SampleOptions:
     sample = replace(context.options.sample, num_points=NUM_POINTS)
     return sample if noise is None else SampleOptions(**{**vars(sample), "noise": noise})
-
-
-def _foreign_samples(context: Context) -> list[Sample]:
-    """Objects of other categories: confidence is to be low for them."""
-    others = [category for category in FAMILIES if category not in context.objects.base.categories]
-    return frozen_samples(others[: context.options.foreign_categories], 2, 1, None, VALIDATION_SEEDS, "any")

@@ -1,0 +1,74 @@
+"""The verb ``artperl calibrate``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import ConfigError
+from artsim.model.draws import StateOptions, ViewOptions
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """Calibrate the confidence of an estimator anew, on procedural objects that no training and no test shows.
+
+    Training does so by itself. Do it again for an estimator that shall judge other objects, such as those of some
+    categories only.
+
+        artperl calibrate out/laptop/best
+    """
+
+    estimator: tyro.conf.Positional[str]
+    """Folder of the estimator, or the name of one that comes with the package."""
+    out: Path | None = None
+    """Folder to write it to; by default its own, of which only the confidence changes."""
+    category: tuple[str, ...] = ()
+    """Procedural categories; by default those of its references."""
+    objects: int = 40
+    """Objects of each category."""
+    views: int = 4
+    """Views of each object."""
+
+    def run(self) -> None:
+        from artperl.data.categories import ARTIMAGE, Parts
+        from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings, save_estimator
+        from artperl.evaluation.calibration import calibrated
+        from artperl.evaluation.samples import (
+            NUM_POINTS,
+            VALIDATION_SEEDS,
+            degraded_samples,
+            foreign_samples,
+            frozen_samples,
+        )
+        from artperl.evaluation.scoring import evaluate, evaluate_foreign
+        from artperl.evaluation.tables import summary, table
+        from artsim.families import FAMILIES
+
+        mixed = SampleOptions(NUM_POINTS, states=StateOptions("mixed"), views=ViewOptions("mixed"))
+        for name in ("objects", "views"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{getattr(self, name)} is not possible", name, "use 1 or more")
+        folder = folder_of(self.estimator)
+        if self.out is None and folder.parent == WEIGHTS:
+            raise ConfigError("an estimator that comes with the package stays as it is", self.estimator, "use --out")
+        estimator = load_estimator(folder)
+        categories = self.category or estimator.categories
+        unknown = [name for name in categories if name not in FAMILIES]
+        if unknown:
+            raise ConfigError(f"unknown category {unknown[0]!r}", "category", f"use {', '.join(sorted(FAMILIES))}")
+        votes = estimator.perception.votes
+        parts: Parts = "any" if votes or not set(categories) <= set(ARTIMAGE) else "artimage"
+        samples = frozen_samples(
+            categories, self.objects, self.views, mixed, VALIDATION_SEEDS, parts, estimator.perception.num_rows
+        )
+        scored = evaluate(estimator, [*samples, *degraded_samples(samples)], True)
+        judge = evaluate if votes else evaluate_foreign
+        foreign = judge(estimator, foreign_samples(estimator.categories, 12))
+        made = calibrated(estimator, scored, foreign)
+        save_estimator(made, self.out or folder, read_settings(folder)["about"])
+        print(table(summary(scored)))
+        print(f"these figures are of the confidence before; the new one is in {self.out or folder}")
