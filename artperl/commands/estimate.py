@@ -236,7 +236,7 @@ def estimator_folder(name: str) -> Path:
 
 def record_of(result: Result, cloud: Cloud) -> dict[str, Any]:
     """An estimate in JSON's terms, but for the part of every point; null for what is infinite."""
-    record = {name: _plain(value) for name, value in vars(result).items() if name != "part"}
+    record = {name: _plain(value) for name, value in vars(result).items() if name not in ("part", "part_symptoms")}
     record["state_unit"] = list(result.state_unit)
     record["notes"], record["warnings"] = list(cloud.notes), [*cloud.warnings, *result.warnings]
     return record
@@ -244,7 +244,7 @@ def record_of(result: Result, cloud: Cloud) -> dict[str, Any]:
 
 def arrays_of(result: Result, cloud: Cloud) -> dict[str, Any]:
     """An estimate as arrays, the part of every point among them."""
-    values = {name: value for name, value in vars(result).items() if name != "milliseconds"}
+    values = {name: value for name, value in vars(result).items() if name not in ("milliseconds", "part_symptoms")}
     values |= {"state_unit": result.state_unit, "warnings": (*cloud.warnings, *result.warnings), "notes": cloud.notes}
     texts = ("joint_type", "part_names", "state_unit", "warnings", "notes", "reference")
     return {name: np.asarray(value, dtype=str if name in texts else None) for name, value in values.items()}

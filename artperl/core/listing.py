@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 if TYPE_CHECKING:
     from artperl.core.estimate import Estimate
 
-HEAD = ("part", "joint", "state", "limits", "box centre, m", "rotation vector, deg", "box size, m", "seen")
+HEAD = ("part", "joint", "state", "limits", "box centre, m", "rotation vector, deg", "box size, m", "seen", "sure")
 _MOST_PARTS = 40
 """Parts that are listed: as many as fit a screen."""
 
@@ -57,6 +57,7 @@ def cells(estimate: Estimate) -> list[tuple[str, ...]]:
             " ".join(f"{x:.3f}" for x in estimate.translation[k]),
             " ".join(f"{x:.1f}" for x in turn), " x ".join(f"{x:.3f}" for x in estimate.size[k]),
             f"{100 * estimate.visibility[k]:.0f} %",
+            f"{100 * estimate.part_confidence[k]:.0f} %" if k < len(estimate.part_confidence) else "",
         ))  # fmt: skip
     return rows
 
