@@ -32,13 +32,17 @@ class Evaluate:
     method: str = "full"
     """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; or one
     that you add (CONTRIBUTING.md). A benchmark and the ablation are of the method full."""
-    benchmark: Literal["artimage"] | None = None
-    """artimage: regenerated ArtImage, at least 500 views of each category in each row."""
+    benchmark: Literal["artimage", "robustness"] | None = None
+    """artimage: regenerated ArtImage, at least 500 views of each category in each row. robustness: sensors, occluders,
+    bad masks and few points, at least 100 views in each row; with --json, a run that was stopped goes on."""
     ablation: bool = False
     """Measure what each stage brings: the estimators of all categories without one stage after the other, on validation
     objects. With --json, a run that was stopped goes on from the rows of the file."""
-    rows: tuple[Literal["procedural", "real", "real_trained", "procedural_sphere", "real_sphere"], ...] = ()
-    """Rows of the benchmark; by default all that there are objects and weights for."""
+    rows: tuple[Literal["procedural", "real", "real_all", "real_trained", "procedural_sphere", "real_sphere"], ...] = ()
+    """Rows of the benchmark; by default all that there are objects and weights for. real_all, both halves of the real
+    objects, is of robustness; real_trained and the rows from all round are of artimage."""
+    conditions: tuple[str, ...] = ()
+    """Conditions of robustness, such as occluded_40 leak_7; by default all."""
     real_weights: Path | None = None
     """For the row real_trained: folder of the estimators that have learnt from real objects, too."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
@@ -77,6 +81,8 @@ class Evaluate:
         if self.ablation:
             self._ablation()
             return
+        if self.conditions and self.benchmark != "robustness":
+            raise ConfigError("conditions are of a benchmark", "conditions", "use --benchmark robustness")
         figures = self._single() if self.benchmark is None else self._benchmark()
         if self.json is not None:
             write_atomic(self.json, _json(figures))
@@ -95,17 +101,36 @@ class Evaluate:
         record = run_ablation(categories, self.estimator, self.partnet, self.views or 32, self.json, True, say)
         print("\n".join(verdict_lines(record)))
 
+    def _robustness(self) -> dict[str, Any]:
+        from artperl.data.categories import ARTIMAGE
+        from artperl.evaluation.conditions import CONDITIONS
+        from artperl.evaluation.robustness import run_robustness
+
+        own = ("real_weights", "files", "package_root", "states", "preset", "seen_from", "noise", "num_points")
+        given = [name for name in own if getattr(self, name) != getattr(Evaluate(), name)]
+        if given:
+            raise ConfigError("robustness has conditions of its own", ", ".join(given), "leave it out")
+        sources = self.rows or (("procedural",) if self.partnet is None else ("procedural", "real"))
+        return run_robustness(
+            sources, self.category or tuple(ARTIMAGE), self.conditions or tuple(CONDITIONS), self.estimator,
+            self.partnet, self.objects, self.views or 100, self.json, True, say,
+        )  # fmt: skip
+
     def _benchmark(self) -> dict[str, Any]:
         from artperl.data.categories import ARTIMAGE
         from artperl.evaluation.artimage import ROWS, VIEWS
         from artperl.evaluation.benchmark import run_benchmark
 
+        if self.benchmark == "robustness":
+            return self._robustness()
+        if self.conditions or "real_all" in self.rows:
+            raise ConfigError("artimage has no such rows", "conditions, rows", "use --benchmark robustness")
         if (self.states, self.preset, self.noise) != ("uniform", "artimage", "none"):
             raise ConfigError(
                 "a benchmark has states, viewpoints and noise of its own", "states, preset, noise",
                 "leave them out, or name an estimator instead of the benchmark",
             )  # fmt: skip
-        rows = self.rows or tuple(
+        rows = tuple(row for row in self.rows if row != "real_all") or tuple(
             row
             for row in ROWS
             if not (row == "real_trained" and self.real_weights is None)

@@ -1,0 +1,142 @@
+"""Rows of the benchmark that show where an estimator stops being right, and whether its confidence says so."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from artperl.evaluation.artimage import OBJECTS, real_objects, row_objects
+from artperl.evaluation.benchmark import find_estimator
+from artperl.evaluation.conditions import CONDITIONS, condition_samples, find_condition
+from artperl.evaluation.metrics import auroc
+from artperl.evaluation.reliability import reliability, reliability_lines
+from artperl.evaluation.scoring import Scored, evaluate, object_symmetries
+from artsim.common.files import read_json, write_atomic
+from artsim.errors import ConfigError
+from artsim.model.objects import ArticulatedObject
+
+SOURCES = ("procedural", "real", "real_all")
+"""procedural: 40 unseen ones; real: the test half of ArtImage's split; real_all: both halves."""
+
+_MAX_BYTES = 64_000_000
+_HEAD = (
+    f"{'':13s}{'views':>6s}{'right':>7s}{'sym.':>6s}{'AUROC':>7s}{'conf.':>7s}{'move %':>8s}{'IoU %':>7s}  turn, deg"
+)
+
+
+def run_robustness(
+    sources: Sequence[str], categories: Sequence[str], conditions: Sequence[str] = tuple(CONDITIONS),
+    weights: Path | None = None, partnet: Path | None = None, objects: int = OBJECTS, views: int = 100,
+    kept: Path | None = None, progress: bool = False, say: Callable[[str], None] = print,
+) -> dict[str, Any]:  # fmt: skip
+    """Evaluate under every condition, and print each row as it comes.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        Of :data:`SOURCES`.
+    categories : sequence of str
+    conditions : sequence of str
+    weights : Path, optional
+        Folder of estimators; by default those that come with the package, none of which learns from real objects.
+    partnet : Path, optional
+        Folder of real objects.
+    objects : int
+        Procedural ones of each category.
+    views : int
+        Of each row, at least.
+    kept : Path, optional
+        File of the figures. Rows that it holds for the same options are not measured again.
+    progress : bool
+    say : callable
+        Gets the lines.
+
+    Returns
+    -------
+    dict
+        ``{"options": {...}, "rows": {"source/category/condition": figures}}``
+
+    Raises
+    ------
+    ConfigError
+        When a source or a condition is unknown, or the file holds figures of other options.
+    """
+    for condition in conditions:
+        find_condition(condition)
+    for source in sources:
+        if source not in SOURCES:
+            raise ConfigError(f"there is no source {source!r}", "rows", f"use {', '.join(SOURCES)}")
+    options = {"weights": None if weights is None else str(weights), "objects": objects, "views": views}
+    rows = _kept_rows(kept, options)
+    for source in sources:
+        for category in categories:
+            tested = _objects(source, category, partnet, objects)
+            if not tested:
+                say(f"{source}, {category}: no object")
+                continue
+            say(f"{source}, {category}: {len(tested)} objects\n{_HEAD}")
+            for condition in conditions:
+                key = f"{source}/{category}/{condition}"
+                if key not in rows:
+                    estimator = find_estimator(weights, category)
+                    samples = condition_samples(condition, tested, views)
+                    scored = evaluate(estimator, samples, progress, object_symmetries(tested))
+                    rows[key] = row_figures(scored) | {"objects": len(tested)}
+                    if kept is not None:
+                        write_atomic(kept, (json.dumps({"options": options, "rows": rows}) + "\n").encode())
+                say(row_line(condition, rows[key]))
+    asked = [rows[f"{s}/{c}/{n}"] for s in sources for c in categories for n in conditions if f"{s}/{c}/{n}" in rows]
+    if asked:
+        confidence, right = (np.concatenate([row[name] for row in asked]) for name in ("confidence", "is_right"))
+        whole = reliability(confidence, right.astype(bool))
+        say("\n".join(reliability_lines(whole)))
+        return {"options": options, "rows": rows, "reliability": whole, "auroc": auroc(confidence, right.astype(bool))}
+    return {"options": options, "rows": rows}
+
+
+def _objects(source: str, category: str, partnet: Path | None, objects: int) -> list[ArticulatedObject]:
+    if source == "procedural":
+        return row_objects("procedural", category, partnet, objects)
+    test = real_objects(category, "test", partnet)
+    return test if source == "real" else [*test, *real_objects(category, "train", partnet)]
+
+
+def _kept_rows(kept: Path | None, options: dict[str, Any]) -> dict[str, Any]:
+    if kept is None or not kept.exists():
+        return {}
+    found = read_json(kept, "the file of figures", ConfigError, _MAX_BYTES)
+    if not isinstance(found, dict) or found.get("options") != options or not isinstance(found.get("rows"), dict):
+        raise ConfigError("it holds figures of other options", kept, "name another file, or remove it")
+    return dict(found["rows"])
+
+
+def row_figures(scored: Sequence[Scored]) -> dict[str, Any]:
+    """Figures of one row, in JSON's terms; errors are means, up to symmetry where objects have one."""
+    judged = [s.up_to_symmetry for s in scored]
+    right, confidence = np.array([s.right for s in judged]), np.array([s.confidence for s in scored])
+    return {
+        "views": len(scored),
+        "right": float(np.mean([s.right for s in scored])),
+        "right_up_to_symmetry": float(right.mean()),
+        "rotation_deg": np.mean([s.rotation for s in judged], axis=0).tolist(),
+        "translation_percent_diagonal": float(np.mean([100.0 * s.translation.mean() for s in judged])),
+        "iou_exact": float(np.mean([s.errors["iou_exact"].mean() for s in judged])),
+        "auroc": auroc(confidence, right),
+        "confidence": confidence.round(4).tolist(),
+        "is_right": right.tolist(),
+    }
+
+
+def row_line(name: str, row: dict[str, Any]) -> str:
+    """One line of the table; errors are means."""
+    told = "-" if row["auroc"] is None else f"{row['auroc']:.2f}"
+    turn = " ".join(f"{value:.1f}" for value in row["rotation_deg"])
+    return (
+        f"{name:13s}{row['views']:6d}{100 * row['right']:6.0f}%{100 * row['right_up_to_symmetry']:5.0f}%{told:>7s}"
+        f"{100 * np.mean(row['confidence']):6.0f}%{row['translation_percent_diagonal']:8.1f}"
+        f"{100 * row['iou_exact']:7.1f}  {turn}"
+    )
