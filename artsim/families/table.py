@@ -1,8 +1,8 @@
 """Tables and desks: drawers and doors under the top, and what else of a table moves.
 
 What varies: the kind (apron between legs, pedestals, a case on a stand, a column), size and proportions (a few are long
-consoles, low slabs, deep or tall stands), tops (square, round, oval), legs, the grid of cells under the top and what they hold, cells at the back, leaves that drop, tops that turn, tip or
-rise, a tray for a keyboard, wheels.
+consoles, low slabs, deep or tall stands), tops (square, round, oval), legs, the grid of cells under the top and what
+they hold, cells at the back, leaves that drop, tops that turn, tip or rise, a tray for a keyboard, wheels.
 """
 
 from __future__ import annotations
