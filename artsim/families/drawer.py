@@ -1,8 +1,8 @@
 """Furniture with drawers: chests and nightstands, tables with drawers under the top, desks with pedestals.
 
-What varies: the kind; proportions (a few are long and low, deep or tall); number and grid of the drawers, how wide those of a row and how high those of a column are, on
-which side of a desk they are, in one row or at the back of a table as well; open compartments and fronts that do not
-move; legs, plinths and shelves; fronts and handles.
+What varies: the kind; proportions (a few are long and low, deep or tall); number and grid of the drawers, how wide
+those of a row and how high those of a column are, on which side of a desk they are, in one row or at the back of a
+table as well; open compartments and fronts that do not move; legs, plinths and shelves; fronts and handles.
 """
 
 from __future__ import annotations
