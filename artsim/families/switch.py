@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.common.elementary import sin, tan
+from artsim.common.elementary import arctan, sin, tan
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
@@ -45,7 +45,10 @@ def build(rng: np.random.Generator) -> Assembly:
     else:
         plate += rounded_box((-depth, -width / 2, -height / 2), (0, width / 2, height / 2), 0.004)
     buttons: list[tuple[Solid, JointSpec]] = []
-    tilt, style = np.deg2rad(rng.uniform(2.0, 8.0)), int(rng.integers(1 << 30))
+    # The end of a rocker that is pressed in stays before the plate's back.
+    room = 0.8 * depth - 0.0028 - 0.3 * min(0.3 * depth, 0.004)
+    steepest = arctan(2.0 * room / (0.5 * (cells[0][1, 1] - cells[0][0, 1])))
+    tilt, style = min(np.deg2rad(rng.uniform(2.0, 8.0)), steepest), int(rng.integers(1 << 30))
     level = rng.random() < 0.35  # rockers rest in the middle and tip either way
     live = int(rng.integers(1, count + 1)) if rng.random() < 0.3 else count  # how many move; the others are set
     order = rng.permutation(count)
