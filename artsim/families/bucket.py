@@ -27,7 +27,7 @@ def build(rng: np.random.Generator) -> Assembly:
     wall = rng.uniform(0.0018, 0.004)
     profile = _profile(rng, top, height)
     body = vessel(profile, wall, sections=SIDES) + _rim(rng, top, height, wall, profile)
-    oval = with_tails(rng, (0.7, 0.98), (0.5, 1.7), 0.5) if rng.random() < 0.35 else 1.0  # depth over width
+    oval = with_tails(rng, (0.7, 0.98), (0.45, 1.9), 0.5) if rng.random() < 0.4 else 1.0  # depth over width
     body = body.scaled((oval, 1.0, 1.0))
     rim_z = height + 0.004
 

@@ -157,8 +157,9 @@ def _frame(
         )
     elif extra == "wall":  # or fixed panels, beside and above
         beside = with_tails(rng, (0.2, 2.0), (0.2, 12.0), 0.3)  # up to a shop front or a long partition
-        left, right = rng.uniform(0.0, 1.0, 2) * min(beside * width, 3.7) + 0.02
-        above = rng.uniform(0.02, 0.6)
+        shares = rng.uniform(0.0 if beside < 4.0 else 0.7, 1.0, 2)
+        left, right = shares * min(beside * width, 3.7) + 0.02
+        above = rng.uniform(0.02, 0.6 if beside < 4.0 else 0.2)
         solid += frame((x0 + 0.004, -y - jamb - left, 0.0), (x1 - 0.003, y + jamb + right, height + jamb + above),
                        [left + 0.002, right + 0.002, 0.0, above + 0.002], 1, 2)  # fmt: skip
     elif extra == "arch":

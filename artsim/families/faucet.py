@@ -30,8 +30,8 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _basin_mixer(rng: np.random.Generator) -> Assembly:
     """A body with a fixed spout, and one handle on its top."""
-    radius, height = rng.uniform(0.017, 0.028), with_tails(rng, (0.06, 0.2), (0.04, 0.5), 0.3)
-    reach = with_tails(rng, (0.08, 0.17), (0.05, 0.7), 0.3)
+    radius, height = with_tails(rng, (0.017, 0.028), (0.01, 0.028), 0.2), with_tails(rng, (0.06, 0.2), (0.04, 0.5), 0.3)
+    reach = with_tails(rng, (0.08, 0.17), (0.05, 0.8), 0.3)
     body, top = _body(rng, radius, height)
     r = radius * rng.uniform(0.5, 0.8)
     kind = rng.choice(["straight", "bar", "drooping", "bow"])
@@ -108,7 +108,7 @@ def _swing(rng: np.random.Generator, origin: Vector) -> JointSpec:
 
 def _three_piece(rng: np.random.Generator) -> Assembly:
     """A spout between two handles on one plate."""
-    spread = with_tails(rng, (0.08, 0.13), (0.07, 0.32), 0.25)
+    spread = with_tails(rng, (0.08, 0.13), (0.07, 0.38), 0.25)
     foot_radius, foot_height = rng.uniform(0.018, 0.026), rng.uniform(0.02, 0.07)
     plate = rng.uniform(0.005, 0.012)
     half = foot_radius + rng.uniform(0.003, 0.012)
@@ -166,7 +166,7 @@ def _pillar_tap(rng: np.random.Generator) -> Assembly:
 
 def _wall_tap(rng: np.random.Generator) -> Assembly:
     """A bar on two wall flanges, a knob at each end, and a spout that swings below."""
-    half, radius = with_tails(rng, (0.08, 0.13), (0.055, 0.45), 0.4), rng.uniform(0.016, 0.024)
+    half, radius = with_tails(rng, (0.08, 0.13), (0.05, 0.5), 0.4), with_tails(rng, (0.016, 0.024), (0.011, 0.024), 0.3)
     body = tube([(0, -half, 0), (0, half, 0)], radius, 20)
     wall = radius + rng.uniform(0.02, 0.05)
     for y in (-0.6 * half, 0.6 * half):

@@ -126,7 +126,7 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
     top, x, y = height - thick, depth / 2 - over, width / 2 - over
     table.body += table_top(rng, depth, width, top, height)
     style = _style(rng)
-    broad = min(with_tails(rng, (0.26, 0.5), (0.13, 0.6), 0.3), 0.38 * width)
+    broad = min(with_tails(rng, (0.26, 0.5), (0.1, 0.6), 0.4), 0.38 * width)
     sides = [(-1,), (1,), (-1, 1)][rng.choice(3, p=[0.3, 0.3, 0.4])]
     rolling = rng.random() < 0.1
     on_legs = not rolling and rng.random() < 0.35
