@@ -1,7 +1,7 @@
 """Boxes: cartons with one, two or four flaps (see ``carton``), and rigid boxes, chests and cases with one lid or two.
 
-Sizes, the shape of lids (flat, hollow, domed, with a skirt), corners, bands, feet, dividers, handles and latches of
-rigid boxes vary.
+Sizes and proportions, the shape of lids (flat, hollow, domed, with a skirt), corners, a board at the back, bands, feet,
+dividers, handles and latches of rigid boxes vary.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.families.carton import carton
+from artsim.families.carton import LEAST_SHARES, MOST_SHARES, carton
 from artsim.families.details import bow_handle, knob, rounded_tray
+from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, rounded_box, tray, union
 
@@ -27,6 +28,8 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     width = rng.choice([rng.uniform(0.12, 0.35), rng.uniform(0.4, 1.3)])
     depth = width * rng.uniform(0.42, 0.8)
     height = width * rng.uniform(0.18, 0.6)
+    if rng.random() < 0.35:
+        depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.07, 0.1, 0.05)).tolist()
     wall = max(0.003, width * rng.uniform(0.012, 0.035))
     x, y = depth / 2, width / 2
     radius = rng.choice([0.0, rng.uniform(0.02, 0.1) * depth])
@@ -42,9 +45,9 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     body += grips
 
     chest = Assembly()
-    chest.add("body", body, density=700.0)
     halves = rng.random() < 0.12 and radius == 0.0
     if halves:  # two lids, hinged at the left and the right
+        chest.add("body", body, density=700.0)
         chest.record(handles=True)
         limit = np.deg2rad(rng.uniform(80.0, 175.0))
         thick = wall * rng.uniform(0.6, 1.2)
@@ -65,6 +68,11 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     chest.record(handles=bool(grips.pieces or grip.pieces))
     barrel = max(0.002, 0.25 * wall)
     axis_x = back + barrel
+    if not domed and top - seam + 0.2 * min(x, y) < 0.7 * height and rng.random() < 0.25:
+        # A board below that stands out at the back, under the open lid, so that the box does not tip.
+        behind = depth * rng.uniform(0.015, 0.065)
+        body += box((x - wall, -0.95 * (y - radius), 0.0), (axis_x + behind, 0.95 * (y - radius), 0.6 * wall))
+    chest.add("body", body, density=700.0)
     spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
     for first, last in spans:
         lid += cylinder((axis_x, first * y, seam), (axis_x, last * y, seam), barrel, sections=12)
@@ -72,7 +80,7 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     limit = np.deg2rad(rng.choice([rng.uniform(75.0, 115.0), rng.uniform(115.0, 170.0)]))
     chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit), density=700.0)
     if top - seam > 0.02 and rng.random() < 0.2:
-        _latches(rng, chest, x + band, y, seam, top)
+        _latches(rng, chest, max(x + band, -float(lid.bounds()[0, 0])), y, seam, top)
     return chest
 
 
@@ -158,7 +166,7 @@ def _lid(
             )
         return solid, seam + thick, False
     if kind == "hollow":
-        rise = height * rng.uniform(0.15, 0.9)
+        rise = height * with_tails(rng, (0.15, 0.9), (0.08, 1.6), 0.2)
         if radius == 0.0:
             return tray((-x, -y, seam), (x, y, seam + rise), wall, min(wall, 0.7 * rise), side=-1), seam + rise, False
         bevel = min(rng.choice([0.0, 0.6 * radius]), 0.5 * rise)

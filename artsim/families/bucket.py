@@ -1,7 +1,8 @@
 """Buckets and pails: a vessel with a bail on two pins.
 
-Round or oval, flat to deep, tapered, straight or bulging; rims, hoops, feet, round or D-shaped bails of wire or straps,
-with or without a grip, where the pins are, and how far the bail swings vary. The bail stands upright at rest.
+Round or oval, small to large, flat to deep, tapered, straight or bulging; rims, hoops, feet, round or D-shaped bails of
+wire or straps, with or without a grip, where the pins are, and how far the bail swings vary. The bail stands upright at
+rest.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.common.products import norm
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import Solid, box, cylinder, ring, tube, vessel
 from artsim.model.kinematics import Array
@@ -20,20 +22,20 @@ SIDES = 20
 
 def build(rng: np.random.Generator) -> Assembly:
     """A bucket whose bail stands up at rest and swings to both sides."""
-    top = rng.uniform(0.09, 0.18)
-    height = top * rng.uniform(0.85, 3.6)
+    top = with_tails(rng, (0.09, 0.18), (0.06, 0.34), 0.25)
+    height = top * with_tails(rng, (0.85, 3.2), (0.55, 5.4), 0.3)
     wall = rng.uniform(0.0018, 0.004)
     profile = _profile(rng, top, height)
     body = vessel(profile, wall, sections=SIDES) + _rim(rng, top, height, wall, profile)
-    oval = rng.uniform(0.7, 0.98) if rng.random() < 0.25 else 1.0  # narrower from front to back
+    oval = with_tails(rng, (0.7, 0.98), (0.45, 1.9), 0.5) if rng.random() < 0.4 else 1.0  # depth over width
     body = body.scaled((oval, 1.0, 1.0))
     rim_z = height + 0.004
 
-    pin = rng.uniform(0.0022, 0.005)
+    pin = with_tails(rng, (0.0022, 0.005), (0.0012, 0.005))
     # Pins lie near the rim: a bail bends inwards as it rises, and has to pass the rim outside.
     pivot = height - top * rng.uniform(0.06, 0.22)
-    ahead = top * rng.uniform(-0.32, 0.32) if rng.random() < 0.3 else 0.0  # of the pins from the middle
-    wire = rng.uniform(0.0012, 0.0045)
+    ahead = oval * top * rng.uniform(-0.32, 0.32) if rng.random() < 0.3 else 0.0  # of the pins from the middle
+    wire = with_tails(rng, (0.0012, 0.0045), (0.0008, 0.008)) if pin > 0.0017 else 0.0008
     outer = top + 0.012  # beyond the rim
     bail_y = outer + 0.0015 + max(wire, 0.0025)
     across = float(np.sqrt(1.0 - np.square(ahead / (oval * top))))
@@ -43,11 +45,12 @@ def build(rng: np.random.Generator) -> Assembly:
         ear = _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
         body += ear.moved((ahead, 0, 0))
     # Up to the level, a point of a round bail lies this far from the middle of the pins; the rim keeps within.
-    reach = hypot(outer + abs(ahead), rim_z - pivot) + 2 * wire + 0.006
+    reach = hypot(max(1.0, oval) * outer + abs(ahead), rim_z - pivot) + 2 * wire + 0.006
     bail, path, thick = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
 
-    ends = [_swing(side, path, thick, profile, outer + 0.5 * wire, pivot, ahead) for side in (-1.0, 1.0)]
-    shares = rng.uniform(0.6, 1.0, 2)
+    longest = profile * (max(1.0, oval), 1.0)
+    ends = [_swing(side, path, thick, longest, outer + 0.5 * wire, pivot, ahead) for side in (-1.0, 1.0)]
+    shares = rng.uniform(0.5, 1.0, 2)
     if rng.random() < 0.5:  # as far to both sides
         ends, shares = [min(ends)] * 2, np.repeat(shares[0], 2)
     low, high = (float(share * end) for share, end in zip(shares, ends, strict=True))
@@ -80,7 +83,7 @@ def _swing(side: float, path: Array, thick: Array, profile: Array, outer: float,
     outer : float
         Distance from the middle plane beyond which there are only the ends of the pins.
     """
-    angles = np.deg2rad(np.arange(60.0, 151.0, 2.0))[:, None]
+    angles = np.deg2rad(np.arange(60.0, 175.0, 2.0))[:, None]
     arm = path[:, 2] - pivot
     x, z = ahead + side * sin(angles) * arm, pivot + cos(angles) * arm
     wide = np.interp(z, profile[:, 1], profile[:, 0]) + 0.009 + thick  # beyond hoops and the rim

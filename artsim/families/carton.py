@@ -1,19 +1,22 @@
 """Cartons: cardboard boxes with flaps.
 
 Flaps share the opening without overlapping one another, so each of them moves freely: mitred, one pair between the
-other, around a hole, or with the inner pair folding down into the carton. Sizes, reach of the flaps and hand holes
-vary.
+other, around a hole, or with the inner pair folding down into the carton. Sizes (a few are flat, long or tall), how far
+flaps reach and turn, and hand holes vary.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from artsim.families.proportions import unusual_sides
 from artsim.making.assembly import Assembly, JointSpec, revolute
 from artsim.making.solids import Solid, box, frame, hull, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
+LEAST_SHARES, MOST_SHARES = (0.29, 0.43, 0.075), (0.765, 0.95, 0.79)
+"""Depth, width and height of unusual boxes over their diagonal."""
 
 
 def carton(rng: np.random.Generator) -> Assembly:
@@ -21,6 +24,8 @@ def carton(rng: np.random.Generator) -> Assembly:
     width = rng.uniform(0.18, 0.6)
     depth = width * rng.uniform(0.5, 1.0)
     height = width * rng.uniform(0.3, 1.3)
+    if rng.random() < 0.3:
+        depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.14, 0.18, 0.06)).tolist()
     wall = rng.uniform(0.003, 0.005)
     x, y = depth / 2, width / 2
     result = Assembly()
@@ -28,17 +33,22 @@ def carton(rng: np.random.Generator) -> Assembly:
     kind = str(rng.choice(["one", "two", "mitred", "long", "short", "wheel", "inner"],
                           p=[0.12, 0.25, 0.14, 0.16, 0.11, 0.1, 0.12]))  # fmt: skip
     flaps = _flaps(rng, kind, x, y, wall, height)
-    limit = np.deg2rad(rng.uniform(100.0, 250.0))
+    limit = np.deg2rad(_limit(rng, 100.0))
     for number, (side, inward, outline) in enumerate(flaps):
         z = height + GAP + (0.0007 if side in ("left", "right") else 0.0)
         if inward:
             result.add(f"flap_{number}", *_inner_flap(side, outline, x, y, height, wall), density=150.0)
             continue
-        own_limit = limit if rng.random() < 0.7 else np.deg2rad(rng.uniform(95.0, 250.0))
+        own_limit = limit if rng.random() < 0.7 else np.deg2rad(_limit(rng, 95.0))
         lip = rng.uniform(0.03, 0.08) if kind == "one" and rng.random() < 0.5 else 0.0
         solid, joint = _outer_flap(side, outline, x, y, z, wall, own_limit, min(lip, 0.6 * height))
         result.add(f"flap_{number}", solid, joint, density=150.0)
     return result
+
+
+def _limit(rng: np.random.Generator, least: float) -> float:
+    """Degrees that a flap turns by; some hang down flat against the outside."""
+    return 270.0 if rng.random() < 0.2 else float(rng.uniform(least, 250.0))
 
 
 def _carton_body(rng: np.random.Generator, x: float, y: float, height: float, wall: float) -> Solid:
@@ -75,8 +85,9 @@ def _flaps(rng: np.random.Generator, kind: str, x: float, y: float, wall: float,
         return [("left", False, bar(share * y - c, -x, x, tip)), ("right", False, bar(second * y - c, -x, x, tip))]
     if kind == "mitred":  # at 45 degrees, whatever their reach; a raised flap's inner edge clears the next one's corner
         corner = wall + c
-        longs = bar(x * (reach := rng.uniform(0.6, 1.0)) - c, -y + corner, y - corner, x * reach - c)
-        ends = bar(x * (reach := rng.uniform(0.6, 0.95)) - c, -x + corner, x - corner, x * reach - 2 * c - wall)
+        long, short = min(x, y) * rng.uniform(0.6, 1.0), min(x, y) * rng.uniform(0.6, 0.95)
+        longs = bar(long - c, -y + corner, y - corner, long - c)
+        ends = bar(short - c, -x + corner, x - corner, short - 2 * c - wall)
         return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
     if kind == "long":  # short flaps reach a little way, long ones lie between them
         short = y * rng.uniform(0.15, 0.6)
@@ -133,7 +144,7 @@ def _outer_flap(
             (-x - GAP - wall, -y, z), (0, y, z + wall)
         )
     origin = np.array([0.0, 0.0, z + wall])
-    origin[across] = sign * edge
+    origin[across] = sign * (edge + GAP)  # beyond the wall, which a flap turned by 270 degrees hangs beside
     return solid, revolute("body", axis, tuple(origin), 0.0, limit)
 
 

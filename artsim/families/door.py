@@ -1,7 +1,8 @@
 """Doors in a frame: one leaf or two, hinged at the left or the right, or sliding on two tracks.
 
 Leaves are plain, panelled or glazed; levers or knobs turn on the leaf and pass through it, others have fixed pulls.
-Sizes, panels, the frame's shape (with fanlight, side light or round arch), handles and how far the leaf opens vary.
+Sizes, panels, the frame's shape (with fanlight, side light, round arch or a wall up to a long partition, in which the
+door stands), the thickness of the wall, handles and how far the leaf opens vary.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
 from artsim.model.kinematics import Array
@@ -43,7 +45,7 @@ def build(rng: np.random.Generator) -> Assembly:
     kind = str(rng.choice(["single", "double", "sliding"], p=[0.62, 0.23, 0.15]))
     width = rng.uniform(0.5, 1.4) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
     height = rng.uniform(1.6, 3.0)
-    depth, jamb = rng.uniform(0.07, 0.42), rng.uniform(0.03, 0.25)
+    depth, jamb = with_tails(rng, (0.07, 0.42), (0.07, 0.75), 0.15), rng.uniform(0.03, 0.25)
     style = _style(rng, kind)
     door = Assembly()
     door.record(handles=True)
@@ -154,8 +156,10 @@ def _frame(
             (x0, ends[0], 0), (x1, ends[1], height + jamb), [0.05, 0.05, 0.1, jamb], [], lights, 0.03, 0.006
         )
     elif extra == "wall":  # or fixed panels, beside and above
-        left, right = rng.uniform(0.0, 1.0, 2) * rng.uniform(0.2, 2.0) * width + 0.02
-        above = rng.uniform(0.02, 0.6)
+        beside = with_tails(rng, (0.2, 2.0), (0.2, 12.0), 0.3)  # up to a shop front or a long partition
+        shares = rng.uniform(0.0 if beside < 4.0 else 0.7, 1.0, 2)
+        left, right = shares * min(beside * width, 3.7) + 0.02
+        above = rng.uniform(0.02, 0.6 if beside < 4.0 else 0.2)
         solid += frame((x0 + 0.004, -y - jamb - left, 0.0), (x1 - 0.003, y + jamb + right, height + jamb + above),
                        [left + 0.002, right + 0.002, 0.0, above + 0.002], 1, 2)  # fmt: skip
     elif extra == "arch":

@@ -1,8 +1,8 @@
 """Furniture with drawers: chests and nightstands, tables with drawers under the top, desks with pedestals.
 
-What varies: the kind; number and grid of the drawers, how wide those of a row and how high those of a column are, on
-which side of a desk they are, in one row or at the back of a table as well; open compartments and fronts that do not
-move; legs, plinths and shelves; fronts and handles.
+What varies: the kind; proportions (a few are long and low, deep or tall); number and grid of the drawers, how wide
+those of a row and how high those of a column are, on which side of a desk they are, in one row or at the back of a
+table as well; open compartments and fronts that do not move; legs, plinths and shelves; fronts and handles.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from artsim.families.details import bar_handle, bow_handle, knob, panel
+from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
 from artsim.model.kinematics import Array
@@ -20,6 +21,9 @@ from artsim.model.kinematics import Array
 GAP = 0.002
 _FRONT = 0.018  # thickness of a front
 _NARROWEST, _SHALLOWEST = 0.12, 0.1  # of what is between a table's legs, and of its drawers with what is around them
+
+_LEAST_SHARES, _MOST_SHARES = (0.148, 0.28, 0.11), (0.84, 0.983, 0.935)
+"""Depth, width and height of unusual furniture over its diagonal."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +140,8 @@ def _style(rng: np.random.Generator) -> _Style:
         reach=rng.uniform(0.015, 0.04),
         rise=rng.uniform(-0.2, 0.3),
         side=rng.uniform(0.6, 0.95),
-        length=rng.uniform(0.75, 1.0),
-        travel=rng.triangular(0.6, 0.95, 1.0),
+        length=with_tails(rng, (0.75, 1.0), (0.45, 1.0), 0.15),
+        travel=with_tails(rng, (0.65, 0.97), (0.35, 1.0), 0.3),
     )
 
 
@@ -150,6 +154,13 @@ def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
     wall = rng.uniform(0.012, 0.03)
     raised = rng.random() < 0.4
     legs = rng.uniform(0.08, 0.45) if raised else rng.uniform(0.0, 0.1)
+    if rng.random() < 0.45:
+        depth, width, height = unusual_sides(rng, _LEAST_SHARES, _MOST_SHARES, (0.24, 0.3, 0.2)).tolist()
+        legs = min(legs, 0.5 * height - 0.05)
+        height -= legs
+        columns, rows = max(1, min(columns, int(width / 0.2))), max(1, min(rows, int(height / 0.11)))
+        if width > 6 * height and rng.random() < 0.7:
+            columns = int(rng.integers(2, 5))
     x0, x1, y, top = -depth / 2, depth / 2, width / 2, legs + height
     contents = ["drawer"] * rows
     if rows > 1 and rng.random() < 0.3:  # the lower rows, the commonest first
@@ -178,6 +189,8 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
     height = rng.uniform(0.35, 0.85)
     width = height * rng.uniform(0.7, 3.2)
     depth = min(max(width * rng.uniform(0.35, 1.0), 0.3), 1.0)
+    if rng.random() < 0.25:
+        depth, width, height = unusual_sides(rng, _LEAST_SHARES, _MOST_SHARES, (0.3, 0.34, 0.32)).tolist()
     thick, over = rng.uniform(0.015, 0.05), rng.uniform(0.0, 0.07)
     leg = height * rng.uniform(0.05, 0.13)
     over = min(over, width / 2 - leg - _NARROWEST / 2, depth / 2 - leg - _SHALLOWEST / 2)  # room between the legs

@@ -1,7 +1,8 @@
 """Faucets: basin mixers, kitchen taps, three-piece sets, pillar taps and wall-mounted bath taps.
 
-What varies: the layout, whether the spout turns, the spout (gooseneck, bow, straight tube, flat bar), one or two
-handles (levers, paddles, crosses, round knobs), how they turn, the body and its feet.
+What varies: the layout, how far, high and wide it reaches (a few are tall, far or wide), whether the spout turns, the
+spout (gooseneck, bow, straight tube, flat bar), one or two handles (levers, paddles, crosses, round knobs), how they
+turn and lean, the body and its feet.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute, screw
 from artsim.making.solids import Solid, Vector, cylinder, ellipsoid, hull_of, rounded_box, tube, union
 from artsim.model.kinematics import Array
@@ -28,8 +30,8 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _basin_mixer(rng: np.random.Generator) -> Assembly:
     """A body with a fixed spout, and one handle on its top."""
-    radius, height = rng.uniform(0.017, 0.028), rng.uniform(0.06, 0.2)
-    reach = rng.uniform(0.08, 0.17)
+    radius, height = with_tails(rng, (0.017, 0.028), (0.01, 0.028), 0.2), with_tails(rng, (0.06, 0.2), (0.04, 0.5), 0.3)
+    reach = with_tails(rng, (0.08, 0.17), (0.05, 0.8), 0.3)
     body, top = _body(rng, radius, height)
     r = radius * rng.uniform(0.5, 0.8)
     kind = rng.choice(["straight", "bar", "drooping", "bow"])
@@ -51,11 +53,16 @@ def _basin_mixer(rng: np.random.Generator) -> Assembly:
         body += tube(path, (np.linspace(1.0, 0.75, 9) * r).tolist(), 14)
         body += _nozzle(rng, path[-1] + 0.2 * (path[-2] - path[-1]), path[-1] - path[-2], 0.85 * r, 0.9 * r)
     tap = Assembly()
+    # A leaning axis stands on a stub, so that the hub's rim clears the body's top.
+    lean = rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.5) if rng.random() < 0.35 else 0.0
+    axis, start = (cos(lean) * UP + sin(lean) * FRONT, cos(lean) * FRONT - sin(lean) * UP)
+    pivot = np.array([0.0, 0.0, top]) + 2.0 * radius * sin(abs(lean)) * axis
+    if lean:
+        body += cylinder(pivot - 2.5 * radius * sin(abs(lean)) * axis, pivot, 0.9 * radius)
     tap.add("base", body, density=BRASS)
-    pivot = np.array([0.0, 0.0, top])
-    handle = _handle(rng, pivot, UP, FRONT, radius * rng.uniform(0.9, 1.0), rng.uniform(0.05, 0.12), True)
-    low, high = (-0.5 * np.pi, 0.5 * np.pi) if rng.random() < 0.7 else (0.0, rng.uniform(0.8, 1.9))
-    tap.add("handle", handle, revolute("base", UP, pivot, low, high), density=BRASS)
+    handle = _handle(rng, pivot, axis, start, radius * rng.uniform(0.9, 1.0), rng.uniform(0.05, 0.12), True)
+    low, high = (-0.5 * np.pi, 0.5 * np.pi) if rng.random() < 0.7 and lean <= 0 else (0.0, rng.uniform(0.8, 1.9))
+    tap.add("handle", handle, revolute("base", axis, pivot, low, high), density=BRASS)
     return tap
 
 
@@ -70,12 +77,13 @@ def _kitchen_mixer(rng: np.random.Generator) -> Assembly:
     hub = radius * rng.uniform(0.6, 0.85)
     hub = min(hub, level - 0.012, top - level - 0.002)
     body += cylinder((0, 0, level), (0, side * stem, level), hub, sections=20)
-    length = rng.uniform(0.05, 0.09)
+    length = with_tails(rng, (0.05, 0.09), (0.05, 0.15), 0.2)
     # A turning spout passes over the lever, wherever that points.
     lowest = level + 1.2 * length + 0.02
-    r = radius * rng.uniform(0.45, 0.7)
-    reach = rng.uniform(0.13, 0.24)
-    spout = _gooseneck(rng, np.array([0.0, 0.0, top]), r, reach, max(lowest, top + 0.03) + rng.uniform(0.0, 0.1))
+    r = radius * rng.uniform(0.4, 0.7)
+    reach = with_tails(rng, (0.13, 0.24), (0.1, 0.5), 0.2)
+    tip = max(lowest, top + 0.03) + with_tails(rng, (0.0, 0.1), (0.0, 0.4), 0.2)
+    spout = _gooseneck(rng, np.array([0.0, 0.0, top]), r, reach, tip)
     tap = Assembly()
     tap.add("base", body, density=BRASS)
     pivot = np.array([0.0, side * stem, level])
@@ -100,7 +108,7 @@ def _swing(rng: np.random.Generator, origin: Vector) -> JointSpec:
 
 def _three_piece(rng: np.random.Generator) -> Assembly:
     """A spout between two handles on one plate."""
-    spread = rng.uniform(0.08, 0.13)
+    spread = with_tails(rng, (0.08, 0.13), (0.07, 0.38), 0.25)
     foot_radius, foot_height = rng.uniform(0.018, 0.026), rng.uniform(0.02, 0.07)
     plate = rng.uniform(0.005, 0.012)
     half = foot_radius + rng.uniform(0.003, 0.012)
@@ -112,9 +120,9 @@ def _three_piece(rng: np.random.Generator) -> Assembly:
     r = foot_radius * rng.uniform(0.4, 0.6)
     column = foot_height * rng.uniform(0.6, 1.3) + 0.01
     base += cylinder((0, 0, 0.5 * plate), (0, 0, column), foot_radius, max(taper * foot_radius, 1.2 * r))
-    reach = rng.uniform(0.1, 0.18)
+    reach = with_tails(rng, (0.1, 0.18), (0.06, 0.35), 0.25)
     length = min(rng.uniform(0.05, 0.08), spread - foot_radius - 0.012)
-    tip = foot_height + 0.06 + rng.uniform(0.0, 0.06)
+    tip = foot_height + 0.06 + with_tails(rng, (0.0, 0.06), (0.0, 0.3), 0.2)
     spout = _gooseneck(rng, np.array([0.0, 0.0, column]), r, reach, tip)
     tap = Assembly()
     turning = rng.random() < 0.6
@@ -158,7 +166,7 @@ def _pillar_tap(rng: np.random.Generator) -> Assembly:
 
 def _wall_tap(rng: np.random.Generator) -> Assembly:
     """A bar on two wall flanges, a knob at each end, and a spout that swings below."""
-    half, radius = rng.uniform(0.08, 0.13), rng.uniform(0.016, 0.024)
+    half, radius = with_tails(rng, (0.08, 0.13), (0.05, 0.5), 0.4), with_tails(rng, (0.016, 0.024), (0.011, 0.024), 0.3)
     body = tube([(0, -half, 0), (0, half, 0)], radius, 20)
     wall = radius + rng.uniform(0.02, 0.05)
     for y in (-0.6 * half, 0.6 * half):
@@ -166,7 +174,7 @@ def _wall_tap(rng: np.random.Generator) -> Assembly:
         body += cylinder((wall - 0.006, y, 0), (wall + 0.004, y, 0), 1.5 * radius, sections=24)
     drop = radius + rng.uniform(0.008, 0.02)
     body += cylinder((0, 0, 0), (0, 0, -drop), 0.85 * radius, sections=20)
-    reach, r = rng.uniform(0.12, 0.2), 0.6 * radius
+    reach, r = with_tails(rng, (0.12, 0.2), (0.05, 0.75), 0.4), 0.6 * radius
     s = np.linspace(0.0, 0.5 * np.pi, 6)
     bend = 2.2 * r
     low = -drop - GAP
@@ -178,11 +186,11 @@ def _wall_tap(rng: np.random.Generator) -> Assembly:
     limit = min(arcsin(min((half - 0.03) / (reach + bend + 2 * r), 1.0)), 1.2)
     tap.add("spout", spout, revolute("base", UP, (0, 0, low), -limit, limit), density=BRASS)
     style = int(rng.integers(1 << 30))
-    size = radius * rng.uniform(1.3, 1.9)
+    size, turn = radius * rng.uniform(1.3, 2.2), min(with_tails(rng, (1.57, 3.0), (0.8, 3.4), 0.4), np.pi)
     for number, side in enumerate((-1.0, 1.0)):
         pivot, out = np.array([0.0, side * half, 0.0]), np.array([0.0, side, 0.0])
         knob = _knob(np.random.default_rng(style), pivot, out, size)
-        tap.add(f"handle_{number}", knob, revolute("base", out, pivot, 0.0, 3.1), density=BRASS)
+        tap.add(f"handle_{number}", knob, revolute("base", out, pivot, 0.0, turn), density=BRASS)
     return tap
 
 

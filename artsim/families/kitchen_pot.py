@@ -1,7 +1,7 @@
 """Kitchen pots: casseroles, stockpots, saucepans, bellied pots and pans with a lid.
 
-What varies: the shape, one long or two short handles of several kinds, the lid (flat, domed, with a rim), its knob or
-bow, whether the lid lifts off or swings up about a hinge at the back.
+What varies: the size and the shape, one long or two short handles of several kinds, the lid (flat, domed, with a rim),
+its knob or bow, whether the lid lifts off or swings up about a hinge at the back.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
 from artsim.model.kinematics import Array
@@ -20,9 +21,9 @@ STEEL = 2500.0  # kg/m^3, as walls are thicker than real ones
 
 def build(rng: np.random.Generator) -> Assembly:
     """A pot with its lid on at rest; it faces -X."""
-    radius = rng.uniform(0.08, 0.16)
+    radius = with_tails(rng, (0.08, 0.16), (0.06, 0.24), 0.2)
     shape = str(rng.choice(["straight", "flared", "bellied", "round"], p=[0.4, 0.2, 0.2, 0.2]))
-    height = radius * (rng.uniform(0.3, 0.9) if rng.random() < 0.4 else rng.uniform(0.9, 2.1))
+    height = radius * (rng.uniform(0.3, 0.9) if rng.random() < 0.4 else with_tails(rng, (0.9, 2.1), (0.9, 3.0), 0.15))
     wall = rng.uniform(0.003, 0.006)
     profile = _profile(rng, shape, radius, height)
     pot = vessel(profile, wall, sections=24)
@@ -103,7 +104,7 @@ def _stick(rng: np.random.Generator, radius: float, z: float) -> Solid:
 
 def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Solid:
     """Short handle at -X."""
-    spread, reach = rng.uniform(0.25, 0.45), rng.uniform(0.022, 0.045)
+    spread, reach = rng.uniform(0.25, 0.45), with_tails(rng, (0.022, 0.045), (0.012, 0.06), 0.3)
     inside = radius - 0.003
     start, end = (np.array([-inside * cos(spread), s * inside * sin(spread), z]) for s in (-1, 1))
     if kind == "bow":
@@ -127,7 +128,7 @@ def _lid(
     rng: np.random.Generator, radius: float, height: float, wall: float, mouth: float, hinged: bool
 ) -> tuple[Solid, float, float]:
     """The lid, its radius, and the height of its top."""
-    lid_radius = radius + rng.uniform(-0.5 * wall, 0.004)
+    lid_radius = radius + with_tails(rng, (-0.5 * wall, 0.004), (-0.5 * wall, 0.01), 0.2)
     z = height + GAP
     rim = rng.uniform(0.003, 0.008)
     solid = cylinder((0, 0, z), (0, 0, z + rim), lid_radius, sections=24)

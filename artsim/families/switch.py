@@ -1,6 +1,7 @@
 """Wall switches: one to four rockers, toggles or dimmer knobs on a plate.
 
-What varies: how many, what kind, side by side or above one another, square and long plates, screws, bevels.
+What varies: how many, what kind, side by side or above one another, square and long plates, how deep they are, screws,
+bevels, how long toggles are.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.common.elementary import sin, tan
+from artsim.common.elementary import arctan, sin, tan
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
 from artsim.model.kinematics import Array
@@ -23,7 +25,7 @@ def build(rng: np.random.Generator) -> Assembly:
     kind = str(rng.choice(["rocker", "toggle", "dimmer"], p=[0.65, 0.25, 0.1]))
     count = int(rng.choice([1, 2, 3, 4], p=[0.35, 0.35, 0.18, 0.12]))
     upright = kind == "rocker" and count > 1 and rng.random() < 0.2
-    depth = rng.uniform(0.007, 0.022)
+    depth = with_tails(rng, (0.007, 0.022), (0.006, 0.032), 0.15)
     height = rng.uniform(0.065, 0.15)
     border = height * rng.uniform(0.08, 0.2)
     pitch = {"rocker": rng.uniform(0.022, 0.045), "toggle": rng.uniform(0.036, 0.046), "dimmer": 0.06}[kind]
@@ -43,7 +45,10 @@ def build(rng: np.random.Generator) -> Assembly:
     else:
         plate += rounded_box((-depth, -width / 2, -height / 2), (0, width / 2, height / 2), 0.004)
     buttons: list[tuple[Solid, JointSpec]] = []
-    tilt, style = np.deg2rad(rng.uniform(2.0, 8.0)), int(rng.integers(1 << 30))
+    # The end of a rocker that is pressed in stays before the plate's back.
+    room = 0.8 * depth - 0.0028 - 0.3 * min(0.3 * depth, 0.004)
+    steepest = arctan(2.0 * room / (0.5 * (cells[0][1, 1] - cells[0][0, 1])))
+    tilt, style = min(np.deg2rad(rng.uniform(2.0, 8.0)), steepest), int(rng.integers(1 << 30))
     level = rng.random() < 0.35  # rockers rest in the middle and tip either way
     live = int(rng.integers(1, count + 1)) if rng.random() < 0.3 else count  # how many move; the others are set
     order = rng.permutation(count)
@@ -139,7 +144,7 @@ def _toggle(rng: np.random.Generator, center: Array, depth: float) -> Solid:
     """A bat on a round hub, straight out."""
     x = -depth - 0.006
     wide, r = rng.uniform(0.0035, 0.006), 0.0045
-    length = rng.uniform(0.012, 0.02)
+    length = with_tails(rng, (0.012, 0.02), (0.007, 0.028), 0.3)
     hub = cylinder((x, -wide, 0), (x, wide, 0), r, sections=18)
     root = rounded_box((x - 0.003, -wide, -0.003), (x, wide, 0.003), 0.001)
     tip_half = rng.uniform(0.003, 0.0043)

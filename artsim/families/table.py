@@ -1,8 +1,8 @@
 """Tables and desks: drawers and doors under the top, and what else of a table moves.
 
-What varies: the kind (apron between legs, pedestals, a case on a stand, a column), size, tops (square, round, oval),
-legs, the grid of cells under the top and what they hold, cells at the back, leaves that drop, tops that turn, tip or
-rise, a tray for a keyboard, wheels.
+What varies: the kind (apron between legs, pedestals, a case on a stand, a column), size and proportions (a few are long
+consoles, low slabs, deep or tall stands), tops (square, round, oval), legs, the grid of cells under the top and what
+they hold, cells at the back, leaves that drop, tops that turn, tip or rise, a tray for a keyboard, wheels.
 """
 
 from __future__ import annotations
@@ -14,11 +14,14 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
 from artsim.families.fronts import Style
+from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, Table, drop_leaves, four_legs, keyboard_tray, table_top, wheels
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
 
 UP = (0.0, 0.0, 1.0)
+LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
+"""Depth, width and height of unusual tables over their diagonal."""
 
 
 def build(rng: np.random.Generator) -> Assembly:
@@ -35,7 +38,8 @@ def build(rng: np.random.Generator) -> Assembly:
     return assembly
 
 
-def _style(rng: np.random.Generator) -> Style:
+def _style(rng: np.random.Generator, deep: bool = False) -> Style:
+    """Of all fronts; the drawers of a deep table come out nearly wholly."""
     return Style(
         face=0.0,
         back=0.0,
@@ -52,7 +56,7 @@ def _style(rng: np.random.Generator) -> Style:
         handle_length=rng.uniform(0.06, 0.4),
         reach=rng.uniform(0.014, 0.04),
         grip=rng.uniform(0.004, 0.008),
-        travel=rng.triangular(0.45, 0.8, 0.92),
+        travel=rng.uniform(0.92, 1.0) if deep else with_tails(rng, (0.5, 0.9), (0.35, 1.0), 0.4),
     )
 
 
@@ -62,6 +66,8 @@ def _apron(rng: np.random.Generator, table: Table) -> None:
     width, depth = height * rng.uniform(0.65, 3.4), height * rng.uniform(0.4, 1.7)
     depth = float(np.clip(depth, 0.3, 1.1))
     width = float(np.clip(width, 0.34, 2.4))
+    if rng.random() < 0.3:
+        depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.28, 0.34, 0.3)).tolist()
     thick, over = rng.uniform(0.014, 0.06), rng.uniform(0.0, 0.06)
     size = height * rng.uniform(0.04, 0.12)
     size = min(size, 0.2 * depth, 0.15 * width)
@@ -73,7 +79,7 @@ def _apron(rng: np.random.Generator, table: Table) -> None:
     foot = 0.07 if rolling else 0.0
     table.body += table_top(rng, depth, width, top, height)
     table.body += four_legs(rng, x, y, foot, top + 0.001, size, splay=rng.random() < 0.2)
-    style = _style(rng)
+    style = _style(rng, depth > width)
     inset = 0.25 * size
     both = rng.random() < 0.12 and 2 * x > 0.5
     rear = not both and rng.random() < 0.1
@@ -120,7 +126,7 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
     top, x, y = height - thick, depth / 2 - over, width / 2 - over
     table.body += table_top(rng, depth, width, top, height)
     style = _style(rng)
-    broad = min(rng.uniform(0.26, 0.5), 0.38 * width)
+    broad = min(with_tails(rng, (0.26, 0.5), (0.1, 0.6), 0.4), 0.38 * width)
     sides = [(-1,), (1,), (-1, 1)][rng.choice(3, p=[0.3, 0.3, 0.4])]
     rolling = rng.random() < 0.1
     on_legs = not rolling and rng.random() < 0.35
@@ -130,6 +136,7 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
     low_z = (
         rng.uniform(0.1, 0.5) * height if on_legs else 0.07 if rolling else rng.choice([0.0, rng.uniform(0.03, 0.12)])
     )
+    broad = min(broad, outer - 0.1) if len(sides) == 2 else broad  # room for knees
     deep = rng.uniform(0.75, 1.0) * 2 * x
     recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
     doors = float(rng.choice([0.0, 0.4, 1.0], p=[0.45, 0.3, 0.25]))
@@ -165,6 +172,8 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
         (front + deep - overhang - 0.012, far, top + 0.001),
     )
     between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
+    if far - near < 0.2:
+        between = "nothing"
     if between == "case":
         flat = rng.uniform(0.085, 0.14)
         table.add_case(
@@ -190,9 +199,11 @@ def _case(rng: np.random.Generator, table: Table) -> None:
     width, depth = height * rng.uniform(0.6, 3.2), height * rng.uniform(0.4, 1.6)
     depth = float(np.clip(depth, 0.28, 0.9))
     width = max(width, 0.34)
+    if rng.random() < 0.45:
+        depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.28, 0.34, 0.28)).tolist()
     thick, over = rng.uniform(0.012, 0.05), rng.uniform(0.0, 0.05)
     top, x, y = height - thick, depth / 2 - min(over, 0.1 * depth), width / 2 - over
-    style = _style(rng)
+    style = _style(rng, depth > width)
     stand = str(rng.choice(["legs", "plinth", "wheels"], p=[0.55, 0.3, 0.15]))
     low = {"legs": rng.uniform(0.12, 0.65), "plinth": rng.uniform(0.03, 0.2)}.get(stand, 0.0) * height
     low = 0.07 if stand == "wheels" else min(low, top - 0.12)

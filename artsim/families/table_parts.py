@@ -102,7 +102,7 @@ def _fill(
     width, height = cell.sides
     if not must_move and rng.random() < 0.12:
         return fronts.shelves(rng, cell, style) if rng.random() < 0.7 else fronts.fixed(cell, style)
-    if height > 0.2 and width > 0.16 and rng.random() < doors * (1.0 if height > 0.3 else 0.6):
+    if height > 0.2 and width > 0.05 and rng.random() < doors * (1.0 if height > 0.3 else 0.6):
         if width > 0.42 and rng.random() < 0.75:
             return (
                 fronts.double_door(rng, cell, style) if rng.random() < 0.85 else fronts.sliding_doors(rng, cell, style)
@@ -110,7 +110,7 @@ def _fill(
         if width < 1.3 * height:
             return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
         return fronts.door(rng, cell, style, str(rng.choice(["bottom", "top"])))
-    if height > 0.5:
+    if height > 0.65:
         return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
     return fronts.drawer(rng, cell, style)
 

@@ -1,7 +1,7 @@
 """Trash cans: pedal bins, bins with a swinging flap, bins with two lids, wheelie bins.
 
-Round or rectangular, straight or tapered; the lid turns at the back, about its middle, or in two halves at the sides.
-A pedal follows the lid; wheelie bins have two wheels and a grip at the back.
+Round or rectangular, low to slim and tall, straight or tapered; the lid turns at the back, about its middle, or in two
+halves at the sides. A pedal follows the lid; wheelie bins have two wheels and a grip at the back.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.families.details import rounded_tray
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
 
@@ -50,13 +51,16 @@ def build(rng: np.random.Generator) -> Assembly:
 
 def _size(rng: np.random.Generator) -> Bin:
     x, y = rng.uniform(0.09, 0.24), rng.uniform(0.09, 0.28)
+    height = min(with_tails(rng, (1.3, 4.2), (0.9, 4.5), 0.2) * max(x, y), 0.8)
+    if rng.random() < 0.15:  # slim and tall
+        (x, y), height = rng.uniform(0.06, 0.1, 2), rng.uniform(0.55, 1.0)
     radius = rng.uniform(0.015, 0.5) * min(x, y)
     if round_one := rng.random() < 0.35:
         y, radius = x, 0.999 * x
     return Bin(
         x=x,
         y=y,
-        height=min(rng.uniform(1.3, 4.2) * max(x, y), 0.8),
+        height=height,
         radius=radius,
         taper=float(rng.choice([0.0, rng.uniform(0.02, 0.16)])) * min(x, y),
         foot=rng.uniform(0.02, 0.05),
@@ -83,7 +87,7 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
     x, seam = size.x, size.height + GAP
     hinge = (x + 0.013, 0.0, seam)
     half = 0.4 * (size.y - 0.5 * size.radius)
-    rise = rng.uniform(0.08, 0.6) * min(size.x, size.y)
+    rise = max(with_tails(rng, (0.08, 0.6), (0.03, 0.8), 0.3) * min(size.x, size.y), 0.006)
     inset = rng.choice([0.25, 0.7, 1.0]) * rise
     profile = [(0.0, inset), (0.12, 0.45 * inset), (0.5, 0.06 * inset), (1.0, 0.0)]
     lid = rounded_tray((-x - 0.003, -size.y - 0.003, seam), (x + 0.003, size.y + 0.003, seam + rise), 0.003,

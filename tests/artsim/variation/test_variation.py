@@ -145,7 +145,7 @@ def test_an_exchanged_part_fills_the_box_of_the_part_that_it_replaces() -> None:
 
 
 def test_nothing_is_exchanged_for_a_part_of_another_kind() -> None:
-    assert exchange_part(artsim.make("laptop", 0), rng(), 1.0, [artsim.make("box", 0)]) is None
+    assert exchange_part(artsim.make("laptop", 0), rng(), 1.0, [artsim.make("drawer", 0)]) is None
     assert exchange_part(artsim.make("laptop", 0), rng(), 1.0, ()) is None
 
 

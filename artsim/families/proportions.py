@@ -1,0 +1,56 @@
+"""Draws with tails: most objects of a family are usual, and a few lie far from the middle.
+
+A flat draw over all that a category holds makes most objects odd. So the usual range is drawn most often, and its
+tails seldom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from artsim.common.elementary import arccos, arcsin, cos, sin
+from artsim.model.kinematics import Array
+
+
+def with_tails(
+    rng: np.random.Generator, usual: tuple[float, float], widest: tuple[float, float], share: float = 0.25
+) -> float:
+    """A number from the usual range, or with chance ``share`` from one of the tails up to the widest range."""
+    tails = [t for t in ((widest[0], usual[0]), (usual[1], widest[1])) if t[0] < t[1]]
+    if not tails or rng.random() >= share:
+        return float(rng.uniform(*usual))
+    return float(rng.uniform(*tails[int(rng.integers(len(tails)))]))
+
+
+def unusual_sides(
+    rng: np.random.Generator, low: Sequence[float], high: Sequence[float], least: Sequence[float]
+) -> Array:
+    """Sides of a box, one of which is near the end of its range.
+
+    Parameters
+    ----------
+    low, high : (3,) float
+        Smallest and largest share of each side in the diagonal.
+    least : (3,) float
+        Metres that each side needs at least; the box is up to a third larger than these ask for.
+
+    Returns
+    -------
+    (3,) float
+        Metres.
+    """
+    axis = int(rng.integers(3))
+    b, c = (k for k in range(3) if k != axis)
+    near = rng.uniform(0.0, 0.2)
+    value = low[axis] * (1.0 + near) if rng.random() < 0.5 else high[axis] - near * (1.0 - high[axis])
+    rest = float(np.sqrt(1.0 - value * value))
+    # Angle of the other two sides in their plane.
+    first = max(arccos(min(high[b] / rest, 1.0)), arcsin(min(low[c] / rest, 1.0)))
+    last = min(arccos(min(low[b] / rest, 1.0)), arcsin(min(high[c] / rest, 1.0)))
+    angle = rng.uniform(first, last) if first < last else 0.5 * (first + last)
+    shares = np.empty(3)
+    shares[[axis, b, c]] = value, rest * cos(angle), rest * sin(angle)
+    metres: Array = shares * (np.asarray(least) / shares).max() * rng.uniform(1.0, 1.3)
+    return metres
