@@ -10,6 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, rounded_box, tray, union
 from artsim.model.kinematics import Array
@@ -19,14 +20,15 @@ GAP = 0.0015
 
 def build(rng: np.random.Generator) -> Assembly:
     """A microwave oven, closed at rest. The back of its door is the plane x = 0."""
-    width, depth, height = rng.uniform(0.42, 0.62), rng.uniform(0.30, 0.48), rng.uniform(0.23, 0.37)
-    wall, thick = rng.uniform(0.012, 0.03), rng.uniform(0.018, 0.045)
+    width, depth = rng.uniform(0.42, 0.62), with_tails(rng, (0.30, 0.48), (0.16, 0.62))
+    height = with_tails(rng, (0.23, 0.37), (0.2, 0.46))
+    wall, thick = rng.uniform(0.012, 0.03), with_tails(rng, (0.018, 0.045), (0.008, 0.045))
     foot = rng.uniform(0.006, 0.018)
     drops = bool(rng.random() < 0.15)  # the door falls open, its controls below or above it
     mirrored = bool(rng.random() < 0.15)
     half = 0.5 * width
     # Controls take the strip of the front that the door leaves: at -Y (before mirroring), or below it.
-    strip = rng.uniform(0.17, 0.33) * width if rng.random() < 0.88 else 0.0
+    strip = with_tails(rng, (0.17, 0.33), (0.17, 0.5)) * width if rng.random() < 0.88 else 0.0
     low, high = np.array([-thick, strip - half, foot]), np.array([0.0, half, foot + height])
     panel_low, panel_high = np.array([-thick, -half, foot]), np.array([0.0, strip - half - GAP, foot + height])
     if drops:
@@ -58,9 +60,11 @@ def build(rng: np.random.Generator) -> Assembly:
 
     sign = -1.0 if mirrored else 1.0
     oven.add("body", placed(body + controls), density=350.0)
-    angle = np.deg2rad(rng.uniform(90.0, 90.0 if drops else 150.0))
+    angle = np.deg2rad(90.0 if drops else with_tails(rng, (90.0, 150.0), (45.0, 170.0)))
+    # The axis of a thin door may stand at the front face: the free edge of a thick one would run into the panel.
+    outer = thick if thick**2 < GAP * (high[1] - low[1]) and rng.random() < 0.5 else 0.0
     drop = revolute("body", (0, -1, 0), (-thick, 0, low[2]), 0.0, angle)
-    oven.add("door", placed(door), drop if drops else side_hinge(0.0, sign * half, angle, not mirrored))
+    oven.add("door", placed(door), drop if drops else side_hinge(-outer, sign * half, angle, not mirrored))
     for name, solid, point in movers:
         point = point * (1.0, sign, 1.0)
         turns = continuous("body", (-1, 0, 0), point)
@@ -145,9 +149,10 @@ def _controls(
         keys = [0.12 * size[long], 0.75 * size[short]]
         movers.append(("button_1", push_button(at(-0.39), keys if short == 2 else keys[::-1], 0.003), at(-0.39)))
     if rng.random() < 0.5:
-        radius = min(0.36 * size[short], 0.1 * size[long], 0.03)
-        for number, along in enumerate((0.15, -0.15)[: int(rng.integers(1, 3))], 1):
-            movers.append((f"dial_{number}", dial(at(along), (-1, 0, 0), rng.uniform(0.012, 0.022), radius), at(along)))
+        radius = min(0.36 * size[short], 0.1 * size[long], 0.03) * with_tails(rng, (0.9, 1.0), (0.55, 1.0))
+        reach, lower = with_tails(rng, (0.012, 0.022), (0.004, 0.022)), 0.0 if opener else rng.uniform(0.0, 0.12)
+        for number, along in enumerate((0.15 - lower, -0.15 - lower)[: int(rng.integers(1, 3))], 1):
+            movers.append((f"dial_{number}", dial(at(along), (-1, 0, 0), reach, radius), at(along)))
         return fixed, movers
     rows, columns = int(rng.integers(3, 6)), int(rng.integers(2, 4))
     moving = rng.random() < 0.35

@@ -12,6 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
 from artsim.model.kinematics import Array
@@ -24,14 +25,14 @@ def build(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.12:
         return _cooktop(rng)
     built_in = rng.random() < 0.25
-    half = 0.5 * (rng.uniform(0.54, 0.62) if built_in else rng.uniform(0.48, 0.78))
-    depth = rng.uniform(0.5, 0.66)
+    half = 0.5 * (rng.uniform(0.54, 0.62) if built_in else with_tails(rng, (0.48, 0.78), (0.44, 1.0)))
+    depth = with_tails(rng, (0.5, 0.66), (0.42, 0.72))
     height = rng.uniform(0.44, 0.62) if built_in else rng.uniform(0.82, 0.95)
     two = not built_in and rng.random() < 0.2
-    wall, thick = rng.uniform(0.03, 0.05), rng.uniform(0.03, 0.06)
+    wall, thick = rng.uniform(0.03, 0.05), with_tails(rng, (0.03, 0.06), (0.022, 0.1))
     guard = 0.0 if built_in or rng.random() < 0.55 else rng.uniform(0.06, 0.2)
     on_guard = guard > 0.11 and rng.random() < 0.6  # the dials
-    strip = rng.uniform(0.02, 0.05) if on_guard else rng.uniform(0.08, 0.13)
+    strip = rng.uniform(0.02, 0.05) if on_guard else with_tails(rng, (0.08, 0.13), (0.07, 0.2))
     plinth = 0.01 if built_in else rng.uniform(0.03, 0.11)
     drawer = rng.uniform(0.13, 0.2) if not built_in and not two and rng.random() < 0.55 else 0.0
     ceiling = height - strip
@@ -65,7 +66,9 @@ def build(rng: np.random.Generator) -> Assembly:
     kind, reach = str(rng.choice(["bar", "bow", "flat"])), rng.uniform(0.035, 0.055)
     for number, (low, high) in enumerate(pairwise(edges), 1):
         corner_low = np.array([-thick, 0.001 - half, low + GAP])
-        corner_high = np.array([0.0, half - 0.001, high - 3 * GAP])
+        # The upper back edge of a door that drops rises before it falls.
+        rise = thick**2 / (2.0 * (high - low))
+        corner_high = np.array([0.0, half - 0.001, high - max(3 * GAP, rise + GAP)])
         name = f"door_{number}" if two else "door"
         door, grip = _door(rng, corner_low, corner_high, kind, reach)
         oven.add(name, door, _hinge(rng, corner_low, corner_high, sideways, grip, reach if number == 2 else 0.0))
@@ -75,7 +78,7 @@ def build(rng: np.random.Generator) -> Assembly:
         oven.add("drawer", _drawer(rng, half, depth, thick, wall, plinth, floor, kind),
                  prismatic("body", (-1, 0, 0), 0.0, travel, (0, 0, 0.5 * (plinth + floor))))  # fmt: skip
     face, middle = (depth - 0.05, height + 0.5 * guard) if on_guard else (-thick, height - 0.5 * strip)
-    _dials(rng, oven, half, face, middle, min(0.5 * guard, 0.06) if on_guard else 0.5 * strip)
+    _dials(rng, oven, half, face, middle, min(0.5 * guard, 0.035) if on_guard else 0.5 * strip)
     return oven
 
 
@@ -200,12 +203,14 @@ def _drawer(
 def _dials(rng: np.random.Generator, oven: Assembly, half: float, face: float, z: float, room: float) -> None:
     """A row of dials, perhaps around a display, and perhaps buttons."""
     count = int(rng.integers(2, 8))
-    reach = rng.uniform(0.018, 0.035)
+    reach = with_tails(rng, (0.018, 0.035), (0.01, 0.055))
     stops = rng.random() < 0.35
-    ys = np.linspace(-0.85, 0.85, count + 2)[1:-1] * half
+    end = with_tails(rng, (0.85, 0.85), (0.85, 1.1), 0.3)  # of the row of dials, with a gap before it
+    ys = np.linspace(-end, end, count + 2)[1:-1] * half
     if rng.random() < 0.4:  # in two groups
         ys = np.sign(ys + 1e-6) * (0.25 + 0.65 * np.abs(ys) / half) * half
-    radius = min(rng.uniform(0.016, 0.026), 0.75 * room, 0.42 * float(np.diff(ys).min()))
+    room = min(0.75 * room, 0.42 * float(np.diff(ys).min()), half - float(np.abs(ys).max()) - 0.002)
+    radius = min(with_tails(rng, (0.016, 0.026), (0.01, 0.045)), room)
     for number, y in enumerate(ys, 1):
         foot = (face, float(y), z)
         turn = revolute("body", (-1, 0, 0), foot, 0.0, 5.0) if stops else continuous("body", (-1, 0, 0), foot)

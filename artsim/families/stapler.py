@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_box, rounded_rectangle
 from artsim.model.kinematics import Array
@@ -83,7 +84,7 @@ def build(rng: np.random.Generator) -> Assembly:
     stapler.add("base", _base(rng, lay, arm_width), density=2500.0)
     magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
     widest = _opening(arm, lay)
-    wide = min(np.deg2rad(rng.uniform(80, 125) if rng.random() < 0.6 else rng.uniform(125, 204)), widest)
+    wide = min(np.deg2rad(with_tails(rng, (80, 125), (80, 206), 0.45)), widest)
     axis, origin = (0, 1, 0), (0, 0, hinge)
     if rng.random() < 0.55:
         lift = min(np.deg2rad(rng.uniform(12, 50)), 0.5 * wide)
@@ -100,7 +101,7 @@ def _back(rng: np.random.Generator, length: float, tail: float) -> float:
     kind = rng.random()
     if kind < 0.45:
         return float(tail * rng.uniform(0.5, 0.8))
-    return float(tail * rng.uniform(1.0, 2.2) if kind < 0.8 else length * rng.uniform(0.1, 0.95))
+    return float(tail * rng.uniform(1.0, 2.2) if kind < 0.8 else length * rng.uniform(0.1, 1.1))
 
 
 def _opening(solid: Solid, lay: Layout) -> float:
@@ -108,7 +109,7 @@ def _opening(solid: Solid, lay: Layout) -> float:
     corners = np.concatenate([vertices[faces] for vertices, faces in solid.piece_meshes()])
     points = np.concatenate([corners + t * (np.roll(corners, 1, axis=1) - corners) for t in (0.0, 0.25, 0.5, 0.75)])
     points = points.reshape(-1, 3)
-    angles = np.deg2rad(np.arange(0.0, 205.0, 2.0))
+    angles = np.deg2rad(np.arange(0.0, 207.0, 2.0))
     heights = lay.hinge + (points[:, 2] - lay.hinge) * cos(angles)[:, None] - points[:, 0] * sin(angles)[:, None]
     forward = points[:, 0] * cos(angles)[:, None] + (points[:, 2] - lay.hinge) * sin(angles)[:, None]
     low = ((heights < lay.base + 2 * GAP) & (forward < lay.back + 2 * GAP)).any(axis=1)
@@ -179,6 +180,8 @@ def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
         [front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, rng.uniform(0.3, 0.6) * lay.tail]
     )
     kind = str(rng.choice(["straight", "arched", "nosed", "wedge", "tapered"]))
+    if lay.back < lay.tail and rng.random() < 0.3:  # nothing behind the hinge keeps it from turning over
+        kind = "tapered"
     heights: Array = {
         "straight": np.array([0.85, 0.95, 1.0, 1.0, 0.9, 0.8, 0.5]),
         "arched": np.array([0.5, 0.8, 1.05, 1.05, 0.85, 0.7, 0.4]),

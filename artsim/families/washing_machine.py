@@ -13,6 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
+from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, ring, rounded_box, tray, union, vessel
 from artsim.model.kinematics import Array
@@ -40,6 +41,8 @@ def build(rng: np.random.Generator) -> Assembly:
         low=low,
         high=low + (rng.uniform(0.8, 0.95) if front_loader else rng.uniform(0.85, 0.98)),
     )
+    if not front_loader and rng.random() < 0.35:  # narrow and tall ones, for small rooms
+        shape = Shape(0.5 * rng.uniform(0.4, 0.56), rng.uniform(0.42, 0.6), low, low + rng.uniform(0.85, 1.15))
     return _front_loader(rng, shape) if front_loader else _top_loader(rng, shape)
 
 
@@ -203,7 +206,7 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
         lid += rounded_box((low[0] - 0.012, -0.07, low[2] + 0.004), (low[0] + 0.01, 0.07, high[2] - 0.003), 0.004)
         machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
     else:
-        upper, side = np.deg2rad(rng.uniform(85.0, 120.0)), int(rng.choice([-1, 1]))
+        upper, side = np.deg2rad(with_tails(rng, (85.0, 120.0), (40.0, 120.0), 0.3)), int(rng.choice([-1, 1]))
         x, free = 0.5 * (low[0] + high[0]), -side * high[1]
         lid += rounded_box((x - 0.06, free - 0.01, low[2] + 0.004), (x + 0.06, free + 0.01, high[2] - 0.003), 0.004)
         machine.add("lid", lid, revolute("body", (-side, 0, 0), (x, side * high[1], high[2]), 0.0, upper))
