@@ -36,6 +36,9 @@ from artperl.retrieval.shape_base import ShapeBase
 
 _LATE_POINTS = 8192
 """Points that occluded parts and normals are posed by."""
+_OWN = 0.9
+"""Probability from which a point is taken for one of the object: a foreign point moves faces of boxes, while a point of
+the object that is left out is missed by nobody."""
 _MOST_FOREIGN = 0.5
 """Share of points that may be taken for something else; masks as bad as that are no masks of the object."""
 
@@ -161,12 +164,12 @@ class Estimator:
         clouds = Clouds.of(cloud.tensor(self.perception.device))
         with clock("perception"):
             first = self.perception(clouds.points)
-        foreign, share = (first.own_logits[0] < 0.0).cpu().numpy(), 0.0
+        own, share = first.own_logits[0].sigmoid().double().cpu().numpy(), 0.0
+        foreign = own < _OWN
         if foreign.any():
             with clock("label smoothing"):
-                own = first.own_logits.sigmoid()[0, :, None].double().cpu().numpy()
-                own = smooth_labels(clouds.points[0].double().cpu().numpy(), own, float(first.log_diagonal.exp()[0]))
-                foreign = own[:, 0] < 0.5
+                points, diagonal = clouds.points[0].double().cpu().numpy(), float(first.log_diagonal.exp()[0])
+                foreign = smooth_labels(points, own[:, None], diagonal)[:, 0] < _OWN
             share = float(foreign.mean())
         if not 0.0 < share < _MOST_FOREIGN:
             return cloud, clouds, self._parts(clouds, first, clock), share

@@ -77,8 +77,8 @@ def build(rng: np.random.Generator) -> Assembly:
         travel = min(0.65 * depth, grip - floor - 0.09)
         oven.add("drawer", _drawer(rng, half, depth, thick, wall, plinth, floor, kind),
                  prismatic("body", (-1, 0, 0), 0.0, travel, (0, 0, 0.5 * (plinth + floor))))  # fmt: skip
-    face, middle = (depth - 0.05, height + 0.5 * guard) if on_guard else (-thick, height - 0.5 * strip)
-    _dials(rng, oven, half, face, middle, min(0.5 * guard, 0.035) if on_guard else 0.5 * strip)
+    face, middle = (depth - 0.05, height + 0.66 * guard) if on_guard else (-thick, height - 0.5 * strip)
+    _dials(rng, oven, half, face, middle, min(0.3 * guard, 0.035) if on_guard else 0.5 * strip)
     return oven
 
 
