@@ -146,7 +146,7 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: 
         errors=errors,
         symmetric_errors=nearest,
         parts_found=match_share(estimate, sample),
-        segmentation=float((estimate.part == np.where(sample.part == FOREIGN, -1, sample.part.astype(np.int64))).mean()),
+        segmentation=float((estimate.part == np.where(sample.part == FOREIGN, -1, sample.part.astype(int))).mean()),
         failed=False,
         symptoms=estimate.symptoms,
         confidence=estimate.confidence,
