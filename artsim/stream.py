@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
+from artsim.datasets.padding import PaddedStream
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ConfigError
 from artsim.loading.sources import family_sources
@@ -26,7 +28,8 @@ class FamilyStream:
 
     Object ``n`` is drawn from (seed, n) and is of category ``n`` modulo the number of categories; sample ``i`` shows
     object ``i // views_per_object`` and is always the same. Iterating yields all samples of the objects ``start``,
-    ``start + step``, ...: give each training process its own ``start`` and a common ``step``.
+    ``start + step``, ... Workers of a torch ``DataLoader``, and processes of its process group, share the objects out
+    by themselves; other processes need a ``start`` of their own and a common ``step``.
 
     Parameters
     ----------
@@ -64,7 +67,24 @@ class FamilyStream:
         self.options, self.seed = options or SampleOptions(), seed
         self.views_per_object, self.start, self.step = views_per_object, start, step
         self._renderer: Renderer | None = None
+        self._rank: tuple[int, int] | None = None
         self._object = lru_cache(maxsize=8)(self._make)
+        register_with_torch(FamilyStream)
+
+    def padded(self, max_parts: int, float32: bool = False) -> PaddedStream:
+        """The stream as dictionaries of arrays of one shape, which default collation stacks.
+
+        Parameters
+        ----------
+        max_parts : int
+            Rows of per-part arrays. An object with more parts is an error.
+        float32 : bool
+            Poses, boxes and joints in single precision, too.
+        """
+        return PaddedStream(self, max_parts, float32)
+
+    def __len__(self) -> int:
+        raise TypeError(NO_LENGTH)
 
     def __getitem__(self, i: int) -> Sample:
         if i < 0:
@@ -78,11 +98,12 @@ class FamilyStream:
         return self._object(n)
 
     def __iter__(self) -> Iterator[Sample]:
-        n = self.start
+        share, shares = share_of(self._rank or process_rank())
+        n = self.start + share * self.step
         while True:
             for view in range(self.views_per_object):
                 yield self[n * self.views_per_object + view]
-            n += self.step
+            n += shares * self.step
 
     def _make(self, n: int) -> ArticulatedObject:
         seed = int(np.random.default_rng([self.seed, n]).integers(*STREAM_SEEDS))
@@ -90,8 +111,10 @@ class FamilyStream:
         return source.load()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**{k: v for k, v in self.__dict__.items() if k != "_object"}, "_renderer": None}
+        rank = self._rank or process_rank()  # of the process that hands it to workers, which have no group
+        return {**{k: v for k, v in self.__dict__.items() if k != "_object"}, "_renderer": None, "_rank": rank}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        register_with_torch(FamilyStream)
         self._object = lru_cache(maxsize=8)(self._make)

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
 from artsim.datasets.description import read_description
+from artsim.datasets.padding import PaddedDataset, PaddedStream
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.problems import repair_command
 from artsim.datasets.sample_options import draw_sample
@@ -20,7 +21,6 @@ from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
-from artsim.model.kinematics import JOINT_TYPES
 from artsim.model.object_file import ObjectCache
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
@@ -125,15 +125,17 @@ class Dataset:
         """The object that a sample shows, at the sample's scale."""
         return self.objects[self.planned(sample.index).key].scaled(sample.scale)
 
-    def padded(self, max_parts: int | None = None) -> PaddedDataset:
+    def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedDataset:
         """View as dictionaries of arrays of one shape, which default collation stacks.
 
         Parameters
         ----------
         max_parts : int, optional
             Rows of per-part arrays; by default the most parts of any object of the dataset.
+        float32 : bool
+            Poses, boxes and joints in single precision, too.
         """
-        return PaddedDataset(self, max_parts or max(o.num_parts for o in self.plan.objects))
+        return PaddedDataset(self, max_parts or max(o.num_parts for o in self.plan.objects), float32)
 
     def stream(self, split: str = "train", seed: int | None = None, start: int = 0, step: int = 1) -> SampleStream:
         """Fresh samples of a split's objects for ever, drawn like this dataset's but with another seed.
@@ -149,61 +151,12 @@ class Dataset:
         return SampleStream(self.plan, self.folder, split, self.plan.seed + _FAR if seed is None else seed, start, step)
 
 
-class PaddedDataset:
-    """Samples as dictionaries of equally shaped arrays; rows beyond a sample's parts are zero.
-
-    ``part_valid (P,) bool`` marks the rows that are parts; ``joint_type (P,) int64`` indexes
-    ``artsim.model.kinematics.JOINT_TYPES``; infinite limits stay infinite.
-    """
-
-    def __init__(self, dataset: Dataset, max_parts: int):
-        self.dataset = dataset
-        self.max_parts = max_parts
-
-    def __len__(self) -> int:
-        return len(self.dataset)
-
-    def __getitem__(self, i: int) -> dict[str, NDArray[Any]]:
-        return pad_sample(self.dataset[i], self.max_parts)
-
-
-_PER_PART = (
-    "T_camera_part", "box_center", "box_size", "visible_fraction", "joint_parent", "joint_axis", "joint_origin",
-    "joint_axis_camera", "joint_origin_camera", "joint_state", "joint_rest", "joint_limits",
-)  # fmt: skip
-
-
-def pad_sample(sample: Sample, max_parts: int) -> dict[str, NDArray[Any]]:
-    """A sample as arrays whose shapes do not depend on its number of parts.
-
-    Raises
-    ------
-    ConfigError
-        When the sample has more parts than rows.
-    """
-    num_parts = len(sample.joint_type)
-    if num_parts > max_parts:
-        raise ConfigError(f"{num_parts} parts do not fit {max_parts} rows", "max_parts", f"use at least {num_parts}")
-
-    def pad(array: NDArray[Any]) -> NDArray[Any]:
-        rows: NDArray[Any] = np.zeros((max_parts, *array.shape[1:]), dtype=array.dtype)
-        rows[:num_parts] = array
-        return rows
-
-    arrays = {name: pad(getattr(sample, name)) for name in _PER_PART}
-    arrays["joint_type"] = pad(np.array([JOINT_TYPES.index(t) for t in sample.joint_type], dtype=np.int64))
-    arrays["part_valid"] = np.arange(max_parts) < num_parts
-    arrays |= {name: getattr(sample, name) for name in ("points", "part", "npcs", "K", "T_world_camera")}
-    arrays |= {name: np.asarray(getattr(sample, name)) for name in ("scale", "diagonal", "index", "width", "height")}
-    arrays |= {name: image for name in ("depth", "part_mask", "rgb") if (image := getattr(sample, name)) is not None}
-    return arrays
-
-
 class SampleStream:
     """Endless on-line source: sample ``i`` is made when asked for, and is always the same.
 
-    Iterating yields samples ``start``, ``start + step``, ...; give each training process its own ``start`` and a common
-    ``step``. Indexing makes any one.
+    Iterating yields samples ``start``, ``start + step``, ... Workers of a torch ``DataLoader``, and processes of its
+    process group, share them out by themselves; other processes need a ``start`` of their own and a common ``step``.
+    Indexing makes any one.
 
     Parameters
     ----------
@@ -223,6 +176,15 @@ class SampleStream:
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
         self.objects = ObjectCache(Path(folder) / "objects")
         self._renderer: Renderer | None = None
+        self._rank: tuple[int, int] | None = None
+        register_with_torch(SampleStream)
+
+    def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
+        """The stream as dictionaries of arrays of one shape; see :meth:`Dataset.padded`."""
+        return PaddedStream(self, max_parts or max(o.num_parts for o in self.plan.objects), float32)
+
+    def __len__(self) -> int:
+        raise TypeError(NO_LENGTH)
 
     def __getitem__(self, i: int) -> Sample:
         if i < 0:
@@ -233,13 +195,19 @@ class SampleStream:
         return draw_sample(self.objects[planned.key], self.plan.sample, self.seed, i, self._renderer)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "objects": ObjectCache(self.objects.folder), "_renderer": None}
+        rank = self._rank or process_rank()  # of the process that hands it to workers, which have no group
+        return {**self.__dict__, "objects": ObjectCache(self.objects.folder), "_renderer": None, "_rank": rank}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        register_with_torch(SampleStream)
 
     def __iter__(self) -> Iterator[Sample]:
-        i = self.start
+        share, shares = share_of(self._rank or process_rank())
+        i = self.start + share * self.step
         while True:
             yield self[i]
-            i += self.step
+            i += shares * self.step
 
 
 def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:

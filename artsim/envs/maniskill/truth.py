@@ -26,7 +26,7 @@ class Truth:
     Attributes
     ----------
     fixed : dict
-        Rows, as :func:`artsim.datasets.dataset.pad_sample` names them: ``part_valid (B, P)`` and ``joint_type``,
+        Rows, as :func:`artsim.datasets.padding.pad_sample` names them: ``part_valid (B, P)`` and ``joint_type``,
         ``joint_parent``, ``joint_axis``, ``joint_origin``, ``joint_rest``, ``joint_limits``, ``box_center``,
         ``box_size``, and for each object ``scale``, ``diagonal``, ``T_world_object (B, 4, 4)``.
     free : (B, P) bool

@@ -18,7 +18,7 @@ import webdataset
 
 import artsim
 from artsim import StateOptions, observe, sample_state
-from artsim.datasets.dataset import pad_sample
+from artsim.datasets.padding import pad_sample
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.shards import sample_from_members, sample_members
 from artsim.errors import ConfigError, DatasetError

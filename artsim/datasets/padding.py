@@ -1,0 +1,112 @@
+"""Samples as dictionaries of equally shaped arrays, which default collation of training loops stacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.common.sharding import NO_LENGTH, register_with_torch
+from artsim.errors import ConfigError
+from artsim.model.kinematics import JOINT_TYPES
+from artsim.observing.sample import Sample
+
+_PER_PART = (
+    "T_camera_part", "box_center", "box_size", "visible_fraction", "joint_parent", "joint_axis", "joint_origin",
+    "joint_axis_camera", "joint_origin_camera", "joint_state", "joint_rest", "joint_limits",
+)  # fmt: skip
+
+
+def pad_sample(sample: Sample, max_parts: int, float32: bool = False) -> dict[str, NDArray[Any]]:
+    """A sample as arrays whose shapes do not depend on its number of parts. Loops may write into them.
+
+    ``part_valid (P,) bool`` marks the rows that are parts, rows beyond are zero; ``joint_type (P,) int64`` indexes
+    ``artsim.model.kinematics.JOINT_TYPES``; infinite limits stay infinite.
+
+    Parameters
+    ----------
+    sample : Sample
+    max_parts : int
+        Rows of per-part arrays.
+    float32 : bool
+        Poses, boxes and joints in single precision, too, as networks take them.
+
+    Raises
+    ------
+    ConfigError
+        When the sample has more parts than rows.
+    """
+    num_parts = len(sample.joint_type)
+    if num_parts > max_parts:
+        raise ConfigError(f"{num_parts} parts do not fit {max_parts} rows", "max_parts", f"use at least {num_parts}")
+
+    def pad(array: NDArray[Any]) -> NDArray[Any]:
+        rows: NDArray[Any] = np.zeros((max_parts, *array.shape[1:]), dtype=array.dtype)
+        rows[:num_parts] = array
+        return rows
+
+    arrays = {name: pad(getattr(sample, name)) for name in _PER_PART}
+    arrays["joint_type"] = pad(np.array([JOINT_TYPES.index(t) for t in sample.joint_type], dtype=np.int64))
+    arrays["part_valid"] = np.arange(max_parts) < num_parts
+    arrays |= {name: getattr(sample, name) for name in ("points", "part", "npcs", "K", "T_world_camera")}
+    arrays |= {name: np.asarray(getattr(sample, name)) for name in ("scale", "diagonal", "index", "width", "height")}
+    arrays |= {name: image for name in ("depth", "part_mask", "rgb") if (image := getattr(sample, name)) is not None}
+    return {name: _writable(array, float32) for name, array in arrays.items()}
+
+
+def _writable(array: NDArray[Any], float32: bool) -> NDArray[Any]:
+    if float32 and array.dtype == np.float64:
+        return array.astype(np.float32)
+    return array if array.flags.writeable else array.copy()
+
+
+class Stream(Protocol):
+    """An endless source of samples by number."""
+
+    def __getitem__(self, i: int) -> Sample: ...
+
+    def __iter__(self) -> Iterator[Sample]: ...
+
+
+class Source(Protocol):
+    """A finite source of samples by number."""
+
+    def __getitem__(self, i: int) -> Sample: ...
+
+    def __len__(self) -> int: ...
+
+
+class PaddedDataset:
+    """Samples of a dataset by number, as :func:`pad_sample` makes them."""
+
+    def __init__(self, dataset: Source, max_parts: int, float32: bool = False):
+        self.dataset, self.max_parts, self.float32 = dataset, max_parts, float32
+
+    def __len__(self) -> int:
+        return len(self.dataset)
+
+    def __getitem__(self, i: int) -> dict[str, NDArray[Any]]:
+        return pad_sample(self.dataset[i], self.max_parts, self.float32)
+
+
+class PaddedStream:
+    """Samples of a stream, as :func:`pad_sample` makes them; for loaders of torch an ``IterableDataset``."""
+
+    def __init__(self, stream: Stream, max_parts: int, float32: bool = False):
+        self.stream, self.max_parts, self.float32 = stream, max_parts, float32
+        register_with_torch(PaddedStream)
+
+    def __getitem__(self, i: int) -> dict[str, NDArray[Any]]:
+        return pad_sample(self.stream[i], self.max_parts, self.float32)
+
+    def __iter__(self) -> Iterator[dict[str, NDArray[Any]]]:
+        return (pad_sample(sample, self.max_parts, self.float32) for sample in self.stream)
+
+    def __len__(self) -> int:
+        raise TypeError(NO_LENGTH)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        register_with_torch(PaddedStream)

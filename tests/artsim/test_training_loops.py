@@ -1,0 +1,90 @@
+"""Streams and datasets in the loaders of torch: each sample once, whatever processes share the work."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import distributed, multiprocessing
+from torch.utils.data import DataLoader, IterableDataset
+
+import artsim
+from artsim.datasets.generate import generate
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import ConfigError
+from artsim.loading.sources import family_sources
+from artsim.stream import FamilyStream
+
+SMALL = SampleOptions(num_points=32)
+
+
+def indices(loader: DataLoader[object], batches: int) -> list[int]:
+    return [int(i) for batch in itertools.islice(loader, batches) for i in batch["index"]]
+
+
+@pytest.mark.parametrize("context", ["fork", "spawn", "forkserver"])
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_workers_of_a_loader_share_a_stream_out(context: str) -> None:
+    stream = FamilyStream(["laptop", "drawer"], SMALL, views_per_object=2).padded(max_parts=8, float32=True)
+    loader = DataLoader(stream, batch_size=4, num_workers=2, multiprocessing_context=context)
+    assert sorted(indices(loader, 6)) == list(range(24))
+    batch = next(iter(loader))
+    assert batch["points"].shape == (4, 32, 3)
+    assert batch["T_camera_part"].dtype == batch["joint_limits"].dtype == torch.float32
+    np.testing.assert_array_equal(batch["points"][0], stream[int(batch["index"][0])]["points"])
+
+
+def test_without_workers_a_loader_goes_through_a_stream_in_its_order() -> None:
+    stream = FamilyStream(["laptop"], SMALL, views_per_object=3, start=1, step=2)
+    assert isinstance(stream, IterableDataset)
+    loader = DataLoader(stream, batch_size=2, collate_fn=lambda samples: {"index": [s.index for s in samples]})
+    assert indices(loader, 3) == [3, 4, 5, 9, 10, 11]
+
+
+def test_streams_say_what_to_do_where_a_length_is_asked_for() -> None:
+    with pytest.raises(TypeError, match="import torch before"):
+        len(FamilyStream(["laptop"]))
+    with pytest.raises(ConfigError, match="max_parts"):
+        FamilyStream(["robot_arm"], SMALL).padded(max_parts=1)[0]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("dataset") / "made"
+    generate(family_sources(["laptop"], 4), out, 12, sample=SMALL, workers=1, progress=False)
+    return out
+
+
+def test_datasets_and_their_streams_can_be_written_to(folder: Path) -> None:
+    """Loaders warn of arrays that cannot be written to: there are none."""
+    dataset = artsim.open_dataset(folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for source in (dataset.padded(float32=True), dataset.stream().padded(float32=True)):
+            batch = next(iter(DataLoader(source, batch_size=3)))
+            assert batch["T_camera_part"].dtype == torch.float32
+            assert all(array.flags.writeable for array in source[0].values())
+    assert dataset.padded()[0]["T_camera_part"].dtype == np.float64
+
+
+def _rank(rank: int, file: str, results: str) -> None:
+    distributed.init_process_group("gloo", init_method=f"file://{file}", rank=rank, world_size=2)
+    stream = FamilyStream(["laptop"], SMALL, views_per_object=1).padded(max_parts=2)
+    loader = DataLoader(stream, batch_size=2, num_workers=2, multiprocessing_context="spawn")
+    Path(results, f"{rank}.pickle").write_bytes(pickle.dumps(indices(loader, 4)))
+    distributed.destroy_process_group()
+
+
+@pytest.mark.slow
+def test_processes_of_a_group_and_their_workers_share_a_stream_out(tmp_path: Path) -> None:
+    multiprocessing.spawn(_rank, (str(tmp_path / "group"), str(tmp_path)), nprocs=2)
+    seen: Iterator[int] = itertools.chain.from_iterable(
+        pickle.loads((tmp_path / f"{rank}.pickle").read_bytes()) for rank in range(2)
+    )
+    assert sorted(seen) == list(range(16))
