@@ -25,12 +25,32 @@ from artsim.datasets.padding import pad_sample
 from artsim.drawing.annotation import shade_parts
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions, openness
 from artsim.physics.world import Control, Simulation
 from artsim.renderers import render
 
 Observation = dict[str, NDArray[Any]]
+
+
+def _complete(obj: ArticulatedObject, state: ArrayLike) -> Array:
+    """A state (K,) within limits, with joints that follow others where they have to be.
+
+    Raises
+    ------
+    ConfigError
+        When it is no state of the object.
+    """
+    q = np.asarray(state, dtype=np.float64)
+    if q.shape != (len(obj),) or not np.isfinite(q).all():
+        raise ConfigError(f"shape {q.shape} is no state of {len(obj)} parts", "options: state", f"pass ({len(obj)},)")
+    low, high = obj.tree.limits.T
+    if ((q < low - 1e-9) | (q > high + 1e-9)).any():
+        joint = int(np.argmax((q < low - 1e-9) | (q > high + 1e-9)))
+        reach = f"{low[joint]:.3g} to {high[joint]:.3g}"
+        raise ConfigError(f"joint {joint} cannot be at {q[joint]:.3g}", "options: state", f"use {reach}")
+    return obj.tree.complete_state(q)
 
 
 @dataclass(frozen=True)
@@ -118,21 +138,35 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
         ----------
         seed : int, optional
         options : mapping, optional
-            Not used.
+            ``category``: the episode has a new object of this procedural category. ``object``: it has this
+            ArticulatedObject. ``state`` (K,): it begins in this state, radians and metres; 0 for the root.
 
         Returns
         -------
         observation, info : dict
+
+        Raises
+        ------
+        ConfigError
+            When an option is unknown or makes no sense.
         """
         super().reset(seed=seed)
-        obj = self.episode.draw_object(self.np_random)
+        given = dict(options or {})
+        category, obj, state = (given.pop(name, None) for name in ("category", "object", "state"))
+        if given:
+            unknown = ", ".join(sorted(map(str, given)))
+            raise ConfigError(f"reset has no option {unknown}", "options", "use category, object, state")
+        if category is not None and obj is not None:
+            raise ConfigError("an episode has one object", "options", "name a category or an object")
+        if obj is None:
+            obj = self.episode.draw_object(self.np_random, category)
         if len(obj) - 1 > self.options.max_joints:
             raise ConfigError(
                 f"has {len(obj) - 1} joints, more than {self.options.max_joints}",
                 f"{obj.category} {obj.object_id}",
                 f"set max_joints={len(obj) - 1} or more",
             )
-        self.episode.begin(obj, self.np_random)
+        self.episode.begin(obj, self.np_random, None if state is None else _complete(obj, state))
         self._openness = openness(obj, self.simulation.state)
         return self._look()
 

@@ -127,10 +127,19 @@ class Episode:
         """Seconds since the episode began."""
         return self.steps * self.options.physics.control_step
 
-    def draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
-        """An object for a new episode."""
+    def draw_object(self, rng: np.random.Generator, category: str | None = None) -> ArticulatedObject:
+        """An object for a new episode; of a procedural category, if one is named, a new one of that.
+
+        Raises
+        ------
+        ConfigError
+            When there is no such category.
+        """
         obj = self.options.obj
-        if obj is None:
+        if category is not None:
+            (source,) = family_sources((category,), 1, int(rng.integers(*STREAM_SEEDS)))
+            obj = source.load()
+        elif obj is None:
             number = int(rng.integers(len(self._sources)))
             source = self._sources[number]
             if isinstance(source, FamilySource):
@@ -139,12 +148,13 @@ class Episode:
                 obj = self._load(number)
         return sample_scale(obj, self.options.scale, rng)
 
-    def begin(self, obj: ArticulatedObject, rng: np.random.Generator) -> None:
-        """Begin an episode with this object; ``rng`` draws its state and the camera."""
+    def begin(self, obj: ArticulatedObject, rng: np.random.Generator, state: Array | None = None) -> None:
+        """Begin an episode with this object; ``rng`` draws its state, unless one (K,) is given, and the camera."""
         if self._simulation is None or self._simulation.obj is not obj:
             self.close()
             self._simulation = Simulation(obj, self.options.physics)
-        self._simulation.reset(sample_state(obj, self.options.states, rng))
+        drawn = sample_state(obj, self.options.states, rng)
+        self._simulation.reset(drawn if state is None else state)
         self.steps = 0
         self._camera = sample_view(obj, most_open_state(obj), self.options.views, rng)
 

@@ -197,3 +197,46 @@ def test_a_step_before_the_first_reset_is_refused() -> None:
 def test_the_environment_is_registered_on_import() -> None:
     assert artsim.envs.__name__ == "artsim.envs"
     assert ID in gymnasium.registry
+
+
+def test_an_episode_has_the_category_the_object_and_the_state_that_reset_is_told() -> None:
+    env = new(categories=("drawer",))
+    _, info = env.reset(seed=1, options={"category": "laptop"})
+    assert info["category"] == "laptop"
+    laptop = artsim.make("laptop", 3)
+    _, info = env.reset(seed=1, options={"object": laptop, "state": [0.0, 0.5]})
+    assert env.unwrapped.episode.obj.sha256 == laptop.sha256
+    np.testing.assert_allclose(info["joint_state"][:2], [0.0, 0.5], atol=1e-9)
+    again = new(categories=("drawer",)).reset(seed=1, options={"object": laptop, "state": [0.0, 0.5]})[0]
+    np.testing.assert_array_equal(
+        again["points"], env.reset(seed=1, options={"object": laptop, "state": [0.0, 0.5]})[0]["points"]
+    )
+    assert env.reset(seed=1)[1]["category"] == "drawer"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"stat": [0.0, 0.5]}, "stat"),
+        ({"category": "laptp"}, "laptp"),
+        ({"category": "laptop", "state": [0.0, 9.0]}, "joint 1 cannot be at 9"),
+        ({"category": "laptop", "state": [0.0]}, "no state"),
+        ({"category": "laptop", "object": artsim.make("laptop", 0)}, "one object"),
+    ],
+)
+def test_reset_refuses_what_it_does_not_know(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        new().reset(options=options)
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_gymnasium_makes_vectors_of_environments(mode: str) -> None:
+    envs = gymnasium.make_vec(ID, 2, vectorization_mode=mode, **SMALL)
+    try:
+        points = envs.reset(seed=[3, 4])[0]["points"]
+        np.testing.assert_array_equal(points[1], new().reset(seed=4)[0]["points"])
+        observation, reward, *_ = envs.step(envs.action_space.sample())
+        assert observation["points"].shape == points.shape
+        assert reward.shape == (2,)
+    finally:
+        envs.close()
