@@ -137,8 +137,7 @@ class Episode:
         """
         obj = self.options.obj
         if category is not None:
-            (source,) = family_sources((category,), 1, int(rng.integers(*STREAM_SEEDS)))
-            obj = source.load()
+            obj = family_sources((category,), 1, int(rng.integers(*STREAM_SEEDS)))[0].load()
         elif obj is None:
             number = int(rng.integers(len(self._sources)))
             source = self._sources[number]
