@@ -151,11 +151,17 @@ class GenerateObjects:
     seed: int = 0
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
     having: Having = ()
+    base: Literal["fixed", "free"] = "fixed"
+    """fixed: the root is fixed to the world; free: it falls. Of MJCF and USD: for URDF the simulator is told."""
+    actuators: Literal["none", "motor", "position"] = "none"
+    """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
+    control is where the joint shall be."""
     workers: int = field(default_factory=_cores)
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
         from artsim.export.batch import generate_objects
+        from artsim.export.options import ExportOptions
 
         try:
             result = generate_objects(
@@ -166,6 +172,7 @@ class GenerateObjects:
                 self.formats,
                 self.workers,
                 constraints=_constraints(self.having),
+                options=ExportOptions(self.base, self.actuators),
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")

@@ -1,8 +1,8 @@
 """Procedural objects as files: PartNet-style URDF folders, MJCF and USD.
 
 All lengths are metres, Z is up and the front towards -X: meshes are written in the object's rest frame, and each link's
-frame stands at its joint's origin with the axes of the rest frame. The root link is the robot's base; nothing fixes it
-to the world but what the simulator is asked to do.
+frame stands at its joint's origin with the axes of the rest frame. The root link is the robot's base; MJCF and USD fix
+it to the world or do not (:class:`ExportOptions`), and for URDF the simulator is asked to.
 
 MuJoCo fuses a link that no joint moves into the world, unless its compiler has ``fusestatic="false"``. The URDF files
 say so themselves, in a ``<mujoco>`` element that other programs ignore, and the MJCF files do too.
@@ -12,15 +12,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from artsim.errors import ConfigError
+from artsim.export.options import ExportOptions
 from artsim.export.robot import Robot, as_robot
 from artsim.export.text import obj_text
 from artsim.model.objects import ArticulatedObject
 
+DEFAULTS = ExportOptions()
 FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda"}
 """File written in each format."""
 
@@ -30,6 +33,7 @@ def export(
     folder: str | Path,
     formats: Sequence[str] = ("urdf",),
     notes: Mapping[str, Any] | None = None,
+    options: ExportOptions = DEFAULTS,
 ) -> dict[str, Any]:
     """Write a procedural object into a folder.
 
@@ -46,6 +50,8 @@ def export(
         Keys of ``FORMATS``.
     notes : mapping, optional
         Further entries of ``meta.json``: how the object came about.
+    options : ExportOptions
+        How it stands and is driven.
 
     Returns
     -------
@@ -73,12 +79,13 @@ def export(
     if "mjcf" in formats:
         from artsim.export.mjcf import mjcf_text
 
-        (folder / FORMATS["mjcf"]).write_text(mjcf_text(robot))
+        (folder / FORMATS["mjcf"]).write_text(mjcf_text(robot, options))
     if "usd" in formats:
         from artsim.export.usd import usd_text
 
-        (folder / FORMATS["usd"]).write_text(usd_text(robot))
+        (folder / FORMATS["usd"]).write_text(usd_text(robot, options))
     meta = {**describe(robot, formats), **(notes or {})}
+    meta["artsim"] |= asdict(options)
     (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n")
     return meta
 

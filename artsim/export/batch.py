@@ -12,7 +12,7 @@ import os
 import shutil
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from artsim.common.files import read_json, write_atomic, write_error
 from artsim.common.progress import track
 from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError
-from artsim.export import FORMATS, check_formats, export
+from artsim.export import DEFAULTS, FORMATS, check_formats, export
+from artsim.export.options import ExportOptions
 from artsim.families import FAMILIES, make_constrained
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 
@@ -49,6 +50,7 @@ def generate_objects(
     workers: int = 2,
     progress: bool = True,
     constraints: Constraints = NO_CONSTRAINTS,
+    options: ExportOptions = DEFAULTS,
 ) -> ObjectsResult:
     """Write procedural objects as files, or go on with a run that was stopped.
 
@@ -70,6 +72,8 @@ def generate_objects(
         Show a progress bar.
     constraints : Constraints
         Of :func:`artsim.make`; they hold of every object.
+    options : ExportOptions
+        How objects stand and are driven.
 
     Raises
     ------
@@ -89,13 +93,13 @@ def generate_objects(
     wanted = [(category, number) for category in dict.fromkeys(categories) for number in range(seed, seed + count)]
     with folder_lock(folder):
         _remove_leftovers(folder)
-        found = {key: meta for key in wanted if (meta := _whole(folder, key, formats, constraints))}
+        found = {key: meta for key in wanted if (meta := _whole(folder, key, formats, constraints, options))}
         missing = [key for key in wanted if key not in found]
         with (
             track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
             WorkerPool(folder, workers) as team,
         ):
-            tasks = ((key, (folder, *key, tuple(formats), constraints)) for key in missing)
+            tasks = ((key, (folder, *key, tuple(formats), constraints, options)) for key in missing)
             for key, answer in team.run(write_object, tasks):
                 if isinstance(answer, WorkerLost):
                     raise AssetError(answer.why, f"{key[0]} {key[1]}", "use fewer --workers; the same command resumes")
@@ -127,7 +131,9 @@ def _remove_leftovers(out: Path) -> None:
         shutil.rmtree(leftover, ignore_errors=True)
 
 
-def _whole(out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints) -> dict[str, Any] | None:
+def _whole(
+    out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints, options: ExportOptions
+) -> dict[str, Any] | None:
     """Content of an object's ``meta.json`` if this version of artsim wrote it so in these formats.
 
     A folder is whole if it is there at all.
@@ -138,6 +144,7 @@ def _whole(out: Path, key: tuple[str, int], formats: Sequence[str], constraints:
         own = meta["artsim"]
         same = own["version"] == version("artsim") and set(own["formats"]) == set(formats)
         same = same and meta.get("constraints", "") == str(constraints)
+        same = same and asdict(options).items() <= own.items()
         _row(key, meta)  # what index.csv takes from it
     except (AssetError, ValueError, KeyError, TypeError):
         return None
@@ -145,7 +152,7 @@ def _whole(out: Path, key: tuple[str, int], formats: Sequence[str], constraints:
 
 
 def write_object(
-    out: Path, category: str, seed: int, formats: tuple[str, ...], constraints: Constraints
+    out: Path, category: str, seed: int, formats: tuple[str, ...], constraints: Constraints, options: ExportOptions
 ) -> dict[str, Any]:
     """Make an object and write its folder; returns the content of its ``meta.json``."""
     folder = _folder(out, category, seed)
@@ -157,7 +164,7 @@ def write_object(
     except Exception as error:  # whatever a family stumbles on, the seed is what one needs to know
         raise AssetError(f"cannot be made ({type(error).__name__}: {error})", f"{category} {seed}") from error
     try:
-        meta = export(obj, part, formats, {"constraints": str(constraints)} if constraints else {})
+        meta = export(obj, part, formats, {"constraints": str(constraints)} if constraints else {}, options)
         if folder.exists():  # of another version, or in other formats
             shutil.rmtree(folder)
         part.rename(folder)

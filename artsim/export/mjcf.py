@@ -7,20 +7,28 @@ from lxml import etree
 
 from artsim.common.extras import needs
 from artsim.errors import AssetError
-from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
+from artsim.export.options import ExportOptions
+from artsim.export.robot import STRENGTH, BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers, obj_text
 
-STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
+_SOLREF, _SOLIMP = "0.004 1", "0.9999 0.9999 0.001 0.5 2"
+"""As stiff as MuJoCo's time step of 2 ms allows."""
+STIFF = {"solref": _SOLREF, "solimp": _SOLIMP}
 """How stiffly joints follow others. MuJoCo weighs a metre of the one like a radian of the other, which by its default
 leaves a screw's thread far too soft."""
+STOP = {"solreflimit": _SOLREF, "solimplimit": _SOLIMP}
+"""How stiffly joints stop: by its default MuJoCo lets light parts through by tenths of a radian."""
+POSITION_TIME = 0.1
+"""Seconds in which a position actuator, held by damping alone, would be where it is told."""
 
 
-def mjcf_text(robot: Robot) -> str:
+def mjcf_text(robot: Robot, options: ExportOptions) -> str:
     """The object as an MJCF document; its meshes lie in ``meshes/``.
 
     Bodies, joints and inertias are those of the URDF file. What follows another joint (``mimic``, screws) is held by an
-    equality constraint. Geoms of group 2 are seen, those of group 3 collide, as MuJoCo's viewers take them. The root
-    body is fixed to the world: give it a ``<freejoint/>`` to let it move.
+    equality constraint. Geoms of group 2 are seen, those of group 3 collide, as MuJoCo's viewers take them.
+    Actuators have the names of their joints. MuJoCo knows no velocity limits: motors that lose effort with speed keep
+    them.
 
     Raises
     ------
@@ -29,6 +37,8 @@ def mjcf_text(robot: Robot) -> str:
     """
     root = etree.Element("mujoco", model=robot.name)
     # Fused, a root that no joint moves would become part of the world.
+    # The integrator treats damping and what motors lose with speed implicitly: light parts stay stable.
+    etree.SubElement(root, "option", integrator="implicitfast")
     etree.SubElement(root, "compiler", angle="radian", meshdir="meshes", autolimits="true", fusestatic="false")
     default = etree.SubElement(root, "default")
     for group, more in (("visual", {"group": "2", "contype": "0", "conaffinity": "0"}), ("collision", {"group": "3"})):
@@ -44,8 +54,12 @@ def mjcf_text(robot: Robot) -> str:
         parent = world if joint is None else bodies[joint.parent]
         offset = link.origin if joint is None else link.origin - robot.links[joint.parent].origin
         bodies.append(_add_body(parent, numbers(offset), link, joint))
+        if joint is None and options.base == "free":
+            bodies[-1].insert(0, etree.Element("freejoint", name=_unused("root", robot)))
     _add_exclusions(root, robot)
     _add_equalities(root, robot)
+    if options.actuators != "none":
+        _add_actuators(root, robot, options.actuators)
     text: str = etree.tostring(root, pretty_print=True, encoding="unicode")
     _compile(text, robot)
     return text
@@ -58,7 +72,7 @@ def _add_body(parent: etree._Element, pos: str, link: Link, joint: LinkJoint | N
     pos = numbers(inertia.center - link.origin)
     etree.SubElement(body, "inertial", pos=pos, mass=number(inertia.mass), fullinertia=numbers(entries))
     if joint is not None:
-        more = {"range": numbers((joint.lower, joint.upper))} if np.isfinite(joint.lower) else {}
+        more = {"range": numbers((joint.lower, joint.upper)), **STOP} if np.isfinite(joint.lower) else {}
         etree.SubElement(
             body,
             "joint",
@@ -101,6 +115,36 @@ def _add_equalities(root: etree._Element, robot: Robot) -> None:
             source, multiplier, offset = joint.mimic
             polycoef = numbers((offset, multiplier, 0.0, 0.0, 0.0))
             etree.SubElement(equality, "joint", joint1=joint.name, joint2=source, polycoef=polycoef, **STIFF)
+
+
+def _add_actuators(root: etree._Element, robot: Robot, kind: str) -> None:
+    """One for each joint that follows no other."""
+    actuators = etree.SubElement(root, "actuator")
+    for joint in robot.joints:
+        if joint.mimic is not None:
+            continue
+        limit = numbers((-joint.effort, joint.effort))
+        if kind == "motor":
+            # Control, weight and speed add up to nothing at the velocity limit; the joint's damping has a share.
+            lost = max((1.0 + 1.0 / STRENGTH) * joint.effort / joint.velocity - joint.damping, 0.0)
+            gain, bias, control = number(joint.effort), numbers((0.0, 0.0, -lost)), "-1 1"
+        else:
+            gain_of = joint.effort / max(joint.velocity * POSITION_TIME, 1e-9)
+            damp = gain_of * POSITION_TIME
+            gain, bias = number(gain_of), numbers((0.0, -gain_of, -damp))
+            control = numbers((joint.lower, joint.upper)) if np.isfinite(joint.lower) else ""
+        more = {"ctrlrange": control} if control else {}
+        etree.SubElement(
+            actuators, "general", name=joint.name, joint=joint.name, gainprm=gain, biastype="affine", biasprm=bias,
+            forcerange=limit, **more,
+        )  # fmt: skip
+
+
+def _unused(name: str, robot: Robot) -> str:
+    used = {joint.name for joint in robot.joints}
+    while name in used:
+        name += "_"
+    return name
 
 
 def _compile(text: str, robot: Robot) -> None:

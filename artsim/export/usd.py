@@ -7,19 +7,22 @@ from typing import Any
 import numpy as np
 
 from artsim.common.extras import needs
+from artsim.export.options import ExportOptions
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.model.kinematics import Array
 
 
-def usd_text(robot: Robot) -> str:
+def usd_text(robot: Robot, options: ExportOptions) -> str:
     """The object as a USD layer in text form.
 
-    One prim for each link below an articulation root, in metres, kilograms and degrees as UsdPhysics has it, Z up. The
-    object stands freely: add a fixed joint between the world and its root link to hold it. UsdPhysics knows no joints
-    that follow others: such a joint carries ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres).
+    One prim for each link, in metres, kilograms and degrees as UsdPhysics has it, Z up. A fixed base hangs on a fixed
+    joint to the world, and the articulation root is the object's prim; the articulation root of a free one is its root
+    link, to which Isaac Lab can add a fixed joint (``fix_root_link``). UsdPhysics has no velocity limits and no
+    friction: these are attributes of PhysX's schemas. It knows no joints that follow others: such a joint carries
+    ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres).
     """
     with needs("USD files"):
-        from pxr import Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
+        from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
@@ -29,10 +32,18 @@ def usd_text(robot: Robot) -> str:
     root = UsdGeom.Xform.Define(stage, f"/{name}")
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root.GetPrim()).SetKind(Kind.Tokens.component)
-    UsdPhysics.ArticulationRootAPI.Apply(root.GetPrim())
     paths = [root.GetPath().AppendChild(link.name) for link in robot.links]
     for link, path in zip(robot.links, paths, strict=True):
         _add_link(stage, path, link)
+    free = options.base == "free"
+    UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[0]) if free else root.GetPrim())
+    if not free:
+        used = {link.name for link in robot.links} | {"joints", "joints_"}
+        held = next(word for word in ("fixed_base", "fixed_base_", "fixed_base__") if word not in used)
+        base = UsdPhysics.FixedJoint.Define(stage, root.GetPath().AppendChild(held))
+        base.CreateBody1Rel().SetTargets([paths[0]])
+        base.CreateLocalPos0Attr(Gf.Vec3f(*robot.links[0].origin.tolist()))
+        base.CreateLocalPos1Attr(Gf.Vec3f(0.0))
     scope = root.GetPath().AppendChild("joints" if all(link.name != "joints" for link in robot.links) else "joints_")
     if robot.joints:
         UsdGeom.Scope.Define(stage, scope)
@@ -93,7 +104,7 @@ def _add_mesh(stage: Any, path: Any, link: Link, shape: MeshShape) -> Any:
 
 
 def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: list[Any]) -> None:
-    from pxr import Gf, UsdPhysics
+    from pxr import Gf, Sdf, UsdPhysics
 
     slides = joint.type == "prismatic"
     unit = 1.0 if slides else 180.0 / np.pi
@@ -114,6 +125,16 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
     drive.CreateDampingAttr(joint.damping / unit)
     drive.CreateStiffnessAttr(0.0)
     drive.CreateTypeAttr("force")
+    drive.CreateMaxForceAttr(joint.effort)
+    # Schemas of PhysX are not part of usd-core: they are named, and their attributes written, as PhysX reads them.
+    prim, axis = added.GetPrim(), "linear" if slides else "angular"
+    for schema_name, name, value in (
+        ("PhysxJointAPI", "physxJoint:maxJointVelocity", joint.velocity * unit),
+        (f"PhysxJointAxisAPI:{axis}", f"physxJointAxis:{axis}:staticFrictionEffort", joint.friction),
+        (f"PhysxJointAxisAPI:{axis}", f"physxJointAxis:{axis}:dynamicFrictionEffort", joint.friction),
+    ):
+        prim.AddAppliedSchema(schema_name)
+        prim.CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(value)
 
 
 def principal_axes(tensor: Array) -> tuple[Array, Array]:

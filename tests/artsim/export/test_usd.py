@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from artsim.export import FORMATS, export
+from artsim.export.options import ExportOptions
 from artsim.export.robot import as_robot
 from artsim.export.usd import frame_along, principal_axes
+from artsim.families import make
 from tests.conftest import installed, valve
 
 rng = np.random.default_rng(0)
@@ -58,6 +61,13 @@ def test_usd_has_the_bodies_masses_and_joints_of_the_object(tmp_path: Path) -> N
         limits = [made.GetLowerLimitAttr().Get(), made.GetUpperLimitAttr().Get()]
         unit = 1.0 if joint.type == "prismatic" else 180.0 / np.pi
         np.testing.assert_allclose(limits, [joint.lower * unit, joint.upper * unit], rtol=1e-6)
+        kind = "linear" if joint.type == "prismatic" else "angular"
+        written = {
+            "drive": UsdPhysics.DriveAPI(prims[joint.name], kind).GetMaxForceAttr().Get(),
+            "speed": prims[joint.name].GetAttribute("physxJoint:maxJointVelocity").Get() / unit,
+            "friction": prims[joint.name].GetAttribute(f"physxJointAxis:{kind}:dynamicFrictionEffort").Get(),
+        }
+        assert written == pytest.approx({"drive": joint.effort, "speed": joint.velocity, "friction": joint.friction})
     assert prims["cap_slide"].GetAttribute("artsim:mimic:multiplier").Get() == pytest.approx(0.002)
     assert prims["cap_slide"].GetRelationship("artsim:mimic:joint").GetTargets()[0].name == "cap_joint"
 
@@ -71,3 +81,42 @@ def test_principal_axes_and_joint_frames_are_right_handed() -> None:
         moments, axes = principal_axes(tensor)
         assert np.linalg.det(axes) == pytest.approx(1.0)
         np.testing.assert_allclose(axes @ np.diag(moments) @ axes.T, tensor, atol=1e-12)
+
+
+@pytest.mark.parametrize("base", ["fixed", "free"])
+def test_the_articulation_root_is_where_simulators_look_for_it(base: Literal["fixed", "free"], tmp_path: Path) -> None:
+    """Of a free base it is a rigid body, which Isaac Lab wants; a fixed one hangs on a joint to the world."""
+    installed("pxr")
+    from pxr import Usd, UsdPhysics
+
+    obj = make("laptop", 0)
+    export(obj, tmp_path, ["usd"], options=ExportOptions(base=base))
+    stage = Usd.Stage.Open(str(tmp_path / FORMATS["usd"]))
+    (root,) = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.ArticulationRootAPI)]
+    fixed = [UsdPhysics.FixedJoint(prim) for prim in stage.Traverse() if prim.IsA(UsdPhysics.FixedJoint)]
+    if base == "free":
+        assert root.HasAPI(UsdPhysics.RigidBodyAPI)
+        assert root.GetName() == obj.parts[0].name
+        assert not fixed
+    else:
+        assert root == stage.GetDefaultPrim()
+        (joint,) = fixed
+        assert joint.GetBody0Rel().GetTargets() == []
+        assert [path.name for path in joint.GetBody1Rel().GetTargets()] == [obj.parts[0].name]
+
+
+@pytest.mark.parametrize("category", ["laptop", "drawer", "valve", "robot_arm"])
+def test_the_validators_of_usd_find_nothing_wrong(category: str, tmp_path: Path) -> None:
+    installed("pxr")
+    from pxr import Usd, UsdValidation
+
+    export(make(category, 0), tmp_path, ["usd"])
+    file = str(tmp_path / FORMATS["usd"])
+    stage = Usd.Stage.Open(file)
+    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    errors = [
+        f"{error.GetName()}: {error.GetMessage()}"
+        for error in context.Validate(stage)
+        if error.GetType() == UsdValidation.ValidationErrorType.Error
+    ]
+    assert errors == []

@@ -12,6 +12,7 @@ import artsim
 from artsim.errors import ArtsimError
 from artsim.export import export
 from artsim.export.mjcf import mjcf_text
+from artsim.export.options import ExportOptions
 from artsim.export.robot import as_robot
 from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
@@ -142,7 +143,7 @@ def test_damped_joints_move_as_in_mujoco(category: str) -> None:
     obj, q, push = released(category)
     robot = as_robot(obj)
     files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
-    model = mujoco.MjSpec.from_string(mjcf_text(robot), assets=files).compile()
+    model = mujoco.MjSpec.from_string(mjcf_text(robot, ExportOptions()), assets=files).compile()
     model.opt.timestep = 1 / 4000
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
