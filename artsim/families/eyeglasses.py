@@ -14,7 +14,6 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, power, sin
 from artsim.common.products import norm
-from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
 from artsim.model.kinematics import Array
@@ -153,7 +152,7 @@ def _front(rng: np.random.Generator, style: str, outline: Array, rim: float, siz
     low, high = outline[:, 1].min(), outline[:, 1].max()
     return Front(
         half=float(outline[:, 0].max()) + rim + rng.uniform(0.5, 4.0) * MM,
-        ahead=wrap + with_tails(rng, (4.5, 11.0), (3.6, 11.0), 0.15) * MM,
+        ahead=wrap + rng.uniform(4.0, 11.0) * MM,
         wrap=wrap,
         hinge_z=float(high - rng.uniform(0.08, 0.42) * (high - low)) - 0.2 * height * MM,
         height=height * MM,

@@ -13,7 +13,6 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import tan
-from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
 
@@ -65,7 +64,7 @@ def _shape(rng: np.random.Generator) -> _Shape:
         height = max(width * rng.uniform(0.01, 0.15), 0.006)
         lid = max(width * rng.uniform(0.008, 0.08), 0.004)
     # The lid turns about a barrel between the two shells, in notches behind both.
-    radius = with_tails(rng, (0.3, 0.45), (0.12, 0.45), 0.15) * min(height, lid, 0.009)
+    radius = rng.uniform(0.2, 0.45) * min(height, lid, 0.009)
     hinge_x = depth / 2 + radius * rng.uniform(-0.4, 0.9)
     back = min(depth / 2, hinge_x - radius - 0.0008)
     front = base_front = -depth / 2

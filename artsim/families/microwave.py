@@ -62,7 +62,7 @@ def build(rng: np.random.Generator) -> Assembly:
     oven.add("body", placed(body + controls), density=350.0)
     angle = np.deg2rad(90.0 if drops else with_tails(rng, (90.0, 150.0), (45.0, 170.0)))
     # The axis of a thin door may stand at the front face: the free edge of a thick one would run into the panel.
-    outer = thick if thick**2 < GAP * (high[1] - low[1]) and rng.random() < 0.5 else 0.0
+    outer = thick if thick * thick < GAP * (high[1] - low[1]) and rng.random() < 0.5 else 0.0
     drop = revolute("body", (0, -1, 0), (-thick, 0, low[2]), 0.0, angle)
     oven.add("door", placed(door), drop if drops else side_hinge(-outer, sign * half, angle, not mirrored))
     for name, solid, point in movers:

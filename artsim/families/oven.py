@@ -67,7 +67,7 @@ def build(rng: np.random.Generator) -> Assembly:
     for number, (low, high) in enumerate(pairwise(edges), 1):
         corner_low = np.array([-thick, 0.001 - half, low + GAP])
         # The upper back edge of a door that drops rises before it falls.
-        rise = thick**2 / (2.0 * (high - low))
+        rise = thick * thick / (2.0 * (high - low))
         corner_high = np.array([0.0, half - 0.001, high - max(3 * GAP, rise + GAP)])
         name = f"door_{number}" if two else "door"
         door, grip = _door(rng, corner_low, corner_high, kind, reach)

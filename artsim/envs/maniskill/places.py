@@ -90,7 +90,8 @@ def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, 
     opened = min(closed, _front(obj, most_open_state(obj)))
     if robot != "floating_panda_gripper":
         x = np.clip(opened - _CLEARANCE - _READY_REACH, handles[0] - _FAR, handles[0] - _NEAR)
-        return np.array([min(x, closed - _CLEARANCE - _READY_REACH), handles[1], 0.0]), np.array(ROBOTS[robot])
+        free_until = closed if goal == "open" else opened  # joints that open begin closed
+        return np.array([min(x, free_until - _CLEARANCE - _READY_REACH), handles[1], 0.0]), np.array(ROBOTS[robot])
     if goal == "close" and len(free) == 1:
         at, way = _push(obj, free[0])
         tip = np.maximum(at - _RUN_UP * way + up, [-np.inf, -np.inf, 0.05])

@@ -80,13 +80,13 @@ def test_files_are_tested_as_an_estimator_knows_them() -> None:
 
 
 def test_drawers_as_artimage_has_them_open_to_the_front() -> None:
-    tree = artsim.make("drawer", 1_509_110).tree  # a table with three drawers at the back
+    tree = half_turn(artsim.make("drawer", 4)).tree  # three drawers
     assert tree.axes[1:, 0].tolist() == [1.0, 1.0, 1.0]
     assert not has_parts("drawer", tree.types, tree.axes)
     assert has_parts("drawer", tree.types, -tree.axes)
     assert has_parts("drawer", tree.types, tree.axes, "any")
-    (next_one,) = objects_of(["drawer"], 1, 1_509_110)
-    assert next_one.object_id != "1509110"
+    (next_one,) = objects_of(["drawer"], 1, 1_509_001)  # has one drawer
+    assert next_one.object_id != "1509001"
 
 
 def test_rows_are_always_the_same_and_large_enough() -> None:

@@ -57,6 +57,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "train": [("--out run", "train")],
         "evaluate": [("laptop", "train"), ("--benchmark artimage", "train")],
         "estimate": [("cloud.npy", "train"), ("--help", "")],
+        "calibrate": [("laptop", "train"), ("--help", "")],
     },
 }
 """Command lines of every verb, and the extra that each wants."""
