@@ -28,7 +28,8 @@ from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions, openness
-from artsim.physics.world import Control, Simulation
+from artsim.physics.options import Control
+from artsim.physics.world import Simulation
 from artsim.renderers import render
 
 Observation = dict[str, NDArray[Any]]

@@ -5,8 +5,9 @@ Stable names; the modules of this package are private. PyBullet is imported when
 
 from artsim.physics.episode import Episode, EpisodeOptions, openness
 from artsim.physics.episode_file import Motion, follow_points, open_motions, record
+from artsim.physics.options import PhysicsOptions
 from artsim.physics.simulators import Agreement, compare_simulators
-from artsim.physics.world import PhysicsOptions, Simulation
+from artsim.physics.world import Simulation
 
 __all__ = [
     "Agreement",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import numpy as np
 import tyro
@@ -30,7 +30,8 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
 from artsim.observing.sensor import find_sensor
-from artsim.physics.world import Control, PhysicsOptions, Simulation
+from artsim.physics.options import Control, Engine, PhysicsOptions
+from artsim.physics.world import Simulation
 from artsim.stream import STREAM_SEEDS
 
 
@@ -63,6 +64,8 @@ class EpisodeOptions:
     """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
 
     def __post_init__(self) -> None:
+        if isinstance(self.physics, str):  # the name of an engine
+            object.__setattr__(self, "physics", PhysicsOptions(engine=cast(Engine, self.physics)))
         if self.camera not in ("fixed", "orbit"):
             raise ConfigError(f"there is no camera motion {self.camera!r}", "camera", "use fixed or orbit")
         unknown = set(self.images) - {"depth", "part_mask"}

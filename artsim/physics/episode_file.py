@@ -28,6 +28,7 @@ from artsim.model.object_file import load_object, save_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions
+from artsim.physics.world import engine_of
 
 FORMAT = 1
 _GOAL_SECONDS = 2.0  # a joint heads for a goal for so long, then for another
@@ -145,6 +146,7 @@ def record(
         "seed": seed,
         "frames": frames,
         "control_step": options.physics.control_step,
+        "engine": engine_of(options.physics),
         "options": asdict(replace(options, obj=None)),
         "motions": described,
     }

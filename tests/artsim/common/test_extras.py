@@ -43,7 +43,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
             ("--category globe --count 1 --workers 1 --out urdf", ""),
             ("--category globe --count 1 --workers 1 --formats usd --out usd", "sim"),
         ],
-        "record": [("--out motions --motions 1", "pybullet")],
+        "record": [("--out motions --motions 1", "envs")],
         "scene": [("--out scene --renderer raycast", "sim")],
         "view": [("box.urdf --samples 1", "view"), ("made", "view")],
         "inspect": [("box.urdf", ""), ("box.urdf --gates", "sim")],
@@ -75,7 +75,7 @@ CALLS = {
     "import artsim.checks.validity": "sim",
     "import artsim; from artsim.export import export; export(artsim.make('globe'), 'e', ('mjcf',))": "sim",
     "import artsim; from artsim.export import export; export(artsim.make('globe'), 'e', ('usd',))": "sim",
-    "import artsim; from artsim.physics.world import Simulation; Simulation(artsim.make('globe'))": "pybullet",
+    "import artsim; from artsim.physics.world import Simulation; Simulation(artsim.make('globe'))": "envs",
     "from artsim.drawing.contact_sheet import contact_sheet; contact_sheet([])": "view",
     "from artsim.drawing.rerun_recording import write_recording; write_recording([], None)": "view",
     "from pathlib import Path; from artsim.physics.simulators import in_mujoco; in_mujoco(Path('box.urdf'))": "sim",
@@ -241,12 +241,12 @@ def test_gymnasium_without_physics_names_the_extra(tmp_path: Path) -> None:
         "    except artsim.ArtsimError as error:\n"
         "        print(error)\n"
     )
-    variables = environment(tmp_path, ["pybullet", "mani_skill", "torch"])
+    variables = environment(tmp_path, ["pybullet", "mujoco", "mani_skill", "torch"])
     done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, env=variables, timeout=60)
     assert done.returncode == 0, done.stderr
-    bullet, maniskill = done.stdout.splitlines()
-    assert bullet.startswith("pybullet: PyBullet is not installed. Fix: ")
-    assert "[pybullet]" in bullet
+    physics, maniskill = done.stdout.splitlines()
+    assert physics.startswith("physics: MuJoCo is not installed. Fix: ")
+    assert "[envs]" in physics
     assert maniskill.startswith("ArtSimArticulated-v1: ")
     assert "[maniskill]" in maniskill
 

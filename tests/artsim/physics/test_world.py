@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,11 +22,22 @@ from artsim.loading.sources import find_sources
 from artsim.model.inertia import combine_inertias, part_inertia
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
-from artsim.physics.world import PhysicsOptions, Simulation
+from artsim.physics import world
+from artsim.physics.bullet_body import BulletBody
+from artsim.physics.options import PhysicsOptions
+from artsim.physics.world import ENGINES, Simulation
 from artsim.renderers.bullet import import_pybullet
 from tests.conftest import DEMO
 
 FREE = PhysicsOptions(damping=0.0, friction=0.0)
+
+
+@pytest.fixture(autouse=True, params=sorted(ENGINES))
+def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """What ``auto`` stands for."""
+    name: str = request.param
+    monkeypatch.setattr(world, "engine_of", lambda options: name if options.engine == "auto" else options.engine)
+    return name
 
 
 def unlimited(obj: ArticulatedObject) -> ArticulatedObject:
@@ -232,18 +245,33 @@ def test_the_same_efforts_make_the_same_motion_again_and_after_a_reset() -> None
     assert np.array_equal(runs[0], runs[2])
 
 
+@pytest.mark.slow
+def test_engines_agree_on_every_family() -> None:
+    for category in sorted(FAMILIES):
+        obj = make(category, 3)
+        sides = [Simulation(obj, PhysicsOptions(engine=name)) for name in ("pybullet", "mujoco")]
+        share = np.cos(np.arange(len(obj.tree.free_joints)))
+        for simulation in sides:
+            simulation.reset(obj.tree.limits.clip(-1, 1).mean(axis=1))
+            for turn in range(3):
+                simulation.step(share * simulation.effort_limit * 0.5**turn)
+        way = np.maximum(np.abs(sides[0].state - obj.tree.rest), 1e-3)
+        assert np.all(np.abs(sides[0].state - sides[1].state) <= 0.01 * way), category
+
+
 def test_a_ball_comes_to_rest_on_a_closed_laptop() -> None:
     bullet = import_pybullet()
     obj = make("laptop", 0)
-    simulation = Simulation(obj)
-    world = {"physicsClientId": simulation.client}
-    shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.02, **world)
+    simulation = Simulation(obj, PhysicsOptions(engine="pybullet"))
+    assert isinstance(simulation.body, BulletBody)
+    client = {"physicsClientId": simulation.body.client}
+    shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.02, **client)
     start = [0.0, 0.0, obj.bounds[1, 2] + 0.03]
-    ball = bullet.createMultiBody(0.05 / simulation.mass_unit, shape, basePosition=start, **world)
-    bullet.changeDynamics(ball, -1, rollingFriction=0.01, spinningFriction=0.01, **world)
+    ball = bullet.createMultiBody(0.05 / simulation.body.mass_unit, shape, basePosition=start, **client)
+    bullet.changeDynamics(ball, -1, rollingFriction=0.01, spinningFriction=0.01, **client)
     for _ in range(30):
         simulation.step([0.0])
-    height = bullet.getBasePositionAndOrientation(ball, **world)[0][2]
+    height = bullet.getBasePositionAndOrientation(ball, **client)[0][2]
     assert obj.bounds[1, 2] + 0.015 < height < obj.bounds[1, 2] + 0.0225
 
 
@@ -285,3 +313,16 @@ def test_a_wrong_action_is_refused(action: object, one_drawer: ArticulatedObject
 def test_options_that_make_no_sense_are_refused(options: dict[str, float]) -> None:
     with pytest.raises(ArtsimError):
         PhysicsOptions(**options)  # type: ignore[arg-type]
+
+
+def test_where_pybullet_is_missing_mujoco_moves_objects() -> None:
+    program = """
+import sys; sys.modules["pybullet"] = None
+import artsim, numpy as np, gymnasium, artsim.envs
+env = gymnasium.make("artsim/Articulated-v0", categories=("drawer",))
+env.reset(seed=0)
+for _ in range(3): env.step(np.ones(16, np.float32))
+assert env.unwrapped.simulation.engine == "mujoco"
+assert env.unwrapped.simulation.state.max() > 0
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
