@@ -54,10 +54,12 @@ weights: $(VENV)/.ready-dev  ## make the shipped estimators again, each from its
 assets: $(VENV)/.ready-dev  ## make the objects in urdf_assets again
 	$(PY) urdf_assets/build.py
 
-# System libraries that PyBullet's EGL renderer needs, and SAPIEN's Vulkan driver; everything else comes from pip.
-system:  ## install what EGL and SAPIEN need; wants root
+# System libraries that PyBullet's EGL renderer needs, SAPIEN's Vulkan driver and a browser for the tests of pages;
+# everything else comes from pip.
+system:  ## install what EGL, SAPIEN and the tests of pages need; wants root
 	scripts/install-system.sh
 	scripts/install-vulkan.sh
+	scripts/install-browser.sh
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)

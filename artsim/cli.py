@@ -266,8 +266,8 @@ class Scene:
 class View:
     """Draw samples of a dataset, or an object in several states.
 
-    Writes a contact sheet (PNG: depth, part colours, boxes, joint axes) and, with --rerun, a recording that the
-    rerun viewer opens.
+    Writes a contact sheet (PNG: depth, part colours, boxes, joint axes). With --rerun, a recording for the rerun
+    viewer comes with it. With --html, it writes a page for any browser instead: sliders for joints, boxes, clouds.
     """
 
     path: tyro.conf.Positional[Path]
@@ -280,12 +280,20 @@ class View:
     """Draw from this split only."""
     rerun: Path | None = None
     """Also write a rerun recording (.rrd) to this file."""
+    html: Path | None = None
+    """Page to write, such as laptop.html; it needs no network and no other file."""
     package_root: PackageRoots = field(default_factory=dict)
     """Folders that package:// names stand for, where they are not found as they are; repeatable."""
 
     def run(self) -> None:
         from artsim.drawing.contact_sheet import write_contact_sheet
+        from artsim.drawing.page import write_page
 
+        if self.html is not None:
+            write_page(self.path, self.html, self.samples, self.split, self.package_root)
+            print(f"wrote {self.html}")
+            if self.out is None and self.rerun is None:
+                return
         for written in write_contact_sheet(
             self.path, self.out, self.samples, self.split, self.rerun, self.package_root
         ):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,6 +18,7 @@ from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import KINDS
+from artsim.common.showing import Showable
 
 Array = NDArray[np.float64]
 
@@ -28,7 +31,7 @@ _SEEN = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(Showable):
     """9D poses of the K parts of one object. Camera frame, metres, radians.
 
     Attributes
@@ -123,6 +126,10 @@ class Estimate:
 
     def __repr__(self) -> str:
         return short_text(self)
+
+    def _page(self, **more: Any) -> str:
+        # By name: pages stand floors above estimates, which use none of them themselves.
+        return str(import_module("artperl.viewer").page(self, **more))
 
 
 def slide_parts(estimate: Estimate, farther: Array) -> Estimate:

@@ -38,6 +38,7 @@ MODULES = {
     "pytest": ("pytest", "dev"),
     "stable_baselines3": ("stable-baselines3", "dev"),
     "webdataset": ("webdataset", "dev"),
+    "playwright": ("playwright", "dev"),
 }
 """Optional modules: what each is called, and the extra that brings it."""
 

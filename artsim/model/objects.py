@@ -6,13 +6,15 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.names import printable
 from artsim.common.products import norm
+from artsim.common.showing import Showable
 from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.model.kinematics import LARGEST, Array, KinematicTree
@@ -134,7 +136,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class ArticulatedObject:
+class ArticulatedObject(Showable):
     """A kinematic tree with geometry, in its rest frame.
 
     The rest frame has Z up and the front towards -X; its origin is the centre of the axis-aligned box
@@ -189,6 +191,10 @@ class ArticulatedObject:
 
     def __len__(self) -> int:
         return len(self.parts)
+
+    def _page(self, **more: Any) -> str:
+        # By name: pictures stand floors above the model, which uses none of them itself.
+        return str(import_module("artsim.drawing.page").object_page(self, **more))
 
     def __str__(self) -> str:
         tree = self.tree

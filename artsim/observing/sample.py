@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from artsim.common.products import norm
+from artsim.common.showing import Showable
 from artsim.common.tables import centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.model.kinematics import Array
 
@@ -20,7 +23,7 @@ IMAGES = ("depth", "part_mask", "rgb")
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class Sample(Showable):
     """One view of one posed object. N points, K parts; camera frame = OpenCV, metres, radians.
 
     Attributes
@@ -133,6 +136,10 @@ class Sample:
     def __repr__(self) -> str:
         who = f"{type(self).__name__} {label_of(self.category)} {label_of(self.object_id)}"
         return f"<{who}: {len(self.points):,} points, {plural(len(self.joint_type), 'part')}>"
+
+    def _page(self, **more: Any) -> str:
+        # By name: pictures stand floors above samples, which use none of them themselves.
+        return str(import_module("artsim.drawing.page").sample_page([self], **more))
 
     @property
     def rest_points(self) -> Array:
