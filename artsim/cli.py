@@ -156,6 +156,8 @@ class GenerateObjects:
     actuators: Literal["none", "motor", "position"] = "none"
     """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
     control is where the joint shall be."""
+    materials: bool = False
+    """Write finishes, other for each object: colours, textures, and where they lie."""
     workers: int = field(default_factory=_cores)
     """Worker processes; by default one for each core."""
 
@@ -172,7 +174,7 @@ class GenerateObjects:
                 self.formats,
                 self.workers,
                 constraints=_constraints(self.having),
-                options=ExportOptions(self.base, self.actuators),
+                options=ExportOptions(self.base, self.actuators, self.materials),
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")

@@ -133,7 +133,7 @@ class Patch:
         return np.arange(len(self.vertices), dtype=np.uint32).reshape(-1, 3)
 
 
-def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
+def patches(part: Part, coat: Coat, scale: float = 1.0, closed: bool = False) -> Iterator[Patch]:
     """A part's surface, one patch for each material; what is not a closed solid is seen from both sides.
 
     Parameters
@@ -142,8 +142,10 @@ def patches(part: Part, coat: Coat, scale: float = 1.0) -> Iterator[Patch]:
     coat : Coat
     scale : float
         Of the object: textures keep their size in metres.
+    closed : bool
+        The surface is known to be closed: one side will do.
     """
-    faces = part.two_sided_faces()
+    faces = part.faces if closed else part.two_sided_faces()
     twice = len(faces) // max(len(part.faces), 1)
     corners = part.vertices[faces].astype(np.float64)
     normals = corner_normals(part.vertices, faces)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from artsim.errors import ConfigError
+from artsim.export.looks import MATERIALS_FILE, NO_FINISH, Finish, draw_finish, looks_text, materials_text
 from artsim.export.options import ExportOptions
 from artsim.export.robot import Robot, as_robot
 from artsim.export.text import obj_text
@@ -69,8 +70,11 @@ def export(
     folder = Path(folder)
     robot = as_robot(obj)
     folder.mkdir(parents=True, exist_ok=True)
+    finish = draw_finish(robot) if options.materials else NO_FINISH
     if "urdf" in formats or "mjcf" in formats:
-        _write_meshes(robot, folder / "meshes")
+        _write_meshes(robot, folder / "meshes", finish, apart="mjcf" in formats)
+    elif finish.pictures:
+        _write_pictures(folder / "meshes", finish)
     if "urdf" in formats:
         from artsim.export.urdf import semantics_text, urdf_text
 
@@ -79,11 +83,11 @@ def export(
     if "mjcf" in formats:
         from artsim.export.mjcf import mjcf_text
 
-        (folder / FORMATS["mjcf"]).write_text(mjcf_text(robot, options))
+        (folder / FORMATS["mjcf"]).write_text(mjcf_text(robot, options, finish))
     if "usd" in formats:
         from artsim.export.usd import usd_text
 
-        (folder / FORMATS["usd"]).write_text(usd_text(robot, options))
+        (folder / FORMATS["usd"]).write_text(usd_text(robot, options, finish))
     meta = {**describe(robot, formats), **(notes or {})}
     meta["artsim"] |= asdict(options)
     (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n")
@@ -123,10 +127,25 @@ def describe(robot: Robot, formats: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _write_meshes(robot: Robot, folder: Path) -> None:
+def _write_meshes(robot: Robot, folder: Path, finish: Finish, apart: bool) -> None:
+    """Meshes of all links; surfaces with a finish in one file for each link and, ``apart``, for each material."""
     folder.mkdir(exist_ok=True)
     for mesh in robot.meshes:
         (folder / f"{mesh.name}.obj").write_text(obj_text(mesh))
+    if not finish.materials:
+        return
+    for name, looks in finish.looks.items():
+        (folder / f"{name}.obj").write_text(looks_text(looks))
+        for look in looks if apart else ():
+            (folder / f"{look.name}.obj").write_text(looks_text([look]))
+    (folder / MATERIALS_FILE).write_text(materials_text(finish.materials))
+    _write_pictures(folder, finish)
+
+
+def _write_pictures(folder: Path, finish: Finish) -> None:
+    folder.mkdir(exist_ok=True)
+    for name, content in finish.pictures.items():
+        (folder / name).write_bytes(content)
 
 
 __all__ = ["FORMATS", "export"]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from lxml import etree
 
 from artsim.common.extras import needs
 from artsim.errors import AssetError
+from artsim.export.looks import NO_FINISH, Finish, Look, looks_text
 from artsim.export.options import ExportOptions
 from artsim.export.robot import STRENGTH, BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers, obj_text
@@ -22,7 +25,7 @@ POSITION_TIME = 0.1
 """Seconds in which a position actuator, held by damping alone, would be where it is told."""
 
 
-def mjcf_text(robot: Robot, options: ExportOptions) -> str:
+def mjcf_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -> str:
     """The object as an MJCF document; its meshes lie in ``meshes/``.
 
     Bodies, joints and inertias are those of the URDF file. What follows another joint (``mimic``, screws) is held by an
@@ -44,8 +47,11 @@ def mjcf_text(robot: Robot, options: ExportOptions) -> str:
     for group, more in (("visual", {"group": "2", "contype": "0", "conaffinity": "0"}), ("collision", {"group": "3"})):
         etree.SubElement(etree.SubElement(default, "default", {"class": group}), "geom", mass="0", **more)
     asset = etree.SubElement(root, "asset")
+    finished = {link.visual.name for link in robot.links if link.visual is not None and link.name in finish.looks}
     for mesh in robot.meshes:
-        etree.SubElement(asset, "mesh", name=mesh.name, file=f"{mesh.name}.obj")
+        if mesh.name not in finished:
+            etree.SubElement(asset, "mesh", name=mesh.name, file=f"{mesh.name}.obj")
+    _add_materials(asset, finish)
     bodies: list[etree._Element] = []
     incoming = {joint.child: joint for joint in robot.joints}
     world = etree.SubElement(root, "worldbody")
@@ -53,7 +59,7 @@ def mjcf_text(robot: Robot, options: ExportOptions) -> str:
         joint = incoming.get(i)
         parent = world if joint is None else bodies[joint.parent]
         offset = link.origin if joint is None else link.origin - robot.links[joint.parent].origin
-        bodies.append(_add_body(parent, numbers(offset), link, joint))
+        bodies.append(_add_body(parent, numbers(offset), link, joint, finish.looks.get(link.name, ())))
         if joint is None and options.base == "free":
             bodies[-1].insert(0, etree.Element("freejoint", name=_unused("root", robot)))
     _add_exclusions(root, robot)
@@ -61,11 +67,30 @@ def mjcf_text(robot: Robot, options: ExportOptions) -> str:
     if options.actuators != "none":
         _add_actuators(root, robot, options.actuators)
     text: str = etree.tostring(root, pretty_print=True, encoding="unicode")
-    _compile(text, robot)
+    _compile(text, robot, finish)
     return text
 
 
-def _add_body(parent: etree._Element, pos: str, link: Link, joint: LinkJoint | None) -> etree._Element:
+def _add_materials(asset: etree._Element, finish: Finish) -> None:
+    """Materials with their textures, and the meshes of each; pictures lie beside the meshes."""
+    for name, material in finish.materials.items():
+        red, green, blue = (1.0, 1.0, 1.0) if material.texture is not None else material.colour
+        shown = {"rgba": numbers((red, green, blue, 1.0)), "specular": number(material.specular)}
+        shown |= {"shininess": number(1.0 - material.roughness), "emission": number(material.emission)}
+        shown |= {"metallic": number(material.metallic), "roughness": number(material.roughness)}
+        if material.texture is not None:
+            etree.SubElement(asset, "texture", name=name, type="2d", file=f"meshes/{name}.png")
+            shown["texture"] = name
+        etree.SubElement(asset, "material", name=name, **shown)
+    for looks in finish.looks.values():
+        for look in looks:
+            # Flat surfaces enclose nothing; their mass is 0 in any case.
+            etree.SubElement(asset, "mesh", name=look.name, file=f"{look.name}.obj", inertia="shell")
+
+
+def _add_body(
+    parent: etree._Element, pos: str, link: Link, joint: LinkJoint | None, looks: Sequence[Look]
+) -> etree._Element:
     body = etree.SubElement(parent, "body", name=link.name, pos=pos)
     inertia, tensor = link.inertia, link.inertia.tensor
     entries = [tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
@@ -84,7 +109,10 @@ def _add_body(parent: etree._Element, pos: str, link: Link, joint: LinkJoint | N
             actuatorfrcrange=numbers((-joint.effort, joint.effort)),
             **more,
         )
-    if link.visual is not None:
+    for look in looks:
+        mesh = {"mesh": look.name, "material": look.material}
+        etree.SubElement(body, "geom", {"class": "visual"}, type="mesh", pos=numbers(-link.origin), **mesh)
+    if link.visual is not None and not looks:
         _add_geom(body, "visual", link, link.visual)
     for shape in link.collision:
         _add_geom(body, "collision", link, shape)
@@ -147,11 +175,13 @@ def _unused(name: str, robot: Robot) -> str:
     return name
 
 
-def _compile(text: str, robot: Robot) -> None:
+def _compile(text: str, robot: Robot, finish: Finish) -> None:
     with needs("MJCF files"):  # a file that MuJoCo does not compile is not written
         import mujoco
 
     files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
+    files |= {f"{look.name}.obj": looks_text([look]).encode() for looks in finish.looks.values() for look in looks}
+    files |= {f"meshes/{name}": content for name, content in finish.pictures.items()}
     try:
         mujoco.MjSpec.from_string(text, assets=files).compile()
     except ValueError as error:

@@ -28,6 +28,9 @@ class ExportOptions:
     takes away: at full control it does not exceed its velocity limit. position: a control is where the joint shall be.
     USD has drives in any case."""
 
+    materials: bool = False
+    """Write finishes, as renderers draw them for the category: colours and textures, with where they lie."""
+
     def __post_init__(self) -> None:
         for name, kind in (("base", Base), ("actuators", Actuators)):
             if getattr(self, name) not in get_args(kind):

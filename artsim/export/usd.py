@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from artsim.common.extras import needs
+from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
 from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.model.kinematics import Array
 
 
-def usd_text(robot: Robot, options: ExportOptions) -> str:
+def usd_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -> str:
     """The object as a USD layer in text form.
 
     One prim for each link, in metres, kilograms and degrees as UsdPhysics has it, Z up. A fixed base hangs on a fixed
@@ -35,6 +37,7 @@ def usd_text(robot: Robot, options: ExportOptions) -> str:
     paths = [root.GetPath().AppendChild(link.name) for link in robot.links]
     for link, path in zip(robot.links, paths, strict=True):
         _add_link(stage, path, link)
+    _add_finish(stage, root.GetPath(), robot, finish)
     free = options.base == "free"
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[0]) if free else root.GetPrim())
     if not free:
@@ -88,6 +91,75 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
             UsdPhysics.MeshCollisionAPI.Apply(collider.GetPrim()).CreateApproximationAttr("convexHull")
         UsdPhysics.CollisionAPI.Apply(collider.GetPrim())
         collider.CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+
+def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish) -> None:
+    """Materials, and meshes with places on textures, each face in the subset of its material."""
+    from pxr import Sdf, UsdGeom, UsdShade, Vt
+
+    if not finish.materials:
+        return
+    taken = {link.name for link in robot.links}
+    scope = root.AppendChild(next(name for name in ("Looks", "Looks_", "Looks__") if name not in taken))
+    UsdGeom.Scope.Define(stage, scope)
+    for name, material in finish.materials.items():
+        made = UsdShade.Material.Define(stage, scope.AppendChild(name))
+        shader = UsdShade.Shader.Define(stage, made.GetPath().AppendChild("surface"))
+        shader.CreateIdAttr("UsdPreviewSurface")
+        colour = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+        colour.Set(tuple(_linear(np.asarray(material.colour)).tolist()))
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(material.roughness)
+        shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(material.metallic)
+        if material.emission:
+            sent = tuple((material.emission * _linear(np.asarray(material.colour))).tolist())
+            shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).Set(sent)
+        if material.texture is not None:
+            place = UsdShade.Shader.Define(stage, made.GetPath().AppendChild("place"))
+            place.CreateIdAttr("UsdPrimvarReader_float2")
+            place.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+            out = place.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+            texture = UsdShade.Shader.Define(stage, made.GetPath().AppendChild("texture"))
+            texture.CreateIdAttr("UsdUVTexture")
+            texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./meshes/{name}.png")
+            texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(out)
+            for side in ("wrapS", "wrapT"):
+                texture.CreateInput(side, Sdf.ValueTypeNames.Token).Set("repeat")
+            texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
+            colour.ConnectToSource(texture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3))
+        made.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    for link in robot.links:
+        looks = finish.looks.get(link.name, ())
+        if not looks:
+            continue
+        mesh = _add_mesh(stage, root.AppendChild(link.name).AppendChild("visual"), link, _joined(link, looks))
+        laid = np.concatenate([look.uv[look.faces.ravel()] for look in looks]).astype(np.float32)
+        places = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
+        )
+        places.Set(Vt.Vec2fArray.FromNumpy(laid))
+        normals = np.concatenate([look.normals[look.faces.ravel()] for look in looks]).astype(np.float32)
+        mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
+        mesh.SetNormalsInterpolation(UsdGeom.Tokens.faceVarying)
+        binding, first = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()), 0
+        for look in looks:
+            faces = Vt.IntArray.FromNumpy(np.arange(first, first + len(look.faces), dtype=np.int32))
+            first += len(look.faces)
+            subset = binding.CreateMaterialBindSubset(look.material, faces)
+            material = UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(look.material)))
+            UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+
+
+def _joined(link: Link, looks: Sequence[Look]) -> MeshShape:
+    """The surfaces of all materials as one mesh, with each corner once."""
+    corners = np.concatenate([look.vertices[look.faces.ravel()] for look in looks])
+    vertices, index = np.unique(corners, axis=0, return_inverse=True)
+    return MeshShape(link.name, vertices, index.reshape(-1, 3).astype(np.int32))
+
+
+def _linear(srgb: Array) -> Array:
+    """Colours without the curve of sRGB, as UsdPreviewSurface takes them."""
+    low: Array = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return low
 
 
 def _add_mesh(stage: Any, path: Any, link: Link, shape: MeshShape) -> Any:

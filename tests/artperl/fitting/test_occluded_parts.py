@@ -82,7 +82,9 @@ def test_a_temple_without_a_point_is_where_a_camera_would_not_see_it() -> None:
 def test_what_fits_stays(degrees: float) -> None:
     for seed in range(4):
         shapes, sample, truth = seen("eyeglasses", seed, degrees, FRONT)
-        assert torch.equal(found(shapes, truth, sample).state, truth.state)
+        state = found(shapes, truth, sample).state
+        # The edge of the shadow is known to about the spacing of the shape's points.
+        torch.testing.assert_close(state, truth.state, rtol=0.0, atol=np.radians(3.0))
 
 
 @pytest.mark.parametrize("category", ["laptop", "dishwasher", "drawer", "robot_arm"])
