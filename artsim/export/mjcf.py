@@ -21,6 +21,9 @@ STIFF = {"solref": _SOLREF, "solimp": _SOLIMP}
 leaves a screw's thread far too soft."""
 STOP = {"solreflimit": _SOLREF, "solimplimit": _SOLIMP}
 """How stiffly joints stop: by its default MuJoCo lets light parts through by tenths of a radian."""
+BELOW = 1.0 - 1e-6
+"""Share of the effort limit that a motor has at most. At the limit itself MuJoCo's implicit integrator forgets what the
+motor loses with speed, and light parts dart off."""
 POSITION_TIME = 0.1
 """Seconds in which a position actuator, held by damping alone, would be where it is told."""
 
@@ -155,7 +158,7 @@ def _add_actuators(root: etree._Element, robot: Robot, kind: str) -> None:
         if kind == "motor":
             # Control, weight and speed add up to nothing at the velocity limit; the joint's damping has a share.
             lost = max((1.0 + 1.0 / STRENGTH) * joint.effort / joint.velocity - joint.damping, 0.0)
-            gain, bias, control = number(joint.effort), numbers((0.0, 0.0, -lost)), "-1 1"
+            gain, bias, control = number(BELOW * joint.effort), numbers((0.0, 0.0, -lost)), "-1 1"
         else:
             gain_of = joint.effort / max(joint.velocity * POSITION_TIME, 1e-9)
             damp = gain_of * POSITION_TIME

@@ -26,6 +26,9 @@ STRENGTH = 5.0
 """Effort limit over what holds the carried weight, held horizontally at its whole reach."""
 TURN_SPEED, SLIDE_SPEED = 4.0 * np.pi, 2.0
 """Velocity limits, rad/s and m/s."""
+STROKE_TIME = 0.2
+"""Least seconds that a joint needs for its whole range: in a time step of 2 ms it goes 1 % of it at most, and
+simulators stop it where its limit is."""
 HELPER_SHARE = 0.01
 """Share of a screw part's mass that its helper link takes over from it."""
 
@@ -261,6 +264,8 @@ def _link_joint(
         reach = np.sqrt(moment / carried.mass)
         effort, velocity = STRENGTH * weight * reach, TURN_SPEED
         damping, friction = moment / DECAY, weight * PIN_RADIUS * min(1.0, reach)
+    if 0.0 < upper - lower < np.inf:
+        velocity = min(velocity, (upper - lower) / STROKE_TIME)
     return LinkJoint(
         name, kind, parent, child, axis, lower, upper, float(effort), float(velocity), damping, friction, mimic
     )
