@@ -20,6 +20,8 @@ from typing import Any
 from artsim.common.extras import needs
 
 ENV_ID = "ArtSimArticulated-v1"
+RECORDED_ID = f"artsim.envs:{ENV_ID}"
+"""The id as programs know it that import no artsim: gymnasium imports the module before the colon."""
 EPISODE_LENGTH = 100
 """Control steps, unless ``max_episode_steps`` says otherwise."""
 

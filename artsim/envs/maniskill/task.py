@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 import sapien
 import torch
+from gymnasium.envs.registration import EnvSpec
 from mani_skill.envs.sapien_env import BaseEnv
 from mani_skill.sensors.camera import CameraConfig
 from mani_skill.utils.building.ground import build_ground
@@ -18,13 +19,14 @@ from torch import Tensor
 
 from artsim.appearance.finishes import draw_coats
 from artsim.appearance.painted import painted_coats
-from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
+from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH, RECORDED_ID
 from artsim.envs.maniskill.build import OBJECT_BIT, build
 from artsim.envs.maniskill.cameras import camera_record, look, poses
 from artsim.envs.maniskill.goal import BEST, dense_reward
 from artsim.envs.maniskill.mechanism import Mechanism
 from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
 from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_start
+from artsim.envs.maniskill.recorded import read_options, recorded_options
 from artsim.envs.maniskill.truth import Record, Truth, start_and_goal, truth_of
 from artsim.errors import ConfigError
 from artsim.model.objects import ArticulatedObject
@@ -89,6 +91,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     truth: Truth
     objects: tuple[ArticulatedObject, ...]
     """The object of each sub-scene."""
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -102,7 +105,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         **options: Any,
     ):
         own = {f.name for f in fields(TaskOptions)}
-        self.options = TaskOptions(**{name: options.pop(name) for name in own & options.keys()})
+        self.options = read_options({name: options.pop(name) for name in own & options.keys()})
         self.robot_init_qpos_noise = robot_init_qpos_noise
         self._source = Episode(
             EpisodeOptions(
@@ -127,6 +130,18 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             render_backend=render_backend,
             **options,
         )
+        # Flat states are read by the names in here, which ManiSkill leaves out where there are no actors.
+        self._init_raw_state.setdefault("actors", {})
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What gymnasium made the environment of, as recordings keep it: the id names the module that registers it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec) -> None:
+        # ManiSkill's command line makes the environment of this id and these options, after a way through JSON.
+        self._spec = replace(spec, id=RECORDED_ID, kwargs=recorded_options(spec.kwargs))
 
     @property
     def _default_sim_config(self) -> SimConfig:
@@ -259,15 +274,16 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
 
     def get_state_dict(self) -> dict[str, Any]:
         """ManiSkill's state of the simulation, and the goals."""
-        state: dict[str, Any] = super().get_state_dict()
-        # Flat states are read in this order, actors or not.
-        return {"actors": {}, **state, "goal": self.goal.clone()}
+        return {**super().get_state_dict(), "goal": self.goal.clone()}
 
     def set_state_dict(self, state: dict[str, Any], env_idx: Tensor | None = None) -> None:
-        """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do."""
+        """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do.
+
+        Tensors or NumPy arrays, with or without the axis of sub-scenes where there is one: recordings have none.
+        """
         super().set_state_dict(state, env_idx)
         if "goal" in state:
-            self.goal[slice(None) if env_idx is None else env_idx] = state["goal"]
+            self.goal[slice(None) if env_idx is None else env_idx] = _tensor(state["goal"], self.device)
 
     def step(self, action: Any) -> Any:
         """One control step; see ManiSkill.
@@ -294,7 +310,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
 
 
 def _tensor(values: Any, device: Any) -> Tensor:
-    return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
+    return torch.as_tensor(values, dtype=torch.float32, device=device)
 
 
 if ENV_ID not in REGISTERED_ENVS:  # gymnasium knows it from artsim.envs
