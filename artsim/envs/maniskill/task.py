@@ -9,6 +9,9 @@ import numpy as np
 import sapien
 import torch
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box
+from gymnasium.vector.utils import batch_space
+from mani_skill.agents.robots.fetch import FETCH_WHEELS_COLLISION_BIT
 from mani_skill.envs.sapien_env import BaseEnv
 from mani_skill.sensors.camera import CameraConfig
 from mani_skill.utils.building.ground import build_ground
@@ -25,8 +28,9 @@ from artsim.envs.maniskill.cameras import camera_record, look, poses
 from artsim.envs.maniskill.goal import BEST, dense_reward
 from artsim.envs.maniskill.mechanism import Mechanism
 from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
-from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_start
+from artsim.envs.maniskill.places import ONLOOKER_FOV, onlooker, robot_start
 from artsim.envs.maniskill.recorded import read_options, recorded_options
+from artsim.envs.maniskill.robots import NO_ROBOT, ROBOTS
 from artsim.envs.maniskill.truth import Record, Truth, start_and_goal, truth_of
 from artsim.errors import ConfigError
 from artsim.model.objects import ArticulatedObject
@@ -67,7 +71,8 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     Parameters
     ----------
     robot_uids : str
-        "panda", "panda_wristcam" or "floating_panda_gripper".
+        "panda", "panda_wristcam", "floating_panda_gripper", "fetch", "xarm6_robotiq" (whose files ManiSkill
+        downloads), or "none": actions are empty then, and nothing moves the object but gravity.
     num_envs : int
         Sub-scenes; more than one need a CUDA device, as everywhere in ManiSkill.
     obs_mode : str
@@ -85,7 +90,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         When something is to be drawn, and there is no device that can.
     """
 
-    SUPPORTED_ROBOTS = tuple(ROBOTS)
+    SUPPORTED_ROBOTS = (*ROBOTS, NO_ROBOT)
     SUPPORTED_REWARD_MODES = REWARD_MODES
 
     truth: Truth
@@ -132,6 +137,11 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         )
         # Flat states are read by the names in here, which ManiSkill leaves out where there are no actors.
         self._init_raw_state.setdefault("actors", {})
+        if self.agent is None:
+            self.single_action_space = self._orig_single_action_space = Box(-1.0, 1.0, (0,))
+            self.action_space = (
+                batch_space(self.single_action_space, num_envs) if num_envs > 1 else self.single_action_space
+            )
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -151,13 +161,19 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     def _load_agent(self, options: dict[str, Any]) -> None:
         super()._load_agent(options, sapien.Pose([-3.0, 0.0, 0.0]))
 
+    @property
+    def control_mode(self) -> str:
+        """The robot's control mode; "none" where there is no robot."""
+        return NO_ROBOT if self.agent is None else self.agent.control_mode
+
     def _load_scene(self, options: dict[str, Any]) -> None:
         rngs = [np.random.default_rng(int(seed)) for seed in self._batched_episode_rng.randint(_SEEDS)]
         self.objects = tuple(self._draw_object(rng) for rng in rngs)
         self.truth = truth_of(self.objects, self.options.max_joints, self.device)
         self._cameras = [look(obj, self.options.views, rng) for obj, rng in zip(self.objects, rngs, strict=True)]
         ground = build_ground(self.scene)
-        ground.set_collision_group_bit(group=2, bit_idx=OBJECT_BIT, bit=1)
+        for bit in (OBJECT_BIT, FETCH_WHEELS_COLLISION_BIT):  # the wheels reach below the ground
+            ground.set_collision_group_bit(group=2, bit_idx=bit, bit=1)
         built = []
         for number, (obj, rng) in enumerate(zip(self.objects, rngs, strict=True)):
             coats = (painted_coats(obj) or draw_coats(obj, rng)) if self.scene.can_render() else ()
@@ -166,8 +182,10 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             self.remove_from_state_dict_registry(each.articulation)
         self.mechanism = Mechanism(self.scene, built, self.truth)
         self.add_to_state_dict_registry(self.mechanism.articulation)
-        starts = [robot_start(obj, self.robot_uids, self.options.goal) for obj in self.objects]
-        self._stands, self._begins = (_tensor(np.stack(column), self.device) for column in zip(*starts, strict=True))
+        self._stands, self._begins = torch.zeros(self.num_envs, 3, device=self.device), None
+        if self.agent is not None:
+            starts = [robot_start(obj, self.robot_uids, self.options.goal) for obj in self.objects]
+            self._stands, self._begins = (_tensor(np.stack(each), self.device) for each in zip(*starts, strict=True))
         self.goal = torch.zeros_like(self.truth.low)
 
     def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
@@ -195,7 +213,10 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     @property
     def _default_human_render_camera_configs(self) -> CameraConfig:
         pose = poses(
-            [onlooker(obj, stand) for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)]
+            [
+                onlooker(obj, self.robot_uids, stand)
+                for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)
+            ]
         )
         return CameraConfig(
             "render_camera", pose, 512, 512, fov=ONLOOKER_FOV, near=0.01, far=100.0, shader_pack="default"
@@ -214,9 +235,11 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         start, goal = start_and_goal(self.options.goal, truth, draw)
         self.goal[env_idx] = goal[env_idx]
         self.mechanism.set_state(start, env_idx)
+        if self._begins is None:
+            return
         robot = self.agent.robot
         noise = rng.normal(0.0, self.robot_init_qpos_noise, self._begins.shape[1])
-        noise[:, -2:] = 0.0  # fingers
+        noise[:, -ROBOTS[self.robot_uids].fingers :] = 0.0
         robot.set_qpos(self._begins[env_idx] + _tensor(noise, self.device))
         robot.set_pose(Pose.create_from_pq(self._stands[env_idx]))
 
@@ -247,9 +270,13 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             "success": (error.abs() <= self.options.tolerance).all(1),
         }
 
+    def _get_obs_agent(self) -> Any:
+        return {} if self.agent is None else super()._get_obs_agent()
+
     def _get_obs_extra(self, info: Record) -> Record:
         span = (self.truth.high - self.truth.low).clamp(min=1e-9)
-        seen = {"tcp_pose": self.agent.tcp.pose.raw_pose, "goal": (self.goal - self.truth.low) / span}
+        seen = {} if self.agent is None else {"tcp_pose": self.agent.tcp.pose.raw_pose}
+        seen["goal"] = (self.goal - self.truth.low) / span
         if self.obs_mode_struct.use_state:
             free = info["joint_free"]
             seen |= {
@@ -257,15 +284,21 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
                 "joint_place": (info["joint_state"] - self.truth.low) / span,
                 "joint_error": info["joint_error"],
                 "joint_velocity": info["joint_velocity"],
-                "tcp_to_handle": (info["handle"] - self.agent.tcp.pose.p[:, None]) * free[..., None],
-                "handle_direction": info["handle_direction"] * free[..., None],
             }
+            if self.agent is not None:
+                seen["tcp_to_handle"] = self._tcp_to_handle(info) * free[..., None]
+            seen["handle_direction"] = info["handle_direction"] * free[..., None]
         # The first row is the root's.
         return {name: value if name == "tcp_pose" else value[:, 1:].flatten(1) for name, value in seen.items()}
 
+    def _tcp_to_handle(self, info: Record) -> Tensor:
+        """(B, P, 3) metres; infinite without a robot."""
+        handle = info["handle"]
+        return torch.full_like(handle, torch.inf) if self.agent is None else handle - self.agent.tcp.pose.p[:, None]
+
     def compute_dense_reward(self, obs: Any, action: Any, info: Record) -> Tensor:
         """(B,) see :func:`artsim.envs.maniskill.goal.dense_reward`."""
-        distance = torch.linalg.vector_norm(info["handle"] - self.agent.tcp.pose.p[:, None], dim=-1)
+        distance = torch.linalg.vector_norm(self._tcp_to_handle(info), dim=-1)
         return dense_reward(info["joint_error"], info["joint_free"], self.options.tolerance, distance)
 
     def compute_normalized_dense_reward(self, obs: Any, action: Any, info: Record) -> Tensor:
@@ -274,7 +307,9 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
 
     def get_state_dict(self) -> dict[str, Any]:
         """ManiSkill's state of the simulation, and the goals."""
-        return {**super().get_state_dict(), "goal": self.goal.clone()}
+        # ManiSkill asks the robot for its controllers' state.
+        state = self.scene.get_sim_state() if self.agent is None else super().get_state_dict()
+        return {**state, "goal": self.goal.clone()}
 
     def set_state_dict(self, state: dict[str, Any], env_idx: Tensor | None = None) -> None:
         """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do.
@@ -306,7 +341,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
                     ENV_ID,
                     f"pass one of shape {whole}: control mode {self.control_mode} of {self.robot_uids}",
                 )
-        return super().step(action)
+        return super().step(None if self.agent is None else action)
 
 
 def _tensor(values: Any, device: Any) -> Tensor:

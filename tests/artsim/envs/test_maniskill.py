@@ -23,12 +23,14 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.physics.episode import openness
 from artsim.renderers import render
-from tests.conftest import ASSETS, backend, installed, rigid, valve
-from tests.without import environment
+from tests.conftest import ASSETS, absent, backend, installed, rigid, valve
+from tests.without import beyond_the_core, environment
 
 torch = installed("torch")
 installed("mani_skill")
 from artsim.envs.maniskill.goal import BEST, dense_reward  # noqa: E402
+from artsim.envs.maniskill.options import lacking_files  # noqa: E402
+from artsim.envs.maniskill.robots import ROBOTS  # noqa: E402
 from artsim.envs.maniskill.task import ArticulatedTask  # noqa: E402
 from artsim.envs.maniskill.truth import truth_of  # noqa: E402
 
@@ -36,6 +38,8 @@ pytestmark = pytest.mark.slow
 
 ID = "ArtSimArticulated-v1"
 GRIPPER = "floating_panda_gripper"
+ROBOTS_HERE = [robot for robot in ROBOTS if not lacking_files(robot)]
+"""ManiSkill brings the files of these, or has downloaded them."""
 
 
 def new(**options: Any) -> ArticulatedTask:
@@ -166,7 +170,7 @@ def test_a_gripper_near_the_handle_is_worth_more() -> None:
 
 
 @pytest.mark.parametrize("goal", ["open", "close", "random"])
-@pytest.mark.parametrize("robot", ["panda", GRIPPER])
+@pytest.mark.parametrize("robot", ROBOTS_HERE)
 def test_robots_begin_clear_of_the_object(robot: str, goal: str) -> None:
     for category in ("drawer", "laptop"):
         env = new(robot_uids=robot, categories=(category,), goal=goal, max_joints=1)
@@ -174,6 +178,39 @@ def test_robots_begin_clear_of_the_object(robot: str, goal: str) -> None:
         for _ in range(3):
             *_, after = env.step(np.zeros(env.single_action_space.shape, np.float32))
         assert torch.allclose(before["joint_state"], after["joint_state"], atol=1e-4)
+
+
+@pytest.mark.parametrize("robot", [robot for robot in ROBOTS_HERE if robot != GRIPPER])
+def test_robots_stand_still_behind_their_reach(robot: str) -> None:
+    """No shape of the robot is farther forward than it is said to be, and none in the ground or in another one."""
+    env = new(robot_uids=robot, categories=("drawer",), robot_init_qpos_noise=0.0)
+    env.reset(seed=0)
+    robot_links = [link._objs[0] for link in env.agent.robot.links]
+    boxes = np.array([link.compute_global_aabb_tight() for link in robot_links if link.collision_shapes])
+    base = env.agent.robot.pose.p[0].numpy()
+    start = ROBOTS[robot]
+    assert start.reach - 0.02 < boxes[:, 1, 0].max() - base[0] <= start.reach
+    assert abs(boxes[..., 1] - base[1]).max() <= start.room[1]
+    assert base[2] - 0.01 < boxes[..., 2].min()
+    env.step(np.zeros(env.single_action_space.shape, np.float32))
+    still = env.agent.robot.qpos[0, : -start.fingers].numpy()
+    assert np.allclose(still, start.qpos[: -start.fingers], atol=0.01)
+
+
+def test_without_a_robot_lids_fall_and_handles_are_still_known() -> None:
+    env = new(robot_uids="none", obj=make("laptop", 0), goal="close", gravity=True, obs_mode="state_dict")
+    observation, before = env.reset(seed=0)
+    assert set(observation["extra"]).isdisjoint(("tcp_pose", "tcp_to_handle"))
+    assert env.action_space.shape == env.action_space.sample().shape == (0,)
+    for action in (None, env.action_space.sample(), np.zeros((1, 0))):
+        observation, reward, *_, after = env.step(action)
+    assert not torch.allclose(before["joint_state"], after["joint_state"])
+    assert torch.isfinite(reward).all()
+    assert torch.isfinite(observation["extra"]["handle_direction"]).all()
+    flat = env.get_state()
+    env.step(None)
+    env.set_state(flat)
+    assert torch.allclose(env.get_state(), flat, atol=1e-5)
 
 
 def test_success_ends_an_episode() -> None:
@@ -390,10 +427,12 @@ def test_a_panda_does_the_task_too() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"obs_mode": "rgbx"}, "obs_mode"),
+        ({"obs_mode": "rgbx"}, r"obs_mode.*use state, state_dict, .*pointcloud, .*segmentation, position, normal"),
         ({"obs_mode": 3}, "obs_mode"),
+        ({"sim_backend": "tpu"}, "use auto, cpu or gpu"),
         ({"reward_mode": "lavish"}, "reward_mode"),
-        ({"robot_uids": "fetch"}, "floating_panda_gripper"),
+        ({"robot_uids": "anymal_c"}, "floating_panda_gripper, fetch, .*none"),
+        ({"robot_uids": ["panda"]}, "robot_uids"),
         ({"goal": "slam"}, "open, close"),
         ({"tolerance": 0.0}, "tolerance"),
         ({"categories": ("spaceship",)}, "spaceship"),
@@ -426,6 +465,31 @@ def test_folders_without_objects_or_meshes_are_refused(tmp_path: Path) -> None:
         gymnasium.make(ID, objects=(tmp_path,))
 
 
+@pytest.mark.parametrize("backend", ["gpu", "cuda", "physx_cuda", "cuda:0"])
+def test_without_cuda_gpus_are_refused(backend: str) -> None:
+    if torch.cuda.is_available():
+        absent("this machine has a CUDA device")
+    with pytest.raises(ConfigError, match=r"sim_backend: .* needs a CUDA device.* Fix: use cpu, or auto$"):
+        gymnasium.make(ID, sim_backend=backend)
+
+
+def test_robots_without_files_name_the_command_that_downloads_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MS_ASSET_DIR", str(tmp_path))
+    source = (
+        "import gymnasium, artsim.envs\n"
+        "from artsim.errors import ConfigError\n"
+        "try:\n"
+        f"    gymnasium.make({ID!r}, robot_uids='xarm6_robotiq')\n"
+        "except ConfigError as error:\n"
+        "    print('said', error)\n"
+    )
+    said = output_of(source).splitlines()[-1]
+    assert said.startswith("said robot_uids: the files of 'xarm6_robotiq' are not in ")
+    assert said.endswith("Fix: python -m mani_skill.utils.download_asset xarm6")
+
+
 def test_without_a_vulkan_device_states_are_there_and_images_name_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
     source = (
         "import gymnasium, artsim.envs\n"
@@ -454,6 +518,20 @@ def test_without_maniskill_the_environment_names_the_extra(tmp_path: Path, monke
         "    print('said', error)\n"
     )
     assert "[maniskill]" in output_of(source)
+
+
+def test_the_extra_alone_is_enough_and_brings_no_pybullet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = beyond_the_core("maniskill")
+    assert "pybullet" in missing
+    assert "mani_skill" not in missing
+    monkeypatch.setenv("PYTHONPATH", environment(tmp_path, missing)["PYTHONPATH"])
+    source = (
+        "import gymnasium, artsim.envs\n"
+        f"env = gymnasium.make({ID!r}, robot_uids={GRIPPER!r}, categories=('laptop',))\n"
+        "env.reset(seed=0)\n"
+        "print('said', env.step(env.action_space.sample())[4]['part_valid'].sum().item())\n"
+    )
+    assert "said 2" in output_of(source)
 
 
 def test_nothing_heavy_is_imported_before_an_environment_is_made() -> None:
