@@ -306,19 +306,34 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         return self.compute_dense_reward(obs, action, info) / BEST
 
     def get_state_dict(self) -> dict[str, Any]:
-        """ManiSkill's state of the simulation, and the goals."""
+        """ManiSkill's state of the simulation, with the goals (B, P) and the diagonals (B, 1) of the objects."""
         # ManiSkill asks the robot for its controllers' state.
         state = self.scene.get_sim_state() if self.agent is None else super().get_state_dict()
-        return {**state, "goal": self.goal.clone()}
+        return {**state, "goal": self.goal.clone(), "diagonal": self.truth.fixed["diagonal"][:, None].clone()}
 
     def set_state_dict(self, state: dict[str, Any], env_idx: Tensor | None = None) -> None:
         """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do.
 
         Tensors or NumPy arrays, with or without the axis of sub-scenes where there is one: recordings have none.
+
+        Raises
+        ------
+        ConfigError
+            When the state is one of another object.
         """
+        rows = slice(None) if env_idx is None else env_idx
+        if "diagonal" in state:
+            there = _tensor(state["diagonal"], self.device).reshape(-1)
+            if not torch.allclose(there, self.truth.fixed["diagonal"][rows], rtol=1e-5):
+                names = ", ".join(f"{obj.category} {obj.object_id}" for obj in self.objects[:3])
+                raise ConfigError(
+                    f"a state of another object than {names}",
+                    "set_state_dict",
+                    'begin the episode that it is of: reset(seed=..., options={"reconfigure": True})',
+                )
         super().set_state_dict(state, env_idx)
         if "goal" in state:
-            self.goal[slice(None) if env_idx is None else env_idx] = _tensor(state["goal"], self.device)
+            self.goal[rows] = _tensor(state["goal"], self.device)
 
     def step(self, action: Any) -> Any:
         """One control step; see ManiSkill.

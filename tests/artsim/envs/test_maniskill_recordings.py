@@ -110,6 +110,19 @@ def test_states_of_a_recording_can_be_set(drawers: Path) -> None:
         assert np.allclose(env.get_state_dict()["goal"][0], state["goal"])
 
 
+def test_states_of_another_object_are_refused(drawers: Path) -> None:
+    from mani_skill.trajectory.utils import dict_to_list_of_dicts
+
+    env = gymnasium.make(RECORDED_ID, **OPTIONS, categories=("drawer",)).unwrapped
+    env.reset(seed=6)
+    before = env.get_state()
+    with h5py.File(drawers) as data:
+        states = dict_to_list_of_dicts(data["traj_0/env_states"])
+    with pytest.raises(ConfigError, match=r"another object than drawer .*Fix: .*reset\(seed="):
+        env.set_state_dict(states[0])
+    assert env.get_state().equal(before)
+
+
 @pytest.mark.parametrize(
     "options",
     [
