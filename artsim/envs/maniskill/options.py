@@ -13,7 +13,7 @@ from mani_skill import ASSET_DIR
 from mani_skill.agents.registration import REGISTERED_AGENTS
 from mani_skill.envs.sapien_env import BaseEnv
 from mani_skill.envs.utils.observations import ALL_VISUAL_TEXTURES, parse_obs_mode_to_struct
-from mani_skill.envs.utils.system.backend import CPU_SIM_BACKENDS, sim_backend_name_mapping
+from mani_skill.envs.utils.system.backend import CPU_SIM_BACKENDS, render_backend_name_mapping, sim_backend_name_mapping
 from mani_skill.utils import assets
 
 from artsim.envs.maniskill import ENV_ID
@@ -95,6 +95,25 @@ def check(robot_uids: Any, num_envs: int, obs_mode: str, options: dict[str, Any]
     if reward_mode not in (None, *REWARD_MODES):
         raise ConfigError(f"there is no {reward_mode!r}", "reward_mode", f"use {', '.join(REWARD_MODES)}")
     _check_backend(options.get("sim_backend", "auto"), num_envs)
+
+
+def choose_renderer(render_backend: str | None, obs_mode: str, render_mode: str | None) -> str:
+    """The device that draws, by ManiSkill's names; ``auto`` is "none" where nothing is to be drawn.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such device, or none for observations that are drawn.
+    """
+    drawn = obs_mode not in ("state", "state_dict", "none")
+    if render_backend == "auto":
+        return "none" if not drawn and render_mode is None else "gpu" if torch.cuda.is_available() else "cpu"
+    name = "none" if render_backend is None else render_backend
+    if name.partition(":")[0] not in ("none", "pci", *render_backend_name_mapping):
+        raise ConfigError(f"there is no {name!r}", "render_backend", "use auto, cpu, gpu or none")
+    if name == "none" and drawn:
+        raise ConfigError("draws nothing", f"render_backend: {name}", "use auto, or obs_mode='state'")
+    return name
 
 
 def _check_robot(robot_uids: Any) -> None:

@@ -27,7 +27,7 @@ from artsim.envs.maniskill.build import OBJECT_BIT, build
 from artsim.envs.maniskill.cameras import camera_record, look, poses
 from artsim.envs.maniskill.goal import BEST, dense_reward
 from artsim.envs.maniskill.mechanism import Mechanism
-from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
+from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check, choose_renderer
 from artsim.envs.maniskill.places import ONLOOKER_FOV, onlooker, robot_start
 from artsim.envs.maniskill.recorded import read_options, recorded_options
 from artsim.envs.maniskill.robots import NO_ROBOT, ROBOTS
@@ -121,9 +121,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             )
         )
         check(robot_uids, num_envs, obs_mode, options)
-        if render_backend == "auto":
-            seen = obs_mode not in ("state", "state_dict", "none") or options.get("render_mode") is not None
-            render_backend = "none" if not seen else "gpu" if torch.cuda.is_available() else "cpu"
+        render_backend = choose_renderer(render_backend, obs_mode, options.get("render_mode"))
         if render_backend != "none":
             import_sapien()  # tells what to do where nothing can be drawn
         super().__init__(

@@ -430,6 +430,8 @@ def test_a_panda_does_the_task_too() -> None:
         ({"obs_mode": "rgbx"}, r"obs_mode.*use state, state_dict, .*pointcloud, .*segmentation, position, normal"),
         ({"obs_mode": 3}, "obs_mode"),
         ({"sim_backend": "tpu"}, "use auto, cpu or gpu"),
+        ({"render_backend": "tpu"}, "use auto, cpu, gpu or none"),
+        ({"render_backend": None, "obs_mode": "rgbd"}, "render_backend: none: draws nothing"),
         ({"reward_mode": "lavish"}, "reward_mode"),
         ({"robot_uids": "anymal_c"}, "floating_panda_gripper, fetch, .*none"),
         ({"robot_uids": ["panda"]}, "robot_uids"),
