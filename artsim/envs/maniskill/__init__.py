@@ -8,7 +8,8 @@
     env = gymnasium.make("ArtSimArticulated-v1", categories=("laptop",), goal="close", obs_mode="pointcloud")
     observation, info = env.reset(seed=0)
 
-The environment itself is :class:`artsim.envs.maniskill.task.ArticulatedTask`; importing this package imports no part of
+Programs that import no artsim, such as ManiSkill's own, make it by the id ``artsim.envs:ArtSimArticulated-v1``. The
+environment itself is :class:`artsim.envs.maniskill.task.ArticulatedTask`; importing this package imports no part of
 ManiSkill.
 """
 
