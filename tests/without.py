@@ -46,9 +46,10 @@ def environment(folder: Path, missing: Collection[str]) -> dict[str, str]:
 
 
 @cache
-def beyond_the_core() -> frozenset[str]:
-    """Installed modules that belong to no distribution that artsim's core, as its metadata has it, brings along."""
-    core = distributions_of("") | _TOOLS
+def beyond_the_core(extra: str = "") -> frozenset[str]:
+    """Installed modules that belong to no distribution that artsim's core, as its metadata has it, brings along, nor
+    one of its extras."""
+    core = distributions_of("") | distributions_of(extra) | _TOOLS
     return frozenset(
         module for module, owners in packages_distributions().items() if not core & {normal(owner) for owner in owners}
     )

@@ -41,7 +41,7 @@ class Options:
     goal: str = "close"
     """open, close or random."""
     robot: str = "floating_panda_gripper"
-    """panda, or floating_panda_gripper."""
+    """floating_panda_gripper, panda, panda_wristcam, fetch or xarm6_robotiq."""
     control: str = "pd_joint_delta_pos"
     """Control mode of the robot."""
     max_joints: int = 1

@@ -5,30 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.envs.maniskill.goal import LEAST_OPEN, MOST_OPEN, Goal
+from artsim.envs.maniskill.robots import FLOATING, ROBOTS
 from artsim.model.camera import look_at_transform
 from artsim.model.draws import bounding_sphere, joint_intervals
 from artsim.model.kinematics import ROTATING, Array
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.episode import most_open_state
 
-_READY = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4, 0.04, 0.04)
-ROBOTS = {
-    "panda": _READY,
-    "panda_wristcam": _READY,
-    "floating_panda_gripper": (0.0, 0.0, 0.0, 0.0, np.pi / 2, 0.0, 0.04, 0.04),
-}
-"""Robots that do the task, and the state in which each of them begins, facing the object; fingers come last."""
 _FACING_DOWN = (0.0, 0.0, 0.0, 0.0, np.pi, 0.0, 0.04, 0.04)  # of a floating hand
 SLICE = 0.1
 """Share of a part's reach that its handle lies in."""
 ONLOOKER_FOV = 0.8
 """Vertical field of view of the camera that shows everything, radians."""
-_NEAR, _FAR = 0.55, 0.75  # metres between an arm's base and the handles
+_NEAR, _FAR = 0.18, 0.38  # metres between an arm's hand as it begins and the handles
 _CLEARANCE = 0.12  # metres between an object and what stands before it at first
 _FINGERS = 0.11  # metres from a hand to the tips of its fingers
 _RUN_UP = 0.15  # metres between a hand that is to push and what it pushes
-_READY_REACH = 0.37  # metres from an arm's base to the far side of its hand as it begins
-_ARM = np.array([0.2, 0.3, 0.8])  # half the room that an arm takes around its base in x and y, and its height
 
 
 def T_world_object(obj: ArticulatedObject) -> Array:
@@ -88,10 +80,12 @@ def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, 
     handles = np.mean([handle(obj, k) for k in free], axis=0) + up
     closed = float(obj.bounds[0, 0])
     opened = min(closed, _front(obj, most_open_state(obj)))
-    if robot != "floating_panda_gripper":
-        x = np.clip(opened - _CLEARANCE - _READY_REACH, handles[0] - _FAR, handles[0] - _NEAR)
+    start = ROBOTS[robot]
+    if robot != FLOATING:
+        x = np.clip(opened - _CLEARANCE, handles[0] - _FAR, handles[0] - _NEAR)
         free_until = closed if goal == "open" else opened  # joints that open begin closed
-        return np.array([min(x, free_until - _CLEARANCE - _READY_REACH), handles[1], 0.0]), np.array(ROBOTS[robot])
+        hand = min(x, free_until - _CLEARANCE)
+        return np.array([hand - start.reach, handles[1], 0.0]), np.array(start.qpos)
     if goal == "close" and len(free) == 1:
         at, way = _push(obj, free[0])
         tip = np.maximum(at - _RUN_UP * way + up, [-np.inf, -np.inf, 0.05])
@@ -99,7 +93,7 @@ def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, 
         tip = np.array([(closed if goal == "open" else opened) - _CLEARANCE, handles[1], max(handles[2], 0.1)])
         way = np.eye(3)[0]
     if way[0] > 0.5:
-        return tip - [_FINGERS, 0.0, 0.0], np.array(ROBOTS[robot])
+        return tip - [_FINGERS, 0.0, 0.0], np.array(start.qpos)
     return tip + [0.0, 0.0, _FINGERS], np.array(_FACING_DOWN)
 
 
@@ -117,15 +111,17 @@ def _push(obj: ArticulatedObject, k: int) -> tuple[Array, Array]:
     return at, (then - at) / max(float(np.linalg.norm(then - at)), 1e-12)
 
 
-def onlooker(obj: ArticulatedObject, stand: Array) -> Array:
-    """(4, 4) ``T_world_camera`` from which object and robot are seen, from the front and the object's right side."""
+def onlooker(obj: ArticulatedObject, robot: str, stand: Array) -> Array:
+    """(4, 4) ``T_world_camera`` that shows an object and a robot with its base at ``stand`` (3,), from the front and
+    the object's right side."""
     center, radius = bounding_sphere(obj, most_open_state(obj))
     center = center + T_world_object(obj)[:3, 3]
-    low, high = (
-        np.minimum(center - radius, stand - [*_ARM[:2], 0.0]),
-        np.maximum(center + radius, stand + [*_ARM[:2], 0.0]),
-    )
-    low[2], high[2] = 0.0, max(high[2], _ARM[2] if stand[2] == 0 else 0.0)
+    low, high = center - radius, center + radius
+    if robot in ROBOTS:
+        x, y, height = ROBOTS[robot].room
+        low = np.minimum(low, stand - [x, y, 0.0])
+        high = np.maximum(high, stand + [x, y, height if robot != FLOATING else 0.0])
+    low[2] = 0.0
     middle, reach = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     away = np.array([-0.35, -0.8, 0.45])
     return look_at_transform(middle + away / np.linalg.norm(away) * reach / np.sin(0.5 * ONLOOKER_FOV), middle)

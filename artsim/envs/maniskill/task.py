@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 import sapien
 import torch
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box
+from gymnasium.vector.utils import batch_space
+from mani_skill.agents.robots.fetch import FETCH_WHEELS_COLLISION_BIT
 from mani_skill.envs.sapien_env import BaseEnv
 from mani_skill.sensors.camera import CameraConfig
 from mani_skill.utils.building.ground import build_ground
@@ -18,13 +22,15 @@ from torch import Tensor
 
 from artsim.appearance.finishes import draw_coats
 from artsim.appearance.painted import painted_coats
-from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
+from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH, RECORDED_ID
 from artsim.envs.maniskill.build import OBJECT_BIT, build
 from artsim.envs.maniskill.cameras import camera_record, look, poses
 from artsim.envs.maniskill.goal import BEST, dense_reward
 from artsim.envs.maniskill.mechanism import Mechanism
-from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check
-from artsim.envs.maniskill.places import ONLOOKER_FOV, ROBOTS, onlooker, robot_start
+from artsim.envs.maniskill.options import REWARD_MODES, TaskOptions, check, choose_renderer
+from artsim.envs.maniskill.places import ONLOOKER_FOV, onlooker, robot_start
+from artsim.envs.maniskill.recorded import read_options, recorded_options
+from artsim.envs.maniskill.robots import NO_ROBOT, ROBOTS
 from artsim.envs.maniskill.truth import Record, Truth, start_and_goal, truth_of
 from artsim.errors import ConfigError
 from artsim.model.objects import ArticulatedObject
@@ -65,7 +71,8 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     Parameters
     ----------
     robot_uids : str
-        "panda", "panda_wristcam" or "floating_panda_gripper".
+        "panda", "panda_wristcam", "floating_panda_gripper", "fetch", "xarm6_robotiq" (whose files ManiSkill
+        downloads), or "none": actions are empty then, and nothing moves the object but gravity.
     num_envs : int
         Sub-scenes; more than one need a CUDA device, as everywhere in ManiSkill.
     obs_mode : str
@@ -83,12 +90,13 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         When something is to be drawn, and there is no device that can.
     """
 
-    SUPPORTED_ROBOTS = tuple(ROBOTS)
+    SUPPORTED_ROBOTS = (*ROBOTS, NO_ROBOT)
     SUPPORTED_REWARD_MODES = REWARD_MODES
 
     truth: Truth
     objects: tuple[ArticulatedObject, ...]
     """The object of each sub-scene."""
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -102,7 +110,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         **options: Any,
     ):
         own = {f.name for f in fields(TaskOptions)}
-        self.options = TaskOptions(**{name: options.pop(name) for name in own & options.keys()})
+        self.options = read_options({name: options.pop(name) for name in own & options.keys()})
         self.robot_init_qpos_noise = robot_init_qpos_noise
         self._source = Episode(
             EpisodeOptions(
@@ -113,9 +121,7 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             )
         )
         check(robot_uids, num_envs, obs_mode, options)
-        if render_backend == "auto":
-            seen = obs_mode not in ("state", "state_dict", "none") or options.get("render_mode") is not None
-            render_backend = "none" if not seen else "gpu" if torch.cuda.is_available() else "cpu"
+        render_backend = choose_renderer(render_backend, obs_mode, options.get("render_mode"))
         if render_backend != "none":
             import_sapien()  # tells what to do where nothing can be drawn
         super().__init__(
@@ -127,6 +133,23 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             render_backend=render_backend,
             **options,
         )
+        # Flat states are read by the names in here, which ManiSkill leaves out where there are no actors.
+        self._init_raw_state.setdefault("actors", {})
+        if self.agent is None:
+            self.single_action_space = self._orig_single_action_space = Box(-1.0, 1.0, (0,))
+            self.action_space = (
+                batch_space(self.single_action_space, num_envs) if num_envs > 1 else self.single_action_space
+            )
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What gymnasium made the environment of, as recordings keep it: the id names the module that registers it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec) -> None:
+        # ManiSkill's command line makes the environment of this id and these options, after a way through JSON.
+        self._spec = replace(spec, id=RECORDED_ID, kwargs=recorded_options(spec.kwargs))
 
     @property
     def _default_sim_config(self) -> SimConfig:
@@ -136,13 +159,19 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     def _load_agent(self, options: dict[str, Any]) -> None:
         super()._load_agent(options, sapien.Pose([-3.0, 0.0, 0.0]))
 
+    @property
+    def control_mode(self) -> str:
+        """The robot's control mode; "none" where there is no robot."""
+        return NO_ROBOT if self.agent is None else self.agent.control_mode
+
     def _load_scene(self, options: dict[str, Any]) -> None:
         rngs = [np.random.default_rng(int(seed)) for seed in self._batched_episode_rng.randint(_SEEDS)]
         self.objects = tuple(self._draw_object(rng) for rng in rngs)
         self.truth = truth_of(self.objects, self.options.max_joints, self.device)
         self._cameras = [look(obj, self.options.views, rng) for obj, rng in zip(self.objects, rngs, strict=True)]
         ground = build_ground(self.scene)
-        ground.set_collision_group_bit(group=2, bit_idx=OBJECT_BIT, bit=1)
+        for bit in (OBJECT_BIT, FETCH_WHEELS_COLLISION_BIT):  # the wheels reach below the ground
+            ground.set_collision_group_bit(group=2, bit_idx=bit, bit=1)
         built = []
         for number, (obj, rng) in enumerate(zip(self.objects, rngs, strict=True)):
             coats = (painted_coats(obj) or draw_coats(obj, rng)) if self.scene.can_render() else ()
@@ -151,8 +180,10 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             self.remove_from_state_dict_registry(each.articulation)
         self.mechanism = Mechanism(self.scene, built, self.truth)
         self.add_to_state_dict_registry(self.mechanism.articulation)
-        starts = [robot_start(obj, self.robot_uids, self.options.goal) for obj in self.objects]
-        self._stands, self._begins = (_tensor(np.stack(column), self.device) for column in zip(*starts, strict=True))
+        self._stands, self._begins = torch.zeros(self.num_envs, 3, device=self.device), None
+        if self.agent is not None:
+            starts = [robot_start(obj, self.robot_uids, self.options.goal) for obj in self.objects]
+            self._stands, self._begins = (_tensor(np.stack(each), self.device) for each in zip(*starts, strict=True))
         self.goal = torch.zeros_like(self.truth.low)
 
     def _draw_object(self, rng: np.random.Generator) -> ArticulatedObject:
@@ -180,7 +211,10 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
     @property
     def _default_human_render_camera_configs(self) -> CameraConfig:
         pose = poses(
-            [onlooker(obj, stand) for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)]
+            [
+                onlooker(obj, self.robot_uids, stand)
+                for obj, stand in zip(self.objects, self._stands.cpu().numpy(), strict=True)
+            ]
         )
         return CameraConfig(
             "render_camera", pose, 512, 512, fov=ONLOOKER_FOV, near=0.01, far=100.0, shader_pack="default"
@@ -199,9 +233,11 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         start, goal = start_and_goal(self.options.goal, truth, draw)
         self.goal[env_idx] = goal[env_idx]
         self.mechanism.set_state(start, env_idx)
+        if self._begins is None:
+            return
         robot = self.agent.robot
         noise = rng.normal(0.0, self.robot_init_qpos_noise, self._begins.shape[1])
-        noise[:, -2:] = 0.0  # fingers
+        noise[:, -ROBOTS[self.robot_uids].fingers :] = 0.0
         robot.set_qpos(self._begins[env_idx] + _tensor(noise, self.device))
         robot.set_pose(Pose.create_from_pq(self._stands[env_idx]))
 
@@ -232,9 +268,13 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
             "success": (error.abs() <= self.options.tolerance).all(1),
         }
 
+    def _get_obs_agent(self) -> Any:
+        return {} if self.agent is None else super()._get_obs_agent()
+
     def _get_obs_extra(self, info: Record) -> Record:
         span = (self.truth.high - self.truth.low).clamp(min=1e-9)
-        seen = {"tcp_pose": self.agent.tcp.pose.raw_pose, "goal": (self.goal - self.truth.low) / span}
+        seen = {} if self.agent is None else {"tcp_pose": self.agent.tcp.pose.raw_pose}
+        seen["goal"] = (self.goal - self.truth.low) / span
         if self.obs_mode_struct.use_state:
             free = info["joint_free"]
             seen |= {
@@ -242,15 +282,21 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
                 "joint_place": (info["joint_state"] - self.truth.low) / span,
                 "joint_error": info["joint_error"],
                 "joint_velocity": info["joint_velocity"],
-                "tcp_to_handle": (info["handle"] - self.agent.tcp.pose.p[:, None]) * free[..., None],
-                "handle_direction": info["handle_direction"] * free[..., None],
             }
+            if self.agent is not None:
+                seen["tcp_to_handle"] = self._tcp_to_handle(info) * free[..., None]
+            seen["handle_direction"] = info["handle_direction"] * free[..., None]
         # The first row is the root's.
         return {name: value if name == "tcp_pose" else value[:, 1:].flatten(1) for name, value in seen.items()}
 
+    def _tcp_to_handle(self, info: Record) -> Tensor:
+        """(B, P, 3) metres; infinite without a robot."""
+        handle = info["handle"]
+        return torch.full_like(handle, torch.inf) if self.agent is None else handle - self.agent.tcp.pose.p[:, None]
+
     def compute_dense_reward(self, obs: Any, action: Any, info: Record) -> Tensor:
         """(B,) see :func:`artsim.envs.maniskill.goal.dense_reward`."""
-        distance = torch.linalg.vector_norm(info["handle"] - self.agent.tcp.pose.p[:, None], dim=-1)
+        distance = torch.linalg.vector_norm(self._tcp_to_handle(info), dim=-1)
         return dense_reward(info["joint_error"], info["joint_free"], self.options.tolerance, distance)
 
     def compute_normalized_dense_reward(self, obs: Any, action: Any, info: Record) -> Tensor:
@@ -258,16 +304,34 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         return self.compute_dense_reward(obs, action, info) / BEST
 
     def get_state_dict(self) -> dict[str, Any]:
-        """ManiSkill's state of the simulation, and the goals."""
-        state: dict[str, Any] = super().get_state_dict()
-        # Flat states are read in this order, actors or not.
-        return {"actors": {}, **state, "goal": self.goal.clone()}
+        """ManiSkill's state of the simulation, with the goals (B, P) and the diagonals (B, 1) of the objects."""
+        # ManiSkill asks the robot for its controllers' state.
+        state = self.scene.get_sim_state() if self.agent is None else super().get_state_dict()
+        return {**state, "goal": self.goal.clone(), "diagonal": self.truth.fixed["diagonal"][:, None].clone()}
 
     def set_state_dict(self, state: dict[str, Any], env_idx: Tensor | None = None) -> None:
-        """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do."""
+        """Inverse of :meth:`get_state_dict`; goals stay as they are where the state tells of none, as flat ones do.
+
+        Tensors or NumPy arrays, with or without the axis of sub-scenes where there is one: recordings have none.
+
+        Raises
+        ------
+        ConfigError
+            When the state is one of another object.
+        """
+        rows = slice(None) if env_idx is None else env_idx
+        if "diagonal" in state:
+            there = _tensor(state["diagonal"], self.device).reshape(-1)
+            if not torch.allclose(there, self.truth.fixed["diagonal"][rows], rtol=1e-5):
+                names = ", ".join(f"{obj.category} {obj.object_id}" for obj in self.objects[:3])
+                raise ConfigError(
+                    f"a state of another object than {names}",
+                    "set_state_dict",
+                    'begin the episode that it is of: reset(seed=..., options={"reconfigure": True})',
+                )
         super().set_state_dict(state, env_idx)
         if "goal" in state:
-            self.goal[slice(None) if env_idx is None else env_idx] = state["goal"]
+            self.goal[rows] = _tensor(state["goal"], self.device)
 
     def step(self, action: Any) -> Any:
         """One control step; see ManiSkill.
@@ -290,11 +354,11 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
                     ENV_ID,
                     f"pass one of shape {whole}: control mode {self.control_mode} of {self.robot_uids}",
                 )
-        return super().step(action)
+        return super().step(None if self.agent is None else action)
 
 
 def _tensor(values: Any, device: Any) -> Tensor:
-    return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
+    return torch.as_tensor(values, dtype=torch.float32, device=device)
 
 
 if ENV_ID not in REGISTERED_ENVS:  # gymnasium knows it from artsim.envs
