@@ -193,7 +193,7 @@ def _bop(material: Material) -> str:
     parts = sum(map(len, truth.values()))
     models = json.loads((out / "models" / "models_info.json").read_text())
     assert {str(entry["obj_id"]) for entries in truth.values() for entry in entries} <= set(models)
-    return f"{len(truth)} images, {parts} poses of {len(models)} models; read by its definition, as bop_toolkit is no package"
+    return f"{len(truth)} images, {parts} poses of {len(models)} models; bop_toolkit is no package"
 
 
 def _ply(material: Material) -> str:
