@@ -13,13 +13,13 @@ import numpy as np
 
 from artsim.checks.strict_urdf import (
     convex_collision_geometry,
-    is_convex,
     strict_inertia,
     strict_kinematics,
     strict_urdf,
 )
 from artsim.errors import ArtsimError
 from artsim.model.collision import Collision, Sweep
+from artsim.model.convex_bodies import is_convex
 from artsim.model.inertia import part_inertia
 from artsim.model.objects import ArticulatedObject
 

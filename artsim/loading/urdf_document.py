@@ -1,9 +1,16 @@
-"""What a URDF document says, checked: links with their shapes, and joints between them."""
+"""What a URDF document says, checked: links with their shapes, and joints between them.
+
+Other formats are written as the same links and joints.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
 
 
@@ -45,6 +52,15 @@ class MeshFile:
     scale: Array | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class InlineMesh:
+    """A mesh that stands in the document itself, or was read with it: (V, 3) metres and (F, 3) triangles."""
+
+    name: str
+    vertices: Array
+    faces: NDArray[np.int32]
+
+
 @dataclass(frozen=True)
 class Geometry:
     """A shape of a link; one field is set."""
@@ -54,10 +70,13 @@ class Geometry:
     capsule: Capsule | None = None
     sphere: Sphere | None = None
     mesh: MeshFile | None = None
+    inline: InlineMesh | None = None
 
     def __str__(self) -> str:
         if self.mesh is not None:
             return f"mesh {self.mesh.filename!r}"
+        if self.inline is not None:
+            return f"mesh {self.inline.name!r}"
         return next(name for name, shape in vars(self).items() if shape is not None)
 
 
@@ -89,12 +108,18 @@ class UrdfLink:
         Why other shapes of it cannot be shown.
     empty : tuple of str
         What shapes of it have no extent, so that there is nothing to show.
+    collision : tuple of Shape
+        What collides; of MJCF and USD alone.
+    inertia : Inertia or None
+        In the link's frame; of MJCF and USD alone.
     """
 
     name: str
     shapes: tuple[Shape, ...] = ()
     unusable: tuple[str, ...] = ()
     empty: tuple[str, ...] = ()
+    collision: tuple[Shape, ...] = ()
+    inertia: Inertia | None = None
 
 
 @dataclass(frozen=True)

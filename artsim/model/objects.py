@@ -20,6 +20,8 @@ from artsim.model.kinematics import LARGEST, Array, KinematicTree
 if TYPE_CHECKING:
     import trimesh
 
+    from artsim.model.inertia import Inertia
+
 _MAX_REPAIR = 1000
 """Characters of a repair as text: names out of files may be of any length."""
 
@@ -66,11 +68,14 @@ class Body:
         kg/m^3.
     solid : Mesh or None
         Closed surface of what has the mass, where the part's own surface need not be closed.
+    inertia : Inertia or None
+        What the source file says of it, in native units; it counts instead of what follows from surface and density.
     """
 
     pieces: tuple[Mesh, ...]
     density: float
     solid: Mesh | None = None
+    inertia: Inertia | None = None
 
     __repr__ = brief
 
@@ -129,7 +134,8 @@ class Part:
         if body is not None:
             pieces = tuple((vertices + offset, faces) for vertices, faces in body.pieces)
             solid = None if body.solid is None else (body.solid[0] + offset, body.solid[1])
-            body = replace(body, pieces=pieces, solid=solid)
+            inertia = body.inertia and replace(body.inertia, center=body.inertia.center + offset)
+            body = replace(body, pieces=pieces, solid=solid, inertia=inertia)
         return replace(self, vertices=self.vertices + offset, body=body)
 
 

@@ -187,7 +187,7 @@ def centered(obj: ArticulatedObject) -> ArticulatedObject:
 
 def _mapped(part: Part, surface: Callable[[Mesh], Mesh], pieces: Callable[[Body], list[Mesh]]) -> Part:
     vertices, faces = surface((part.vertices, part.faces))
-    body = None if part.body is None else replace(part.body, pieces=tuple(pieces(part.body)))
+    body = None if part.body is None else replace(part.body, pieces=tuple(pieces(part.body)), inertia=None)
     return replace(part, vertices=vertices, faces=faces, body=body)
 
 
