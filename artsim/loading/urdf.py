@@ -34,6 +34,7 @@ from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.urdf_xml import parse_robot
+from artsim.loading.usd_layers import SUFFIXES
 from artsim.loading.xml_repair import xacro_error
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
 from artsim.model.object_file import load_object
@@ -41,7 +42,6 @@ from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
 
 OTHER_FILES = ("mobility.xml", "mobility.usda", "mobility.usdc", "mobility.usd")
 """Names of an object's file, in a folder without a URDF file, in MJCF and in USD."""
-USD_SUFFIXES = (".usd", ".usda", ".usdc")
 
 _FAR = 20.0
 """Times the object's size that no slide goes: a cart on its track goes once, a drawer less."""
@@ -100,9 +100,7 @@ def load(
     bodies = merge_fixed_links(robot, file, repairs)
     _read_geometry(bodies, robot, reader, file, repairs)
     repairs += reader.paths.repairs
-    # Only PartNet-Mobility's URDF files leave it unsaid how far a screw goes for each turn.
-    is_urdf = not any(link.collision or link.inertia for link in robot.links)
-    bodies = join_screws(without_empty_leaves(bodies, repairs), side.helpers, repairs, guessed=is_urdf)
+    bodies = join_screws(without_empty_leaves(bodies, repairs), side.helpers, repairs, guessed=not robot.explicit)
     bodies, exported = in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
     parts = [body.part(side.labels) for body in bodies]
@@ -137,6 +135,10 @@ def _read_document(
 ) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
     """Links and joints of a file of any format, what was mended, and what other files it is made of."""
     limits = reader.limits
+    if file.suffix.lower() in SUFFIXES:
+        from artsim.loading.usd import read_usd
+
+        return read_usd(file, limits)
     if is_mjcf(data, file):
         from artsim.loading.mjcf import read_mjcf
 
@@ -147,7 +149,7 @@ def _read_document(
 
 def max_bytes(file: Path, limits: LoadLimits) -> int:
     """Size that an object's file may have: that of USD holds its meshes."""
-    return limits.max_mesh_bytes if file.suffix.lower() in USD_SUFFIXES else limits.max_urdf_bytes
+    return limits.max_mesh_bytes if file.suffix.lower() in SUFFIXES else limits.max_urdf_bytes
 
 
 def _far_slides(tree: KinematicTree, parts: list[Part]) -> list[Repair]:

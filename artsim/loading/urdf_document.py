@@ -161,7 +161,17 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class UrdfRobot:
-    """Links and joints in the document's order."""
+    """Links and joints in the document's order.
+
+    Attributes
+    ----------
+    links : tuple of UrdfLink
+    joints : tuple of UrdfJoint
+    explicit : bool
+        Whether it says of every joint that follows another that it does. PartNet-Mobility's URDF files leave it unsaid
+        how far a screw goes for each turn.
+    """
 
     links: tuple[UrdfLink, ...]
     joints: tuple[UrdfJoint, ...]
+    explicit: bool = False

@@ -113,7 +113,7 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -
         found.append(UrdfLink(link.name, shapes, collision=collision, inertia=inertia))
         if link.joint is not None:
             joints.append(_joint(link, links[link.parent].name, origins[k] - origins[link.parent], file, repairs))
-    return UrdfRobot(tuple(found), tuple(joints))
+    return UrdfRobot(tuple(found), tuple(joints), explicit=True)
 
 
 def _root(links: Sequence[WorldLink]) -> int:

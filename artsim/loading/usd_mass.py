@@ -1,0 +1,89 @@
+"""Mass, centre of mass and inertia of a USD body: what its MassAPI says, and the rest from its collision geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from artsim.common.products import apply, matmul
+from artsim.loading.zero_pose import combined
+from artsim.model.convex_bodies import convex_hull
+from artsim.model.inertia import Inertia
+from artsim.model.kinematics import Array
+from artsim.model.objects import Mesh
+
+_WATER = 1000.0
+"""kg/m^3: UsdPhysics has this density where nothing else is said."""
+_THIN = 1e-4
+
+
+def read_inertia(
+    prim: Any, T_body_prim: Array, solid: Sequence[Mesh], meters: float, kilograms: float
+) -> Inertia | None:
+    """Inertia of a body in its own rigid frame; None where nothing says anything of it.
+
+    Parameters
+    ----------
+    prim : Usd.Prim
+    T_body_prim : (4, 4) float
+        Carries the prim's own coordinates, scale included, to the body's frame.
+    solid : sequence of Mesh
+        Its collision geometry, in the body's frame.
+    meters, kilograms : float
+        Of one unit of the stage.
+    """
+    from pxr import UsdPhysics
+
+    api = UsdPhysics.MassAPI(prim)
+    mass, density = (_positive(attribute) for attribute in (api.GetMassAttr(), api.GetDensityAttr()))
+    mass *= kilograms
+    density *= kilograms / meters**3
+    found = _of_shapes(solid, density or _WATER)
+    if found is None and mass == 0.0:
+        return None
+    if found is None:  # a point, unless more is said
+        found = Inertia(mass, np.zeros(3), np.zeros((3, 3)))
+    if mass > 0.0 and found.mass > 0.0:
+        found = found.share(mass / found.mass)
+    center, tensor = found.center, found.tensor
+    given = api.GetCenterOfMassAttr().Get()
+    if given is not None and np.isfinite(np.array(given)).all():
+        center = apply(T_body_prim[:3, :3], np.array(given, dtype=np.float64)) + T_body_prim[:3, 3]
+    moments = np.array(api.GetDiagonalInertiaAttr().Get() or (0.0, 0.0, 0.0), dtype=np.float64)
+    if (moments > 0).any() and np.isfinite(moments).all():
+        axes = _axes(api.GetPrincipalAxesAttr().Get())
+        tensor = matmul(matmul(axes, np.diag(moments * kilograms * meters**2)), axes.T)
+    return Inertia(found.mass, center, tensor)
+
+
+def _positive(attribute: Any) -> float:
+    value = attribute.Get()
+    return float(value) if value is not None and np.isfinite(value) and value > 0 else 0.0
+
+
+def _axes(quaternion: Any) -> Array:
+    """(3, 3) principal axes, one a column; those of the body where the quaternion is none."""
+    from scipy.spatial.transform import Rotation
+
+    if quaternion is None:
+        return np.eye(3)
+    values = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], dtype=np.float64)
+    if not np.linalg.norm(values) > 1e-6:
+        return np.eye(3)
+    matrix: Array = Rotation.from_quat(values).as_matrix()
+    return matrix
+
+
+def _of_shapes(solid: Sequence[Mesh], density: float) -> Inertia | None:
+    import trimesh
+
+    inertias = []
+    for vertices, faces in solid:
+        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        if not (mesh.is_volume and mesh.volume > 0):
+            mesh = trimesh.Trimesh(*convex_hull(vertices, _THIN), process=False)
+        mesh.density = density
+        inertias.append(Inertia(float(mesh.mass), np.asarray(mesh.center_mass), np.asarray(mesh.moment_inertia)))
+    return combined(inertias)
