@@ -45,6 +45,7 @@ from artsim.loading.urdf_document import (
     Sphere,
     UrdfRobot,
 )
+from artsim.loading.xml_values import Element
 from artsim.loading.zero_pose import WORLD, WorldJoint, WorldLink, as_document, unused_name
 from artsim.model.convex_bodies import convex_hull, is_convex
 from artsim.model.inertia import Inertia
@@ -93,7 +94,8 @@ def read_mjcf(
     repairs: list[Repair] = []
     document = safe_mjcf(data, file, limits, repairs)
     meshes = {name: _read_mesh(filename, reader, file) for name, filename in document.meshes.items()}
-    spec, model = _compile(mujoco, document.text, meshes, file)
+    spec, model = _compile(mujoco, document.text, meshes, file, repairs)
+    _set_total_mass(model, document.total_mass, file)
     state = mujoco.MjData(model)
     for j in range(model.njnt):
         if model.jnt_type[j] in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
@@ -112,8 +114,10 @@ def _read_mesh(filename: str, reader: MeshReader, file: Path) -> Mesh:
         raise AssetError(str(problem), file, fix) from problem
 
 
-def _compile(mujoco: Any, text: str, meshes: Mapping[str, Mesh], file: Path) -> tuple[Any, Any]:
-    """The model as MuJoCo has it; meshes are handed over, so that it reads no file."""
+def _compile(mujoco: Any, text: str, meshes: Mapping[str, Mesh], file: Path, repairs: list[Repair]) -> tuple[Any, Any]:
+    """The model as MuJoCo has it; meshes are handed over, so that it reads no file, and writes none."""
+    own = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: repairs.append(Repair("MuJoCo", str(text))))  # else a file in this folder
     try:
         spec = mujoco.MjSpec.from_string(text)
         for mesh in spec.meshes:
@@ -125,6 +129,20 @@ def _compile(mujoco: Any, text: str, meshes: Mapping[str, Mesh], file: Path) -> 
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise AssetError(f"MuJoCo refuses it ({reason})", file, "mend what it names") from error
+    finally:
+        mujoco.set_mju_user_warning(own)
+
+
+def _set_total_mass(model: Any, total: str | None, file: Path) -> None:
+    """Scale masses and moments, so that all bodies together weigh what the document says."""
+    if total is None:
+        return
+    element = Element("<compiler>", file, [])
+    mass = float(element.parsed(total, f"settotalmass={total[:60]!r}", (1,))[0])
+    if 0.0 < mass < np.inf and model.body_mass.sum() > 0:  # MuJoCo takes others for none
+        factor = mass / float(model.body_mass.sum())
+        model.body_mass[:] *= factor
+        model.body_inertia[:] *= factor
 
 
 def _placed_meshes(spec: Any, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:

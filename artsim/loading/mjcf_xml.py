@@ -37,8 +37,10 @@ _GROWING = ("composite", "flexcomp", "attach", "model", "flex", "skin")
 """Elements that make bodies or shapes of their own, or read another model."""
 _COMPILER = (
     "angle", "autolimits", "eulerseq", "inertiafromgeom", "balanceinertia", "boundmass", "boundinertia",
-    "inertiagrouprange", "settotalmass",
+    "inertiagrouprange",
 )  # fmt: skip
+_OWN_SETTINGS = ("meshdir", "assetdir", "strippath", "settotalmass")
+"""Settings of the compiler that the loader follows itself."""
 _UNREAD = ("material", "texture", "user", "fluidshape", "fluidcoef", "hfield")
 _MESH_NAME = re.compile(r"[^\0]{1,1000}")
 
@@ -52,12 +54,15 @@ class SafeMjcf:
     text : str
     meshes : dict
         Name of each mesh that is a file: the file's name, from the document's folder on.
+    total_mass : str or None
+        What all bodies together weigh, kg, where the document says so.
     contents : list of bytes
         Included files.
     """
 
     text: str
     meshes: dict[str, str]
+    total_mass: str | None = None
     contents: list[bytes] = field(default_factory=list)
 
 
@@ -100,7 +105,8 @@ def safe_mjcf(data: bytes, file: Path, limits: LoadLimits, repairs: list[Repair]
         repairs.append(Repair("file", f"left out, which says nothing of the object: {', '.join(left_out)}", note=True))
     _check_size(root, file, limits)
     meshes = _take_meshes(root, settings, file)
-    return SafeMjcf(etree.tostring(root, encoding="unicode"), meshes, contents)
+    text = etree.tostring(root, encoding="unicode")
+    return SafeMjcf(text, meshes, settings.get("settotalmass"), contents)
 
 
 def _include(root: etree._Element, file: Path, limits: LoadLimits, contents: list[bytes], seen: set[Path]) -> None:
@@ -139,10 +145,10 @@ def _inside(name: str, file: Path) -> Path:
 
 
 def _compiler_settings(root: etree._Element) -> dict[str, str]:
-    """Keep the settings of the compiler that are about the object; returns those that say where meshes lie."""
-    folders: dict[str, str] = {}
+    """Keep the settings of the compiler that are about the object; returns those that are not MuJoCo's to follow."""
+    own: dict[str, str] = {}
     for compiler in root.findall("compiler"):
-        folders |= {key: str(compiler.get(key)) for key in ("meshdir", "assetdir", "strippath") if compiler.get(key)}
+        own |= {key: str(compiler.get(key)) for key in _OWN_SETTINGS if compiler.get(key)}
         for key in list(compiler.attrib):
             if key not in _COMPILER:
                 del compiler.attrib[key]
@@ -151,7 +157,7 @@ def _compiler_settings(root: etree._Element) -> dict[str, str]:
     # Bodies stay apart and shapes that nothing collides with stay there; one thread does.
     fixed = {"fusestatic": "false", "discardvisual": "false", "usethread": "false"}
     root.append(etree.Element("compiler", fixed))
-    return folders
+    return own
 
 
 def _strip(element: etree._Element, left_out: dict[str, None], file: Path) -> None:

@@ -29,7 +29,7 @@ from artsim.loading.described_bodies import with_described_bodies
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_shapes, merge_shapes
 from artsim.loading.mjcf_xml import is_mjcf
 from artsim.loading.packages import MissingFileError
-from artsim.loading.partnet import read_side_files
+from artsim.loading.partnet import GAPARTNET, read_side_files
 from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
@@ -90,7 +90,7 @@ def load(
     if file.suffix == ".npz":
         return load_object(file)
     data = read_urdf(file, max_bytes(file, limits))
-    side = read_side_files(file.parent)
+    side = read_side_files(file)
     roots = _roots(package_roots or {})
     reader = MeshReader(file.parent, roots, limits)
     robot, repairs, contents = _read_document(data, file, reader, side.helpers)
@@ -186,6 +186,19 @@ def read_urdf(file: Path, max_bytes: int) -> bytes:
     return read_bounded(file, max_bytes, what)
 
 
+def is_urdf(file: Path) -> bool:
+    """Whether an object's file is URDF, and not MJCF, USD or an object file.
+
+    Raises
+    ------
+    AssetError
+        When it cannot be read.
+    """
+    if file.suffix.lower() in (".npz", *SUFFIXES):
+        return False
+    return not is_mjcf(read_urdf(file, LoadLimits().max_urdf_bytes), file)
+
+
 def find_urdf(path: Path) -> Path:
     """The file that a path names: itself, or the URDF file in a folder; without one, its MJCF or USD file.
 
@@ -202,9 +215,9 @@ def find_urdf(path: Path) -> Path:
         found_folder = False
     if not found_folder:
         raise AssetError("no such file or folder", path, "pass a URDF, MJCF or USD file, or a folder that holds one")
-    mobility = path / "mobility.urdf"
-    if mobility.is_file():
-        return mobility
+    for mobility in (path / "mobility.urdf", path / GAPARTNET):
+        if mobility.is_file():
+            return mobility
     found = sorted(p for p in path.glob("*.urdf") if p.is_file())
     if len(found) == 1:
         return found[0]
@@ -229,7 +242,7 @@ def _roots(declared: Mapping[str, str | Path]) -> dict[str, Path]:
 
 def _object_id(file: Path, annotated: str | None) -> str:
     """PartNet-Mobility's own number is the folder's name; ``meta.json`` may carry an older one."""
-    if file.stem != "mobility":
+    if file.stem != "mobility" and file.name != GAPARTNET:
         return _encodable(file.stem)
     folder = file.resolve().parent.name
     return _encodable(folder) if folder.isdigit() or annotated is None else annotated

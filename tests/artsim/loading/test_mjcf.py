@@ -136,8 +136,37 @@ def test_masses_are_those_that_mujoco_computes(tmp_path: Path) -> None:
     assert box.mass == pytest.approx(1000 * 0.2 * 0.4 * 0.6)
     np.testing.assert_allclose(box.tensor.diagonal(), box.mass / 3 * np.array([0.13, 0.1, 0.05]))
     assert ball.mass == pytest.approx(500 * 4 / 3 * np.pi * 0.1**3)
-    assert obj.scaled(2.0).parts[0].body is not None
+    whole = load(written(tmp_path, f'<body name="a">{BOX}</body>', '<compiler settotalmass="3"/>'))
+    assert part_inertia(whole, 0).mass == pytest.approx(3)
+    np.testing.assert_allclose(part_inertia(whole, 0).tensor, box.tensor * 3 / box.mass, atol=1e-12)
     assert part_inertia(obj.scaled(2.0), 0).mass == pytest.approx(8 * box.mass)
+
+
+@pytest.mark.parametrize("name", ["humanoid", "walker2d", "half_cheetah", "reacher", "pusher"])
+def test_robots_of_others_move_as_in_mujoco(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The centre of mass of every part, in random states of files that come with Gymnasium."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo itself writes its warnings there
+    mujoco, gymnasium = installed("mujoco"), installed("gymnasium")
+    path = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / f"{name}.xml"
+    obj, model = load(path), mujoco.MjModel.from_xml_path(str(path))
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    limits = np.clip(obj.tree.limits, -3.0, 3.0)
+    for q in rng.uniform(limits[:, 0], limits[:, 1], (5, len(obj))):
+        for joint, value in obj.source_state(q).items():
+            data.joint(joint).qpos[0] = value
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        T_base_part = obj.T_base_rest @ obj.tree.forward_kinematics(q)
+        for k, part in enumerate(obj.parts):
+            if part.name == "world" or part.body is None or part.body.inertia is None:
+                continue
+            rigid = [model.body(part.name).id]  # and the bodies that are held by it
+            for b in range(rigid[0] + 1, model.nbody):
+                if model.body_parentid[b] in rigid and model.body_jntnum[b] == 0:
+                    rigid.append(b)
+            center = np.average(data.xipos[rigid], axis=0, weights=model.body_mass[rigid])
+            own = transform_points(T_base_part[k], part.body.inertia.center[None])[0]
+            np.testing.assert_allclose(own, center, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -276,6 +305,14 @@ def test_mujoco_opens_no_file(tmp_path: Path) -> None:
         + '<size memory="900G"/><extension><plugin plugin="no.such.plugin"/></extension>',
     )
     assert len(load(path)) == 1
+
+
+def test_mujoco_writes_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By itself it writes what it warns of into the current folder."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(AssetError):
+        load(written(tmp_path, '<body name="a" pos="nan 0 0"><geom size="1"/></body>'))
+    assert [path.name for path in tmp_path.iterdir()] == ["object.xml"]
 
 
 def test_without_mujoco_the_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
