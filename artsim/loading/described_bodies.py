@@ -15,7 +15,7 @@ from artsim.loading.zero_pose import combined
 from artsim.model.convex_bodies import DEFAULT_DENSITY, convex_hull
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array, transform_points
-from artsim.model.objects import Body, Mesh, Part
+from artsim.model.objects import UNKNOWN_DYNAMICS, Body, JointDynamics, Mesh, Part
 
 _THIN = 0.01
 """Share of its length as which a flat part counts as thick."""
@@ -53,11 +53,12 @@ def with_described_bodies(
                 pieces.append((transform_points(matmul(T_rest_link, shape.origin), vertices), faces))
             if link.inertia is not None:
                 inertias.append(link.inertia.transformed(T_rest_link))
-        found.append(replace(part, body=_body(part, pieces, combined(inertias))))
+        joint = UNKNOWN_DYNAMICS if body.joint is None else body.joint.dynamics
+        found.append(replace(part, body=_body(part, pieces, combined(inertias), joint)))
     return found
 
 
-def _body(part: Part, pieces: list[Mesh], inertia: Inertia | None) -> Body | None:
+def _body(part: Part, pieces: list[Mesh], inertia: Inertia | None, joint: JointDynamics) -> Body | None:
     """A body whose mass, spread over the solid that the part's surface encloses, or else over its hull, is the same."""
     if inertia is None and not pieces:
         return None
@@ -75,4 +76,5 @@ def _body(part: Part, pieces: list[Mesh], inertia: Inertia | None) -> Body | Non
             points = np.zeros((1, 3)) if inertia is None else inertia.center[None]
         solid = convex_hull(points, max(_THIN * float(np.ptp(points, axis=0).max()), _SPECK))
         volume = float(trimesh.Trimesh(*solid, process=False).volume)
-    return Body(tuple(pieces), DEFAULT_DENSITY if inertia is None else inertia.mass / volume, solid, inertia)
+    density = DEFAULT_DENSITY if inertia is None else inertia.mass / volume
+    return Body(tuple(pieces), density, solid, inertia, joint)

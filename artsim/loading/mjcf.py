@@ -50,7 +50,7 @@ from artsim.loading.zero_pose import WORLD, WorldJoint, WorldLink, as_document, 
 from artsim.model.convex_bodies import convex_hull, is_convex
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
-from artsim.model.objects import Mesh, Repair
+from artsim.model.objects import JointDynamics, Mesh, Repair
 
 _SHOWN_GROUPS = 3
 """MuJoCo's viewers show groups 0 to 2 unless they are told otherwise."""
@@ -220,7 +220,13 @@ class _ModelReader:
         elif model.jnt_limited[j]:
             lower, upper = model.jnt_range[j].tolist()
         kind = "prismatic" if slides else "revolute" if np.isfinite(lower) else "continuous"
-        return WorldJoint(name, kind, anchor, self._state.xaxis[j].copy(), lower, upper, mimics.get(j))
+        dof = int(model.jnt_dofadr[j])
+        dynamics = JointDynamics(
+            effort=float(np.abs(model.jnt_actfrcrange[j]).max()) if model.jnt_actfrclimited[j] else None,
+            damping=float(np.ravel(model.dof_damping[dof])[0]),
+            friction=float(model.dof_frictionloss[dof]),
+        )
+        return WorldJoint(name, kind, anchor, self._state.xaxis[j].copy(), lower, upper, mimics.get(j), dynamics)
 
     def _equalities(self) -> tuple[dict[int, MimicRelation], dict[int, float]]:
         """What joints follow, and where others are held; values count from 0, where MuJoCo's count from ``ref``."""

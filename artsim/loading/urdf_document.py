@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
+from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,8 @@ class UrdfJoint:
     lower, upper : float
         Radians or metres; infinite where it turns freely.
     mimic : MimicRelation or None
+    dynamics : JointDynamics
+        Of MJCF and USD alone.
     """
 
     name: str
@@ -157,6 +160,7 @@ class UrdfJoint:
     lower: float
     upper: float
     mimic: MimicRelation | None = None
+    dynamics: JointDynamics = UNKNOWN_DYNAMICS
 
 
 @dataclass(frozen=True)

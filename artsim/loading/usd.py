@@ -29,8 +29,8 @@ from artsim.common.products import matmul, unit
 from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits, UnusableMeshError
 from artsim.loading.urdf_document import Geometry, InlineMesh, MimicRelation, Shape, UrdfRobot
+from artsim.loading.usd_dynamics import read_dynamics, read_inertia
 from artsim.loading.usd_layers import open_stage
-from artsim.loading.usd_mass import read_inertia
 from artsim.loading.usd_shapes import KINDS, surface
 from artsim.loading.zero_pose import WORLD, WorldJoint, WorldLink, as_document, unused_name
 from artsim.model.convex_bodies import convex_hull, is_convex
@@ -401,7 +401,8 @@ class _StageReader:
             )
             mimic = MimicRelation(source, rate, offset)
         sign = 1.0 if side == 0 else -1.0  # values say how the second body moves against the first
-        return WorldJoint(joint.name, joint.type, frame[:3, 3], sign * axis, joint.lower, joint.upper, mimic)
+        dynamics = read_dynamics(joint.prim, joint.type == "prismatic", self._unit, self._kilograms)
+        return WorldJoint(joint.name, joint.type, frame[:3, 3], sign * axis, joint.lower, joint.upper, mimic, dynamics)
 
     def _error(self, prim: Any, what: str, fix: str) -> AssetError:
         return AssetError(what, f"{self._file}: prim {prim.GetPath()}", fix)

@@ -20,7 +20,7 @@ from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLi
 from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.kinematics import Array
-from artsim.model.objects import Repair
+from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics, Repair
 
 WORLD = "world"
 
@@ -40,6 +40,7 @@ class WorldJoint:
     lower, upper : float
         Radians or metres; infinite where there is no end.
     mimic : MimicRelation or None
+    dynamics : JointDynamics
     """
 
     name: str
@@ -49,6 +50,7 @@ class WorldJoint:
     lower: float = -np.inf
     upper: float = np.inf
     mimic: MimicRelation | None = None
+    dynamics: JointDynamics = UNKNOWN_DYNAMICS
 
 
 @dataclass(eq=False)
@@ -144,7 +146,7 @@ def _joint(link: WorldLink, parent: str, offset: Array, file: Path, repairs: lis
         if not (np.isfinite(joint.axis).all() and abs(np.linalg.norm(joint.axis) - 1.0) < 1e-6):
             raise element.error("has no axis", "give its axis a length")
         kind, lower, upper = settle_limits(kind, lower, upper, element)
-    return UrdfJoint(joint.name, kind, parent, link.name, origin, joint.axis, lower, upper, joint.mimic)
+    return UrdfJoint(joint.name, kind, parent, link.name, origin, joint.axis, lower, upper, joint.mimic, joint.dynamics)
 
 
 def _check_names(names: Sequence[str], what: str, file: Path) -> None:

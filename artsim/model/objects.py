@@ -55,6 +55,28 @@ Mesh = tuple[Array, NDArray[np.int32]]
 """Vertices (V, 3) and triangles (F, 3)."""
 
 
+@dataclass(frozen=True)
+class JointDynamics:
+    """What drives and opposes the motion of a joint, at native size; None where the source file does not say.
+
+    Attributes
+    ----------
+    effort, velocity : float or None
+        Limits: N m or N, rad/s or m/s.
+    damping, friction : float or None
+        N m s or N s/m; N m or N.
+    """
+
+    effort: float | None = None
+    velocity: float | None = None
+    damping: float | None = None
+    friction: float | None = None
+
+
+UNKNOWN_DYNAMICS = JointDynamics()
+"""Of a joint of which the source file says nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """What physics needs of a part.
@@ -70,12 +92,15 @@ class Body:
         Closed surface of what has the mass, where the part's own surface need not be closed.
     inertia : Inertia or None
         What the source file says of it, in native units; it counts instead of what follows from surface and density.
+    joint : JointDynamics
+        Of the joint that carries the part.
     """
 
     pieces: tuple[Mesh, ...]
     density: float
     solid: Mesh | None = None
     inertia: Inertia | None = None
+    joint: JointDynamics = UNKNOWN_DYNAMICS
 
     __repr__ = brief
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from artsim.export.robot import as_robot
 from artsim.model.inertia import part_inertia
 from artsim.model.objects import ArticulatedObject
 
@@ -49,3 +50,6 @@ def assert_same_object(loaded: ArticulatedObject, obj: ArticulatedObject) -> Non
         np.testing.assert_allclose(
             inertia.tensor, expected_inertia.tensor, atol=CLOSE * np.abs(expected_inertia.tensor).max()
         )
+    for joint, expected_joint in zip(as_robot(loaded).joints, as_robot(obj).joints, strict=True):
+        for name in ("effort", "velocity", "damping", "friction"):
+            np.testing.assert_allclose(getattr(joint, name), getattr(expected_joint, name), rtol=CLOSE)

@@ -15,6 +15,7 @@ import pytest
 from artsim.errors import AssetError, ConfigError
 from artsim.export import export
 from artsim.export.options import ExportOptions
+from artsim.export.robot import as_robot
 from artsim.families import make
 from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
@@ -23,7 +24,7 @@ from artsim.model.draws import ViewOptions, sample_view
 from artsim.model.inertia import part_inertia
 from artsim.model.kinematics import transform_points
 from artsim.model.object_file import load_object, save_object
-from artsim.model.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject, JointDynamics
 from artsim.renderers import render
 from tests.artsim.loading.round_trip import FAMILIES, assert_same_object
 from tests.conftest import installed, valve
@@ -140,6 +141,18 @@ def test_masses_are_those_that_mujoco_computes(tmp_path: Path) -> None:
     assert part_inertia(whole, 0).mass == pytest.approx(3)
     np.testing.assert_allclose(part_inertia(whole, 0).tensor, box.tensor * 3 / box.mass, atol=1e-12)
     assert part_inertia(obj.scaled(2.0), 0).mass == pytest.approx(8 * box.mass)
+
+
+def test_a_joint_keeps_its_strength_damping_and_friction(tmp_path: Path) -> None:
+    door = f'<joint name="j" damping="3" frictionloss="2" actuatorfrcrange="-5 5"/>{BOX}'
+    obj = load(written(tmp_path, f'<body name="a">{BOX}<body name="b" pos="1 0 0">{door}</body></body>'))
+    assert obj.parts[1].body is not None
+    assert obj.parts[1].body.joint == JointDynamics(effort=5, damping=3, friction=2)
+    (joint,) = as_robot(obj).joints
+    assert (joint.effort, joint.damping, joint.friction) == (5, 3, 2)
+    assert joint.velocity > 0
+    (scaled,) = as_robot(obj.scaled(0.5)).joints
+    assert scaled.effort != 5  # of a smaller object, it follows from what the joint carries
 
 
 @pytest.mark.parametrize("name", ["humanoid", "walker2d", "half_cheetah", "reacher", "pusher"])

@@ -140,12 +140,16 @@ def test_lengths_are_metres_and_z_is_up(tmp_path: Path) -> None:
     content = body("base", shape=cube) + body("lid", (0, 100, 0), weight, cube)
     slide = 'uniform token physics:axis = "Y"\nfloat physics:lowerLimit = 0\nfloat physics:upperLimit = 50\n'
     slide += "point3f physics:localPos0 = (0, 100, 0)\n"
-    obj = load(written(tmp_path, content + joint("Prismatic", "base", "lid", slide), head))
+    drive = joint("Prismatic", "base", "lid", slide + "float drive:linear:physics:maxForce = 400\n")
+    drive = drive.replace('"j" {', '"j" (prepend apiSchemas = ["PhysicsDriveAPI:linear"]) {')
+    obj = load(written(tmp_path, content + drive, head))
     np.testing.assert_allclose(obj.tree.axes[1], [0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(obj.tree.limits[1], [0, 0.5])
     np.testing.assert_allclose(obj.box_center[1] - obj.box_center[0], [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(obj.box_size, 0.2)
     inertia = part_inertia(obj, 1)
+    assert obj.parts[1].body is not None
+    assert obj.parts[1].body.joint.effort == pytest.approx(4)  # N: 400 kg cm/s2
     assert inertia.mass == pytest.approx(7)
     np.testing.assert_allclose(inertia.tensor.diagonal(), [1, 3, 2], rtol=1e-6)
 

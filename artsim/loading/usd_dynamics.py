@@ -1,4 +1,7 @@
-"""Mass, centre of mass and inertia of a USD body: what its MassAPI says, and the rest from its collision geometry."""
+"""Physics of USD prims: mass, centre and inertia of a body, and what drives and opposes a joint.
+
+What a body's MassAPI leaves unsaid follows from its collision geometry.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from artsim.loading.zero_pose import combined
 from artsim.model.convex_bodies import convex_hull
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
-from artsim.model.objects import Mesh
+from artsim.model.objects import JointDynamics, Mesh
 
 _WATER = 1000.0
 """kg/m^3: UsdPhysics has this density where nothing else is said."""
@@ -56,6 +59,32 @@ def read_inertia(
         axes = _axes(api.GetPrincipalAxesAttr().Get())
         tensor = matmul(matmul(axes, np.diag(moments * kilograms * meters**2)), axes.T)
     return Inertia(found.mass, center, tensor)
+
+
+def read_dynamics(prim: Any, slides: bool, meters: float, kilograms: float) -> JointDynamics:
+    """What a joint's drive and PhysX's attributes say of it; parameters as of :func:`read_inertia`.
+
+    A drive without stiffness damps; with one, its damping belongs to a controller.
+    """
+    from pxr import UsdPhysics
+
+    axis = "linear" if slides else "angular"
+    speed = meters if slides else np.pi / 180.0
+    force = kilograms * meters * (1.0 if slides else meters)
+    effort = damping = None
+    drive = UsdPhysics.DriveAPI.Get(prim, axis)
+    if drive and prim.HasAPI(UsdPhysics.DriveAPI, axis):
+        effort = _finite(drive.GetMaxForceAttr(), force)
+        if not drive.GetStiffnessAttr().Get():
+            damping = _finite(drive.GetDampingAttr(), force / speed)
+    friction = _finite(prim.GetAttribute(f"physxJointAxis:{axis}:staticFrictionEffort"), force)
+    velocity = _finite(prim.GetAttribute("physxJoint:maxJointVelocity"), speed)
+    return JointDynamics(effort, velocity, damping, friction)
+
+
+def _finite(attribute: Any, unit: float) -> float | None:
+    value = attribute.Get() if attribute else None
+    return float(value) * unit if isinstance(value, float) and np.isfinite(value) and value >= 0 else None
 
 
 def _positive(attribute: Any) -> float:
