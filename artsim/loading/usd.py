@@ -30,8 +30,9 @@ from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits, UnusableMeshError
 from artsim.loading.urdf_document import Geometry, InlineMesh, MimicRelation, Shape, UrdfRobot
 from artsim.loading.usd_dynamics import read_dynamics, read_inertia
-from artsim.loading.usd_layers import open_stage
+from artsim.loading.usd_layers import open_stage, unreadable
 from artsim.loading.usd_shapes import KINDS, surface
+from artsim.loading.usd_values import flag, number, rotation, token, vectors
 from artsim.loading.zero_pose import WORLD, WorldJoint, WorldLink, as_document, unused_name
 from artsim.model.convex_bodies import convex_hull, is_convex
 from artsim.model.kinematics import Array
@@ -70,8 +71,14 @@ def read_usd(file: Path, limits: LoadLimits) -> tuple[UrdfRobot, list[Repair], l
         When usd-core is not installed.
     """
     stage, contents = open_stage(file, limits)
+    from pxr import Tf
+
     repairs: list[Repair] = []
-    return as_document(_StageReader(stage, file, limits, repairs).links(), file, repairs), repairs, contents
+    try:
+        links = _StageReader(stage, file, limits, repairs).links()
+    except Tf.ErrorException as error:  # values are read when they are asked for
+        raise unreadable(file, error) from error
+    return as_document(links, file, repairs), repairs, contents
 
 
 @dataclass(eq=False)
@@ -128,7 +135,7 @@ class _StageReader:
     def links(self) -> list[WorldLink]:
         """The world, then every body after its parent."""
         for prim in self._prims:
-            if prim.HasAPI(self._physics.RigidBodyAPI) and _value(
+            if prim.HasAPI(self._physics.RigidBodyAPI) and flag(
                 self._physics.RigidBodyAPI(prim).GetRigidBodyEnabledAttr(), True
             ):
                 if len(self._bodies) > self._limits.max_links:
@@ -204,7 +211,7 @@ class _StageReader:
         """Whether CollisionAPI is on a prim, or on one between it and its body."""
         while prim and not prim.IsPseudoRoot():
             if prim.HasAPI(self._physics.CollisionAPI):
-                return bool(_value(self._physics.CollisionAPI(prim).GetCollisionEnabledAttr(), True))
+                return flag(self._physics.CollisionAPI(prim).GetCollisionEnabledAttr(), True)
             if body.prim is not None and prim.GetPath() == body.prim.GetPath():
                 return False
             prim = prim.GetParent()
@@ -212,7 +219,7 @@ class _StageReader:
 
     def _collision_mesh(self, prim: Any, mesh: Mesh) -> Mesh:
         api = self._physics.MeshCollisionAPI(prim)
-        approximation = _value(api.GetApproximationAttr(), "none") if api else "none"
+        approximation = token(api.GetApproximationAttr(), "none") if api else "none"
         if approximation != _HULL or is_convex(*mesh):
             return mesh
         return convex_hull(mesh[0], _THIN)
@@ -223,7 +230,7 @@ class _StageReader:
         joints = []
         names: set[str] = set()
         for prim in self._prims:
-            if not prim.IsA(self._physics.Joint) or not _value(self._physics.Joint(prim).GetJointEnabledAttr(), True):
+            if not prim.IsA(self._physics.Joint) or not flag(self._physics.Joint(prim).GetJointEnabledAttr(), True):
                 continue
             schema = self._physics.Joint(prim)
             ends = [self._end(prim, schema, side) for side in (0, 1)]
@@ -241,7 +248,7 @@ class _StageReader:
         """Body at one end of a joint, and the joint's frame in it."""
         relation = schema.GetBody0Rel() if side == 0 else schema.GetBody1Rel()
         position = schema.GetLocalPos0Attr() if side == 0 else schema.GetLocalPos1Attr()
-        rotation = schema.GetLocalRot0Attr() if side == 0 else schema.GetLocalRot1Attr()
+        turn = schema.GetLocalRot0Attr() if side == 0 else schema.GetLocalRot1Attr()
         targets = relation.GetTargets()
         if len(targets) > 1:
             raise self._error(prim, f"names {len(targets)} bodies at one end", "name one")
@@ -253,10 +260,10 @@ class _StageReader:
                 raise self._error(prim, f"its body {targets[0]} does not exist", "name a body of the file")
             affine, body = self._affine(target), self._owner(target)
         T_prim_joint = np.eye(4)
-        T_prim_joint[:3, 3] = np.array(_value(position, (0.0, 0.0, 0.0)), dtype=np.float64)
+        T_prim_joint[:3, 3] = next(iter(vectors(position)), np.zeros(3))
         T_world_joint = np.eye(4)
         T_world_joint[:3, 3] = matmul(affine, T_prim_joint)[:3, 3]
-        T_world_joint[:3, :3] = matmul(_rigid(affine)[:3, :3], _rotation(_value(rotation, None)))
+        T_world_joint[:3, :3] = matmul(_rigid(affine)[:3, :3], rotation(turn))
         return body, matmul(np.linalg.inv(self._bodies[body].T_world_body), T_world_joint)
 
     def _motion(self, prim: Any) -> tuple[str, Array, float, float]:
@@ -267,9 +274,9 @@ class _StageReader:
         for schema, slides in ((physics.RevoluteJoint, False), (physics.PrismaticJoint, True)):
             if prim.IsA(schema):
                 joint = schema(prim)
-                ends = [float(_value(at, e)) for at, e in (
+                ends = [number(at, e) for at, e in (
                     (joint.GetLowerLimitAttr(), -np.inf), (joint.GetUpperLimitAttr(), np.inf))]  # fmt: skip
-                axis = "XYZ".index(str(_value(joint.GetAxisAttr(), "X")))
+                axis = "XYZ".index(token(joint.GetAxisAttr(), "X", ("X", "Y", "Z")))
                 return self._limited(slides, axis, ends)
         if prim.IsA(physics.SphericalJoint) or prim.IsA(physics.DistanceJoint):
             raise self._error(
@@ -281,7 +288,7 @@ class _StageReader:
                 api = physics.LimitAPI.Get(prim, f"{word}{letter}")
                 ends = [-np.inf, np.inf]
                 if api and prim.HasAPI(physics.LimitAPI, f"{word}{letter}"):
-                    ends = [float(_value(api.GetLowAttr(), -np.inf)), float(_value(api.GetHighAttr(), np.inf))]
+                    ends = [number(api.GetLowAttr(), -np.inf), number(api.GetHighAttr(), np.inf)]
                 if ends[0] < ends[1]:
                     free.append((slides, axis, ends))
         if not free:
@@ -396,7 +403,7 @@ class _StageReader:
             if source is None:
                 raise self._error(joint.prim, f"mimics {targets[0]}, which is no joint", "name a joint of the file")
             rate, offset = (
-                float(_value(joint.prim.GetAttribute(f"artsim:mimic:{word}"), default))
+                number(joint.prim.GetAttribute(f"artsim:mimic:{word}"), default)
                 for word, default in (("multiplier", 1.0), ("offset", 0.0))
             )
             mimic = MimicRelation(source, rate, offset)
@@ -408,12 +415,6 @@ class _StageReader:
         return AssetError(what, f"{self._file}: prim {prim.GetPath()}", fix)
 
 
-def _value(attribute: Any, default: Any) -> Any:
-    """The value of an attribute, which may not be there or have none."""
-    found = attribute.Get() if attribute else None
-    return default if found is None else found
-
-
 def _rigid(affine: Array) -> Array:
     """The rigid transform of the same origin whose axes are nearest those of an affine one."""
     u, _, v = np.linalg.svd(affine[:3, :3])
@@ -423,17 +424,3 @@ def _rigid(affine: Array) -> Array:
     if np.abs(affine[:3, :3] - affine[0, 0] * np.eye(3)).max() == 0.0 and affine[0, 0] > 0:
         rigid[:3, :3] = np.eye(3)  # to the last digit
     return rigid
-
-
-def _rotation(quaternion: Any) -> Array:
-    """(3, 3) rotation of a quaternion of USD, of any length but 0; the identity without one."""
-    from scipy.spatial.transform import Rotation
-
-    if quaternion is None:
-        return np.eye(3)
-    values = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], dtype=np.float64)
-    length = float(np.linalg.norm(values))
-    if not (np.isfinite(length) and length > 1e-6):
-        return np.eye(3)
-    matrix: Array = Rotation.from_quat(values / length).as_matrix()
-    return matrix

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from artsim.common.products import apply, matmul
+from artsim.loading.usd_values import number, rotation, vectors
 from artsim.loading.zero_pose import combined
 from artsim.model.convex_bodies import convex_hull
 from artsim.model.inertia import Inertia
@@ -51,12 +52,12 @@ def read_inertia(
     if mass > 0.0 and found.mass > 0.0:
         found = found.share(mass / found.mass)
     center, tensor = found.center, found.tensor
-    given = api.GetCenterOfMassAttr().Get()
-    if given is not None and np.isfinite(np.array(given)).all():
-        center = apply(T_body_prim[:3, :3], np.array(given, dtype=np.float64)) + T_body_prim[:3, 3]
-    moments = np.array(api.GetDiagonalInertiaAttr().Get() or (0.0, 0.0, 0.0), dtype=np.float64)
+    given = vectors(api.GetCenterOfMassAttr())
+    if len(given) and np.isfinite(given).all():
+        center = apply(T_body_prim[:3, :3], given[0]) + T_body_prim[:3, 3]
+    moments = vectors(api.GetDiagonalInertiaAttr()).ravel()
     if (moments > 0).any() and np.isfinite(moments).all():
-        axes = _axes(api.GetPrincipalAxesAttr().Get())
+        axes = rotation(api.GetPrincipalAxesAttr())
         tensor = matmul(matmul(axes, np.diag(moments * kilograms * meters**2)), axes.T)
     return Inertia(found.mass, center, tensor)
 
@@ -75,7 +76,7 @@ def read_dynamics(prim: Any, slides: bool, meters: float, kilograms: float) -> J
     drive = UsdPhysics.DriveAPI.Get(prim, axis)
     if drive and prim.HasAPI(UsdPhysics.DriveAPI, axis):
         effort = _finite(drive.GetMaxForceAttr(), force)
-        if not drive.GetStiffnessAttr().Get():
+        if not number(drive.GetStiffnessAttr(), 0.0):
             damping = _finite(drive.GetDampingAttr(), force / speed)
     friction = _finite(prim.GetAttribute(f"physxJointAxis:{axis}:staticFrictionEffort"), force)
     velocity = _finite(prim.GetAttribute("physxJoint:maxJointVelocity"), speed)
@@ -83,26 +84,13 @@ def read_dynamics(prim: Any, slides: bool, meters: float, kilograms: float) -> J
 
 
 def _finite(attribute: Any, unit: float) -> float | None:
-    value = attribute.Get() if attribute else None
-    return float(value) * unit if isinstance(value, float) and np.isfinite(value) and value >= 0 else None
+    value = number(attribute, -1.0)
+    return value * unit if np.isfinite(value) and value >= 0 else None
 
 
 def _positive(attribute: Any) -> float:
-    value = attribute.Get()
-    return float(value) if value is not None and np.isfinite(value) and value > 0 else 0.0
-
-
-def _axes(quaternion: Any) -> Array:
-    """(3, 3) principal axes, one a column; those of the body where the quaternion is none."""
-    from scipy.spatial.transform import Rotation
-
-    if quaternion is None:
-        return np.eye(3)
-    values = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], dtype=np.float64)
-    if not np.linalg.norm(values) > 1e-6:
-        return np.eye(3)
-    matrix: Array = Rotation.from_quat(values).as_matrix()
-    return matrix
+    value = number(attribute, 0.0)
+    return value if np.isfinite(value) and value > 0 else 0.0
 
 
 def _of_shapes(solid: Sequence[Mesh], density: float) -> Inertia | None:

@@ -50,21 +50,24 @@ def open_stage(file: Path, limits: LoadLimits) -> tuple[Any, list[bytes]]:
             else:  # as this process opened it before: the file may be another one by now
                 layer.Reload(force=True)
         except Tf.ErrorException as error:
-            raise _unreadable(path, error) from error
+            raise unreadable(path, error) from error
         if layer is None:
-            raise _unreadable(path, "unknown content")
+            raise unreadable(path, "unknown content")
         layers[path] = layer
         waiting += [_beside(name, path, file) for name in layer.GetCompositionAssetDependencies() if name]
     _check_expansion(list(layers.values()), file)
     try:
         stage = Usd.Stage.Open(layers[file.resolve()])
     except Tf.ErrorException as error:
-        raise _unreadable(file, error) from error
+        raise unreadable(file, error) from error
     return stage, contents
 
 
-def _unreadable(path: Path, why: object) -> AssetError:
-    text = " ".join(str(why).split())
+def unreadable(path: Path, why: object) -> AssetError:
+    try:
+        text = " ".join(str(why).split())
+    except UnicodeDecodeError:  # USD quotes the file, whatever its bytes are
+        text = "it is not text"
     reason = (text.partition(" : ")[2] or text)[:300]  # what comes first is a place in USD's own source
     return AssetError(f"is no USD layer that can be read ({reason})", path, "write it again, or convert it with usdcat")
 

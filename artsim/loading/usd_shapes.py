@@ -9,6 +9,7 @@ import numpy as np
 from artsim.loading import primitives
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import UnusableMeshError, mirrors, transform_affine
+from artsim.loading.usd_values import integers, number, token, vectors
 from artsim.model.kinematics import Array
 from artsim.model.objects import Mesh
 
@@ -39,20 +40,19 @@ def _mesh(prim: Any, max_faces: int) -> Mesh:
     from pxr import UsdGeom
 
     mesh = UsdGeom.Mesh(prim)
-    points = np.asarray(mesh.GetPointsAttr().Get() or np.zeros((0, 3)), dtype=np.float64).reshape(-1, 3)
-    counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get() or [], dtype=np.int64)
-    corners = np.asarray(mesh.GetFaceVertexIndicesAttr().Get() or [], dtype=np.int64)
+    points = vectors(mesh.GetPointsAttr())
+    counts, corners = integers(mesh.GetFaceVertexCountsAttr()), integers(mesh.GetFaceVertexIndicesAttr())
     if len(corners) > 3 * max_faces or len(points) > max_faces:
         raise UnusableMeshError(f"{prim.GetPath()} has over {max_faces} triangles")
     if (counts < 0).any() or counts.sum() != len(corners):
         raise UnusableMeshError(f"{prim.GetPath()} has {len(corners)} corners, which its counts of corners do not fit")
-    holes = np.asarray(mesh.GetHoleIndicesAttr().Get() or [], dtype=np.int64)
+    holes = integers(mesh.GetHoleIndicesAttr())
     if len(holes):
         kept = np.ones(len(counts), dtype=bool)
         kept[holes[(holes >= 0) & (holes < len(counts))]] = False
         corners, counts = corners[np.repeat(kept, counts)], counts[kept]
     faces = corners[triangulate(points, corners, counts).corners]
-    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+    if token(mesh.GetOrientationAttr(), "") == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
     return points, faces.astype(np.int32)
 
@@ -61,14 +61,14 @@ def _primitive(prim: Any, kind: str) -> Mesh:
     from pxr import UsdGeom
 
     if kind == "Cube":
-        return primitives.box(np.full(3, float(UsdGeom.Cube(prim).GetSizeAttr().Get())))
+        return primitives.box(np.full(3, number(UsdGeom.Cube(prim).GetSizeAttr(), 2.0)))
     if kind == "Sphere":
-        return primitives.sphere(float(UsdGeom.Sphere(prim).GetRadiusAttr().Get()))
+        return primitives.sphere(number(UsdGeom.Sphere(prim).GetRadiusAttr(), 1.0))
     shape = getattr(UsdGeom, kind)(prim)
-    radius, height = float(shape.GetRadiusAttr().Get()), float(shape.GetHeightAttr().Get())
+    radius, height = number(shape.GetRadiusAttr(), 1.0), number(shape.GetHeightAttr(), 2.0)
     make = {"Cylinder": primitives.cylinder, "Capsule": primitives.capsule, "Cone": _cone}[kind]
     vertices, faces = make(radius, height)
-    return vertices @ np.array(_UPRIGHT[str(shape.GetAxisAttr().Get())], dtype=np.float64).T, faces
+    return vertices @ np.array(_UPRIGHT[token(shape.GetAxisAttr(), "Z", ("X", "Y", "Z"))], dtype=np.float64).T, faces
 
 
 def _cone(radius: float, height: float) -> Mesh:
