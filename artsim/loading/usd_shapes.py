@@ -10,7 +10,7 @@ from artsim.loading import primitives
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import UnusableMeshError, mirrors, transform_affine
 from artsim.loading.usd_values import integers, number, token, vectors
-from artsim.model.kinematics import Array
+from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Mesh
 
 KINDS = ("Mesh", "Cube", "Sphere", "Cylinder", "Capsule", "Cone")
@@ -25,7 +25,7 @@ def surface(prim: Any, T: Array, max_faces: int) -> Mesh:
     Raises
     ------
     UnusableMeshError
-        When it has no triangle, or too many.
+        When it has no triangle, too many, or a coordinate out of range.
     """
     kind = str(prim.GetTypeName())
     vertices, faces = _mesh(prim, max_faces) if kind == "Mesh" else _primitive(prim, kind)
@@ -33,7 +33,10 @@ def surface(prim: Any, T: Array, max_faces: int) -> Mesh:
         raise UnusableMeshError(f"{prim.GetPath()} has no faces")
     if mirrors(T):
         faces = faces[:, ::-1]
-    return transform_affine(T, vertices), np.ascontiguousarray(faces, dtype=np.int32)
+    moved = transform_affine(T, vertices)
+    if not (np.abs(moved) <= LARGEST).all():
+        raise UnusableMeshError(f"{prim.GetPath()} has a coordinate that is not finite, or over {LARGEST:g} m")
+    return moved, np.ascontiguousarray(faces, dtype=np.int32)
 
 
 def _mesh(prim: Any, max_faces: int) -> Mesh:

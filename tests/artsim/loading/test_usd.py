@@ -254,6 +254,26 @@ REFUSED: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 
 
+def test_a_binary_file_that_declares_more_than_it_holds_is_refused_by_its_sections(tmp_path: Path) -> None:
+    installed("pxr")
+    from pxr import Sdf
+
+    text = written(tmp_path, PAIR + joint("Revolute", "base", "lid"))
+    binary = text.with_suffix(".usdc")
+    Sdf.Layer.FindOrOpen(str(text)).Export(str(binary))
+    whole = binary.read_bytes()
+    assert len(load(binary)) == 2
+    table = int.from_bytes(whole[16:24], "little")
+    first = int.from_bytes(whole[table + 24 : table + 32], "little")
+    for at in (16, table, table + 24, table + 32, first, first + 8, first + 16):
+        binary.write_bytes(whole[:at] + (1 << 40).to_bytes(8, "little") + whole[at + 8 :])
+        with pytest.raises(AssetError, match=r"no USD layer that can be read .its (section|table)"):
+            load(binary)
+    binary.write_bytes(whole[:100])
+    with pytest.raises(AssetError, match="table of contents is damaged"):
+        load(binary)
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_or_may_not_be_read_is_refused(case: str, tmp_path: Path) -> None:
     content, message = REFUSED[case]
