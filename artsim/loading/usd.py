@@ -35,7 +35,7 @@ from artsim.loading.usd_shapes import KINDS, surface
 from artsim.loading.usd_values import flag, number, rotation, token, vectors
 from artsim.loading.zero_pose import WORLD, WorldJoint, WorldLink, as_document, unused_name
 from artsim.model.convex_bodies import convex_hull, is_convex
-from artsim.model.kinematics import Array
+from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Mesh, Repair
 
 _SAME = 1e-5
@@ -43,6 +43,8 @@ _SAME = 1e-5
 precision; then the place of the body, which is in double precision, counts."""
 _THIN = 1e-4
 """Metres of thickness that a flat mesh has where it collides."""
+_FLAT = 1e-9
+"""Share of the largest scale of a transform below which another is none."""
 _HULL = "convexHull"
 _UNREAD = ("PointInstancer", "Plane", "BasisCurves", "NurbsPatch", "Points", "TetMesh")
 
@@ -128,7 +130,7 @@ class _StageReader:
         self._cache = UsdGeom.XformCache(Usd.TimeCode.Default())
         self._prims = list(stage.Traverse(Usd.TraverseInstanceProxies()))
         self._names: set[str] = {WORLD}
-        world = _Body(WORLD, None, _rigid(self._T_world_stage), self._T_world_stage)
+        world = _Body(WORLD, None, _rigid(self._T_world_stage, str(file)), self._T_world_stage)
         self._bodies = [world]
         self._index: dict[Any, int] = {}
 
@@ -145,7 +147,7 @@ class _StageReader:
                 self._index[prim.GetPath()] = len(self._bodies)
                 affine = self._affine(prim)
                 name = unused_name(str(prim.GetName()), self._names)
-                self._bodies.append(_Body(name, prim, _rigid(affine), affine))
+                self._bodies.append(_Body(name, prim, _rigid(affine, self._where(prim)), affine))
         self._read_shapes()
         joints = self._read_joints()
         return self._tree(joints)
@@ -263,7 +265,7 @@ class _StageReader:
         T_prim_joint[:3, 3] = next(iter(vectors(position)), np.zeros(3))
         T_world_joint = np.eye(4)
         T_world_joint[:3, 3] = matmul(affine, T_prim_joint)[:3, 3]
-        T_world_joint[:3, :3] = matmul(_rigid(affine)[:3, :3], rotation(turn))
+        T_world_joint[:3, :3] = matmul(_rigid(affine, self._where(prim))[:3, :3], rotation(turn))
         return body, matmul(np.linalg.inv(self._bodies[body].T_world_body), T_world_joint)
 
     def _motion(self, prim: Any) -> tuple[str, Array, float, float]:
@@ -412,12 +414,25 @@ class _StageReader:
         return WorldJoint(joint.name, joint.type, frame[:3, 3], sign * axis, joint.lower, joint.upper, mimic, dynamics)
 
     def _error(self, prim: Any, what: str, fix: str) -> AssetError:
-        return AssetError(what, f"{self._file}: prim {prim.GetPath()}", fix)
+        return AssetError(what, self._where(prim), fix)
+
+    def _where(self, prim: Any) -> str:
+        return f"{self._file}: prim {prim.GetPath()}"
 
 
-def _rigid(affine: Array) -> Array:
-    """The rigid transform of the same origin whose axes are nearest those of an affine one."""
-    u, _, v = np.linalg.svd(affine[:3, :3])
+def _rigid(affine: Array, where: str) -> Array:
+    """The rigid transform of the same origin whose axes are nearest those of an affine one.
+
+    Raises
+    ------
+    AssetError
+        When it is not finite, or flat.
+    """
+    scales = np.zeros(3)
+    if (np.abs(affine) <= LARGEST).all():
+        u, scales, v = np.linalg.svd(affine[:3, :3])
+    if not scales.min() > _FLAT * scales.max():
+        raise AssetError("its transform is not finite, or has a scale of 0", where, "write a transform with a scale")
     rigid = np.eye(4)
     rigid[:3, :3] = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
     rigid[:3, 3] = affine[:3, 3]

@@ -246,6 +246,11 @@ REFUSED: dict[str, tuple[str, str]] = {
     "no such body": (PAIR + joint("Revolute", "base", "nobody"), "does not exist"),
     "itself": (PAIR + joint("Revolute", "base", "base"), "joins a body to itself"),
     "nothing to see": ('def Xform "a" {}', "no link has any geometry"),
+    "flat": (
+        f'def Xform "a" ({BODY}) {{ float3 xformOp:scale = (1, 0, 1)\n'
+        'uniform token[] xformOpOrder = ["xformOp:scale"] }',
+        "a scale of 0",
+    ),
     "a word for a mass": (body("base", more='string physics:mass = "heavy"'), "'heavy', which is not a number"),
     "an unknown axis": (
         PAIR + joint("Revolute", "base", "lid", 'uniform token physics:axis = "W"'), "which is not one of X, Y, Z"
