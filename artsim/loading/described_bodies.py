@@ -69,7 +69,8 @@ def _body(part: Part, pieces: list[Mesh], inertia: Inertia | None, joint: JointD
     if len(part.faces):
         surface = trimesh.Trimesh(part.vertices, part.faces, process=False)
         surface.merge_vertices()
-        volume = float(surface.volume) if surface.is_volume else 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):  # without a volume, which is what is asked
+            volume = float(surface.volume) if surface.is_volume else 0.0
     if volume <= 0.0:
         points = np.concatenate([part.vertices, *(vertices for vertices, _ in pieces)])
         if len(points) == 0:

@@ -99,7 +99,9 @@ def _of_shapes(solid: Sequence[Mesh], density: float) -> Inertia | None:
     inertias = []
     for vertices, faces in solid:
         mesh = trimesh.Trimesh(vertices, faces, process=False)
-        if not (mesh.is_volume and mesh.volume > 0):
+        with np.errstate(divide="ignore", invalid="ignore"):  # without a volume, which is what is asked
+            closed = mesh.is_volume and mesh.volume > 0
+        if not closed:
             mesh = trimesh.Trimesh(*convex_hull(vertices, _THIN), process=False)
         mesh.density = density
         inertias.append(Inertia(float(mesh.mass), np.asarray(mesh.center_mass), np.asarray(mesh.moment_inertia)))
