@@ -117,15 +117,16 @@ def _include(root: etree._Element, file: Path, limits: LoadLimits, contents: lis
         path = _inside(name, file)
         if path.resolve() in seen or len(contents) >= _MAX_INCLUDES:
             raise AssetError(
-                f"includes {name!r} twice, or over {_MAX_INCLUDES} files", file, "include each file once, in one place"
+                f"includes {name[:100]!r} twice, or over {_MAX_INCLUDES} files",
+                file,
+                "include each file once, in one place",
             )
         seen.add(path.resolve())
         data = read_bounded(path, room, "included file", inside=file.parent)
         contents.append(data)
         room -= len(data)
-        parent, at = include.getparent(), 0
-        if parent is None:
-            raise AssetError("is an <include> alone", file, "pass the file that it includes")
+        parent = include.getparent()
+        assert parent is not None  # the top element is <mujoco>
         at = parent.index(include)
         parent.remove(include)
         for i, element in enumerate(list(safe_xml(readable_xml(data, path)[0], path))):

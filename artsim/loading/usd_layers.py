@@ -9,7 +9,7 @@ from artsim.common.extras import needs
 from artsim.common.files import read_bounded
 from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits
-from artsim.loading.usd_crate import MAGIC, problem_of_crate
+from artsim.loading.usd_bytes import problem_of
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 _MAX_LAYERS = 200
@@ -44,7 +44,7 @@ def open_stage(file: Path, limits: LoadLimits) -> tuple[Any, list[bytes]]:
         room -= len(data)
         if layers:
             contents.append(data)
-        problem = problem_of_crate(data) if path.suffix.lower() == ".usdc" or data.startswith(MAGIC) else None
+        problem = problem_of(data)
         if problem is not None:
             raise unreadable(path, problem)
         try:

@@ -302,6 +302,21 @@ def test_references_that_expand_without_end_are_refused_before_they_are_composed
         load(path)
 
 
+@pytest.mark.parametrize("pair", ['def Xform "a" {\n|}\n', "custom double[] x = [|]", "{dictionary a = |}", "(|)"])
+def test_brackets_inside_each_other_are_counted_before_usd_core_reads_them(pair: str, tmp_path: Path) -> None:
+    opened, closed = pair.split("|")
+    path = tmp_path / "deep.usda"
+    for comment in ("", '# }}}} "\n', '"""]]]]"""', "@}}}}@", "@@@ @)}@ @@@"):
+        path.write_text(f"{HEAD}{(opened + comment) * 100_000}{closed * 100_000}")
+        with pytest.raises(AssetError, match="brackets inside each other"):
+            load(path)
+
+
+def test_brackets_in_texts_are_no_brackets(tmp_path: Path) -> None:
+    words = 'string a = "' + "([{" * 300 + '\\"{{"\nstring b = """\n' + "{" * 900 + '"""\n# ' + "(" * 900
+    assert len(load(written(tmp_path, body("base", more=words)))) == 1
+
+
 def test_without_usd_core_the_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found: Callable[..., Any] = builtins.__import__
 

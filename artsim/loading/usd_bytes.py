@@ -1,13 +1,24 @@
-"""Binary USD files: what their table of contents says is compared with what is there before usd-core takes memory.
+"""The bytes of USD files, looked at before usd-core reads them.
 
-usd-core reserves what a file declares and looks afterwards. A crate has a header, a table of sections, and in each
-section compressed lists, each with its size before it.
+Its reader of text calls itself for each bracket inside another, and ends the process where these are too many. Its
+reader of binary files, called crates, reserves what a file declares and looks afterwards. A crate has a header, a table
+of sections, and in each section compressed lists, each with its size before it.
 """
 
 from __future__ import annotations
 
+import re
 import struct
 
+import numpy as np
+
+_MAX_NESTING = 600
+"""Brackets inside each other: each prim, dictionary, list and tuple is one."""
+_QUOTED = re.compile(
+    rb"""\"{3}.*?(?:\"{3}|\Z)|'{3}.*?(?:'{3}|\Z)|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|@{3}.*?(?:@{3}|\Z)|@[^@\n]*@|\#[^\n]*""",
+    re.DOTALL,
+)
+"""Texts, names of files and comments."""
 MAGIC = b"PXR-USDC"
 _HEADER, _ENTRY = 24, 32
 _MAX_SECTIONS = 64
@@ -19,7 +30,22 @@ _SIZES = {b"TOKENS": 1, b"FIELDS": 2, b"FIELDSETS": 1, b"PATHS": 3, b"SPECS": 3}
 """Compressed lists of each section."""
 
 
-def problem_of_crate(data: bytes) -> str | None:
+def problem_of(data: bytes) -> str | None:
+    """What is wrong with a USD file, text or binary, before it is read; None where nothing is."""
+    return _problem_of_crate(data) if data.startswith(MAGIC) else _problem_of_text(data)
+
+
+def _problem_of_text(data: bytes) -> str | None:
+    """Too many brackets inside each other."""
+    codes = np.frombuffer(_QUOTED.sub(b"", data), dtype=np.uint8)
+    step = np.zeros(256, dtype=np.int8)
+    step[list(b"([{")], step[list(b")]}")] = 1, -1
+    steps = step[codes]
+    depth = np.cumsum(steps[steps != 0], dtype=np.int64)
+    return f"over {_MAX_NESTING} brackets inside each other" if depth.max(initial=0) > _MAX_NESTING else None
+
+
+def _problem_of_crate(data: bytes) -> str | None:
     """What is wrong with the structure of a binary USD file; None where nothing is."""
     if len(data) < _HEADER or data[: len(MAGIC)] != MAGIC:
         return "it has no header"
