@@ -33,6 +33,7 @@ def test_an_exported_file_passes_the_gates(kind: str, tmp_path: Path, capsys: py
     assert "inertia: passed" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", OTHERS)
 def test_an_exported_file_is_varied(kind: str, tmp_path: Path) -> None:
     export(make("drawer", 0), tmp_path / "o", [kind])
@@ -41,6 +42,7 @@ def test_an_exported_file_is_varied(kind: str, tmp_path: Path) -> None:
     assert load(tmp_path / "v" / "0").sha256 != load(tmp_path / "v" / "1").sha256
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", OTHERS)
 def test_samples_of_an_exported_file_are_those_of_the_object(kind: str, tmp_path: Path) -> None:
     export(make("drawer", 0), tmp_path / "o", [kind])
