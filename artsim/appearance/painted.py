@@ -74,7 +74,7 @@ def _tells(coat: Coat) -> bool:
 def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
     """Mesh files of each rigid body, keyed by its links, in the order in which :func:`artsim.load` joins them."""
     limits = LoadLimits()
-    side = read_side_files(file.parent)
+    side = read_side_files(file)
     robot, repairs = parse_robot(read_urdf(file, limits.max_urdf_bytes), file, limits.max_links, side.helpers)
     reader = MeshReader(file.parent, {}, limits)
     links = {link.name: link for link in robot.links}

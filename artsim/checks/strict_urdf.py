@@ -12,8 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from artsim.common.files import read_bounded
 from artsim.errors import ArtsimError
@@ -21,14 +19,12 @@ from artsim.loading.joint_xml import MOVING_TYPES
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
 from artsim.loading.urdf import find_urdf, read_urdf
 from artsim.loading.urdf_xml import safe_xml
+from artsim.model.convex_bodies import is_convex
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 
 TOLERANCE = 1e-6
-"""By which an axis's length may differ from 1, a mimic joint may leave its limits, and a piece fall short of its hull
-(as a share of the volume)."""
-ROUNDING = 1e-8
-"""Metres by which a file may have rounded a vertex."""
+"""By which an axis's length may differ from 1, and a mimic joint may leave its limits."""
 _SHAPES = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere": {"radius": 1}, "mesh": {}}
 """Geometries that every simulator reads: attribute -> count of its numbers. Capsules are not among them."""
 
@@ -108,17 +104,6 @@ def _convexity_problems(collision: etree._Element, reader: MeshReader) -> list[s
     except (UnusableMeshError, ArtsimError) as problem:
         return [str(problem)]
     return [] if len(faces) and is_convex(vertices, faces) else [f"mesh {path.name!r} is not convex"]
-
-
-def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
-    """Whether a mesh encloses its whole convex hull."""
-    corners = (vertices - vertices[0])[faces]
-    volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    try:
-        hull = ConvexHull(vertices - vertices[0])
-    except QhullError:  # flat
-        return False
-    return bool(volume >= (1.0 - TOLERANCE) * hull.volume - ROUNDING * hull.area)
 
 
 def _paths(package_roots: Mapping[str, str | Path] | None) -> dict[str, Path]:

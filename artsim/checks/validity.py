@@ -13,13 +13,14 @@ import numpy as np
 
 from artsim.checks.strict_urdf import (
     convex_collision_geometry,
-    is_convex,
     strict_inertia,
     strict_kinematics,
     strict_urdf,
 )
 from artsim.errors import ArtsimError
+from artsim.loading.urdf import find_urdf, is_urdf
 from artsim.model.collision import Collision, Sweep
+from artsim.model.convex_bodies import is_convex
 from artsim.model.inertia import part_inertia
 from artsim.model.objects import ArticulatedObject
 
@@ -64,12 +65,14 @@ def check(obj: ArticulatedObject, names: Collection[str] | None = None) -> list[
 def check_file(
     obj: ArticulatedObject, path: str | Path, package_roots: Mapping[str, str | Path] | None = None
 ) -> list[Gate]:
-    """All gates of an object and the URDF file that it was loaded from, or exported to: the physics is the file's.
+    """All gates of an object and the file that it was loaded from, or exported to: the physics is the file's.
 
-    Package roots are those that it was loaded with.
+    Package roots are those that it was loaded with. Of MJCF and USD files, the physics is that of the parts' bodies.
 
     :mod:`artsim.physics.simulators` adds a look by three simulators.
     """
+    if not is_urdf(find_urdf(Path(path))):
+        return check(obj)
     return _run(
         {
             "strict URDF": lambda: strict_urdf(path, package_roots),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,7 +182,7 @@ def as_robot(obj: ArticulatedObject) -> Robot:
                 helper = _unused_name(f"{obj.parts[k].name}_thread", used)
                 links.append(Link(helper, -1, origin, inertia.share(HELPER_SHARE)))
                 inertia = inertia.share(1.0 - HELPER_SHARE)
-            joints.append(_joint(obj, joint, parent, len(links), carried[k]))
+            joints.append(_joint(obj, k, parent, len(links), carried[k]))
         index.append(len(links))
         links.append(_link(obj, k, origin, inertia))
     return Robot(obj, tuple(links), tuple(joints))
@@ -226,12 +226,15 @@ def _convex(name: str, piece: Mesh, scale: float) -> BoxShape | MeshShape:
     return MeshShape(name, vertices, faces)
 
 
-def _joint(obj: ArticulatedObject, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:
-    mimic = None
+def _joint(obj: ArticulatedObject, k: int, parent: int, child: int, carried: Inertia) -> LinkJoint:
+    """The joint of part k: with the strength, damping and friction that its source file says, at native size."""
+    joint, body, mimic = obj.tree.joints[k], obj.parts[k].body, None
     if joint.mimic is not None:
         mimic = (obj.tree.joints[joint.mimic.source].name, joint.mimic.multiplier, joint.mimic.offset)
     kind = "continuous" if joint.type == "screw" else joint.type
-    return _link_joint(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
+    derived = _link_joint(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
+    said = {} if body is None or obj.scale != 1.0 else asdict(body.joint)
+    return replace(derived, **{name: value for name, value in said.items() if value is not None})
 
 
 def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:

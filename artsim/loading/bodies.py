@@ -132,10 +132,13 @@ def without_empty_leaves(bodies: list[RigidBody], repairs: list[Repair]) -> list
     return kept
 
 
-def join_screws(bodies: list[RigidBody], known: Collection[str], repairs: list[Repair]) -> list[RigidBody]:
-    """One screw part in place of a helper link between a prismatic and a continuous joint on one axis.
+def join_screws(
+    bodies: list[RigidBody], known: Collection[str], repairs: list[Repair], guessed: bool = True
+) -> list[RigidBody]:
+    """One screw part in place of a helper link between a prismatic and a turning joint on one axis.
 
-    Helpers that the file's annotation knows of need no mention.
+    Helpers that the file's annotation knows of need no mention. With ``guessed``, a slide and a continuous joint that
+    nothing relates are a screw, too, as PartNet-Mobility writes them.
     """
     kept = list(bodies)
     for helper in bodies:
@@ -144,9 +147,11 @@ def join_screws(bodies: list[RigidBody], known: Collection[str], repairs: list[R
             continue
         body = carried[0]
         by_type = {b.joint.type: b for b in (helper, body) if b.joint is not None}
-        if set(by_type) != {"prismatic", "continuous"} or body.joint is None:
+        turn, slide = by_type.get("continuous") or by_type.get("revolute"), by_type.get("prismatic")
+        if turn is None or slide is None or body.joint is None:
             continue
-        turn, slide = by_type["continuous"], by_type["prismatic"]
+        if not guessed and not _follows(slide, turn):
+            continue
         along = float(dot(axis_in_base(slide), axis_in_base(turn)))
         rate = _slide_rate(turn, slide)
         if abs(abs(along) - 1.0) > 1e-6 or rate == 0.0:
@@ -156,6 +161,7 @@ def join_screws(bodies: list[RigidBody], known: Collection[str], repairs: list[R
             continue
         pitch = rate * float(np.sign(along))
         body.links = body.links + helper.links
+        body.T_base_link = helper.T_base_link | body.T_base_link
         if helper.links[0] not in known:
             repairs.append(
                 Repair(
@@ -190,6 +196,12 @@ def axis_in_base(body: RigidBody) -> Array:
     return unit(apply(body.T_base_joint[:3, :3], body.joint.axis))
 
 
+def _follows(slide: RigidBody, turn: RigidBody) -> bool:
+    """Whether a slide's joint is said to follow a turning one."""
+    assert turn.joint is not None
+    return slide.joint is not None and slide.joint.mimic is not None and slide.joint.mimic.joint == turn.joint.name
+
+
 def _slide_rate(turn: RigidBody, slide: RigidBody) -> float:
     """Slide for each radian of turn: what a mimic relation says, else one turn for the whole slide."""
     assert turn.joint is not None
@@ -197,4 +209,6 @@ def _slide_rate(turn: RigidBody, slide: RigidBody) -> float:
     if slide.joint.mimic is not None and slide.joint.mimic.joint == turn.joint.name:
         mimic = slide.joint.mimic
         return 0.0 if mimic.offset else mimic.multiplier
+    if turn.joint.type != "continuous":  # a hinge and a slide, each of its own
+        return 0.0
     return (slide.joint.upper - slide.joint.lower) / (2.0 * np.pi)

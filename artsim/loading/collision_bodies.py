@@ -50,7 +50,7 @@ def read_bodies(
     for link in root.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
-    side = read_side_files(file.parent)
+    side = read_side_files(file)
     repairs: list[Repair] = []
     robot, _ = parse_robot(etree.tostring(root), file, limits.max_links, side.helpers)
     bodies = merge_fixed_links(robot, file, repairs)

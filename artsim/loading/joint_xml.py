@@ -165,12 +165,19 @@ def _read_limits(joint: etree._Element, kind: str, element: Element) -> tuple[st
     if low > high:
         element.say(f"limits {low:g} and {high:g} swapped")
         low, high = high, low
+    if kind == "revolute" and max(abs(low), abs(high)) < ENDLESS:
+        _doubt_degrees(low, high, element)
+    return settle_limits(kind, low, high, element)
+
+
+def settle_limits(kind: str, low: float, high: float, element: Element) -> tuple[str, float, float]:
+    """Type and limits of a joint with these ends, radians or metres; infinite ones mean none. ``low`` is the lesser."""
+    if kind == "continuous":
+        return kind, -np.inf, np.inf
     if max(abs(low), abs(high)) >= ENDLESS:
         return _without_end(kind, low, high, element)
     if low == high:
         element.say(f"cannot move: both of its limits are {low:g}")
-    if kind == "revolute":
-        _doubt_degrees(low, high, element)
     return kind, low + 0.0, high + 0.0
 
 

@@ -100,6 +100,9 @@ class MeshReader:
         """
         if geometry.mesh is not None:
             return self._file(geometry.mesh)
+        if geometry.inline is not None:
+            self._count(len(geometry.inline.faces))
+            return geometry.inline.vertices, geometry.inline.faces
         self._count(_TRIANGLES[str(geometry)])
         if geometry.box is not None:
             return box(geometry.box.size)

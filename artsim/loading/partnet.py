@@ -1,5 +1,8 @@
 """The side files of a PartNet-Mobility folder: category, id, part labels, the joints as first annotated.
 
+GAPartNet adds a URDF file with links of its own to such a folder, and ``link_annotation_gapartnet.json``, which says
+what each of these links is: "slider_drawer", "hinge_door".
+
 Folders that :func:`artsim.export.export` wrote say more in ``meta.json``: the order of the parts, and which links only
 help to build a screw. Such objects are at rest at their file's zero.
 """
@@ -53,14 +56,21 @@ class SideFiles:
     contents: tuple[bytes, ...] = ()
 
 
+GAPARTNET = "mobility_annotation_gapartnet.urdf"
+"""The URDF file of GAPartNet."""
+_GAPARTNET_LINKS = "link_annotation_gapartnet.json"
+_HELD = "_fixed_handle"
+"""End of the names of what does not move against the part that it is on, so that it does not say what that part is."""
 _STILL = ("free", "static", "heavy", "fixed", "junk")
 
 
-def read_side_files(folder: Path) -> SideFiles:
-    """Read ``meta.json``, ``semantics.txt`` and ``mobility_v2.json`` where they exist; broken ones are reported.
+def read_side_files(file: Path) -> SideFiles:
+    """Read what stands beside an object's file, where it exists; broken side files are reported.
 
-    A link that leads out of the folder is reported, not followed.
+    These are ``meta.json``, and ``semantics.txt`` and ``mobility_v2.json``, or, of GAPartNet's URDF file, its own
+    annotation. A link that leads out of the folder is reported, not followed.
     """
+    folder = file.parent
     contents: list[bytes] = []
     repairs: list[Repair] = []
 
@@ -91,6 +101,16 @@ def read_side_files(folder: Path) -> SideFiles:
     own = meta.get("artsim")
     own = own if isinstance(own, dict) else {}
 
+    if file.name == GAPARTNET:  # the other files are about the links of mobility.urdf
+        labels = _gapartnet_labels(parsed(_GAPARTNET_LINKS))
+        return SideFiles(
+            object_id=_word(object_id) if isinstance(object_id, (str, int)) else None,
+            category=_word(category) if isinstance(category, str) else None,
+            labels=labels,
+            repairs=tuple(repairs),
+            contents=tuple(contents),
+        )
+
     rows = [line.split() for line in (content("semantics.txt") or b"").decode("utf-8", "replace").splitlines()]
     rows = [row for row in rows if len(row) >= 3]
     labels = {row[0]: _word(row[2]) for row in rows}
@@ -111,6 +131,17 @@ def read_side_files(folder: Path) -> SideFiles:
         repairs=tuple(repairs),
         contents=tuple(contents),
     )
+
+
+def _gapartnet_labels(annotation: object) -> dict[str, str]:
+    """Link name -> what it is, of the links that GAPartNet counts as parts."""
+    found = {}
+    for entry in annotation if isinstance(annotation, list) else ():
+        if isinstance(entry, dict) and entry.get("is_gapart"):
+            link, label = str(entry.get("link_name", "")), str(entry.get("category", ""))
+            if link and label and not label.endswith(_HELD):
+                found[link] = _word(label)
+    return found
 
 
 def _word(text: str | int) -> str:

@@ -1,4 +1,4 @@
-"""Cylinders, capsules and spheres that a URDF file describes in numbers.
+"""Boxes, cylinders, capsules, spheres and ellipsoids that a file describes in numbers.
 
 The same bits on every processor, as :mod:`artsim.common.elementary` says; trimesh leaves them to BLAS and the C
 library.
@@ -87,6 +87,12 @@ def sphere(radius: float) -> Mesh:
     """A sphere about the origin: an icosahedron whose faces are divided in four, four times."""
     vertices, faces = _unit_sphere()
     return radius * vertices, faces
+
+
+def ellipsoid(radii: Array) -> Mesh:
+    """An ellipsoid about the origin with (3,) half axes along x, y and z; triangles as of a sphere."""
+    vertices, faces = _unit_sphere()
+    return vertices * radii, faces
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Where objects come from: URDF files and folders of them, and the procedural families."""
+"""Where objects come from: URDF, MJCF and USD files and folders of them, and the procedural families."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make_constrained, source_name
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 from artsim.loading.meshes import LoadLimits
-from artsim.loading.urdf import find_urdf, load, read_urdf
+from artsim.loading.urdf import OTHER_FILES, find_urdf, load, max_bytes, read_urdf
 from artsim.model.objects import ArticulatedObject
 
 
@@ -24,7 +24,7 @@ class FileSource:
     Attributes
     ----------
     path : Path
-        URDF file.
+        URDF, MJCF or USD file.
     name : str
         Path from the folder that was named (or holds the file that was) on: stable when that folder moves.
     sha256 : str
@@ -127,8 +127,9 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
     Parameters
     ----------
     paths : sequence of path
-        URDF files, object folders, or folders of object folders: below a folder, every ``mobility.urdf`` is taken, and
-        where there is none, every ``*.urdf``.
+        URDF, MJCF or USD files, object folders, or folders of object folders: below a folder, every ``mobility.urdf``
+        is taken, where there is none, every ``*.urdf``, and where there is none of these, ``mobility.xml`` (MJCF) or
+        ``mobility.usda`` (USD).
     package_roots : mapping, optional
 
     Raises
@@ -141,12 +142,12 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         if given.is_dir():
             found = _below(given)
             if not found:
-                raise AssetError("no URDF file below this folder", given, "name a folder that holds some")
+                raise AssetError("no URDF, MJCF or USD file below this folder", given, "name a folder that holds some")
         else:
             found = [find_urdf(given)]
         for file in found:
             name = (file.relative_to(given.parent) if given.is_dir() else Path(file.parent.name, file.name)).as_posix()
-            data = read_urdf(file, LoadLimits().max_urdf_bytes)
+            data = read_urdf(file, max_bytes(file, LoadLimits()))
             sources.append(FileSource(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
     return sources
 
@@ -165,9 +166,11 @@ def _below(folder: Path) -> list[Path]:
             continue
         visited.add(real)
         folders.sort()
-        if "mobility.urdf" in files:
-            found.append(Path(here) / "mobility.urdf")
+        whole = next((name for name in ("mobility.urdf", *OTHER_FILES) if name in files), None)
+        urdf = sorted(name for name in files if name.endswith(".urdf"))
+        if whole == "mobility.urdf" or (whole is not None and not urdf):
+            found.append(Path(here) / whole)
             folders.clear()
         else:
-            found += [Path(here) / name for name in sorted(files) if name.endswith(".urdf")]
+            found += [Path(here) / name for name in urdf]
     return found

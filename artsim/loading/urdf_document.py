@@ -1,10 +1,18 @@
-"""What a URDF document says, checked: links with their shapes, and joints between them."""
+"""What a URDF document says, checked: links with their shapes, and joints between them.
+
+Other formats are written as the same links and joints.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
+from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,15 @@ class MeshFile:
     scale: Array | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class InlineMesh:
+    """A mesh that stands in the document itself, or was read with it: (V, 3) metres and (F, 3) triangles."""
+
+    name: str
+    vertices: Array
+    faces: NDArray[np.int32]
+
+
 @dataclass(frozen=True)
 class Geometry:
     """A shape of a link; one field is set."""
@@ -54,10 +71,13 @@ class Geometry:
     capsule: Capsule | None = None
     sphere: Sphere | None = None
     mesh: MeshFile | None = None
+    inline: InlineMesh | None = None
 
     def __str__(self) -> str:
         if self.mesh is not None:
             return f"mesh {self.mesh.filename!r}"
+        if self.inline is not None:
+            return f"mesh {self.inline.name!r}"
         return next(name for name, shape in vars(self).items() if shape is not None)
 
 
@@ -89,12 +109,18 @@ class UrdfLink:
         Why other shapes of it cannot be shown.
     empty : tuple of str
         What shapes of it have no extent, so that there is nothing to show.
+    collision : tuple of Shape
+        What collides; of MJCF and USD alone.
+    inertia : Inertia or None
+        In the link's frame; of MJCF and USD alone.
     """
 
     name: str
     shapes: tuple[Shape, ...] = ()
     unusable: tuple[str, ...] = ()
     empty: tuple[str, ...] = ()
+    collision: tuple[Shape, ...] = ()
+    inertia: Inertia | None = None
 
 
 @dataclass(frozen=True)
@@ -121,6 +147,8 @@ class UrdfJoint:
     lower, upper : float
         Radians or metres; infinite where it turns freely.
     mimic : MimicRelation or None
+    dynamics : JointDynamics
+        Of MJCF and USD alone.
     """
 
     name: str
@@ -132,11 +160,22 @@ class UrdfJoint:
     lower: float
     upper: float
     mimic: MimicRelation | None = None
+    dynamics: JointDynamics = UNKNOWN_DYNAMICS
 
 
 @dataclass(frozen=True)
 class UrdfRobot:
-    """Links and joints in the document's order."""
+    """Links and joints in the document's order.
+
+    Attributes
+    ----------
+    links : tuple of UrdfLink
+    joints : tuple of UrdfJoint
+    explicit : bool
+        Whether it says of every joint that follows another that it does. PartNet-Mobility's URDF files leave it unsaid
+        how far a screw goes for each turn.
+    """
 
     links: tuple[UrdfLink, ...]
     joints: tuple[UrdfJoint, ...]
+    explicit: bool = False

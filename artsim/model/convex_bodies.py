@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Body, Mesh, Part
@@ -17,6 +18,10 @@ _SPECK = 0.01
 """Least side of the box that stands for a part without volume, over the object's diagonal."""
 _FLAT = 1e-3
 """A hull that fills less of its box has no volume worth the name."""
+_SHORT = 1e-6
+"""Share of its volume by which a convex piece may fall short of its hull."""
+_ROUNDING = 1e-8
+"""Metres by which a file may have rounded a vertex."""
 
 
 def add_bodies(obj: ArticulatedObject) -> ArticulatedObject:
@@ -43,7 +48,7 @@ def add_surface_bodies(obj: ArticulatedObject) -> ArticulatedObject:
     for k, part in enumerate(obj.parts):
         body = part.body
         if body is None:
-            hull = _hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
+            hull = convex_hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
             pieces = ((part.vertices, part.faces),) if len(part.faces) else ()
             body = Body(pieces, DEFAULT_DENSITY, hull)
         parts.append(
@@ -85,11 +90,11 @@ def _add_body(obj: ArticulatedObject, k: int) -> Part:
     part = replace(obj.parts[k], name=f"part{k}", label=f"part{k}")
     if part.body is not None:
         return part
-    vertices, faces = _hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
+    vertices, faces = convex_hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
     return replace(part, vertices=vertices, faces=faces, body=Body(((vertices, faces),), DEFAULT_DENSITY))
 
 
-def _hull(points: Array, thickness: float) -> Mesh:
+def convex_hull(points: Array, thickness: float) -> Mesh:
     """Convex hull of points; where it has next to no volume, a box around them with sides of at least ``thickness``."""
     import trimesh
     from scipy.spatial import QhullError
@@ -103,3 +108,16 @@ def _hull(points: Array, thickness: float) -> Mesh:
         hull = trimesh.creation.box(np.maximum(high - low, thickness))
         hull.apply_translation(0.5 * (low + high))
     return np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces, dtype=np.int32)
+
+
+def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:
+    """Whether a mesh encloses its whole convex hull."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    corners = (vertices - vertices[0])[faces]
+    volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    try:
+        hull = ConvexHull(vertices - vertices[0])
+    except QhullError:  # flat
+        return False
+    return bool(volume >= (1.0 - _SHORT) * hull.volume - _ROUNDING * hull.area)

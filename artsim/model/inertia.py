@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.common.products import apply, dot
+from artsim.common.products import apply, dot, matmul
 from artsim.errors import AssetError
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -46,12 +46,22 @@ class Inertia:
         """A fraction of the body's mass, spread in space as the whole is."""
         return Inertia(fraction * self.mass, self.center, fraction * self.tensor)
 
+    def scaled(self, scale: float) -> Inertia:
+        """Of a body of the same density, ``scale`` times as large."""
+        return Inertia(scale**3 * self.mass, scale * self.center, scale**5 * self.tensor)
+
+    def transformed(self, T_new_old: Array) -> Inertia:
+        """The same body's in another frame, by a rigid transform (4, 4)."""
+        turn = T_new_old[:3, :3]
+        center = apply(turn, self.center) + T_new_old[:3, 3]
+        return Inertia(self.mass, center, matmul(matmul(turn, self.tensor), turn.T))
+
 
 def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     """Mass, centre of mass and inertia tensor of part k, at rest, at the object's scale.
 
-    They are those of its body's solid, else of the solid that the part's surface encloses (integrals over a polyhedron
-    in closed form), filled with its body's density.
+    They are those that its source file says. Without, they are those of its body's solid, else of the solid that the
+    part's surface encloses (integrals over a polyhedron in closed form), filled with its body's density.
 
     Raises
     ------
@@ -64,6 +74,8 @@ def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     where = f"{obj.category} {obj.object_id}: part {part.name!r}"
     if part.body is None:
         raise AssetError("has no body, so no density", where, "only procedural objects (artsim.make) have one")
+    if part.body.inertia is not None:
+        return part.body.inertia.scaled(obj.scale)
     vertices, faces = part.body.solid or (part.vertices, part.faces)
     triangles = (vertices * obj.scale)[faces]
     with np.errstate(divide="ignore", invalid="ignore"):  # without a volume, which is looked at below

@@ -22,6 +22,8 @@ from artsim.model.kinematics import LARGEST, Array, KinematicTree
 if TYPE_CHECKING:
     import trimesh
 
+    from artsim.model.inertia import Inertia
+
 _MAX_REPAIR = 1000
 """Characters of a repair as text: names out of files may be of any length."""
 
@@ -55,6 +57,28 @@ Mesh = tuple[Array, NDArray[np.int32]]
 """Vertices (V, 3) and triangles (F, 3)."""
 
 
+@dataclass(frozen=True)
+class JointDynamics:
+    """What drives and opposes the motion of a joint, at native size; None where the source file does not say.
+
+    Attributes
+    ----------
+    effort, velocity : float or None
+        Limits: N m or N, rad/s or m/s.
+    damping, friction : float or None
+        N m s or N s/m; N m or N.
+    """
+
+    effort: float | None = None
+    velocity: float | None = None
+    damping: float | None = None
+    friction: float | None = None
+
+
+UNKNOWN_DYNAMICS = JointDynamics()
+"""Of a joint of which the source file says nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """What physics needs of a part.
@@ -68,11 +92,17 @@ class Body:
         kg/m^3.
     solid : Mesh or None
         Closed surface of what has the mass, where the part's own surface need not be closed.
+    inertia : Inertia or None
+        What the source file says of it, in native units; it counts instead of what follows from surface and density.
+    joint : JointDynamics
+        Of the joint that carries the part.
     """
 
     pieces: tuple[Mesh, ...]
     density: float
     solid: Mesh | None = None
+    inertia: Inertia | None = None
+    joint: JointDynamics = UNKNOWN_DYNAMICS
 
     __repr__ = brief
 
@@ -131,7 +161,8 @@ class Part:
         if body is not None:
             pieces = tuple((vertices + offset, faces) for vertices, faces in body.pieces)
             solid = None if body.solid is None else (body.solid[0] + offset, body.solid[1])
-            body = replace(body, pieces=pieces, solid=solid)
+            inertia = body.inertia and replace(body.inertia, center=body.inertia.center + offset)
+            body = replace(body, pieces=pieces, solid=solid, inertia=inertia)
         return replace(self, vertices=self.vertices + offset, body=body)
 
 

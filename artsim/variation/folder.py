@@ -27,7 +27,7 @@ from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.loading.collision_bodies import read_bodies
 from artsim.loading.sources import find_sources
-from artsim.loading.urdf import find_urdf, load
+from artsim.loading.urdf import find_urdf, is_urdf, load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.objects import ArticulatedObject
 from artsim.variation.operations import OPERATIONS
@@ -117,7 +117,7 @@ def write_variations(
     Parameters
     ----------
     path : path
-        URDF file or its folder.
+        URDF, MJCF or USD file, or its folder.
     out : path
         Folder; made if missing. Each variation goes to a folder of its own, named by its seed.
     count : int
@@ -188,7 +188,7 @@ def load_with_bodies(
     """
     obj = load(path, package_roots=package_roots)
     file = find_urdf(Path(path))
-    if file.suffix == ".npz":
+    if not is_urdf(file):  # an object file has no bodies; other formats give them with the object
         return obj, ()
     gates = tuple(name for name, gate in _FILE_GATES.items() if not gate(file, package_roots))
     at_zero = not np.any(obj.tree.rest)

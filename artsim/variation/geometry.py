@@ -11,7 +11,7 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
-from artsim.model.objects import ArticulatedObject, Body, Mesh, Part
+from artsim.model.objects import UNKNOWN_DYNAMICS, ArticulatedObject, Body, Mesh, Part
 from artsim.model.stretching import AxisMap
 
 _ON_PLANE = 1e-9
@@ -187,7 +187,9 @@ def centered(obj: ArticulatedObject) -> ArticulatedObject:
 
 def _mapped(part: Part, surface: Callable[[Mesh], Mesh], pieces: Callable[[Body], list[Mesh]]) -> Part:
     vertices, faces = surface((part.vertices, part.faces))
-    body = None if part.body is None else replace(part.body, pieces=tuple(pieces(part.body)))
+    body = part.body
+    if body is not None:  # what the file said of the physics was that of another shape
+        body = replace(body, pieces=tuple(pieces(body)), inertia=None, joint=UNKNOWN_DYNAMICS)
     return replace(part, vertices=vertices, faces=faces, body=body)
 
 

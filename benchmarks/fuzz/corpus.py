@@ -90,6 +90,68 @@ _CHAIN = """<robot name="chain">
 </robot>
 """
 
+_MJCF = """<mujoco model="pair">
+  <compiler angle="radian" autolimits="true"/>
+  <default><default class="seen"><geom group="2" contype="0" conaffinity="0" mass="0"/></default></default>
+  <asset><mesh name="m" file="m.obj" scale="0.5 0.5 0.5" inertia="shell"/></asset>
+  <worldbody>
+    <body name="base" pos="0 0 0.1" euler="0 0 1.57">
+      <geom type="box" size="0.5 0.25 0.1"/><geom class="seen" type="mesh" mesh="m"/>
+      <body name="lid" pos="-0.5 0 0.1">
+        <joint name="hinge" axis="0 -1 0" range="0 2.5" damping="0.1" frictionloss="0.01" actuatorfrcrange="-9 9"/>
+        <geom type="cylinder" fromto="0 0 0 0.5 0 0" size="0.02"/>
+      </body>
+      <body name="knob" pos="0 0 0.3">
+        <joint name="turn" ref="0.5"/><joint name="push" type="slide" range="0 0.01"/><geom size="0.05"/>
+      </body>
+    </body>
+  </worldbody>
+  <equality><joint joint1="push" joint2="turn" polycoef="0 0.001 0 0 0"/></equality>
+</mujoco>
+"""
+
+_USD = """#usda 1.0
+(
+    defaultPrim = "o"
+    metersPerUnit = 0.01
+    upAxis = "Y"
+)
+def Xform "o"
+{
+    def Xform "base" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
+    {
+        float physics:mass = 2
+        def Cube "shape" (prepend apiSchemas = ["PhysicsCollisionAPI"])
+        {
+            double size = 20
+        }
+    }
+    def Xform "lid" (prepend apiSchemas = ["PhysicsRigidBodyAPI"])
+    {
+        double3 xformOp:translate = (0, 30, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+        def Mesh "shape" (prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMeshCollisionAPI"])
+        {
+            uniform token physics:approximation = "convexHull"
+            point3f[] points = [(0, 0, 0), (10, 0, 0), (0, 10, 0), (0, 0, 10)]
+            int[] faceVertexCounts = [3, 3, 3, 3]
+            int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]
+        }
+    }
+    def PhysicsRevoluteJoint "hinge" (prepend apiSchemas = ["PhysicsDriveAPI:angular"])
+    {
+        rel physics:body0 = </o/base>
+        rel physics:body1 = </o/lid>
+        uniform token physics:axis = "Z"
+        point3f physics:localPos0 = (0, 30, 0)
+        quatf physics:localRot0 = (1, 0, 0, 0)
+        float physics:lowerLimit = -30
+        float physics:upperLimit = 90
+        float drive:angular:physics:maxForce = 100
+    }
+}
+"""
+
 _META = b'{"model_cat": "Laptop", "anno_id": "10211", "artsim": {"parts": ["base", "lid"], "helpers": []}}'
 _SEMANTICS = b"base free base_body\nlid hinge lid\n"
 _MOBILITY = b'[{"id": 0, "parent": -1, "joint": "free", "jointData": {}}, {"id": 1, "parent": 0, "joint": "hinge"}]'
@@ -251,6 +313,8 @@ def _robots() -> Iterator[Seed]:
     }
     yield Seed("urdf", "pair", pair, "mobility.urdf", "xml")
     yield Seed("urdf", "chain", {"mobility.urdf": _CHAIN.encode(), "m.obj": _OBJ}, "mobility.urdf", "xml")
+    yield Seed("urdf", "mjcf", {"mobility.xml": _MJCF.encode(), "m.obj": _OBJ}, "mobility.xml", "xml")
+    yield Seed("urdf", "usd", {"mobility.usda": _USD.encode()}, "mobility.usda", "text")
     for member, form in (("meta.json", "json"), ("semantics.txt", "text"), ("mobility_v2.json", "json")):
         yield Seed("side", member.partition(".")[0], pair, member, form)
 

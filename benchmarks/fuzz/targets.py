@@ -33,7 +33,7 @@ def _check_object(obj: ArticulatedObject) -> None:
 def _urdf(folder: Path) -> None:
     import artsim
 
-    _check_object(artsim.load(folder / "mobility.urdf"))
+    _check_object(artsim.load(min(folder.glob("mobility.*"))))
 
 
 def _object(folder: Path) -> None:

@@ -113,7 +113,6 @@ def load_plain(folder: Path) -> ArticulatedObject:
     ("content", "what"),
     [
         ("<sdf version='1.6'><model/></sdf>", "this is SDF"),
-        ("<mujoco/>", "this is MJCF"),
         ("<!DOCTYPE html><html><body>404</body></html>", "is a web page"),
         ("<html></html>", "this is a web page"),
         ("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "a pointer of Git LFS"),

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
-from artsim.checks.strict_urdf import is_convex
+from artsim.model.convex_bodies import is_convex
 from artsim.model.stretching import AxisMap
 from artsim.variation.geometry import cut_at, fitted, stretched
 from tests.conftest import rigid

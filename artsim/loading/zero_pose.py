@@ -1,0 +1,180 @@
+"""Objects of other formats as links and joints of a URDF document, from where everything is at the zero of all joints.
+
+MJCF and USD write frames, axes and anchors in many ways. Their readers leave it to the format's own library to work out
+where bodies and joints stand in the world when every joint is 0. From that alone the links and joints are written: each
+link's frame has the axes of the world, and its origin at the anchor of its joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from artsim.common.products import matmul
+from artsim.errors import AssetError
+from artsim.loading.joint_xml import settle_limits
+from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
+from artsim.loading.xml_values import Element
+from artsim.model.inertia import Inertia, combine_inertias
+from artsim.model.kinematics import Array
+from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics, Repair
+
+WORLD = "world"
+
+
+@dataclass(frozen=True, eq=False)
+class WorldJoint:
+    """A joint in the world's frame, at the zero of all joints.
+
+    Attributes
+    ----------
+    name, type : str
+        As of :class:`~artsim.loading.urdf_document.UrdfJoint`.
+    anchor : (3,) float
+        A point on the axis, metres.
+    axis : (3,) float
+        Unit.
+    lower, upper : float
+        Radians or metres; infinite where there is no end.
+    mimic : MimicRelation or None
+    dynamics : JointDynamics
+    """
+
+    name: str
+    type: str
+    anchor: Array
+    axis: Array
+    lower: float = -np.inf
+    upper: float = np.inf
+    mimic: MimicRelation | None = None
+    dynamics: JointDynamics = UNKNOWN_DYNAMICS
+
+
+@dataclass(eq=False)
+class WorldLink:
+    """A link in the world's frame, at the zero of all joints.
+
+    Attributes
+    ----------
+    name : str
+    parent : int
+        Index of the link that carries it; -1 for the world.
+    joint : WorldJoint or None
+        None for the world.
+    shapes, collision : list of Shape
+        What it shows and what collides; their origins map to the world's frame.
+    inertia : Inertia or None
+        In the world's frame.
+    """
+
+    name: str
+    parent: int = -1
+    joint: WorldJoint | None = None
+    shapes: list[Shape] = field(default_factory=list)
+    collision: list[Shape] = field(default_factory=list)
+    inertia: Inertia | None = None
+
+
+def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -> UrdfRobot:
+    """Links and joints of an object.
+
+    Parameters
+    ----------
+    links : sequence of WorldLink
+        The world first, parents before children. A world that shows nothing and holds or frees one link is left out:
+        that link is the object's root.
+    file : Path
+        For messages.
+    repairs : list of Repair
+        Added to.
+
+    Raises
+    ------
+    AssetError
+        When two links or two joints have the same name, or a number is not finite.
+    """
+    root = _root(links)
+    if root > 0:
+        links = [replace(links[root], parent=-1, joint=None), *_without(links, root)]
+    _check_names([link.name for link in links], "link", file)
+    _check_names([link.joint.name for link in links if link.joint is not None], "joint", file)
+    origins = [np.zeros(3) if link.joint is None else link.joint.anchor for link in links]
+    found, joints = [], []
+    for k, link in enumerate(links):
+        T_link_world = np.eye(4)
+        T_link_world[:3, 3] = -origins[k]
+        inertia = None if link.inertia is None else link.inertia.transformed(T_link_world)
+        shapes, collision = (
+            tuple(replace(shape, origin=matmul(T_link_world, shape.origin)) for shape in some)
+            for some in (link.shapes, link.collision)
+        )
+        _check_finite(link, [origins[k], *(shape.origin for shape in (*shapes, *collision))], file)
+        found.append(UrdfLink(link.name, shapes, collision=collision, inertia=inertia))
+        if link.joint is not None:
+            joints.append(_joint(link, links[link.parent].name, origins[k] - origins[link.parent], file, repairs))
+    return UrdfRobot(tuple(found), tuple(joints), explicit=True)
+
+
+def _root(links: Sequence[WorldLink]) -> int:
+    """The link that is the object's root: 0 for the world itself."""
+    carried = [k for k, link in enumerate(links) if link.parent == 0]
+    if len(carried) != 1 or links[0].shapes or links[0].collision:
+        return 0
+    joint = links[carried[0]].joint
+    return carried[0] if joint is not None and joint.type in ("fixed", "floating") else 0
+
+
+def _without(links: Sequence[WorldLink], root: int) -> list[WorldLink]:
+    """The links that hang on the new root, which comes first: without the world and itself."""
+    index = {root: 0}
+    rest = [k for k in range(1, len(links)) if k != root]
+    index |= {k: i for i, k in enumerate(rest, start=1)}
+    return [replace(links[k], parent=index[links[k].parent]) for k in rest]
+
+
+def _joint(link: WorldLink, parent: str, offset: Array, file: Path, repairs: list[Repair]) -> UrdfJoint:
+    joint = link.joint
+    assert joint is not None
+    origin = np.eye(4)
+    origin[:3, 3] = offset
+    kind, lower, upper = joint.type, joint.lower, joint.upper
+    if kind in ("revolute", "continuous", "prismatic"):
+        element = Element(f"joint {joint.name!r}", file, repairs)
+        if not (np.isfinite(joint.axis).all() and abs(np.linalg.norm(joint.axis) - 1.0) < 1e-6):
+            raise element.error("has no axis", "give its axis a length")
+        kind, lower, upper = settle_limits(kind, lower, upper, element)
+    return UrdfJoint(joint.name, kind, parent, link.name, origin, joint.axis, lower, upper, joint.mimic, joint.dynamics)
+
+
+def _check_names(names: Sequence[str], what: str, file: Path) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise AssetError(f"two {what}s are called {name!r}", file, "give each its own name")
+        seen.add(name)
+
+
+def _check_finite(link: WorldLink, arrays: Sequence[Array], file: Path) -> None:
+    inertia = link.inertia
+    more = [] if inertia is None else [np.array(inertia.mass), inertia.center, inertia.tensor]
+    if not all(np.isfinite(array).all() for array in (*arrays, *more)):
+        raise AssetError(
+            "a position, size or mass is not finite", f"{file}: link {link.name!r}", "write finite numbers"
+        )
+
+
+def unused_name(name: str, used: set[str]) -> str:
+    """A name that nothing has yet; it is used from now on."""
+    while name in used:
+        name += "_"
+    used.add(name)
+    return name
+
+
+def combined(inertias: Sequence[Inertia]) -> Inertia | None:
+    """Several bodies as one; None where none has a mass."""
+    solid = [inertia for inertia in inertias if inertia.mass > 0]
+    return combine_inertias(solid) if solid else None
