@@ -50,10 +50,13 @@ def mjcf_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) 
     for group, more in (("visual", {"group": "2", "contype": "0", "conaffinity": "0"}), ("collision", {"group": "3"})):
         etree.SubElement(etree.SubElement(default, "default", {"class": group}), "geom", mass="0", **more)
     asset = etree.SubElement(root, "asset")
+    seen = {link.visual.name for link in robot.links if link.visual is not None}
     finished = {link.visual.name for link in robot.links if link.visual is not None and link.name in finish.looks}
     for mesh in robot.meshes:
         if mesh.name not in finished:
-            etree.SubElement(asset, "mesh", name=mesh.name, file=f"{mesh.name}.obj")
+            # What is only seen may be flat, and enclose nothing; its mass is 0 in any case.
+            flat = {"inertia": "shell"} if mesh.name in seen else {}
+            etree.SubElement(asset, "mesh", name=mesh.name, file=f"{mesh.name}.obj", **flat)
     _add_materials(asset, finish)
     bodies: list[etree._Element] = []
     incoming = {joint.child: joint for joint in robot.joints}
