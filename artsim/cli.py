@@ -1,19 +1,18 @@
-"""The program ``artsim``: datasets, procedural objects, variations, motions and scenes; checks and pictures of them."""
+"""The program ``artsim``: datasets, objects, variations, motions and scenes; checks, pictures, other formats."""
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from artsim.common.program import run_program
+from artsim.common.program import cores, run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.families.constraints import Constraints
+from artsim.formats.command import Convert
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
 from artsim.renderers import RendererName
@@ -22,11 +21,6 @@ from artsim.variation.command import Vary
 
 _LISTED = 50
 """Lines of a list before the rest is only counted."""
-
-
-def _cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 Having = Annotated[
@@ -70,7 +64,7 @@ class Generate:
     """Samples in all; every object gets about the same number."""
     seed: int = 0
     """Seed of the dataset; sample i depends on (seed, i) only."""
-    workers: int = field(default_factory=_cores)
+    workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
     sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
@@ -156,7 +150,7 @@ class GenerateObjects:
     actuators: Literal["none", "motor", "position"] = "none"
     """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
     control is where the joint shall be."""
-    workers: int = field(default_factory=_cores)
+    workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
@@ -405,7 +399,7 @@ class Repair:
     """Where objects lie that were loaded from files, if they are not where they were."""
     package_root: PackageRoots = field(default_factory=dict)
     """Folder of a package:// name: NAME=FOLDER ..."""
-    workers: int = field(default_factory=_cores)
+    workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
@@ -465,6 +459,7 @@ Verb = (
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
     | Annotated[Repair, tyro.conf.subcommand("repair")]
+    | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
 

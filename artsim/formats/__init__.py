@@ -1,0 +1,1 @@
+"""Finished datasets in the formats that other programs read."""
