@@ -211,10 +211,12 @@ def _outline_box(obj: ArticulatedObject, sample: Sample, k: int) -> list[int]:
     corners = transform_points(sample.T_camera_part[k], part.vertices[np.unique(part.faces)] * obj.scale)
     if (corners[:, 2] <= 0).any():  # it reaches behind the camera, and has no outline
         return [-1, -1, -1, -1]
-    image = camera.project(corners)
-    left, top = np.floor(image.min(axis=0)).astype(int).tolist()
-    right, bottom = np.ceil(image.max(axis=0)).astype(int).tolist()
-    return [left, top, right - left, bottom - top]
+    image = camera.project(corners) - 0.5  # pixel centres, which rays pass through, at whole numbers
+    left, top = np.ceil(image.min(axis=0)).astype(int).tolist()
+    right, bottom = np.floor(image.max(axis=0)).astype(int).tolist()
+    if right < left or bottom < top:  # it passes between the centres
+        return [-1, -1, -1, -1]
+    return [left, top, right + 1 - left, bottom + 1 - top]
 
 
 def _articulation(obj: ArticulatedObject, sample: Sample, first_id: int) -> dict[str, Any]:
