@@ -13,7 +13,7 @@ from artperl.core.estimate import Estimate
 from artperl.core.listing import HEAD, cells, summary
 from artperl.perception.preprocess import is_measured
 from artsim.common.names import printable
-from artsim.drawing.annotation import PALETTE
+from artsim.common.palette import PALETTE
 
 _MOST = 6000
 """Points that are drawn."""

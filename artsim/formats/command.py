@@ -39,7 +39,7 @@ class Convert:
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
-        from artsim.formats.convert import convert
+        from artsim.formats.conversion import convert
 
         try:
             result = convert(self.path, self.to, self.out, self.split, self.samples, self.group, self.workers)

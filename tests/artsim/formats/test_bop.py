@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import artsim
 from artsim import Dataset
-from artsim.formats.convert import convert
+from artsim.formats.conversion import convert
 from artsim.observing.sample import Sample
 
 pytestmark = pytest.mark.slow

@@ -22,7 +22,7 @@ from artsim import Dataset
 from artsim.common.palette import PALETTE
 from artsim.datasets.shards import sample_key
 from artsim.formats.coco import run_lengths
-from artsim.formats.convert import convert
+from artsim.formats.conversion import convert
 from artsim.formats.ply import save_ply
 from artsim.formats.webdataset import decode_values
 

@@ -17,7 +17,7 @@ from artsim import Dataset
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.formats.base import FormatName
-from artsim.formats.convert import DONE, FORMATS, JOURNAL, convert
+from artsim.formats.conversion import DONE, FORMATS, JOURNAL, convert
 from artsim.loading.sources import family_sources
 from tests.artsim.formats.conftest import contents
 
