@@ -12,6 +12,7 @@ from artsim.common.program import cores, run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.families.constraints import Constraints
+from artsim.formats.base import FormatName
 from artsim.formats.command import Convert
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
@@ -79,6 +80,8 @@ class Generate:
     """Refuse objects that were repaired while loading; with --skip-broken, leave them out."""
     load_limit: float = 300.0
     """Seconds that an object may take to load."""
+    format: FormatName | None = None
+    """Also convert the finished dataset to this format, into the folder <out>_<format>; see artsim convert."""
 
     def run(self) -> None:
         from artsim.common.names import printable
@@ -86,6 +89,10 @@ class Generate:
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
 
+        if self.format is not None:  # before hours are spent on a dataset that it does not take
+            from artsim.formats.conversion import FORMATS
+
+            FORMATS[self.format].check(self.sample, self.out)
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
         sources += family_sources(
             _categories(self.categories), self.objects_per_category, self.first_object, _constraints(self.having)
@@ -118,10 +125,12 @@ class Generate:
             print(f"made again: {file}")
         if result.made == 0:
             print(f"{result.folder}: already complete, {result.num_samples} samples")
-            return
-        rate = result.made / result.seconds
-        print(f"{result.folder}: {result.num_samples} samples, {result.made} of them made now, {rate:.0f} samples/s")
-        print(f"look at them: artsim view {result.folder}")
+        else:
+            made, rate = result.made, result.made / result.seconds
+            print(f"{result.folder}: {result.num_samples} samples, {made} of them made now, {rate:.0f} samples/s")
+            print(f"look at them: artsim view {result.folder}")
+        if self.format is not None:
+            Convert(self.out, self.format, Path(f"{self.out}_{self.format}"), workers=self.workers).run()
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol
 
 from artsim.common.files import write_atomic
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
 from artsim.observing.sample import Sample
 
@@ -66,8 +67,8 @@ class Format(Protocol):
     converts_objects: bool
     """Whether the objects become files of their own."""
 
-    def check(self, dataset: Dataset) -> None:
-        """Refuse a dataset that lacks what the format needs.
+    def check(self, options: SampleOptions, folder: Path) -> None:
+        """Refuse a dataset, made or yet to be made, whose samples lack what the format needs.
 
         Raises
         ------
@@ -89,7 +90,7 @@ class PlainFormat:
 
     converts_objects = False
 
-    def check(self, dataset: Dataset) -> None:
+    def check(self, options: SampleOptions, folder: Path) -> None:
         """Every dataset will do."""
 
     def write_objects(self, dataset: Dataset, piece: Piece, output: Output) -> Any:
@@ -100,20 +101,20 @@ class PlainFormat:
         """Nothing is left to write."""
 
 
-def require_images(dataset: Dataset, name: str, images: Sequence[str]) -> None:
-    """Refuse a dataset without some images.
+def require_images(options: SampleOptions, folder: Path, name: str, images: Sequence[str]) -> None:
+    """Refuse a dataset, by its options and folder, without some images.
 
     Raises
     ------
     ConfigError
         Which says how to generate it with them.
     """
-    have = dataset.plan.sample.images
+    have = options.images
     missing = [image for image in images if image not in have]
     if missing:
         wanted = " ".join(image for image in ("depth", "part_mask", "rgb") if image in {*images, *have})
         raise ConfigError(
             f"{name} needs images, and the dataset has no {' and no '.join(missing)}",
-            dataset.folder,
+            folder,
             f"generate it into another folder with --images {wanted} (rgb also wants --renderer sapien or pybullet)",
         )

@@ -7,6 +7,7 @@ object, so that poses of parts are comparable, and joint axes hold in every pose
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
 from artsim.formats.base import Output, Piece, require_images
 from artsim.formats.images import depth_png, mask_png, png_bytes
@@ -37,13 +39,13 @@ class BopFormat:
 
     converts_objects = True
 
-    def check(self, dataset: Dataset) -> None:
+    def check(self, options: SampleOptions, folder: Path) -> None:
         """There must be depth and masks, and each object must have one size."""
-        require_images(dataset, "bop", ("depth", "part_mask"))
-        if not isinstance(dataset.plan.sample.scale, str):
+        require_images(options, folder, "bop", ("depth", "part_mask"))
+        if not isinstance(options.scale, str):
             raise ConfigError(
                 "a model in BOP has one size, and the objects of the dataset change theirs",
-                dataset.folder,
+                folder,
                 "generate it into another folder with --scale native or --scale unit",
             )
 

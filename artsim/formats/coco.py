@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import orjson
 from numpy.typing import NDArray
 
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key
 from artsim.formats.base import Output, Piece, PlainFormat, require_images
 from artsim.formats.images import png_bytes
@@ -20,10 +22,9 @@ from artsim.observing.sample import Sample
 class CocoFormat(PlainFormat):
     """``annotations/instances_<split>.json`` and ``images/<split>/<index>.png``."""
 
-    def check(self, dataset: Dataset) -> None:
+    def check(self, options: SampleOptions, folder: Path) -> None:
         """There must be masks, and colour or depth."""
-        have = dataset.plan.sample.images
-        require_images(dataset, "coco", ("part_mask",) if "rgb" in have else ("depth", "part_mask"))
+        require_images(options, folder, "coco", ("part_mask",) if "rgb" in options.images else ("depth", "part_mask"))
 
     def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
         """Write the images; the answer has an entry for each."""

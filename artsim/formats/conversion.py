@@ -127,7 +127,7 @@ def convert(
     folder = Path(out)
     if folder.resolve().is_relative_to(source.folder.resolve()):
         raise ConfigError("lies within the dataset", folder, "choose a folder outside of it")
-    FORMATS[to].check(source)
+    FORMATS[to].check(source.plan.sample, source.folder)
     pieces = _pieces(source, to, split, samples, group)
     recipe = {
         "format": to,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import orjson
 
 from artsim.common.extras import needs
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key, sample_members
 from artsim.formats.base import Output, Piece, PlainFormat, require_images
 from artsim.formats.pinhole import integer_centre_K
@@ -22,9 +24,9 @@ from artsim.observing.sample import Sample
 class Hdf5Format(PlainFormat):
     """``<split>/<index>.hdf5``."""
 
-    def check(self, dataset: Dataset) -> None:
+    def check(self, options: SampleOptions, folder: Path) -> None:
         """There must be depth and masks, and h5py."""
-        require_images(dataset, "hdf5", ("depth", "part_mask"))
+        require_images(options, folder, "hdf5", ("depth", "part_mask"))
         with needs("hdf5"):
             import h5py  # noqa: F401
 

@@ -14,6 +14,7 @@ import pytest
 
 import artsim
 from artsim import Dataset
+from artsim.cli import Generate
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.formats.base import FormatName
@@ -111,3 +112,17 @@ def test_bop_refuses_objects_that_change_their_size(tmp_path: Path) -> None:
     artsim.generate(family_sources(("globe",), 1), tmp_path / "data", 1, sample=options, workers=1, progress=False)
     with pytest.raises(ConfigError, match=r"one size.*--scale native"):
         convert(tmp_path / "data", "bop", tmp_path / "out")
+
+
+def test_generate_converts_what_it_made_or_refuses_before_it_makes_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "data"
+    words = {"categories": ("globe",), "objects_per_category": 1, "num_samples": 3, "workers": 1}
+    with pytest.raises(ConfigError, match=r"bop needs images.*--images depth part_mask"):
+        Generate(out, **words, format="bop").run()
+    assert not out.exists()
+    Generate(out, **words, format="ply").run()
+    assert len(list((tmp_path / "data_ply").rglob("*.ply"))) == 3
+    Generate(out, **words, format="ply").run()
+    assert "data_ply: already complete, 3 samples in 3 files" in capsys.readouterr().out
