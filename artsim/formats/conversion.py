@@ -227,7 +227,7 @@ def _run(
     progress: bool,
 ) -> tuple[dict[str, _Answer], int]:
     """Convert what is not converted yet; answers of all pieces by name, and how many samples were done now."""
-    answers = _journal(folder, recipe, pieces)
+    answers = _journal(folder, recipe, pieces, progress)
     write_atomic(folder / JOURNAL, b"".join([_line(recipe), *(_entry(name, a) for name, a in answers.items())]))
     (folder / DONE).unlink(missing_ok=True)
     missing = [piece for piece in pieces if piece.name not in answers]
@@ -313,7 +313,7 @@ def _is_whole(path: Path, size: object, sha256: object) -> bool:
         return False
 
 
-def _journal(folder: Path, recipe: Mapping[str, Any], pieces: Iterable[Piece]) -> dict[str, _Answer]:
+def _journal(folder: Path, recipe: Mapping[str, Any], pieces: Iterable[Piece], progress: bool) -> dict[str, _Answer]:
     """What a run that was stopped has finished.
 
     Raises
@@ -330,13 +330,14 @@ def _journal(folder: Path, recipe: Mapping[str, Any], pieces: Iterable[Piece]) -
     except ValueError as error:
         raise DatasetError(f"{JOURNAL} is damaged", folder, "choose another --out folder") from error
     names, answers = {piece.name for piece in pieces}, {}
-    for line in lines[1:]:
+    for line in track("check", lines[1:], unit="piece", shown=progress, leave=False):
         try:
             name, files, value = json.loads(line)
-        except ValueError:
+            answer = _Answer({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
+        except (ValueError, TypeError, AttributeError):
             continue  # the last line of a killed run may be cut short: its piece is converted again
-        if name in names and all(_is_whole(folder / file, *entry) for file, entry in files.items()):
-            answers[name] = _Answer({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
+        if name in names and all(_is_whole(folder / file, *entry) for file, entry in answer.files.items()):
+            answers[name] = answer
     return answers
 
 
