@@ -226,8 +226,11 @@ def _articulation(obj: ArticulatedObject, sample: Sample, first_id: int) -> dict
     parts = []
     for k, kind in enumerate(sample.joint_type):
         unit = _MM if kind == "prismatic" else 1.0
+        joint = obj.tree.joints[k]
+        more = {"pitch": joint.pitch * _MM} if kind == "screw" else {}
         parts.append(
             {
+                **more,
                 "obj_id": first_id + k if obj.has_surface[k] else None,
                 "name": sample.part_names[k],
                 "parent": int(sample.joint_parent[k]),

@@ -17,9 +17,10 @@ from tests.conftest import ASSETS, installed
 
 @pytest.fixture(scope="session")
 def imaged(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """24 samples in colour: laptops, furniture, and an object whose joint turns without end."""
+    """24 samples in colour: laptops, furniture, a bottle, and an object whose joint turns without end."""
     installed("pybullet")
-    sources = [*family_sources(("laptop", "drawer"), 2), *find_sources([ASSETS / "quirks" / "primitives"])]
+    families = [*family_sources(("laptop", "drawer"), 2), *family_sources(("bottle",), 1, 1)]  # its cap is a screw
+    sources = [*families, *find_sources([ASSETS / "quirks" / "primitives"])]
     options = SampleOptions(
         num_points=64,
         views=ViewOptions(width=96, height=72),
