@@ -12,7 +12,7 @@ Rooms, from the ground up. Each imports only rooms that come before it (import-l
 - appearance: materials and light.
 - renderers: one scene in, one frame out.
 - observing: frames to labelled samples; sensor noise.
-- datasets, then stream: samples to disk and back, or without end.
+- datasets, then stream: samples to disk and back, or without end. formats: datasets as other programs read them.
 - scenes: several objects. checks: gates for simulators.
 - export: objects as URDF, MJCF and USD.
 - variation: objects out of a given one. physics: objects that move. drawing: pictures.
@@ -84,6 +84,6 @@ __all__ = [
 
 def __getattr__(name: str) -> ModuleType:
     """The public packages that need more than the core: ``artsim.physics`` works after ``import artsim``."""
-    if name in ("checks", "drawing", "envs", "export", "physics", "scenes"):
+    if name in ("checks", "drawing", "envs", "export", "formats", "physics", "scenes"):
         return importlib.import_module(f"artsim.{name}")
     raise AttributeError(f"module 'artsim' has no attribute {name!r}")

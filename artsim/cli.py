@@ -1,19 +1,19 @@
-"""The program ``artsim``: datasets, procedural objects, variations, motions and scenes; checks and pictures of them."""
+"""The program ``artsim``: datasets, objects, variations, motions and scenes; checks, pictures, other formats."""
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from artsim.common.program import run_program
+from artsim.common.program import cores, run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.families.constraints import Constraints
+from artsim.formats.base import FormatName
+from artsim.formats.command import Convert
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
 from artsim.renderers import RendererName
@@ -22,11 +22,6 @@ from artsim.variation.command import Vary
 
 _LISTED = 50
 """Lines of a list before the rest is only counted."""
-
-
-def _cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 Having = Annotated[
@@ -70,7 +65,7 @@ class Generate:
     """Samples in all; every object gets about the same number."""
     seed: int = 0
     """Seed of the dataset; sample i depends on (seed, i) only."""
-    workers: int = field(default_factory=_cores)
+    workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
     sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
@@ -85,6 +80,8 @@ class Generate:
     """Refuse objects that were repaired while loading; with --skip-broken, leave them out."""
     load_limit: float = 300.0
     """Seconds that an object may take to load."""
+    format: FormatName | None = None
+    """Also convert the finished dataset to this format, into the folder <out>_<format>; see artsim convert."""
 
     def run(self) -> None:
         from artsim.common.names import printable
@@ -92,6 +89,10 @@ class Generate:
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
 
+        if self.format is not None:  # before hours are spent on a dataset that it does not take
+            from artsim.formats.conversion import FORMATS
+
+            FORMATS[self.format].check(self.sample, self.out)
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
         sources += family_sources(
             _categories(self.categories), self.objects_per_category, self.first_object, _constraints(self.having)
@@ -124,10 +125,12 @@ class Generate:
             print(f"made again: {file}")
         if result.made == 0:
             print(f"{result.folder}: already complete, {result.num_samples} samples")
-            return
-        rate = result.made / result.seconds
-        print(f"{result.folder}: {result.num_samples} samples, {result.made} of them made now, {rate:.0f} samples/s")
-        print(f"look at them: artsim view {result.folder}")
+        else:
+            made, rate = result.made, result.made / result.seconds
+            print(f"{result.folder}: {result.num_samples} samples, {made} of them made now, {rate:.0f} samples/s")
+            print(f"look at them: artsim view {result.folder}")
+        if self.format is not None:
+            Convert(self.out, self.format, Path(f"{self.out}_{self.format}"), workers=self.workers).run()
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,7 @@ class GenerateObjects:
     control is where the joint shall be."""
     materials: bool = False
     """Write finishes, other for each object: colours, textures, and where they lie."""
-    workers: int = field(default_factory=_cores)
+    workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
@@ -415,7 +418,7 @@ class Repair:
     """Where objects lie that were loaded from files, if they are not where they were."""
     package_root: PackageRoots = field(default_factory=dict)
     """Folder of a package:// name: NAME=FOLDER ..."""
-    workers: int = field(default_factory=_cores)
+    workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
@@ -475,6 +478,7 @@ Verb = (
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
     | Annotated[Repair, tyro.conf.subcommand("repair")]
+    | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
 

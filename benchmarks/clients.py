@@ -147,7 +147,7 @@ def _torch(material: Material) -> str:
     import torch
 
     stream = artsim.open_dataset(material.dataset).stream().padded(float32=True)
-    loader = torch.utils.data.DataLoader(stream, batch_size=4, num_workers=2)
+    loader: Any = torch.utils.data.DataLoader(stream, batch_size=4, num_workers=2)  # type: ignore[arg-type]
     indices: list[int] = []
     for number, batch in enumerate(loader):
         indices += batch["index"].tolist()
@@ -159,6 +159,7 @@ def _torch(material: Material) -> str:
 
 def _webdataset(material: Material) -> str:
     import webdataset
+
     from artsim.formats import decode_values
 
     files = sorted(map(str, material.converted("webdataset").glob("*.tar")))

@@ -16,7 +16,7 @@ from artperl.evaluation.scoring import compare
 from artperl.methods.protocol import Method
 from artsim.common.extras import needs
 from artsim.common.names import printable
-from artsim.drawing.annotation import PALETTE
+from artsim.common.palette import PALETTE
 from artsim.errors import ArtsimError
 from artsim.model.camera import Camera
 from artsim.observing.sample import Sample

@@ -30,6 +30,7 @@ MODULES = {
     "mujoco": ("MuJoCo", "sim"),
     "pxr": ("usd-core", "sim"),
     "yourdfpy": ("yourdfpy", "sim"),
+    "h5py": ("h5py", "formats"),
     "torch": ("torch", "train"),
     "tensorboard": ("tensorboard", "train"),
     "safetensors": ("safetensors", "train"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import inspect
 import io
+import os
 import sys
 from importlib.metadata import version
 from typing import Any
@@ -14,6 +15,11 @@ import tyro
 from artsim.common.extras import import_failure, is_own_module
 from artsim.common.names import PrintableStream, printable
 from artsim.errors import ArtsimError
+
+
+def cores() -> int:
+    """Processor cores that this process may use: as many workers a program starts."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def _told(verb: Any, description: str | None) -> str:

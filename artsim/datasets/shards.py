@@ -170,11 +170,17 @@ def write_shard(path: Path, samples: Iterable[Sample], wanted: str | None = None
     OtherBytesError
         When its digest is not ``wanted``: the file is as before.
     """
+    return write_tar(path, ((sample_key(sample.index), sample_members(sample)) for sample in samples), wanted)
+
+
+def write_tar(
+    path: Path, entries: Iterable[tuple[str, Mapping[str, bytes]]], wanted: str | None = None
+) -> tuple[int, str]:
+    """Write a tar file of entries, each a key and its members by suffix; otherwise as :func:`write_shard`."""
     size, digest = 0, hashlib.sha256()
     with atomic_file(path) as file:
-        for sample in samples:
-            key = sample_key(sample.index)
-            block = b"".join(_tar_member(f"{key}.{name}", data) for name, data in sample_members(sample).items())
+        for key, members in entries:
+            block = b"".join(_tar_member(f"{key}.{name}", data) for name, data in members.items())
             file.write(block)
             digest.update(block)
             size += len(block)

@@ -92,8 +92,15 @@ def report(count: int) -> None:
     _worker.connection.send(("progress", count))
 
 
-class _StoppedError(Exception):
+class StoppedError(Exception):
     """The run was asked to stop."""
+
+
+def stop_if_asked() -> None:
+    """Raise :class:`StoppedError` once the parent wishes so: then, work in hand is left as it is."""
+    assert _worker is not None
+    if _worker.connection.poll():  # nothing but a wish to stop comes while there is a task
+        raise StoppedError
 
 
 def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
@@ -115,7 +122,7 @@ def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
         size, digest = write_shard(_worker.folder / shard.name, _samples(_worker, shard), sha256)
     except OtherBytesError as other:
         return other.sha256
-    except _StoppedError:
+    except StoppedError:
         return None
     recipe = _worker.plan.recipe(shard)
     return ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
@@ -124,8 +131,7 @@ def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
 def _samples(worker: _Worker, shard: Shard) -> Iterator[Sample]:
     plan, renderer = worker.plan, worker.renderer  # which says itself what it lacks
     for made, index in enumerate(plan.indices(shard), start=1):
-        if worker.connection.poll():  # nothing but a wish to stop comes while there is a task
-            raise _StoppedError
+        stop_if_asked()
         planned = plan.object_of(index)
         try:
             obj = worker.objects[planned.key]

@@ -7,16 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.palette import PALETTE
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array, transform_points
 from artsim.observing.sample import Sample
 
-# Okabe and Ito's colours, told apart with any colour vision; then lighter ones.
-PALETTE = np.array(
-    [(0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (213, 94, 0), (240, 228, 66),
-     (110, 110, 110), (146, 108, 196), (140, 190, 90), (170, 120, 90), (90, 200, 200)]
-)  # fmt: skip
 _LIGHT = np.array([0.35, -0.55, -0.76])  # towards the light, camera frame
 BOX_EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
 

@@ -12,8 +12,9 @@ import numpy as np
 from artsim.common.extras import needs
 from artsim.common.files import write_atomic
 from artsim.common.names import printable, safe_name
+from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
-from artsim.drawing.annotation import BOX_EDGES, PALETTE, Shown, axis_segment, box_corners, shade_parts
+from artsim.drawing.annotation import BOX_EDGES, Shown, axis_segment, box_corners, shade_parts
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
 from artsim.model.camera import Camera

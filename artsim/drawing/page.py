@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.files import write_atomic
 from artsim.common.names import printable
+from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
-from artsim.drawing.annotation import PALETTE, axis_segment
+from artsim.drawing.annotation import axis_segment
 from artsim.drawing.contact_sheet import spread
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load

@@ -10,7 +10,8 @@ import numpy as np
 from artsim.common.extras import needs
 from artsim.common.files import write_error
 from artsim.common.names import printable
-from artsim.drawing.annotation import PALETTE, Shown, axis_segment
+from artsim.common.palette import PALETTE
+from artsim.drawing.annotation import Shown, axis_segment
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
 

@@ -36,6 +36,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
     "artsim": {
         "generate": [
             ("--objects box.urdf --out made --num-samples 4 --workers 1", ""),
+            ("--objects box.urdf --out imaged --num-samples 4 --workers 1 --images depth part_mask", ""),
             ("--objects box.urdf --out bullet --num-samples 4 --workers 1 --renderer pybullet", "pybullet"),
         ],
         "gallery": [("--categories globe --states 1 --out gallery.png", "")],
@@ -49,6 +50,13 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "inspect": [("box.urdf", ""), ("box.urdf --gates", "sim")],
         "verify": [("made", "")],
         "repair": [("made", "")],
+        "convert": [
+            ("made --to webdataset --workers 1 --out tars", ""),
+            ("made --to ply --workers 1 --out clouds", ""),
+            ("imaged --to bop --workers 1 --out bop", ""),
+            ("imaged --to coco --workers 1 --out coco", ""),
+            ("imaged --to hdf5 --workers 1 --out hdf5", "formats"),
+        ],
         "families": [("globe", "")],
         "vary": [("box.urdf --count 1 --out varied", "sim")],
         "doctor": [("warp", "")],

@@ -1,0 +1,120 @@
+"""What a format is: which samples go into which file, and what is written for them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from artsim.common.files import write_atomic
+from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
+from artsim.errors import ConfigError
+from artsim.observing.sample import Sample
+
+FormatName = Literal["webdataset", "bop", "coco", "hdf5", "ply"]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What is converted at once, and is either finished or done again.
+
+    Attributes
+    ----------
+    split : str
+        Of its samples; empty for objects.
+    number : int
+        Within its split, from 0.
+    members : tuple of int
+        Positions of its samples in the whole dataset, or of its objects in the plan.
+    """
+
+    split: str
+    number: int
+    members: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Unique within a conversion."""
+        return f"{self.split or 'objects'}-{self.number:06d}"
+
+
+@dataclass
+class Output:
+    """The folder of a conversion, and which files were written to it.
+
+    Attributes
+    ----------
+    folder : Path
+    files : dict
+        Size and SHA-256 of each file that was written, by its path within the folder.
+    """
+
+    folder: Path
+    files: dict[str, tuple[int, str]] = field(default_factory=dict)
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a whole file and note it."""
+        write_atomic(self.folder / name, data)
+        self.files[name] = len(data), hashlib.sha256(data).hexdigest()
+
+
+class Format(Protocol):
+    """A format that a dataset can be converted to. All methods but ``check`` run after it."""
+
+    converts_objects: bool
+    """Whether the objects become files of their own."""
+
+    def check(self, options: SampleOptions, folder: Path) -> None:
+        """Refuse a dataset, made or yet to be made, whose samples lack what the format needs.
+
+        Raises
+        ------
+        ConfigError
+        """
+
+    def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
+        """Write the files of a piece. What it returns is JSON, and goes to :meth:`finish`."""
+
+    def write_objects(self, dataset: Dataset, piece: Piece, output: Output) -> Any:
+        """Write the files of some objects of the plan; as :meth:`write_samples`."""
+
+    def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
+        """Write the files that need to know of all pieces, given in order with what was returned for each."""
+
+
+class PlainFormat:
+    """A format whose files each depend on one piece of samples."""
+
+    converts_objects = False
+
+    def check(self, options: SampleOptions, folder: Path) -> None:
+        """Every dataset will do."""
+
+    def write_objects(self, dataset: Dataset, piece: Piece, output: Output) -> Any:
+        """There are no files of objects."""
+        raise NotImplementedError
+
+    def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
+        """Nothing is left to write."""
+
+
+def require_images(options: SampleOptions, folder: Path, name: str, images: Sequence[str]) -> None:
+    """Refuse a dataset, by its options and folder, without some images.
+
+    Raises
+    ------
+    ConfigError
+        Which says how to generate it with them.
+    """
+    have = options.images
+    missing = [image for image in images if image not in have]
+    if missing:
+        wanted = " ".join(image for image in ("depth", "part_mask", "rgb") if image in {*images, *have})
+        raise ConfigError(
+            f"{name} needs images, and the dataset has no {' and no '.join(missing)}",
+            folder,
+            f"generate it into another folder with --images {wanted} (rgb also wants --renderer sapien or pybullet)",
+        )

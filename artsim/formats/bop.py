@@ -1,0 +1,248 @@
+"""BOP, scene by scene: each part of each object is a model of its own, in millimetres.
+
+A scene is a folder of images that need not show the same objects. The frame of a model is the rest frame of its
+object, so that poses of parts are comparable, and joint axes hold in every pose through the parent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from artsim.common.palette import PALETTE
+from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
+from artsim.errors import ConfigError
+from artsim.formats.base import Output, Piece, require_images
+from artsim.formats.images import depth_png, mask_png, png_bytes
+from artsim.formats.pinhole import integer_centre_K
+from artsim.formats.ply import mesh_ply
+from artsim.model.camera import Camera
+from artsim.model.draws import sample_scale
+from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
+from artsim.renderers.raycast import pose, render_posed
+
+_MM = 1000.0
+_TARGET_VISIBLE = 0.1
+"""BOP asks for estimates of objects of which at least a tenth is visible."""
+
+
+class BopFormat:
+    """``models/``, ``<split>/<scene>/`` and ``camera.json``."""
+
+    converts_objects = True
+
+    def check(self, options: SampleOptions, folder: Path) -> None:
+        """There must be depth and masks, and each object must have one size."""
+        require_images(options, folder, "bop", ("depth", "part_mask"))
+        if not isinstance(options.scale, str):
+            raise ConfigError(
+                "a model in BOP has one size, and the objects of the dataset change theirs",
+                folder,
+                "generate it into another folder with --scale native or --scale unit",
+            )
+
+    def write_objects(self, dataset: Dataset, piece: Piece, output: Output) -> Any:
+        """Write the models of some objects; the answer is their share of ``models_info.json``."""
+        first, info = _first_ids(dataset), {}
+        for number in piece.members:
+            planned = dataset.plan.objects[number]
+            size = dataset.plan.sample.scale
+            obj = sample_scale(dataset.objects[planned.key], size, np.random.default_rng(0))
+            for k in np.flatnonzero(obj.has_surface).tolist():
+                model = f"{first[planned.key] + k:06d}"
+                vertices, faces = obj.parts[k].vertices * (obj.scale * _MM), obj.parts[k].faces
+                output.write(f"models/obj_{model}.ply", mesh_ply(vertices, faces, PALETTE[k % len(PALETTE)]))
+                low, extent = (obj.box_center[k] - obj.box_size[k] / 2) * _MM, obj.box_size[k] * _MM
+                entry: dict[str, Any] = {"diameter": _diameter(vertices[np.unique(faces)])}
+                entry |= {f"min_{axis}": low[i] for i, axis in enumerate("xyz")}
+                entry |= {f"size_{axis}": extent[i] for i, axis in enumerate("xyz")}
+                names = {"category": obj.category, "object_id": obj.object_id, "part": k, "name": obj.parts[k].label}
+                info[str(int(model))] = {**entry, **names}
+        return info
+
+    def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
+        """Write one scene; the answer is its first camera, and the targets in it."""
+        folder, first = f"{piece.split}/{piece.number:06d}", _first_ids(dataset)
+        cameras, truths, infos, articulations = {}, {}, {}, {}
+        answer: dict[str, Any] = {"camera": None, "targets": []}
+        for image, sample in enumerate(samples):
+            obj = dataset.object_of(sample)
+            assert sample.depth is not None
+            assert sample.part_mask is not None
+            depth, unit = depth_png(sample.depth)
+            output.write(f"{folder}/depth/{image:06d}.png", depth)
+            if sample.rgb is not None:
+                output.write(f"{folder}/rgb/{image:06d}.png", png_bytes(sample.rgb))
+            parts = np.flatnonzero(obj.has_surface).tolist()
+            whole = _whole_masks(obj, sample)
+            for number, k in enumerate(parts):
+                name = f"{image:06d}_{number:06d}.png"
+                output.write(f"{folder}/mask/{name}", mask_png(whole[k]))
+                output.write(f"{folder}/mask_visib/{name}", mask_png(sample.part_mask == k))
+            key, first_id = str(image), first[dataset.planned(sample.index).key]
+            cameras[key] = _camera(sample, unit)
+            truths[key] = [{**_model_pose(sample.T_camera_part[k]), "obj_id": first_id + k} for k in parts]
+            infos[key] = [_truth_info(obj, sample, k, whole[k]) for k in parts]
+            articulations[key] = _articulation(obj, sample, first_id)
+            answer["camera"] = answer["camera"] or _shared_camera(sample, unit)
+            for k, info in zip(parts, infos[key], strict=True):
+                if info["visib_fract"] >= _TARGET_VISIBLE:
+                    target = {"im_id": image, "inst_count": 1, "obj_id": first_id + k, "scene_id": piece.number}
+                    answer["targets"].append(target)
+        for name, content in (
+            ("camera", cameras), ("gt", truths), ("gt_info", infos), ("articulation", articulations)
+        ):  # fmt: skip
+            output.write(f"{folder}/scene_{name}.json", _json(content))
+        return answer
+
+    def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
+        """Write ``models_info.json``, ``camera.json``, and the targets of the test split."""
+        models: dict[str, Any] = {}
+        for piece, answer in answers:
+            if not piece.split:
+                models |= answer
+        output.write("models/models_info.json", _json(models))
+        scenes = [(piece, answer) for piece, answer in answers if piece.split]
+        if scenes:
+            output.write("camera.json", _json(scenes[0][1]["camera"]))
+        targets = [target for piece, answer in scenes if piece.split == "test" for target in answer["targets"]]
+        if targets:
+            output.write("test_targets_bop19.json", _json(targets))
+
+
+def _first_ids(dataset: Dataset) -> dict[str, int]:
+    """Model number of the first part of each object, by the object's key; the first of all is 1."""
+    ids, following = {}, 1
+    for planned in dataset.plan.objects:
+        ids[planned.key] = following
+        following += planned.num_parts
+    return ids
+
+
+def _json(content: Any) -> bytes:
+    """Readable JSON; numbers of NumPy are written as numbers, infinite ones as null."""
+    return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+
+
+def _diameter(points: Array) -> float:
+    """Largest distance between two of (N, 3) points."""
+    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial.distance import cdist
+
+    try:
+        points = points[ConvexHull(points).vertices]
+    except QhullError:  # flat: all points it is
+        points = np.unique(points, axis=0)
+    step = 1000  # rows of distances at once
+    return max(float(cdist(points[i : i + step], points).max()) for i in range(0, len(points), step))
+
+
+def _model_pose(T_camera_part: Array) -> dict[str, Any]:
+    return {"cam_R_m2c": T_camera_part[:3, :3].ravel().tolist(), "cam_t_m2c": (T_camera_part[:3, 3] * _MM).tolist()}
+
+
+def _camera(sample: Sample, unit: float) -> dict[str, Any]:
+    """Intrinsics, pose in the world, and millimetres that 1 stands for in the depth image."""
+    T_camera_world = invert_transform(sample.T_world_camera)
+    return {
+        "cam_K": integer_centre_K(sample.K).ravel().tolist(),
+        "depth_scale": _depth_scale(unit),
+        "cam_R_w2c": T_camera_world[:3, :3].ravel().tolist(),
+        "cam_t_w2c": (T_camera_world[:3, 3] * _MM).tolist(),
+    }
+
+
+def _shared_camera(sample: Sample, unit: float) -> dict[str, Any]:
+    """What ``camera.json`` says; scenes have the camera of each image."""
+    K = integer_centre_K(sample.K)
+    focal = {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]}
+    size = {"width": sample.width, "height": sample.height, "depth_scale": _depth_scale(unit)}
+    return {**{name: float(value) for name, value in focal.items()}, **size}
+
+
+def _depth_scale(unit: float) -> float:
+    """Millimetres in a unit of so many metres, a power of ten, without the error of a product."""
+    return float(f"1e{round(float(np.log10(unit))) + 3}")
+
+
+def _whole_masks(obj: ArticulatedObject, sample: Sample) -> list[NDArray[np.bool_]]:
+    """(H, W) mask of each part as if nothing hid it."""
+    camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
+    posed = pose(obj, sample.joint_state, camera)
+    assert sample.part_mask is not None
+    # A rasteriser may cover a pixel more than rays do at an outline: what is seen belongs to the whole.
+    return [(render_posed(posed, only=k).part_ids == k) | (sample.part_mask == k) for k in range(len(obj))]
+
+
+def _truth_info(obj: ArticulatedObject, sample: Sample, k: int, whole: NDArray[np.bool_]) -> dict[str, Any]:
+    assert sample.depth is not None
+    assert sample.part_mask is not None
+    seen = sample.part_mask == k
+    count_all, count_seen = int(whole.sum()), int(seen.sum())
+    return {
+        "bbox_obj": _outline_box(obj, sample, k),
+        "bbox_visib": _mask_box(seen),
+        "px_count_all": count_all,
+        "px_count_valid": int((whole & (sample.depth > 0)).sum()),
+        "px_count_visib": count_seen,
+        "visib_fract": count_seen / count_all if count_all else 0.0,
+    }
+
+
+def _mask_box(mask: NDArray[np.bool_]) -> list[int]:
+    """Left, top, width and height; -1 for an empty mask, as BOP has it."""
+    if not mask.any():
+        return [-1, -1, -1, -1]
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    left, top = int(columns[0]), int(rows[0])
+    return [left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top]
+
+
+def _outline_box(obj: ArticulatedObject, sample: Sample, k: int) -> list[int]:
+    """Box of the pixels that the whole part covers, within the image or not."""
+    part = obj.parts[k]
+    camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
+    corners = transform_points(sample.T_camera_part[k], part.vertices[np.unique(part.faces)] * obj.scale)
+    if (corners[:, 2] <= 0).any():  # it reaches behind the camera, and has no outline
+        return [-1, -1, -1, -1]
+    image = camera.project(corners) - 0.5  # pixel centres, which rays pass through, at whole numbers
+    left, top = np.ceil(image.min(axis=0)).astype(int).tolist()
+    right, bottom = np.floor(image.max(axis=0)).astype(int).tolist()
+    if right < left or bottom < top:  # it passes between the centres
+        return [-1, -1, -1, -1]
+    return [left, top, right + 1 - left, bottom + 1 - top]
+
+
+def _articulation(obj: ArticulatedObject, sample: Sample, first_id: int) -> dict[str, Any]:
+    """Joints of an object, whose axes and origins are in the frame of the models; lengths in millimetres."""
+    parts = []
+    for k, kind in enumerate(sample.joint_type):
+        unit = _MM if kind == "prismatic" else 1.0
+        joint = obj.tree.joints[k]
+        more = {"pitch": joint.pitch * _MM} if kind == "screw" else {}
+        parts.append(
+            {
+                **more,
+                "obj_id": first_id + k if obj.has_surface[k] else None,
+                "name": sample.part_names[k],
+                "parent": int(sample.joint_parent[k]),
+                "joint_type": kind,
+                "axis": sample.joint_axis[k],
+                "origin": sample.joint_origin[k] * _MM,
+                "axis_camera": sample.joint_axis_camera[k],
+                "origin_camera": sample.joint_origin_camera[k] * _MM,
+                "state": float(sample.joint_state[k] * unit),
+                "rest": float(sample.joint_rest[k] * unit),
+                "limits": sample.joint_limits[k] * unit,
+            }
+        )
+    identity = {"category": sample.category, "object_id": sample.object_id, "index": sample.index}
+    return {**identity, "scale": sample.scale, "parts": parts}

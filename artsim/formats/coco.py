@@ -1,0 +1,127 @@
+"""COCO: instance masks and boxes of parts, as run lengths, in one JSON file for each split."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from artsim.datasets.dataset import Dataset
+from artsim.datasets.sample_options import SampleOptions
+from artsim.datasets.shards import sample_key
+from artsim.formats.base import Output, Piece, PlainFormat, require_images
+from artsim.formats.images import png_bytes
+from artsim.observing.sample import Sample
+
+
+class CocoFormat(PlainFormat):
+    """``annotations/instances_<split>.json`` and ``images/<split>/<index>.png``."""
+
+    def check(self, options: SampleOptions, folder: Path) -> None:
+        """There must be masks, and colour or depth."""
+        require_images(options, folder, "coco", ("part_mask",) if "rgb" in options.images else ("depth", "part_mask"))
+
+    def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
+        """Write the images; the answer has an entry for each."""
+        entries = []
+        for sample in samples:
+            name = f"{sample_key(sample.index)}.png"
+            output.write(f"images/{piece.split}/{name}", png_bytes(_picture(sample)))
+            image = {"id": sample.index, "file_name": name, "width": sample.width, "height": sample.height}
+            entries.append({"image": image, "category": sample.category, "parts": _parts(sample)})
+        return entries
+
+    def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
+        """Number categories and annotations, and write the JSON of each split."""
+        entries = [(piece.split, entry) for piece, answer in answers for entry in answer]
+        named = sorted({(entry["category"], part["name"]) for _, entry in entries for part in entry["parts"]})
+        number = {category: i for i, category in enumerate(named, start=1)}
+        categories = [
+            {"id": i, "name": f"{category}/{part}", "supercategory": category} for (category, part), i in number.items()
+        ]
+        for split, group in groupby(entries, key=lambda pair: pair[0]):
+            images: list[Any] = []
+            annotations: list[Any] = []
+            for _, entry in group:
+                images.append(entry["image"])
+                for part in entry["parts"]:
+                    own = {key: value for key, value in part.items() if key != "name"}
+                    category_id = number[entry["category"], part["name"]]
+                    identity = {"id": len(annotations) + 1, "image_id": entry["image"]["id"]}
+                    annotations.append({**identity, "category_id": category_id, **own})
+            info = {"description": f"artsim, split {split}", "version": dataset.description["artsim_version"]}
+            document = {
+                "info": info, "licenses": [], "images": images, "annotations": annotations, "categories": categories,
+            }  # fmt: skip
+            output.write(f"annotations/instances_{split}.json", orjson.dumps(document))
+
+
+def _picture(sample: Sample) -> NDArray[np.uint8]:
+    """(H, W, 3) colour, or (H, W) depth as grey where there is none: near is bright, no return is black."""
+    if sample.rgb is not None:
+        return sample.rgb
+    assert sample.depth is not None
+    seen = sample.depth > 0
+    grey = np.zeros(sample.depth.shape, np.uint8)
+    if seen.any():
+        near, far = float(sample.depth[seen].min()), float(sample.depth[seen].max())
+        share = (far - sample.depth[seen]) / max(far - near, 1e-9)
+        grey[seen] = np.rint(55.0 + 200.0 * share).astype(np.uint8)
+    return grey
+
+
+def _parts(sample: Sample) -> list[dict[str, Any]]:
+    """What COCO says of each part that is seen, and its name."""
+    assert sample.part_mask is not None
+    found = []
+    for k, name in enumerate(sample.part_names):
+        mask = sample.part_mask == k
+        if not mask.any():
+            continue
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        left, top = int(columns[0]), int(rows[0])
+        box = [left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top]
+        found.append(
+            {
+                "segmentation": {"size": list(mask.shape), "counts": run_lengths(mask)},
+                "area": int(mask.sum()),
+                "bbox": box,
+                "iscrowd": 0,
+                "name": name,
+                "part": k,
+            }
+        )
+    return found
+
+
+def run_lengths(mask: NDArray[np.bool_]) -> str:
+    """A mask as COCO's compressed run lengths.
+
+    Runs go down the columns and begin with one outside. From the fourth on, each is written as its difference from the
+    run two before. A number is written five bits at a time, lowest first; 32 says that more follow, 48 makes it a
+    letter.
+
+    Parameters
+    ----------
+    mask : (H, W) bool
+    """
+    flat = mask.ravel(order="F")
+    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    ends = np.concatenate([[0], changes, [flat.size]])
+    runs = np.diff(ends).tolist()
+    if flat[0]:
+        runs = [0, *runs]
+    letters = bytearray()
+    for i, run in enumerate(runs):
+        value = run - runs[i - 2] if i > 2 else run
+        more = True
+        while more:
+            bits, value = value & 31, value >> 5
+            more = value != (-1 if bits & 16 else 0)  # the highest bit written is the sign
+            letters.append(48 + bits + 32 * more)
+    return letters.decode()

@@ -1,0 +1,54 @@
+"""The verb ``artsim convert``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tyro
+
+from artsim.common.program import cores
+from artsim.formats.base import FormatName
+
+
+@dataclass(frozen=True)
+class Convert:
+    """Convert a finished dataset to a format that other programs read.
+
+    webdataset: tar shards with plain keys. bop: scenes, models of parts, poses, masks, joints. coco: masks of parts.
+    hdf5: one file for each sample, with BlenderProc's keys. ply: one coloured cloud for each sample. All but webdataset
+    and ply need images: generate with --images depth part_mask. Stop it at any moment: the same command goes on where
+    it stopped. The result does not depend on the number of workers.
+
+    Example: artsim convert out/first --to bop --out out/first_bop
+    """
+
+    path: tyro.conf.Positional[Path]
+    """Dataset folder."""
+    to: FormatName
+    """Format to write."""
+    out: Path
+    """Folder to write to; made if missing."""
+    split: str | None = None
+    """Convert this split only: train, val or test."""
+    samples: tuple[int, ...] = ()
+    """Convert samples with these indices only."""
+    group: int = 256
+    """Samples of each tar file (webdataset), or images of each scene (bop)."""
+    workers: int = field(default_factory=cores)
+    """Worker processes; by default one for each core."""
+
+    def run(self) -> None:
+        from artsim.formats.conversion import convert
+
+        try:
+            result = convert(self.path, self.to, self.out, self.split, self.samples, self.group, self.workers)
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole files are kept in {self.out}: the same command goes on from there")
+            raise
+        counted = f"{result.num_samples} samples in {result.files} files"
+        if result.made == 0:
+            print(f"{result.folder}: already complete, {counted}")
+            return
+        rate = result.made / result.seconds
+        print(f"{result.folder}: {counted}, {result.made} samples converted now, {rate:.0f} samples/s")
