@@ -34,6 +34,7 @@ bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 	$(PY) -m benchmarks.objects
 	$(PY) -m benchmarks.simulators
 	$(PY) -m benchmarks.efforts
+	$(PY) -m benchmarks.clients
 	$(PY) -m benchmarks.realism
 	$(PY) -m benchmarks.fitting
 	$(PY) -m benchmarks.inference
