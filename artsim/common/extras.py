@@ -28,6 +28,7 @@ MODULES = {
     "rerun": ("rerun-sdk", "view"),
     "fcl": ("python-fcl", "sim"),
     "mujoco": ("MuJoCo", "sim"),
+    "coacd": ("CoACD", "sim"),
     "pxr": ("usd-core", "sim"),
     "yourdfpy": ("yourdfpy", "sim"),
     "h5py": ("h5py", "formats"),
