@@ -274,7 +274,7 @@ def _read_geometry(
         _check_range(body.vertices, f"{file}: link {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
-        raise AssetError("no link has any geometry", file, "add <visual> elements")
+        raise AssetError("no link has any geometry", file, "give a link a visible shape")
 
 
 def _surfaces(
