@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import installed
+
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]
 TELL_THE_PAST = ("CHANGELOG.md", "experiments.md")
@@ -111,7 +113,7 @@ def test_sentences_are_counted_as_a_reader_counts_them() -> None:
 
 
 def test_citation_names_the_version_and_the_paper_of_the_readme() -> None:
-    yaml = pytest.importorskip("yaml", reason="CITATION.cff is YAML")
+    yaml = installed("yaml")
     record = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert {"cff-version", "message", "title", "authors"} <= set(record)
     assert record["cff-version"] == "1.2.0"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import pickle
+import json
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -77,7 +77,7 @@ def _rank(rank: int, file: str, results: str) -> None:
     distributed.init_process_group("gloo", init_method=f"file://{file}", rank=rank, world_size=2)
     stream = FamilyStream(["laptop"], SMALL, views_per_object=1).padded(max_parts=2)
     loader = DataLoader(stream, batch_size=2, num_workers=2, multiprocessing_context="spawn")
-    Path(results, f"{rank}.pickle").write_bytes(pickle.dumps(indices(loader, 4)))
+    Path(results, f"{rank}.json").write_text(json.dumps(indices(loader, 4)))
     distributed.destroy_process_group()
 
 
@@ -85,6 +85,6 @@ def _rank(rank: int, file: str, results: str) -> None:
 def test_processes_of_a_group_and_their_workers_share_a_stream_out(tmp_path: Path) -> None:
     multiprocessing.spawn(_rank, (str(tmp_path / "group"), str(tmp_path)), nprocs=2)
     seen: Iterator[int] = itertools.chain.from_iterable(
-        pickle.loads((tmp_path / f"{rank}.pickle").read_bytes()) for rank in range(2)
+        json.loads((tmp_path / f"{rank}.json").read_text()) for rank in range(2)
     )
     assert sorted(seen) == list(range(16))

@@ -53,3 +53,17 @@ def assert_same_object(loaded: ArticulatedObject, obj: ArticulatedObject) -> Non
     for joint, expected_joint in zip(as_robot(loaded).joints, as_robot(obj).joints, strict=True):
         for name in ("effort", "velocity", "damping", "friction"):
             np.testing.assert_allclose(getattr(joint, name), getattr(expected_joint, name), rtol=CLOSE)
+
+
+def assert_same_geometry(loaded: ArticulatedObject, obj: ArticulatedObject) -> None:
+    """Trees, triangles, masses and inertias agree, whatever names and repairs say."""
+    assert loaded.tree.types == obj.tree.types
+    np.testing.assert_allclose(loaded.tree.axes, obj.tree.axes, atol=CLOSE)
+    np.testing.assert_allclose(loaded.tree.origins, obj.tree.origins, atol=CLOSE)
+    np.testing.assert_allclose(loaded.tree.limits, obj.tree.limits, atol=CLOSE)
+    for k, (own, other) in enumerate(zip(loaded.parts, obj.parts, strict=True)):
+        np.testing.assert_allclose(own.vertices[own.faces], other.vertices[other.faces], atol=CLOSE)
+        inertia, expected = part_inertia(loaded, k), part_inertia(obj, k)
+        np.testing.assert_allclose(inertia.mass, expected.mass, rtol=CLOSE)
+        np.testing.assert_allclose(inertia.center, expected.center, atol=CLOSE)
+        np.testing.assert_allclose(inertia.tensor, expected.tensor, atol=CLOSE * np.abs(expected.tensor).max())

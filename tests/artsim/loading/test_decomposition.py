@@ -12,7 +12,7 @@ from manifold3d import Manifold, OpType
 
 from artsim.errors import ArtsimError
 from artsim.families import make
-from artsim.model.decomposition import DecompositionOptions, connected_surfaces, convex_pieces, decompose, hollow
+from artsim.loading.decomposition import DecompositionOptions, connected_surfaces, convex_pieces, decompose, hollow
 from artsim.model.objects import Mesh
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.physics.bullet_body import BulletBody
