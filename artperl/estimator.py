@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, cast, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import torch
 from torch import Tensor, nn
@@ -19,10 +19,9 @@ from artperl.boxes.network import Boxes
 from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.tensor_files import MAX_BYTES, read_tensors, write_tensors
 from artperl.fitting.options import EstimatorOptions
-from artperl.methods import method_of
-from artperl.methods.artperl import ArtPERL
+from artperl.methods import STORED_METHODS, method_of
 from artperl.methods.full import Estimator
-from artperl.methods.protocol import Untrained
+from artperl.methods.protocol import Stored, Untrained
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base import ShapeBase
@@ -33,6 +32,9 @@ from artsim.common.names import printable
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import MAX_PARTS
 
+if TYPE_CHECKING:
+    from artperl.methods.artperl import ArtPERL
+
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the estimators that come with the package."""
 
@@ -41,19 +43,19 @@ _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 
 
-def save_estimator(estimator: Estimator | ArtPERL, folder: Path, about: Mapping[str, Any]) -> None:
+def save_estimator(estimator: Estimator | Stored, folder: Path, about: Mapping[str, Any]) -> None:
     """Write an estimator.
 
     Parameters
     ----------
-    estimator : Estimator
+    estimator : Estimator or Stored
     folder : Path
         Made if missing; files in it are replaced one by one.
     about : mapping
         Anything else worth knowing, in JSON's terms: what it was trained on, and how well it does.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    if isinstance(estimator, ArtPERL):
+    if not isinstance(estimator, Estimator):
         _write(folder, estimator.networks(), estimator.base, {"method": estimator.name, **estimator.settings()}, about)
         return
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
@@ -106,12 +108,12 @@ def load_estimator(
 @overload
 def load_estimator(
     name: str | Path, device: torch.device | str = "cpu", *, method: str, **changes: Any
-) -> Estimator | ArtPERL | Untrained: ...
+) -> Estimator | Stored | Untrained: ...
 
 
 def load_estimator(
     name: str | Path, device: torch.device | str = "cpu", method: str = "full", **changes: Any
-) -> Estimator | ArtPERL | Untrained:
+) -> Estimator | Stored | Untrained:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
 
     Parameters
@@ -133,8 +135,8 @@ def load_estimator(
         When there is no such estimator, or its files are damaged.
     """
     kind = method_of(method)
-    if kind is ArtPERL:
-        return _load_artperl(name, device, changes)
+    if method in STORED_METHODS and kind is not Estimator:
+        return _load_stored(cast(type[Stored], kind), name, device, changes)
     if kind is not Estimator:
         return cast(type[Untrained], kind).of_category(str(name))
     unknown = ", ".join(changes.keys() - {field.name for field in fields(EstimatorOptions)})
@@ -171,33 +173,32 @@ def load_estimator(
     return Estimator(perception, base, options, calibration, boxes, part_calibration)
 
 
-def _load_artperl(name: str | Path, device: torch.device | str, changes: Mapping[str, Any]) -> ArtPERL:
-    """The method of the paper, from a folder; none comes with the package."""
+def _load_stored(
+    kind: type[Stored], name: str | Path, device: torch.device | str, changes: Mapping[str, Any]
+) -> Stored:
+    """A method of :data:`artperl.methods.STORED_METHODS`, from a folder; only full comes with the package."""
     folder = folder_of(name)
     if changes:
-        raise ConfigError("the method artperl has no such option", ", ".join(changes), "leave it out")
+        raise ConfigError(f"the method {kind.name} has no such option", ", ".join(changes), "leave it out")
     if folder.parent == WEIGHTS or not (folder / _SETTINGS).exists():
         category = folder.name if folder.parent == WEIGHTS else "laptop"
         raise DatasetError(
-            "there is no estimator of the method artperl", name,
-            f"train it: python train.py --category {category} --method artperl --preset full",
+            f"there is no estimator of the method {kind.name}", name,
+            f"train it: python train.py --category {category} --method {kind.name} --preset full",
         )  # fmt: skip
     settings = read_settings(folder)
-    _check_method(settings, "artperl", folder)
+    _check_method(settings, kind.name, folder)
     base, (tensors, _) = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
     try:
         with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
-            networks = ArtPERL.of_settings(settings, base).networks()
+            networks = kind.of_settings(settings, base).networks()
         _check_fit(networks, tensors, folder)
-        method = ArtPERL.of_settings(settings, base)
+        method = kind.of_settings(settings, base)
     except ValueError as error:
         raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
     for key, network in method.networks().items():
         network.load_state_dict(_under(tensors, f"{key}."))
-        network.to(device)
-    if base.embeddings is None or base.embeddings.shape[1] != method.siamese.num_rows * method.siamese.width:
-        raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
-    return ArtPERL(method.segmentation, method.siamese, method.policy, base, method.options)
+    return method.to(device)
 
 
 def _check_method(settings: Mapping[str, Any], method: str, folder: Path) -> None:

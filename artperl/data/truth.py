@@ -33,6 +33,8 @@ class Truth(Batch):
         See :func:`joint_rows`.
     level : (B, P) int64
         How many joints are between the root and the part.
+    parent : (B, P) int64
+        The root, and rows that pad, name the root.
     diagonal : (B,) float
         Over the cloud's scale.
     """
@@ -45,6 +47,7 @@ class Truth(Batch):
     box_size: Tensor
     joint: Tensor
     level: Tensor
+    parent: Tensor
     diagonal: Tensor
 
     def of_points(self, rows: Tensor) -> Tensor:
@@ -60,8 +63,9 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
     joint = joint_rows(
         sample.joint_type, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal
     )  # fmt: skip
-    level = np.zeros(num_rows, dtype=np.int64)
+    level, parent = np.zeros(num_rows, dtype=np.int64), np.zeros(num_rows, dtype=np.int64)
     for k in range(1, K):
+        parent[k] = sample.joint_parent[k]
         level[k] = level[sample.joint_parent[k]] + 1
 
     def pad(rows: Array) -> Array:
@@ -79,6 +83,7 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
         "box_size": pad(sample.box_size / sample.diagonal),
         "joint": pad(joint),
         "level": level,
+        "parent": parent,
         "diagonal": np.float32(sample.diagonal),
     }
 
@@ -86,5 +91,5 @@ def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, A
 def to_batch(rows: dict[str, Tensor]) -> tuple[Clouds, Truth]:
     """Collated rows of :func:`training_rows` as records."""
     clouds = Clouds.of(rows["points"])
-    names = ("part", "own", "canonical", "part_valid", "box_center", "box_size", "joint", "level")
+    names = ("part", "own", "canonical", "part_valid", "box_center", "box_size", "joint", "level", "parent")
     return clouds, Truth(**{name: rows[name] for name in names}, diagonal=rows["diagonal"] / clouds.scale)

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 METHODS = {
     "full": "artperl.methods.full:Estimator",
     "artperl": "artperl.methods.artperl:ArtPERL",
+    "ancsh": "artperl.methods.ancsh:ANCSH",
 }
-"""Module and class of each method: full, which comes with trained weights; artperl, section 4 of the paper."""
-STORED_METHODS = ("full", "artperl")
+"""Module and class of each method: full, which comes with trained weights; artperl, section 4 of the paper; and the
+baselines that the paper compares with."""
+STORED_METHODS = ("full", "artperl", "ancsh")
 """Those that are trained and written down; others make themselves for a category."""
 
 

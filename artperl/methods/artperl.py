@@ -13,14 +13,13 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
-from torch import Tensor, nn
+from torch import nn
 
 from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.clock import Clock
-from artperl.core.clouds import Clouds
 from artperl.core.confidence import Calibration, Symptoms
 from artperl.core.estimate import Estimate, estimate_of_fit
 from artperl.core.pose import Theta, pose_parts
@@ -30,8 +29,9 @@ from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import Cloud
 from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.part_names import part_names
+from artperl.retrieval.segmented import SegmentedRetrieval, check_embeddings
 from artperl.retrieval.shape_base import ShapeBase
-from artperl.retrieval.siamese import POINTS, Siamese
+from artperl.retrieval.siamese import Siamese
 from artsim.common.json_records import from_json_values
 from artsim.model.objects import MAX_PARTS
 
@@ -84,7 +84,7 @@ def networks_of(sizes: Sizes) -> dict[str, nn.Module]:
     }
 
 
-class ArtPERL:
+class ArtPERL(SegmentedRetrieval):
     """The paper's method.
 
     Parameters
@@ -103,17 +103,9 @@ class ArtPERL:
         self, segmentation: Segmentation, siamese: Siamese, policy: Policy, base: ShapeBase,
         options: ArtPERLOptions | None = None,
     ):  # fmt: skip
-        self.segmentation, self.siamese, self.policy = segmentation, siamese, policy
-        self.device = next(policy.parameters()).device
-        self.base = base.to(self.device)
+        super().__init__(segmentation, siamese, base)
+        self.policy = policy.eval()
         self.options = options or ArtPERLOptions()
-        for network in self.networks().values():
-            network.eval()
-
-    @property
-    def categories(self) -> tuple[str, ...]:
-        """Categories of the references."""
-        return tuple(dict.fromkeys(self.base.categories))
 
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.
@@ -150,17 +142,6 @@ class ArtPERL:
         return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
 
     @torch.no_grad()
-    def segment(self, points: Tensor) -> Tensor:
-        """(B, N) parts of points (B, N, 3), section 4.2."""
-        return self.segmentation(Clouds.of(points).points).argmax(-1)
-
-    @torch.no_grad()
-    def retrieve(self, points: Tensor, part: Tensor, count: int = 1) -> Tensor:
-        """(B, count) rows of the references nearest to segmented clouds, by equation 1."""
-        few, labels = points[:, :POINTS], part[:, :POINTS]
-        return self.base.nearest_objects(self.siamese(Clouds.of(few).points, labels), count)[0]
-
-    @torch.no_grad()
     def fit(self, reference: Shapes, observed: Observed) -> list[Theta]:
         """States of the reference from the start on, after each action of the agent, section 4.3."""
         start = mean_start(reference, observed.points, self.options.start)
@@ -185,7 +166,13 @@ class ArtPERL:
         sizes = from_json_values(Sizes, settings.get("sizes"))
         options = from_json_values(ArtPERLOptions, settings.get("options"))
         own: dict[str, Any] = networks_of(sizes)
+        check_embeddings(base, own["siamese"])
         return cls(**own, base=base, options=options)
+
+    def to(self, device: torch.device | str) -> ArtPERL:
+        """The method on another device."""
+        networks: dict[str, Any] = {name: network.to(device) for name, network in self.networks().items()}
+        return ArtPERL(**networks, base=self.base, options=self.options)
 
     def _report(
         self, row: int, reference: Shapes, observed: Observed, path: list[Theta], labels: NDArray[np.int64],

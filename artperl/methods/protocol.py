@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Protocol
 
+import torch
 from numpy.typing import ArrayLike
 from torch import nn
 from typing_extensions import Self
@@ -58,6 +59,10 @@ class Stored(Method, Protocol):
         Raises
         ------
         ValueError
-            When the settings are none of this method.
+            When the settings are none of this method, or do not fit the base.
         """
+        ...
+
+    def to(self, device: torch.device | str) -> Self:
+        """The method on another device, ready to estimate."""
         ...

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import torch
 
 from artperl.estimator import load_estimator
-from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
+from artperl.methods.protocol import Stored
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
 from artperl.training.report import rounded
@@ -37,7 +37,7 @@ class Context:
     objects : TrainingObjects
     state : RunState
         The stages change it in place.
-    parent : Estimator or ArtPERL or None
+    parent : Estimator or Stored or None
         The estimator that the run started from.
     assemble : callable
         Makes an estimator of the networks as they stand.
@@ -58,8 +58,8 @@ class Context:
     folder: RunFolder
     objects: TrainingObjects
     state: RunState
-    parent: Estimator | ArtPERL | None
-    assemble: Callable[[Context], Estimator | ArtPERL]
+    parent: Estimator | Stored | None
+    assemble: Callable[[Context], Estimator | Stored]
     device: torch.device
     workers: int
     progress: bool
@@ -67,11 +67,11 @@ class Context:
     report: Report
     stop: Stop = field(default_factory=Stop)
 
-    def estimator(self) -> Estimator | ArtPERL:
+    def estimator(self) -> Estimator | Stored:
         """The estimator as it stands."""
         return self.assemble(self)
 
-    def best(self, device: torch.device | str = "cpu") -> Estimator | ArtPERL:
+    def best(self, device: torch.device | str = "cpu") -> Estimator | Stored:
         """The best estimator so far.
 
         Raises
@@ -80,7 +80,9 @@ class Context:
             When its files are damaged or missing.
         """
         try:
-            return load_estimator(self.folder.best, device, method=self.options.method)
+            method: str = self.options.method
+            found = load_estimator(self.folder.best, device, method=method)
+            return cast("Estimator | Stored", found)
         except DatasetError as error:
             raise DatasetError(f"the best estimator is lost ({error.what})", error.where, self.folder.fix) from error
 

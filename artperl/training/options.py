@@ -17,7 +17,9 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 
 T = TypeVar("T")
-Method = Literal["full", "artperl"]
+Method = Literal["full", "artperl", "ancsh"]
+_WITH_AGENT = ("artperl",)
+"""Methods that retrieve a reference by a network and fit it by an agent."""
 _MOST = 1_000_000_000
 _SHARES = ("stretched", "noisy", "degraded", "cloning_share")
 _AT_LEAST_ONE = (
@@ -41,7 +43,7 @@ class TrainOptions:
     """
 
     method: Method = "full"
-    """full: the estimator that is shipped; artperl: the method of the paper as printed."""
+    """full: the estimator that is shipped; artperl: the method of the paper as printed; ancsh: A-NCSH, a baseline."""
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
@@ -131,10 +133,10 @@ class TrainOptions:
             raise ConfigError("clouds that have their noise get no other", "noisy", "use one of noise, dataset, noisy")
         if self.dataset is not None and (self.real or self.files):
             raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
-        if self.method == "full" and (self.agent_rollouts or self.retrieval_steps):
+        if self.method not in _WITH_AGENT and (self.agent_rollouts or self.retrieval_steps):
             raise ConfigError(
-                "the method full has no agent, and no network for retrieval", "agent_rollouts, retrieval_steps",
-                "leave them out, or use the method artperl",
+                f"the method {self.method} has no agent, and no network for retrieval",
+                "agent_rollouts, retrieval_steps", f"leave them out, or use the method {' or '.join(_WITH_AGENT)}",
             )  # fmt: skip
         if not self.categories and not self.files:
             raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
@@ -202,6 +204,22 @@ PAPER_PRESETS = {
 }  # fmt: skip
 """Presets of the method artperl."""
 
+ANCSH_PRESETS = {
+    "quick": TrainOptions(
+        method="ancsh", base_objects=32, reference_points=32, width=32, perception_steps=250, batch_size=16,
+        num_points=768, test_objects=20, test_views=2,
+    ),
+    "full": TrainOptions(method="ancsh", reference_points=32),
+}  # fmt: skip
+"""Presets of the method ancsh."""
+
+METHOD_PRESETS: dict[Method, dict[str, TrainOptions]] = {
+    "full": PRESETS,
+    "artperl": PAPER_PRESETS,
+    "ancsh": ANCSH_PRESETS,
+}
+"""Presets of each method."""
+
 
 def preset_of(method: Method, name: str) -> TrainOptions:
     """A preset of a method.
@@ -211,7 +229,7 @@ def preset_of(method: Method, name: str) -> TrainOptions:
     ConfigError
         When the method has no such preset.
     """
-    presets = PRESETS if method == "full" else PAPER_PRESETS
+    presets = METHOD_PRESETS[method]
     if name not in presets:
         raise ConfigError(f"the method {method} has no preset {name!r}", "preset", f"use {' or '.join(presets)}")
     return presets[name]

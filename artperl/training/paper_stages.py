@@ -19,21 +19,22 @@ from artperl.agent.start import mean_start
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.data.batches import batches
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
 from artperl.estimator import save_estimator
 from artperl.methods.artperl import ArtPERL, Sizes, networks_of
+from artperl.retrieval.segmented import SegmentedRetrieval
 from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
-from artperl.training.steps import autocast, one_cycle, set_rate
+from artperl.training.steps import one_cycle, set_rate
+from artperl.training.supervised import SAVE_STEPS, SupervisedStage, count_step, descend, segmentation_loss
 from artsim.common.progress import track
 
 _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
-_SAVE_STEPS, _SAVE_ROLLOUTS = 100, 10
-"""Steps and rollouts after which a run is saved, against a stop that nobody asked for."""
+_SAVE_ROLLOUTS = 10
+"""Rollouts after which a run is saved, against a stop that nobody asked for."""
 _ALONE_EVERY, _ALONE = 10, 48
 """Rollouts between tests of the agent without an expert, and episodes of such a test, always the same ones."""
 _CHOICES = 4
@@ -53,41 +54,6 @@ def paper_estimator(context: Context) -> ArtPERL:
 
 
 @dataclass(frozen=True)
-class SegmentationStage:
-    """Cross-entropy of the parts of points, on fresh clouds."""
-
-    name: str = "segmentation"
-
-    def run(self, context: Context) -> None:
-        """Take the steps that are left."""
-        options, total = context.options, context.options.perception_steps
-        network, optimizer = context.state.networks[self.name], context.state.optimizers[self.name]
-        first = context.state.done[self.name]
-        if first >= total:
-            return
-        data = batches(
-            context.objects.data, context.objects.num_rows, options.num_points, options.batch_size, first, options.seed,
-            context.workers,
-        )  # fmt: skip
-        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
-        network.train()
-        for step in range(first, total):
-            clouds, truth = next(data)
-            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
-            with autocast(context.device, options.mixed_precision):
-                logits = network(clouds.points.to(context.device)).float()
-            part = truth.part.to(context.device)
-            loss = nn.functional.cross_entropy(logits.flatten(0, 1), part.flatten())
-            _descend(optimizer, network, loss)
-            right = float((logits.argmax(-1) == part).float().mean())
-            context.report(self.name, {"loss": loss.item(), "accuracy": right}, step)
-            bar.set_postfix_str(f"{100 * right:.1f} % of points right")
-            bar.update()
-            _count(context, self.name, step + 1, _SAVE_STEPS)
-        bar.close()
-
-
-@dataclass(frozen=True)
 class RetrievalStage:
     """Equation 2: a cloud, with the parts that the segmentation tells, is to be near its own object at rest."""
 
@@ -100,7 +66,9 @@ class RetrievalStage:
         first = context.state.done[self.name]
         if first >= total:
             return
-        method, base = paper_estimator(context), context.objects.base.shapes
+        segmentation: Any = context.state.networks["segmentation"]
+        siamese: Any = network
+        method, base = SegmentedRetrieval(segmentation, siamese, context.objects.base), context.objects.base.shapes
         samples = _source(context, POINTS, options.seed + 1, 1)
         bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
         network.train()
@@ -113,11 +81,11 @@ class RetrievalStage:
             generator = torch.Generator().manual_seed((options.seed << 32) + step)
             vectors = network(Clouds.of(points).points, method.segment(points))
             loss = contrastive_loss(vectors, network(*canonical_clouds(own, generator)))
-            _descend(optimizer, network, loss)
+            descend(optimizer, network, loss)
             context.report(self.name, {"loss": loss.item()}, step)
             bar.set_postfix_str(f"loss {loss.item():.4f}")
             bar.update()
-            _count(context, self.name, step + 1, _SAVE_STEPS)
+            count_step(context, self.name, step + 1, SAVE_STEPS)
         bar.close()
         network.eval()
 
@@ -152,7 +120,7 @@ class AgentStage:
                 context.report("agent_alone", alone, n)
                 bar.set_postfix_str(f"alone: reward {alone['reward']:.3f}, chamfer {alone['chamfer_end']:.3f}")
             bar.update()
-            _count(context, self.name, n + 1, _SAVE_ROLLOUTS)
+            count_step(context, self.name, n + 1, _SAVE_ROLLOUTS)
         bar.close()
         policy.eval()
 
@@ -166,12 +134,13 @@ class KeepStage:
     def run(self, context: Context) -> None:
         """Write the estimator."""
         context.save()
-        save_estimator(paper_estimator(context), context.folder.best, context.about({}))
+        save_estimator(context.estimator(), context.folder.best, context.about({}))
 
 
 def paper_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
-    return [SegmentationStage(), RetrievalStage(), AgentStage(), KeepStage()]
+    segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
+    return [segmentation, RetrievalStage(), AgentStage(), KeepStage()]
 
 
 def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n: int) -> tuple[Fitting, Theta]:
@@ -227,19 +196,3 @@ def _source(context: Context, num_points: int, seed: int, views: int) -> Source:
 
 def _stacked(clouds: list[np.ndarray]) -> Tensor:
     return torch.from_numpy(np.stack(clouds)).float()
-
-
-def _descend(optimizer: torch.optim.Optimizer, network: nn.Module, loss: Tensor) -> None:
-    """One step of an optimiser."""
-    optimizer.zero_grad()
-    loss.backward()
-    nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-    optimizer.step()
-
-
-def _count(context: Context, stage: str, done: int, save_every: int) -> None:
-    """Count a step of a stage, save at intervals, and stop if somebody has asked for it."""
-    context.state.done[stage] = done
-    if done % save_every == 0:
-        context.save()
-    context.stop_if_asked()

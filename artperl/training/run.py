@@ -7,7 +7,7 @@ stopped run goes on exactly as if it had not been stopped: only the :class:`~art
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from artsim.common.extras import needs
 
@@ -16,8 +16,8 @@ with needs("training"):
     from torch import nn
 
 from artperl.estimator import load_estimator
-from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
+from artperl.methods.protocol import Stored
 from artperl.perception.network import Perception
 from artperl.training.context import Context, Report
 from artperl.training.objects import TrainingObjects
@@ -64,11 +64,13 @@ class Training:
     ):  # fmt: skip
         self.out, self._report = out, report
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
+        programme.check(objects)
         device = _device(options.device)
         torch.manual_seed(options.seed)
         networks = programme.networks(options, objects.num_rows)
         start = options.start_from
-        parent = None if start is None else load_estimator(start, device, method=options.method)
+        method: str = options.method
+        parent = None if start is None else cast("Estimator | Stored", load_estimator(start, device, method=method))
         if parent is not None:
             _start_from(parent, networks, str(start))
         optimizers: dict[str, torch.optim.Optimizer] = {
@@ -118,7 +120,7 @@ def _no_report(group: str, figures: dict[str, float], step: int) -> None:
     """Before a run begins nobody listens."""
 
 
-def _start_from(parent: Estimator | ArtPERL, networks: dict[str, nn.Module], folder: str) -> None:
+def _start_from(parent: Estimator | Stored, networks: dict[str, nn.Module], folder: str) -> None:
     """Begin with the weights of another estimator.
 
     Raises

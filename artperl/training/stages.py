@@ -9,11 +9,14 @@ from typing import Protocol
 from torch import nn
 
 from artperl.fitting.options import EstimatorOptions
-from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
+from artperl.methods.protocol import Stored
 from artperl.perception.network import Perception
+from artperl.retrieval.category_prior import CategoryPrior
+from artperl.training.ancsh_stages import ancsh_estimator, ancsh_run_networks, ancsh_stages
 from artperl.training.boxes import BoxStage
 from artperl.training.context import Context
+from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
 from artperl.training.perception import PerceptionStage
@@ -29,6 +32,15 @@ class Stage(Protocol):
     def run(self, context: Context) -> None: ...
 
 
+def _anything(objects: TrainingObjects) -> None:
+    """A method that learns from any objects."""
+
+
+def _one_tree(objects: TrainingObjects) -> CategoryPrior:
+    """A method that learns one kinematic tree."""
+    return CategoryPrior.of(objects.base)
+
+
 @dataclass(frozen=True)
 class Programme:
     """What a run of a method learns.
@@ -41,11 +53,14 @@ class Programme:
         The stages, in their order.
     estimator : callable
         The estimator that the networks of a context make as they stand.
+    check : callable
+        Raises ConfigError when the method cannot learn from these objects.
     """
 
     networks: Callable[[TrainOptions, int], dict[str, nn.Module]]
     stages: Callable[[TrainOptions], list[Stage]]
-    estimator: Callable[[Context], Estimator | ArtPERL]
+    estimator: Callable[[Context], Estimator | Stored]
+    check: Callable[[TrainingObjects], object] = _anything
 
 
 def stages_of(options: TrainOptions) -> list[Stage]:
@@ -87,5 +102,6 @@ def _full_estimator(context: Context) -> Estimator:
 PROGRAMMES = {
     "full": Programme(_full_networks, _full_stages, _full_estimator),
     "artperl": Programme(paper_networks, paper_stages, paper_estimator),
+    "ancsh": Programme(ancsh_run_networks, ancsh_stages, ancsh_estimator, _one_tree),
 }
 """By the name of the method."""
