@@ -33,7 +33,9 @@ def test_joints_mend_the_rotations_of_parts_with_bad_points(kinds: tuple[str, ..
         truth = chain(kinds, rng)
         source = [rng.random((60, 3)) for _ in kinds]
         noise = (0.001, 0.25, 0.25)  # of parts 1 and 2, points tell little
-        target = [0.4 * own @ R.T + rng.normal(0.0, 0.4 * n, own.shape) for own, R, n in zip(source, truth, noise, strict=True)]  # fmt: skip
+        target = []
+        for own, R, error in zip(source, truth, noise, strict=True):
+            target.append(0.4 * own @ R.T + rng.normal(0.0, 0.4 * error, own.shape))
         start = truth @ Rotation.from_rotvec(rng.normal(0.0, 0.3, (3, 3))).as_matrix()
         scale = np.full(3, 0.4)
         for weight, errors in ((0.0, alone), (3.0, coupled)):
