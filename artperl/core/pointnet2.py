@@ -22,6 +22,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 from typing_extensions import ParamSpec
 
+from artperl.core.edge_kernels import Interpolated, Strongest
 from artperl.core.neighbours import nearest_points
 
 P = ParamSpec("P")
@@ -83,22 +84,18 @@ class Neighbourhoods:
 def strongest(features: Tensor, index: Tensor) -> Tensor:
     """(B, M, C) maxima of the rows of features (B, N, C) that indices (B, M, k) name."""
     every, flat = _flat(features, index)
-    if features.requires_grad or features.is_cuda:
-        # Gathers and maximises in one pass; gradients go back along the winning edges alone.
-        best = functional.embedding_bag(flat, every, mode="max")
-    else:  # in a sixth of the time
-        best, more = (every.index_select(0, flat[:, 0]) for _ in range(2))
-        for column in flat.T.contiguous()[1:]:
-            torch.maximum(best, torch.index_select(every, 0, column, out=more), out=best)
+    best: Tensor = (
+        functional.embedding_bag(flat, every, mode="max") if features.is_cuda else Strongest.apply(every, flat)  # type: ignore[no-untyped-call]
+    )
     return best.reshape(*index.shape[:2], -1)
 
 
 def interpolate(features: Tensor, weight: Tensor, index: Tensor) -> Tensor:
     """(B, N, C) sums, with weights (B, N, k), of the rows of features (B, M, C) that indices (B, N, k) name."""
-    if features.requires_grad or features.is_cuda:  # a product with a dense matrix is faster backwards
+    if features.is_cuda:  # a product with a dense matrix is faster backwards
         return weight.new_zeros(*weight.shape[:2], features.shape[1]).scatter_(2, index, weight) @ features
     every, flat = _flat(features, index)
-    total = functional.embedding_bag(flat, every, mode="sum", per_sample_weights=weight.flatten(0, 1).to(every))
+    total = Interpolated.apply(every, weight.flatten(0, 1), flat)  # type: ignore[no-untyped-call]
     return total.reshape(*index.shape[:2], -1)
 
 

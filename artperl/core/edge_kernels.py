@@ -1,0 +1,108 @@
+"""Sums and maxima over the neighbours of points, compiled, with their derivatives.
+
+They do what ``embedding_bag`` of torch does. A maximum takes a tenth of its time on one core, and a sum backwards needs
+no dense matrix. Compilation takes seconds, once on a machine: its result is kept beside this file, or in the user's
+cache where that folder cannot be written.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+_compiled = numba.njit(cache=True, nogil=True)
+
+
+class Strongest(torch.autograd.Function):
+    """(M, C) maxima of the rows of features (N, C) that indices (M, k) name; the first of equal ones has a gradient."""
+
+    @staticmethod
+    def forward(ctx: Any, features: Tensor, index: Tensor) -> Tensor:
+        highest, winner = maximum(features.detach().float().contiguous().numpy(), index.numpy())
+        ctx.winner, ctx.rows = winner, len(features)
+        return torch.from_numpy(highest).to(features.dtype)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        back = maximum_backward(gradient.float().contiguous().numpy(), ctx.winner, ctx.rows)
+        return torch.from_numpy(back).to(gradient.dtype), None
+
+
+class Interpolated(torch.autograd.Function):
+    """(M, C) sums, with constant weights (M, k), of the rows of features (N, C) that indices (M, k) name."""
+
+    @staticmethod
+    def forward(ctx: Any, features: Tensor, weight: Tensor, index: Tensor) -> Tensor:
+        ctx.weight, ctx.index, ctx.rows = weight.float().contiguous().numpy(), index.numpy(), len(features)
+        summed = weighted_sum(features.detach().float().contiguous().numpy(), ctx.weight, ctx.index)
+        return torch.from_numpy(summed).to(features.dtype)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:
+        back = weighted_sum_backward(gradient.float().contiguous().numpy(), ctx.weight, ctx.index, ctx.rows)
+        return torch.from_numpy(back).to(gradient.dtype), None, None
+
+
+@_compiled
+def maximum(features: NDArray[np.float32], index: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """(M, C) highest of the rows of features (N, C) that indices (M, k) name, and in which row each was found first."""
+    count, channels = len(index), features.shape[1]
+    highest = np.empty((count, channels), np.float32)
+    winner = np.empty((count, channels), np.int32)
+    for query in range(count):
+        first = index[query, 0]
+        for channel in range(channels):
+            highest[query, channel] = features[first, channel]
+            winner[query, channel] = first
+        for row in index[query, 1:]:
+            for channel in range(channels):
+                if features[row, channel] > highest[query, channel]:
+                    highest[query, channel] = features[row, channel]
+                    winner[query, channel] = row
+    return highest, winner
+
+
+@_compiled
+def maximum_backward(gradient: NDArray[np.float32], winner: NDArray[np.int32], rows: int) -> NDArray[np.float32]:
+    """(rows, C) gradient of the features of :func:`maximum` from the gradient (M, C) of its result."""
+    back = np.zeros((rows, gradient.shape[1]), np.float32)
+    for query in range(len(gradient)):
+        for channel in range(gradient.shape[1]):
+            back[winner[query, channel], channel] += gradient[query, channel]
+    return back
+
+
+@_compiled
+def weighted_sum(
+    features: NDArray[np.float32], weight: NDArray[np.float32], index: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """(M, C) sums of the rows of features (N, C) that indices (M, k) name, times weights (M, k)."""
+    summed = np.zeros((len(index), features.shape[1]), np.float32)
+    for query in range(len(index)):
+        for place in range(index.shape[1]):
+            row, share = index[query, place], weight[query, place]
+            for channel in range(features.shape[1]):
+                summed[query, channel] += share * features[row, channel]
+    return summed
+
+
+@_compiled
+def weighted_sum_backward(
+    gradient: NDArray[np.float32], weight: NDArray[np.float32], index: NDArray[np.int64], rows: int
+) -> NDArray[np.float32]:
+    """(rows, C) gradient of the features of :func:`weighted_sum` from the gradient (M, C) of its result."""
+    back = np.zeros((rows, gradient.shape[1]), np.float32)
+    for query in range(len(index)):
+        for place in range(index.shape[1]):
+            row, share = index[query, place], weight[query, place]
+            for channel in range(gradient.shape[1]):
+                back[row, channel] += share * gradient[query, channel]
+    return back
