@@ -157,6 +157,10 @@ class Fitting:
         self.theta = apply(self.shapes, self.theta, action, self.radius)
         self._look()
         self.steps_taken += 1
+        return self.reward(before)
+
+    def reward(self, before: Tensor) -> Tensor:
+        """(B,) reward of the last step, before which the distance was that (B,): equation 3."""
         eta, tolerance = self.options.eta, self.options.tolerance * before
         reward = torch.where(self.distance < before - tolerance, eta, -eta)
         return torch.where((self.distance - before).abs() <= tolerance, -0.1 * eta, reward)

@@ -55,9 +55,9 @@ class Train:
     """Processor threads of the network; by default torch's choice."""
 
     # From here on: fields of TrainOptions under their own names, then those of its parts.
-    method: Literal["full", "artperl", "ancsh"] | None = None
-    """full: the method that comes with trained weights; artperl: section 4 of the paper as printed; ancsh: a baseline
-    of the paper."""
+    method: Literal["full", "artperl", "ancsh", "sporeagent"] | None = None
+    """full: the method that comes with trained weights; artperl: section 4 of the paper as printed; the others: the
+    baselines that the paper compares with."""
     categories: Annotated[tuple[str, ...] | None, tyro.conf.arg(name="category")] = None
     """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By
     default laptop."""

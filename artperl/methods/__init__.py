@@ -17,10 +17,11 @@ METHODS = {
     "full": "artperl.methods.full:Estimator",
     "artperl": "artperl.methods.artperl:ArtPERL",
     "ancsh": "artperl.methods.ancsh:ANCSH",
+    "sporeagent": "artperl.methods.sporeagent:SporeAgent",
 }
 """Module and class of each method: full, which comes with trained weights; artperl, section 4 of the paper; and the
 baselines that the paper compares with."""
-STORED_METHODS = ("full", "artperl", "ancsh")
+STORED_METHODS = ("full", "artperl", "ancsh", "sporeagent")
 """Those that are trained and written down; others make themselves for a category."""
 
 

@@ -17,8 +17,8 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 
 T = TypeVar("T")
-Method = Literal["full", "artperl", "ancsh"]
-_WITH_AGENT = ("artperl",)
+Method = Literal["full", "artperl", "ancsh", "sporeagent"]
+_WITH_AGENT = ("artperl", "sporeagent")
 """Methods that retrieve a reference by a network and fit it by an agent."""
 _MOST = 1_000_000_000
 _SHARES = ("stretched", "noisy", "degraded", "cloning_share")
@@ -43,7 +43,7 @@ class TrainOptions:
     """
 
     method: Method = "full"
-    """full: the estimator that is shipped; artperl: the method of the paper as printed; ancsh: A-NCSH, a baseline."""
+    """full: the estimator that is shipped; artperl: the method of the paper as printed; others: its baselines."""
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
@@ -213,10 +213,18 @@ ANCSH_PRESETS = {
 }  # fmt: skip
 """Presets of the method ancsh."""
 
+_REGISTRATION = PPOOptions(lambda_rotation=0.5, lambda_translation=0.5, lambda_scale=0.0, epochs=2)
+SPOREAGENT_PRESETS = {
+    "quick": replace(PAPER_PRESETS["quick"], method="sporeagent", agent_rate=1e-3, ppo=_REGISTRATION),
+    "full": replace(PAPER_PRESETS["full"], method="sporeagent", ppo=_REGISTRATION),
+}
+"""Presets of the method sporeagent: stages as long as those of artperl."""
+
 METHOD_PRESETS: dict[Method, dict[str, TrainOptions]] = {
     "full": PRESETS,
     "artperl": PAPER_PRESETS,
     "ancsh": ANCSH_PRESETS,
+    "sporeagent": SPOREAGENT_PRESETS,
 }
 """Presets of each method."""
 

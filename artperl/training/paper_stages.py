@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from artperl.agent.actions import expected_action, rotation_vector
 from artperl.agent.decision_process import Fitting
+from artperl.agent.policy import Policy
 from artperl.agent.ppo import algorithm_1
 from artperl.agent.start import mean_start
 from artperl.core.clouds import Clouds
@@ -31,13 +32,13 @@ from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import SAVE_STEPS, SupervisedStage, count_step, descend, segmentation_loss
 from artsim.common.progress import track
 
-_VIEWS = 4
+VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
-_SAVE_ROLLOUTS = 10
+SAVE_ROLLOUTS = 10
 """Rollouts after which a run is saved, against a stop that nobody asked for."""
 _ALONE_EVERY, _ALONE = 10, 48
 """Rollouts between tests of the agent without an expert, and episodes of such a test, always the same ones."""
-_CHOICES = 4
+CHOICES = 4
 """Nearest references among which the agent's is drawn: at test time, too, it is seldom the best one."""
 
 
@@ -69,7 +70,7 @@ class RetrievalStage:
         segmentation: Any = context.state.networks["segmentation"]
         siamese: Any = network
         method, base = SegmentedRetrieval(segmentation, siamese, context.objects.base), context.objects.base.shapes
-        samples = _source(context, POINTS, options.seed + 1, 1)
+        samples = view_source(context, POINTS, options.seed + 1, 1)
         bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
         network.train()
         for step in range(first, total):
@@ -104,7 +105,7 @@ class AgentStage:
         if first >= total:
             return
         method = paper_estimator(context)
-        samples, unseen = (_source(context, POINTS, options.seed + seed, _VIEWS) for seed in (2, 3))
+        samples, unseen = (view_source(context, POINTS, options.seed + seed, VIEWS) for seed in (2, 3))
 
         def episodes(n: int) -> tuple[Fitting, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
@@ -116,11 +117,11 @@ class AgentStage:
         for n, figures in enumerate(rounds, first):
             context.report(self.name, figures, n)
             if n % _ALONE_EVERY == 0 or n + 1 == total:
-                alone = agent_alone(method, *fitting_episodes(method, unseen, _ALONE, options.seed, 0))
+                alone = agent_alone(method.policy, *fitting_episodes(method, unseen, _ALONE, options.seed, 0))
                 context.report("agent_alone", alone, n)
                 bar.set_postfix_str(f"alone: reward {alone['reward']:.3f}, chamfer {alone['chamfer_end']:.3f}")
             bar.update()
-            count_step(context, self.name, n + 1, _SAVE_ROLLOUTS)
+            count_step(context, self.name, n + 1, SAVE_ROLLOUTS)
         bar.close()
         policy.eval()
 
@@ -162,7 +163,7 @@ def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n:
     views = [samples[i] for i in range(n * count, (n + 1) * count)]
     points = _stacked([view.points for view in views]).to(method.device)
     part = method.segment(points)
-    nearest = method.retrieve(points, part, min(_CHOICES, len(method.base)))
+    nearest = method.retrieve(points, part, min(CHOICES, len(method.base)))
     drawn = torch.randint(nearest.shape[1], (count, 1), generator=generator).to(method.device)
     reference = method.base.shapes[nearest.gather(1, drawn)[:, 0]]
     trees = reference.trees
@@ -176,11 +177,11 @@ def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n:
 
 
 @torch.no_grad()
-def agent_alone(method: ArtPERL, fitting: Fitting, goal: Theta) -> dict[str, float]:
+def agent_alone(policy: Policy, fitting: Fitting, goal: Theta) -> dict[str, float]:
     """Mean reward of a step, chamfer distances, and the root's rotation from the goal, when nobody guides the agent."""
     start, rewards = fitting.distance, []
     while not fitting.done:
-        rewards.append(fitting.step(expected_action(method.policy(fitting.view())[0])))
+        rewards.append(fitting.step(expected_action(policy(fitting.view())[0])))
     off = rotation_vector(goal.rotation @ fitting.theta.rotation.mT)
     return {
         "reward": torch.stack(rewards).mean().item(),
@@ -190,7 +191,8 @@ def agent_alone(method: ArtPERL, fitting: Fitting, goal: Theta) -> dict[str, flo
     }
 
 
-def _source(context: Context, num_points: int, seed: int, views: int) -> Source:
+def view_source(context: Context, num_points: int, seed: int, views: int) -> Source:
+    """Fresh views of the objects of a run, so many of each in a row."""
     return context.objects.data.source(context.objects.num_rows, num_points, seed, views)
 
 

@@ -20,6 +20,7 @@ from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
 from artperl.training.perception import PerceptionStage
+from artperl.training.sporeagent_stages import sporeagent_estimator, sporeagent_run_networks, sporeagent_stages
 from artperl.training.validation import Calibration
 
 
@@ -103,5 +104,6 @@ PROGRAMMES = {
     "full": Programme(_full_networks, _full_stages, _full_estimator),
     "artperl": Programme(paper_networks, paper_stages, paper_estimator),
     "ancsh": Programme(ancsh_run_networks, ancsh_stages, ancsh_estimator, _one_tree),
+    "sporeagent": Programme(sporeagent_run_networks, sporeagent_stages, sporeagent_estimator),
 }
 """By the name of the method."""
