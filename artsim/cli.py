@@ -67,6 +67,9 @@ class Generate:
     """Seed of the dataset; sample i depends on (seed, i) only."""
     workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
+    ray: str | None = None
+    """Use a Ray cluster instead: auto (the one that this machine belongs to), local (starts one), or HOST:PORT. Nodes
+    need the same artsim, and no disk in common."""
     sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
     """Shares of each category's objects in train, val and test: by object, never by view."""
@@ -110,6 +113,7 @@ class Generate:
                 skip_broken=self.skip_broken,
                 strict=self.strict,
                 load_limit=self.load_limit,
+                ray=self.ray,
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")

@@ -60,7 +60,7 @@ class Dataset:
         self._ends = np.cumsum([s.end - s.first for s in self.shards]).tolist()
         self._readers: OrderedDict[str, ShardReader] = OrderedDict()
         self._owner = os.getpid()
-        self.objects = ObjectCache(self.folder / "objects")
+        self.objects = ObjectCache(self.folder, below="objects")
 
     def __len__(self) -> int:
         return self._ends[-1] if self._ends else 0
@@ -174,7 +174,7 @@ class SampleStream:
         if seed < 0 or start < 0 or step < 1:
             raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", fix="count from 0 upwards")
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
-        self.objects = ObjectCache(Path(folder) / "objects")
+        self.objects = ObjectCache(Path(folder), below="objects")
         self._renderer: Renderer | None = None
         self._rank: tuple[int, int] | None = None
         register_with_torch(SampleStream)
@@ -196,7 +196,12 @@ class SampleStream:
 
     def __getstate__(self) -> dict[str, Any]:
         rank = self._rank or process_rank()  # of the process that hands it to workers, which have no group
-        return {**self.__dict__, "objects": ObjectCache(self.objects.folder), "_renderer": None, "_rank": rank}
+        return {
+            **self.__dict__,
+            "objects": ObjectCache(self.objects.storage, below="objects"),
+            "_renderer": None,
+            "_rank": rank,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

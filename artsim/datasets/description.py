@@ -15,6 +15,7 @@ from typing import Any
 
 from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
 from artsim.common.names import printable
+from artsim.common.storage import FolderStorage, Place, Storage, storage_of
 from artsim.datasets import json_values
 from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
@@ -84,31 +85,53 @@ def write_if_other(path: Path, data: bytes) -> bool:
     return True
 
 
-def read_plan(folder: Path) -> Plan:
+def read_plan(place: Place) -> Plan:
     """The plan that a generation run wrote into its folder."""
-    return _plan(_document(folder, PLAN), folder / PLAN)
+    storage = storage_of(place)
+    return _plan(_document(storage, PLAN), storage, PLAN)
 
 
-def read_description(folder: Path) -> tuple[Plan, list[ShardRecord], dict[str, Any]]:
+def read_plan_document(storage: Storage) -> dict[str, Any] | None:
+    """Content of ``plan.json``; None where there is none.
+
+    Raises
+    ------
+    DatasetError
+        When it is damaged.
+    """
+    if PLAN not in storage.sizes():
+        return None
+    document = _document(storage, PLAN)
+    _plan(document, storage, PLAN)
+    return document
+
+
+def read_description(place: Place) -> tuple[Plan, list[ShardRecord], dict[str, Any]]:
     """Content of ``dataset.json``: the plan, the shards, and all of it.
+
+    Parameters
+    ----------
+    place : path, str or Storage
+        Folder or URL.
 
     Raises
     ------
     DatasetError
         When it is missing, damaged or of another format.
     """
-    path = folder / DESCRIPTION
-    if not path.exists():
-        begun = (folder / PLAN).exists()
+    storage = storage_of(place)
+    files = storage.sizes()
+    if DESCRIPTION not in files:
+        begun = PLAN in files
         raise DatasetError(
             "the dataset is not complete" if begun else f"no dataset here (no {DESCRIPTION})",
-            folder,
-            f"run the same generate command again, or {repair_command(folder)}: it goes on"
+            storage.place,
+            f"run the same generate command again, or {repair_command(storage.place)}: it goes on"
             if begun
             else "name a folder that generate.py wrote",
         )
-    document = _document(folder, DESCRIPTION)
-    plan = _plan(document, path)
+    document = _document(storage, DESCRIPTION)
+    plan = _plan(document, storage, DESCRIPTION)
     try:
         shards = json_values.sequence(document["shards"], "shards", MAX_SHARDS)
         if len(shards) != plan.num_shards:  # compared before the plan's own are listed: a forged plan has any number
@@ -117,19 +140,20 @@ def read_description(folder: Path) -> tuple[Plan, list[ShardRecord], dict[str, A
         if [record.shard for record in records] != plan.shards():
             raise ValueError("its shards are not those of its plan")
     except (ValueError, KeyError) as error:
-        raise _damage_error(path, error) from error
+        raise _damage_error(storage, DESCRIPTION, error) from error
     return plan, records, document
 
 
-def _document(folder: Path, name: str) -> dict[str, Any]:
+def _document(storage: Storage, name: str) -> dict[str, Any]:
     """A description whose own digest is right."""
-    path = folder / name
-    data = read_bounded(path, MAX_JSON_BYTES, name, DatasetError, fix=repair_command(folder))
+    data = storage.read(name, MAX_JSON_BYTES)
     try:
         document = dict(json_values.mapping(parse_json(data), "it"))
         if document["format"] not in (1, FORMAT):
             raise DatasetError(
-                f"format {document['format']!r:.20} is not {FORMAT}", path, "read it with the artsim that wrote it"
+                f"format {document['format']!r:.20} is not {FORMAT}",
+                f"{storage.place}/{name}",
+                "read it with the artsim that wrote it",
             )
         unknown = document.keys() - {*_PLAN_KEYS, *_MORE_KEYS, _SEAL}
         if unknown:
@@ -139,11 +163,11 @@ def _document(folder: Path, name: str) -> dict[str, Any]:
             if seal != _seal(document):
                 raise ValueError("it is not as it was written: its own sha256 is another")
     except (ValueError, KeyError) as error:
-        raise _damage_error(path, error) from error
+        raise _damage_error(storage, name, error) from error
     return document
 
 
-def _plan(document: Mapping[str, Any], path: Path) -> Plan:
+def _plan(document: Mapping[str, Any], storage: Storage, name: str) -> Plan:
     try:
         plan: Plan = (Plan if document["format"] == FORMAT else PlanFormat1).from_dict(document)
         for entries in (document["left_out"], document["repeated"]):
@@ -151,13 +175,13 @@ def _plan(document: Mapping[str, Any], path: Path) -> Plan:
                 for name in ("source", "source_sha256"):
                     json_values.text(json_values.mapping(entry, "source")[name], name)
     except (ValueError, KeyError, ConfigError) as error:
-        raise _damage_error(path, error) from error
+        raise _damage_error(storage, name, error) from error
     return plan
 
 
-def _damage_error(path: Path, error: Exception) -> DatasetError:
+def _damage_error(storage: Storage, name: str, error: Exception) -> DatasetError:
     reason = f"{error.args[0]!r:.60} is missing" if isinstance(error, KeyError) else str(error)
-    return DatasetError(f"{path.name} is damaged ({reason})", path.parent, repair_command(path.parent))
+    return DatasetError(f"{name} is damaged ({reason})", storage.place, repair_command(storage.place))
 
 
 @dataclass(frozen=True)
@@ -201,8 +225,8 @@ def read_started(folder: Path) -> StartedDataset | None:
             if name == DESCRIPTION:
                 described = read_description(folder)
             else:
-                begun = plan_part(_document(folder, PLAN))
-                _plan(begun, folder / PLAN)
+                begun = plan_part(_document(FolderStorage(folder), PLAN))
+                _plan(begun, FolderStorage(folder), PLAN)
         except DatasetError as error:
             problems.append((name, error))
             if name == PLAN:
@@ -221,7 +245,7 @@ def read_started(folder: Path) -> StartedDataset | None:
     if begun is not None:
         records = _shards_of_journal(folder)
         found = [Problem(name, error.what.removeprefix(f"{name} "), fix) for name, error in problems]
-        return StartedDataset(begun, _plan(begun, folder / PLAN), tuple(records), False, tuple(found))
+        return StartedDataset(begun, _plan(begun, FolderStorage(folder), PLAN), tuple(records), False, tuple(found))
     if problems:
         raise problems[0][1]
     return None

@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from artsim.common.files import write_atomic
+from artsim.common.storage import Place
 from artsim.datasets.description import DESCRIPTION, JOURNAL, StartedDataset, read_started
 from artsim.datasets.new_plan import new_plan
 from artsim.datasets.origins import Origins, write_origins
 from artsim.datasets.plan import FORMAT, MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
+from artsim.datasets.ray_pool import RayPool
 from artsim.datasets.restore import journal_line, remove_leftovers, restore
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares
@@ -77,6 +79,7 @@ def generate(
     progress: bool = True,
     strict: bool = False,
     load_limit: float = LOAD_LIMIT,
+    ray: str | None = None,
 ) -> GenerateResult:
     """Generate a dataset, or go on with one that was stopped, extend it, or repair it.
 
@@ -107,6 +110,9 @@ def generate(
         Refuse objects that were repaired while loading.
     load_limit : float
         Seconds that an object may take to load.
+    ray : str, optional
+        Use a Ray cluster instead of processes of this machine: "auto", "local", or HOST:PORT of its head. The result
+        does not depend on it.
 
     Returns
     -------
@@ -136,7 +142,7 @@ def generate(
         try:
             begun = _start(folder, asked, sources)
             grown_from = None
-            with WorkerPool(folder, workers) as team:
+            with _team(folder, workers, ray) as team:
                 if begun is None:
                     document = new_plan(folder, asked, sources, team, skip_broken, load_limit, progress)
                     begun = StartedDataset(document, Plan.from_dict(document), (), False, ())
@@ -155,6 +161,11 @@ def generate(
         )
     files = tuple(name for name in restored.files if name in damaged)
     return replace(_result(folder, begun, restored.samples, start), restored=files, grown_from=grown_from)
+
+
+def _team(place: Place, workers: int, ray: str | None) -> WorkerPool | RayPool:
+    """What does the tasks of a run."""
+    return WorkerPool(place, workers) if ray is None else RayPool(place, ray)
 
 
 def _is_sound(folder: Path, begun: StartedDataset, num_samples: int, workers: int, progress: bool) -> bool:

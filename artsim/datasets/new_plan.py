@@ -13,12 +13,12 @@ from artsim.common.progress import track
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
 from artsim.datasets.state import STAGED
+from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source
-from artsim.datasets.worker_pool import WorkerLost, WorkerPool
+from artsim.datasets.worker_pool import Team, WorkerLost
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
 
-_VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
 _LISTED = 6
 """Reasons that an error gives; the others are counted."""
 
@@ -27,7 +27,7 @@ def new_plan(
     folder: Path,
     asked: Plan,
     sources: Sequence[Source],
-    team: WorkerPool,
+    team: Team,
     skip_broken: bool,
     load_limit: float,
     progress: bool,
@@ -80,7 +80,7 @@ def new_plan(
     plan = replace(asked, objects=tuple(objects[n] for n in order)).to_dict()
     return {
         **plan,
-        "versions": {name: version(name) for name in _VERSIONS_OF},
+        "versions": {name: version(name) for name in VERSIONS_OF},
         "left_out": left_out,
         "repeated": repeated,
     }

@@ -6,6 +6,8 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+from artsim.common.storage import is_url
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -28,6 +30,8 @@ class Problem:
         return text if self.fix is None else f"{text.rstrip('.')}. Fix: {self.fix}"
 
 
-def repair_command(folder: Path) -> str:
+def repair_command(folder: Path | str) -> str:
     """What to type to have a dataset repaired."""
+    if is_url(folder):
+        return "run the same generate command again"
     return f"artsim repair {shlex.quote(str(folder))}"

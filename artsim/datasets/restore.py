@@ -23,7 +23,7 @@ from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem
 from artsim.datasets.state import STAGED, State, leftovers
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source, make_shard
-from artsim.datasets.worker_pool import WorkerLost, WorkerPool
+from artsim.datasets.worker_pool import Team, WorkerLost
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 
@@ -49,7 +49,7 @@ class RestoreResult:
 
 
 def restore(
-    folder: Path, begun: StartedDataset, state: State, origins: Origins, team: WorkerPool, progress: bool
+    folder: Path, begun: StartedDataset, state: State, origins: Origins, team: Team, progress: bool
 ) -> RestoreResult:
     """Make all that is missing or damaged, and complete the dataset if nothing is left to do.
 
@@ -93,7 +93,7 @@ def _make_objects(
     begun: StartedDataset,
     state: State,
     origins: Origins,
-    team: WorkerPool,
+    team: Team,
     progress: bool,
     restored: RestoreResult,
 ) -> set[PlannedObject]:
@@ -166,7 +166,7 @@ def _make_shards(
     begun: StartedDataset,
     state: State,
     lost: set[PlannedObject],
-    team: WorkerPool,
+    team: Team,
     progress: bool,
     restored: RestoreResult,
 ) -> dict[str, ShardRecord]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import io
 import tarfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import orjson
@@ -18,6 +18,7 @@ from PIL import Image
 
 from artsim.common.files import atomic_file, open_image, parse_npy
 from artsim.common.names import printable
+from artsim.common.storage import FolderStorage, Storage
 from artsim.errors import DatasetError
 from artsim.observing.sample import Sample
 
@@ -170,26 +171,46 @@ def write_shard(path: Path, samples: Iterable[Sample], wanted: str | None = None
     OtherBytesError
         When its digest is not ``wanted``: the file is as before.
     """
-    return write_tar(path, ((sample_key(sample.index), sample_members(sample)) for sample in samples), wanted)
+    return write_tar(path, _entries(samples), wanted)
+
+
+def store_shard(storage: Storage, name: str, samples: Iterable[Sample], wanted: str | None = None) -> tuple[int, str]:
+    """:func:`write_shard` to any storage. One that is no folder gets the shard at once, so it is in memory before."""
+    if isinstance(storage, FolderStorage):
+        return write_shard(storage.folder / name, samples, wanted)
+    file = io.BytesIO()  # a request that fails is made again with the same bytes
+    written = _write_entries(file, _entries(samples), wanted)
+    storage.write(name, file.getvalue())
+    return written
+
+
+def _entries(samples: Iterable[Sample]) -> Iterator[tuple[str, dict[str, bytes]]]:
+    return ((sample_key(sample.index), sample_members(sample)) for sample in samples)
 
 
 def write_tar(
     path: Path, entries: Iterable[tuple[str, Mapping[str, bytes]]], wanted: str | None = None
 ) -> tuple[int, str]:
     """Write a tar file of entries, each a key and its members by suffix; otherwise as :func:`write_shard`."""
-    size, digest = 0, hashlib.sha256()
     with atomic_file(path) as file:
-        for key, members in entries:
-            block = b"".join(_tar_member(f"{key}.{name}", data) for name, data in members.items())
-            file.write(block)
-            digest.update(block)
-            size += len(block)
-        # Two empty blocks end an archive, which fills whole records.
-        end = bytes(-(size + 2 * tarfile.BLOCKSIZE) % tarfile.RECORDSIZE + 2 * tarfile.BLOCKSIZE)
-        file.write(end)
-        digest.update(end)
-        if wanted not in (None, digest.hexdigest()):
-            raise OtherBytesError(digest.hexdigest())
+        return _write_entries(file, entries, wanted)
+
+
+def _write_entries(
+    file: BinaryIO, entries: Iterable[tuple[str, Mapping[str, bytes]]], wanted: str | None
+) -> tuple[int, str]:
+    size, digest = 0, hashlib.sha256()
+    for key, members in entries:
+        block = b"".join(_tar_member(f"{key}.{name}", data) for name, data in members.items())
+        file.write(block)
+        digest.update(block)
+        size += len(block)
+    # Two empty blocks end an archive, which fills whole records.
+    end = bytes(-(size + 2 * tarfile.BLOCKSIZE) % tarfile.RECORDSIZE + 2 * tarfile.BLOCKSIZE)
+    file.write(end)
+    digest.update(end)
+    if wanted not in (None, digest.hexdigest()):
+        raise OtherBytesError(digest.hexdigest())
     return size + len(end), digest.hexdigest()
 
 

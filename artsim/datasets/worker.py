@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
 import os
 import signal
@@ -11,48 +12,68 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from artsim.common.extras import import_failure
-from artsim.common.files import file_sha256
+from artsim.common.storage import Storage
 from artsim.datasets.description import read_plan
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.sample_options import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
-from artsim.datasets.shards import OtherBytesError, write_shard
+from artsim.datasets.shards import OtherBytesError, store_shard
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import FamilySource, Source
-from artsim.model.object_file import ObjectCache, save_object
+from artsim.model.object_file import ObjectCache, object_bytes
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
 
 _STEP = 16  # samples between two reports
 
 
-@dataclass
-class _Worker:
-    """What a worker process keeps between shards. The plan is read at the first: it may not exist before."""
+PARTS = "parts"
+"""Folder of what several machines have done of a dataset that is not complete."""
+PREPARED = f"{PARTS}/objects"
+"""Objects before they have a name in the plan: each is called by the digest of its file."""
 
-    folder: Path
-    connection: Connection
+
+@dataclass
+class Worker:
+    """What a worker process keeps between tasks. The plan is read at the first shard: it may not exist before.
+
+    Attributes
+    ----------
+    storage : Storage
+        Of the dataset.
+    tell : callable
+        Hears how much more is done.
+    is_stopped : callable
+        Whether the run wishes that work in hand is left as it is.
+    """
+
+    storage: Storage
+    tell: Callable[[int], object]
+    is_stopped: Callable[[], bool]
 
     @cached_property
     def plan(self) -> Plan:
-        return read_plan(self.folder)
+        return read_plan(self.storage)
 
     @cached_property
     def objects(self) -> ObjectCache:
-        return ObjectCache(self.folder / "objects")
+        return ObjectCache(self.storage, below="objects")
+
+    @cached_property
+    def prepared(self) -> ObjectCache:
+        return ObjectCache(self.storage, below=PREPARED)
 
     @cached_property
     def renderer(self) -> Renderer:
         return make_renderer(self.plan.sample.renderer)
 
 
-_worker: _Worker | None = None
+_worker: Worker | None = None
 
 
-def serve(connection: Connection, folder: Path) -> None:
+def serve(connection: Connection, storage: Storage) -> None:
     """Do what the parent asks for until it says None, or is gone. Ctrl-C is left to the parent."""
     global _worker
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -65,16 +86,23 @@ def serve(connection: Connection, folder: Path) -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
-    _worker = _Worker(folder, connection)
+    # Nothing but a wish to stop comes while there is a task.
+    _worker = Worker(storage, lambda count: connection.send(("progress", count)), connection.poll)
     try:
         connection.send(("ready", None))
         while (task := connection.recv()) is not None:
-            connection.send(_answer(*task))
+            connection.send(answer(*task))
     except (EOFError, OSError):
         os._exit(1)  # the parent is gone
 
 
-def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+def become(worker: Worker) -> None:
+    """Let this process work for a run."""
+    global _worker
+    _worker = worker
+
+
+def answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
     """What becomes of a task: ("done", its result) or ("failed", what it raised)."""
     try:
         return "done", work(*arguments)
@@ -87,9 +115,9 @@ def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, 
 
 
 def report(count: int) -> None:
-    """Tell the parent that so much more is done."""
+    """Tell the run that so much more is done."""
     assert _worker is not None
-    _worker.connection.send(("progress", count))
+    _worker.tell(count)
 
 
 class StoppedError(Exception):
@@ -97,13 +125,13 @@ class StoppedError(Exception):
 
 
 def stop_if_asked() -> None:
-    """Raise :class:`StoppedError` once the parent wishes so: then, work in hand is left as it is."""
+    """Raise :class:`StoppedError` once the run wishes so: then, work in hand is left as it is."""
     assert _worker is not None
-    if _worker.connection.poll():  # nothing but a wish to stop comes while there is a task
+    if _worker.is_stopped():
         raise StoppedError
 
 
-def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
+def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> ShardRecord | str | None:
     """Make and write one shard.
 
     Parameters
@@ -111,6 +139,8 @@ def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
     shard : Shard
     sha256 : str or None
         What its digest has to be, if that is known: any other bytes are not written.
+    prepared : bool
+        Take the objects from where several machines prepared them.
 
     Returns
     -------
@@ -119,7 +149,7 @@ def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
     """
     assert _worker is not None
     try:
-        size, digest = write_shard(_worker.folder / shard.name, _samples(_worker, shard), sha256)
+        size, digest = store_shard(_worker.storage, shard.name, _samples(_worker, shard, prepared), sha256)
     except OtherBytesError as other:
         return other.sha256
     except StoppedError:
@@ -128,13 +158,13 @@ def make_shard(shard: Shard, sha256: str | None) -> ShardRecord | str | None:
     return ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
 
 
-def _samples(worker: _Worker, shard: Shard) -> Iterator[Sample]:
+def _samples(worker: Worker, shard: Shard, prepared: bool) -> Iterator[Sample]:
     plan, renderer = worker.plan, worker.renderer  # which says itself what it lacks
     for made, index in enumerate(plan.indices(shard), start=1):
         stop_if_asked()
         planned = plan.object_of(index)
         try:
-            obj = worker.objects[planned.key]
+            obj = worker.prepared[planned.file_sha256] if prepared else worker.objects[planned.key]
             yield draw_sample(obj, plan.sample, plan.seed, index, renderer, PLANNED_ATTEMPTS)
         except ImportError:  # which says what to install
             raise
@@ -142,7 +172,7 @@ def _samples(worker: _Worker, shard: Shard) -> Iterator[Sample]:
             what = error.what if isinstance(error, ArtsimError) else f"{type(error).__name__}: {error}"
             raise DatasetError(
                 f"sample {index} of {planned.source} cannot be made ({what})",
-                worker.folder,
+                worker.storage.place,
                 "generate into a new folder, without this object or with other options",
             ) from error
         if made % _STEP == 0 or made == len(shard):
@@ -183,15 +213,15 @@ class RefusedSource:
 
 
 def compile_source(
-    source: Source, staged: str, seed: int, options: SampleOptions | None, strict: bool = False
+    source: Source, staged: str | None, seed: int, options: SampleOptions | None, strict: bool = False
 ) -> CompiledSource | RefusedSource:
     """Load a source and keep it compiled in the dataset's folder, under a provisional name.
 
     Parameters
     ----------
     source : Source
-    staged : str
-        Name of the file.
+    staged : str or None
+        Name of the file; None where several machines prepare objects.
     seed : int
         Of the dataset.
     options : SampleOptions or None
@@ -214,8 +244,9 @@ def compile_source(
         return RefusedSource(str(error) if source.name in str(error) else f"{source.name}: {error}")
     except (Exception, SystemExit) as error:  # parsers raise whatever they stumble on; memory and stack run out, too
         return RefusedSource(f"{source.name}: cannot be loaded ({type(error).__name__}: {error})")
-    path = _worker.folder / "objects" / staged
-    save_object(obj, path)
+    data = object_bytes(obj)
+    digest = hashlib.sha256(data).hexdigest()
+    _worker.storage.write(f"{PREPARED}/{digest}.npz" if staged is None else f"objects/{staged}", data)
     return CompiledSource(
-        staged, identity, obj.category, obj.object_id, obj.sha256, len(obj), obj.is_rigid, repairs, file_sha256(path)
+        staged or "", identity, obj.category, obj.object_id, obj.sha256, len(obj), obj.is_rigid, repairs, digest
     )

@@ -16,9 +16,10 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from artsim.common.files import write_error
+from artsim.common.storage import Place, storage_of
 from artsim.datasets.worker import serve
 from artsim.errors import DatasetError
 
@@ -47,21 +48,34 @@ class _Member:
     since: float = 0.0
 
 
+class Team(Protocol):
+    """What does the tasks of a run: processes of this machine, or of a cluster."""
+
+    def run(
+        self,
+        work: Callable[..., T],
+        tasks: Iterable[tuple[K, tuple[Any, ...]]],
+        limit: float | None = None,
+        progress: Callable[[int], object] = lambda count: None,
+    ) -> Iterator[tuple[K, T | WorkerLost]]:
+        """See :meth:`WorkerPool.run`."""
+
+
 class WorkerPool:
     """The worker processes of a run: started when first given work, stopped at the end however it comes.
 
     Parameters
     ----------
-    folder : Path
+    place : path, str or Storage
         Of the dataset.
     workers : int
         Processes at most.
     """
 
-    def __init__(self, folder: Path, workers: int):
+    def __init__(self, place: Place, workers: int):
         # Inherited by the processes: with one of them for each core, NumPy's own threads only get in the way.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        self.folder, self.workers = folder, workers
+        self.storage, self.workers = storage_of(place), workers
         self._context = multiprocessing.get_context("spawn")
         self._members: list[_Member] = []
 
@@ -137,7 +151,7 @@ class WorkerPool:
                     if not member.greeted:
                         raise DatasetError(
                             "a worker process ended as it started (a script without `if __name__ == '__main__'`?)",
-                            self.folder,
+                            self.storage.place,
                             "start the run from a module, or below `if __name__ == '__main__':`",
                         )
                     if alone:
@@ -165,7 +179,7 @@ class WorkerPool:
     def _start(self) -> _Member:
         """A new process; it never hears a Ctrl-C, which is the parent's to answer."""
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=serve, args=(theirs, self.folder))
+        process = self._context.Process(target=serve, args=(theirs, self.storage))
         if sys.platform == "win32":
             process.start()
         else:

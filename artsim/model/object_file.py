@@ -12,18 +12,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.files import parse_json, read_npz, write_atomic
+from artsim.common.files import MAX_ARRAY_BYTES, parse_json, parse_npz, read_bounded, write_atomic
 from artsim.common.names import printable
+from artsim.common.storage import Place, storage_of
 from artsim.errors import AssetError, KinematicsError
 from artsim.model.kinematics import LARGEST, Array, KinematicTree
 from artsim.model.objects import MAX_PARTS, ArticulatedObject, Part, Repair
 
 _CACHE_BYTES = 250_000_000
 _COMPILED_FORMAT = 1
+_AGAIN = "generate it again"
 
 
 def save_object(obj: ArticulatedObject, path: Path) -> None:
     """Write an object as one compact ``.npz`` that :func:`load_object` reads back without the source folder."""
+    write_atomic(path, object_bytes(obj))
+
+
+def object_bytes(obj: ArticulatedObject) -> bytes:
+    """The content of an object's file; always the same for the same object."""
     header = {
         "format": _COMPILED_FORMAT,
         "object_id": obj.object_id,
@@ -49,7 +56,7 @@ def save_object(obj: ArticulatedObject, path: Path) -> None:
         vertex_counts=np.array([len(p.vertices) for p in obj.parts]),
         face_counts=np.array([len(p.faces) for p in obj.parts]),
     )
-    write_atomic(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def load_object(path: Path) -> ArticulatedObject:
@@ -60,12 +67,22 @@ def load_object(path: Path) -> ArticulatedObject:
     AssetError
         When the file is missing, damaged or of another format.
     """
-    arrays = read_npz(path, "object file")
+    return parse_object(read_bounded(path, MAX_ARRAY_BYTES, "object file", fix=_AGAIN), str(path))
+
+
+def parse_object(data: bytes, where: str) -> ArticulatedObject:
+    """The object of the bytes of a file; ``where`` they come from is for messages. Errors as of :func:`load_object`."""
     try:
-        return _object(arrays, str(path))
+        arrays = parse_npz(data)
+    except ValueError as error:
+        raise AssetError(
+            f"object file cannot be read ({error})", where, "restore the file, or make it again"
+        ) from error
+    try:
+        return _object(arrays, where)
     except (ValueError, KinematicsError) as error:
         reason = error.what if isinstance(error, KinematicsError) else error
-        raise AssetError(f"not an artsim object file ({reason})", path, "generate it again") from error
+        raise AssetError(f"not an artsim object file ({reason})", where, _AGAIN) from error
 
 
 def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObject:
@@ -163,17 +180,29 @@ def _source_joints(joints: object, count: int) -> dict[str, tuple[int, float]]:
 
 
 class ObjectCache:
-    """Compiled objects of a dataset folder, the least recently used dropped once they take too much memory."""
+    """Compiled objects of a folder, the least recently used dropped once they take too much memory.
 
-    def __init__(self, folder: Path, max_bytes: int = _CACHE_BYTES):
-        self.folder = folder
+    Parameters
+    ----------
+    place : path, str or Storage
+        Folder or URL.
+    max_bytes : int
+        Of memory.
+    below : str
+        Where in it the objects lie.
+    """
+
+    def __init__(self, place: Place, max_bytes: int = _CACHE_BYTES, below: str = ""):
+        self.storage, self.below = storage_of(place), f"{below}/" if below else ""
         self.max_bytes = max_bytes
         self._objects: OrderedDict[str, ArticulatedObject] = OrderedDict()
 
     def __getitem__(self, key: str) -> ArticulatedObject:
         obj = self._objects.get(key)
         if obj is None:
-            obj = self._objects[key] = load_object(self.folder / f"{key}.npz")
+            name = f"{self.below}{key}.npz"
+            where = f"{self.storage.place}/{name}"
+            obj = self._objects[key] = parse_object(self.storage.read(name, MAX_ARRAY_BYTES), where)
             while len(self._objects) > 1 and sum(map(_memory, self._objects.values())) > self.max_bytes:
                 self._objects.popitem(last=False)
         self._objects.move_to_end(key)

@@ -1,0 +1,321 @@
+"""Where a dataset lies: a folder, or a place that fsspec knows by its URL, such as ``s3://bucket/first``.
+
+Names in a storage are relative and have ``/`` between their parts. A file is absent or whole. Object storage has no
+locks, no links and cannot append: nothing here asks for them.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import random
+import secrets
+import shutil
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol, TypeAlias, TypeVar
+
+from artsim.common.extras import install_command, needs
+from artsim.common.files import read_bounded, write_atomic, write_error
+from artsim.errors import ArtsimError, ConfigError, DatasetError
+
+T = TypeVar("T")
+
+_ATTEMPTS = 8
+"""Of one request: a storage that fails every tenth one then fails once in a hundred million."""
+_FIRST_PAUSE, _LONGEST_PAUSE = 0.1, 10.0
+"""Seconds before the second attempt, doubled from then on; half of it is random: workers do not come together."""
+_WHOLE = 64_000_000
+"""Bytes up to which a file is opened as one request: a shard of 1,000 clouds."""
+_MISSING = "restore it, or make the dataset again"
+
+
+class Storage(Protocol):
+    """Files of a dataset, by name."""
+
+    @property
+    def place(self) -> str:
+        """Folder or URL."""
+
+    def read(self, name: str, most: int) -> bytes:
+        """Content of a file; a DatasetError where it is missing, unreadable or larger than ``most`` bytes."""
+
+    def open(self, name: str) -> tuple[BinaryIO, int]:
+        """A file to read from any place on, and its size in bytes; errors as of :meth:`read`."""
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a whole file; a ConfigError where that fails for good."""
+
+    def write_new(self, name: str, data: bytes) -> None:
+        """Write a whole file unless there is one: of several writers the first one wins, where the storage can tell."""
+
+    def sizes(self, below: str = "") -> dict[str, int]:
+        """Name and size in bytes of every file directly in a folder; a folder that is missing has none."""
+
+    def copy(self, source: str, target: str) -> None:
+        """Let a file be there under another name, too."""
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files; some may be gone already."""
+
+
+Place: TypeAlias = "str | Path | Storage"
+
+
+def is_url(place: object) -> bool:
+    """Whether a place is for fsspec, which knows ``s3://``, ``gs://``, ``simplecache::s3://`` and others."""
+    return isinstance(place, str) and "://" in place
+
+
+def storage_of(place: Place) -> Storage:
+    """The storage at a folder or URL; ``file://`` is a folder, too, such as one on a disk that several nodes share.
+
+    Raises
+    ------
+    ConfigError
+        When fsspec does not know the protocol, or a module for it is not installed.
+    """
+    if isinstance(place, str):
+        if place.startswith("file://"):
+            return FolderStorage(Path(place.removeprefix("file://")))
+        return UrlStorage(place) if is_url(place) else FolderStorage(Path(place))
+    return FolderStorage(place) if isinstance(place, Path) else place
+
+
+class FolderStorage:
+    """Files of a folder."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+
+    @property
+    def place(self) -> str:
+        """The folder."""
+        return str(self.folder)
+
+    def __str__(self) -> str:
+        return self.place
+
+    def read(self, name: str, most: int) -> bytes:
+        """See :meth:`Storage.read`."""
+        return read_bounded(self.folder / name, most, Path(name).name, DatasetError, fix=_MISSING)
+
+    def open(self, name: str) -> tuple[BinaryIO, int]:
+        """See :meth:`Storage.open`."""
+        path = self.folder / name
+        if not path.is_file():  # to open a pipe would wait for somebody who writes to it
+            raise DatasetError("is missing, or no file", path, _MISSING)
+        try:
+            file = path.open("rb")
+        except OSError as error:
+            raise DatasetError(f"cannot be read ({error.strerror})", path, "mend its rights") from error
+        return file, os.fstat(file.fileno()).st_size
+
+    def write(self, name: str, data: bytes) -> None:
+        """See :meth:`Storage.write`."""
+        write_atomic(self.folder / name, data)
+
+    def write_new(self, name: str, data: bytes) -> None:
+        """See :meth:`Storage.write_new`."""
+        path = self.folder / name
+        part = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")  # processes of several nodes share numbers
+        try:
+            write_atomic(part, data)
+            os.link(part, path)  # fails where there is one
+        except FileExistsError:
+            pass
+        except OSError as error:
+            if path.exists():
+                return
+            try:  # a disk without links
+                part.replace(path)
+            except OSError:
+                raise write_error(error, path) from error
+        finally:
+            part.unlink(missing_ok=True)
+
+    def sizes(self, below: str = "") -> dict[str, int]:
+        """See :meth:`Storage.sizes`."""
+        found = {}
+        try:
+            with os.scandir(self.folder / below) as entries:
+                for entry in entries:
+                    if entry.is_file(follow_symlinks=False):
+                        found[entry.name] = entry.stat().st_size
+        except (FileNotFoundError, NotADirectoryError):
+            return {}
+        except OSError as error:
+            raise DatasetError(
+                f"cannot be listed ({error.strerror})", self.folder / below, "mend its rights"
+            ) from error
+        return found
+
+    def copy(self, source: str, target: str) -> None:
+        """See :meth:`Storage.copy`."""
+        path = self.folder / target
+        part = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                os.link(self.folder / source, part)
+            except OSError:  # a disk without links
+                shutil.copyfile(self.folder / source, part)
+            part.replace(path)
+            part.unlink(missing_ok=True)  # of two links to one file, POSIX keeps both
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise write_error(error, path) from error
+
+    def remove(self, names: Iterable[str]) -> None:
+        """See :meth:`Storage.remove`; folders that are empty then go, too."""
+        folders = set()
+        for name in names:
+            (self.folder / name).unlink(missing_ok=True)
+            folders.add((self.folder / name).parent)
+        for folder in sorted(folders - {self.folder}, key=lambda path: -len(path.parts)):
+            for empty in (folder, *folder.parents):
+                if empty == self.folder or any(empty.iterdir()):
+                    break
+                empty.rmdir()
+
+
+class UrlStorage:
+    """Files below a URL of fsspec. Requests that fail are made again, with longer and longer pauses.
+
+    Parameters
+    ----------
+    url : str
+        Options, such as an endpoint or credentials, come from the environment, as fsspec and its file systems take
+        them: ``AWS_ENDPOINT_URL``, ``AWS_ACCESS_KEY_ID``, ``FSSPEC_S3_ANON`` and others.
+    """
+
+    def __init__(self, url: str):
+        self.place = url.rstrip("/")
+        self._opened: tuple[int, Any, str] | None = None
+        self._system()  # what is missing is said at once
+
+    def __str__(self) -> str:
+        return self.place
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"place": self.place, "_opened": None}
+
+    def _system(self) -> tuple[Any, str]:
+        """The file system, and the path in it; anew in each process, for connections do not outlive a fork."""
+        if self._opened is None or self._opened[0] != os.getpid():
+            with needs(f"datasets at {self.place}", extra="storage"):
+                import fsspec
+            try:
+                system, path = fsspec.core.url_to_fs(self.place)
+            except ImportError as error:  # of the file system itself
+                raise ConfigError(str(error), self.place, install_command("storage")) from error
+            except ValueError as error:
+                raise ConfigError(f"fsspec cannot open it ({error})", self.place, "use s3://BUCKET/NAME") from error
+            self._opened = os.getpid(), system, path.rstrip("/")
+        return self._opened[1], self._opened[2]
+
+    def _path(self, name: str) -> str:
+        path = self._system()[1]
+        return f"{path}/{name}" if name else path
+
+    def _try(self, name: str, work: Callable[[], T], kind: type[ArtsimError], doing: str, fix: str) -> T:
+        """Do something with a file, again after a while where it fails."""
+        for attempt in range(_ATTEMPTS):
+            try:
+                return work()
+            except FileNotFoundError as error:
+                if kind is DatasetError:
+                    raise DatasetError("is missing", f"{self.place}/{name}", _MISSING) from error
+                reason: Exception = error  # a bucket that is not there
+                break
+            except PermissionError as error:
+                reason = error
+                break
+            except OSError as error:
+                reason = error
+            except Exception as error:  # what botocore and other clients raise is of no common family
+                reason = error
+            if attempt + 1 < _ATTEMPTS:
+                pause = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0**attempt)
+                time.sleep(pause * random.uniform(0.5, 1.0))
+        text = f"{type(reason).__name__}: {reason}"
+        raise kind(f"cannot {doing} ({text:.300})", f"{self.place}/{name}", fix) from reason
+
+    def _reading(self, name: str, work: Callable[[], T], doing: str = "be read") -> T:
+        return self._try(name, work, DatasetError, doing, "mend the access to the storage, and try again")
+
+    def _writing(self, name: str, work: Callable[[], T]) -> T:
+        return self._try(
+            name, work, ConfigError, "be written", "mend the access to the storage; the same command resumes"
+        )
+
+    def read(self, name: str, most: int) -> bytes:
+        """See :meth:`Storage.read`."""
+        size = self._size(name)
+        if size > most:
+            raise DatasetError(
+                f"{size / 1e6:.0f} MB are over the limit of {most / 1e6:.0f} MB", f"{self.place}/{name}", _MISSING
+            )
+        data: bytes = self._reading(name, lambda: self._system()[0].cat_file(self._path(name)))
+        return data
+
+    def _size(self, name: str) -> int:
+        return int(self._reading(name, lambda: self._system()[0].info(self._path(name))["size"]))
+
+    def open(self, name: str) -> tuple[BinaryIO, int]:
+        """See :meth:`Storage.open`: a shard as one request, a larger file piece by piece."""
+        size = self._size(name)
+        if size <= _WHOLE:
+            return io.BytesIO(self.read(name, size)), size
+        return self._reading(name, lambda: self._system()[0].open(self._path(name), "rb")), size
+
+    def write(self, name: str, data: bytes) -> None:
+        """See :meth:`Storage.write`."""
+        self._writing(name, lambda: self._system()[0].pipe_file(self._path(name), data))
+
+    def write_new(self, name: str, data: bytes) -> None:
+        """See :meth:`Storage.write_new`."""
+
+        def work() -> None:
+            try:
+                self._system()[0].pipe_file(self._path(name), data, mode="create")
+            except FileExistsError:
+                pass
+            except (TypeError, NotImplementedError):  # a file system that cannot tell
+                self._system()[0].pipe_file(self._path(name), data)
+
+        self._writing(name, work)
+
+    def sizes(self, below: str = "") -> dict[str, int]:
+        """See :meth:`Storage.sizes`."""
+
+        def work() -> dict[str, int]:
+            try:
+                self._system()[0].invalidate_cache()  # others write, too
+                entries = self._system()[0].ls(self._path(below), detail=True)
+            except FileNotFoundError:
+                return {}
+            return {e["name"].rstrip("/").rpartition("/")[2]: int(e["size"]) for e in entries if e["type"] == "file"}
+
+        return self._reading(below, work, "be listed")
+
+    def copy(self, source: str, target: str) -> None:
+        """See :meth:`Storage.copy`."""
+        self._writing(target, lambda: self._system()[0].copy(self._path(source), self._path(target)))
+
+    def remove(self, names: Iterable[str]) -> None:
+        """See :meth:`Storage.remove`."""
+        system, paths = self._system()[0], [self._path(name) for name in names]
+        for first in range(0, len(paths), 1000):  # so many are one request to S3
+            piece = paths[first : first + 1000]
+
+            def work(piece: list[str] = piece) -> None:
+                try:
+                    system.rm(piece)
+                except FileNotFoundError:
+                    for path in piece:
+                        if system.exists(path):
+                            system.rm_file(path)
+
+            self._writing("", work)

@@ -1,0 +1,290 @@
+"""The tasks of a run on a Ray cluster: nodes and processes may die at any time, and their tasks are done elsewhere.
+
+Where the dataset lies in a folder, one actor on the driver's machine hands its files to the nodes and takes theirs: the
+nodes need not see that folder. Where it lies at a URL, or in a folder named by ``file://``, each node uses it directly.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from importlib.metadata import version
+from typing import Any, BinaryIO, TypeVar
+
+from artsim.common.extras import needs
+from artsim.common.storage import FolderStorage, Place, Storage, storage_of
+from artsim.datasets.versions import VERSIONS_OF
+from artsim.datasets.worker import Worker, answer, become
+from artsim.datasets.worker_pool import WorkerLost
+from artsim.errors import ArtsimError, ConfigError
+
+K = TypeVar("K")
+T = TypeVar("T")
+
+_ATTEMPTS = 4
+"""Of a task whose process or node dies: one object that kills its process is told from a cluster that loses nodes."""
+_QUEUED = 2
+"""Tasks for each processor of the cluster: while one is done, the next is on its way."""
+_LOOK = 5.0
+"""Seconds between two looks at how many processors there are."""
+_WHOLE_FILE = 1 << 31
+
+
+class RayPool:
+    """A cluster as the workers of a run; a context manager.
+
+    Parameters
+    ----------
+    place : path, str or Storage
+        Of the dataset.
+    address : str
+        "auto" for the cluster that this machine belongs to, "local" to start one here, or HOST:PORT of its head.
+
+    Raises
+    ------
+    ConfigError
+        When Ray is not installed, or there is no cluster.
+    """
+
+    def __init__(self, place: Place, address: str):
+        with needs("generation on Ray"):
+            import ray
+        self._ray, self.storage = ray, storage_of(place)
+        self._own = not ray.is_initialized()
+        if self._own:
+            _connect(ray, address)
+        self._run = uuid.uuid4().hex
+        self._pending: dict[Any, tuple[Any, tuple[Any, ...], int]] = {}
+        self._processors, self._looked = 1, -_LOOK
+        here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
+            ray.get_runtime_context().get_node_id(), soft=False
+        )
+        hub = ray.remote(num_cpus=0, max_concurrency=8, scheduling_strategy=here)(_Hub)
+        self._hub = hub.remote(_absolute(self.storage))
+        relayed = isinstance(place, FolderStorage) or not isinstance(self.storage, FolderStorage)
+        self._seen = self.storage if relayed else RelayStorage(self._hub, self.storage.place)
+        self._task = ray.remote(num_cpus=1, max_retries=0)(_do)
+        self._versions = {name: version(name) for name in VERSIONS_OF}
+
+    def run(
+        self,
+        work: Callable[..., T],
+        tasks: Iterable[tuple[K, tuple[Any, ...]]],
+        limit: float | None = None,
+        progress: Callable[[int], object] = lambda count: None,
+    ) -> Iterator[tuple[K, T | WorkerLost]]:
+        """Do tasks, in any order; see :meth:`artsim.datasets.worker_pool.WorkerPool.run`.
+
+        A task whose process or node dies is done again, four times at most; the time limit ends its process.
+        """
+        waiting, again = iter(tasks), deque[tuple[Any, tuple[Any, ...], int]]()
+        while True:
+            while len(self._pending) < _QUEUED * self._cluster():
+                task = again.popleft() if again else next(((*task, 1) for task in waiting), None)
+                if task is None:
+                    break
+                self._give(work, task, limit)
+            if not self._pending:
+                return
+            for ref in self._finished():
+                key, arguments, attempt = self._pending.pop(ref)
+                try:
+                    kind, value, count = self._ray.get(ref)
+                except self._ray.exceptions.RayError as error:
+                    late = self._ray.get(self._hub.late.remote(f"{key}"))
+                    if late is not None or attempt == _ATTEMPTS:
+                        yield key, WorkerLost(late or f"its process died {attempt} times ({type(error).__name__})")
+                    else:
+                        again.append((key, arguments, attempt + 1))
+                    continue
+                if kind == "failed":
+                    raise value
+                progress(count)
+                yield key, value
+
+    def _finished(self) -> list[Any]:
+        refs = list(self._pending)
+        first, _ = self._ray.wait(refs, num_returns=1, timeout=1.0)
+        return self._ray.wait(refs, num_returns=len(refs), timeout=0)[0] if first else []
+
+    def _give(self, work: Callable[..., Any], task: tuple[Any, tuple[Any, ...], int], limit: float | None) -> None:
+        about = self._run, self._seen, self._hub, self._versions
+        self._pending[self._task.remote(about, work, f"{task[0]}", task[1], limit)] = task
+
+    def _cluster(self) -> int:
+        """Processors of the cluster: nodes come and go."""
+        if time.monotonic() >= self._looked + _LOOK:
+            self._processors = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+            self._looked = time.monotonic()
+        return self._processors
+
+    def __enter__(self) -> RayPool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for ref in self._pending:
+            with contextlib.suppress(Exception):  # the cluster may be gone
+                self._ray.cancel(ref, force=True)
+        with contextlib.suppress(Exception):
+            self._ray.kill(self._hub)
+        if self._own:
+            self._ray.shutdown()
+
+
+def _connect(ray: Any, address: str) -> None:
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing here calls home
+    # Its next version leaves such variables alone of itself; the warning that it will is not for our users.
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    try:
+        more = {"include_dashboard": False} if address == "local" else {}
+        ray.init(address=address, log_to_driver=False, logging_level="ERROR", **more)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        raise ConfigError(
+            f"there is no Ray cluster ({error!s:.200})", f"--ray {address}",
+            "start one with: ray start --head; or use --ray local",
+        ) from error  # fmt: skip
+
+
+def _absolute(storage: Storage) -> Storage:
+    """A folder, wherever the process that uses it runs."""
+    return FolderStorage(storage.folder.absolute()) if isinstance(storage, FolderStorage) else storage
+
+
+class _Hub:
+    """What nodes ask the driver's machine for; an actor there."""
+
+    def __init__(self, storage: Storage):
+        self.storage = storage
+        self._late: dict[str, str] = {}
+
+    def do(self, method: str, *arguments: Any) -> tuple[str, Any]:
+        """Call a method of the storage."""
+        return answer(getattr(self.storage, method), arguments)
+
+    def is_late(self, key: str, why: str) -> None:
+        """Note why a task is given up."""
+        self._late[key] = why
+
+    def late(self, key: str) -> str | None:
+        """Why a task was given up, if it was."""
+        return self._late.pop(key, None)
+
+
+class RelayStorage:
+    """A storage that another machine has access to.
+
+    Parameters
+    ----------
+    hub : actor
+    place : str
+        As the other machine calls it.
+    """
+
+    def __init__(self, hub: Any, place: str):
+        self._hub, self.place = hub, place
+
+    def _ask(self, method: str, *arguments: Any) -> Any:
+        import ray
+
+        kind, value = ray.get(self._hub.do.remote(method, *arguments))
+        if kind == "failed":
+            raise value
+        return value
+
+    def read(self, name: str, most: int) -> bytes:
+        """See :meth:`artsim.common.storage.Storage.read`; likewise below."""
+        data: bytes = self._ask("read", name, most)
+        return data
+
+    def open(self, name: str) -> tuple[BinaryIO, int]:
+        """The whole file, in memory."""
+        data = self.read(name, _WHOLE_FILE)
+        return io.BytesIO(data), len(data)
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a whole file."""
+        self._ask("write", name, data)
+
+    def write_new(self, name: str, data: bytes) -> None:
+        """Write a whole file unless there is one."""
+        self._ask("write_new", name, data)
+
+    def sizes(self, below: str = "") -> dict[str, int]:
+        """Names and sizes of the files in a folder."""
+        found: dict[str, int] = self._ask("sizes", below)
+        return found
+
+    def copy(self, source: str, target: str) -> None:
+        """Let a file be there under another name, too."""
+        self._ask("copy", source, target)
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files."""
+        self._ask("remove", list(names))
+
+
+_here: tuple[str, Worker] | None = None
+"""Run that this process of a node works for, and what it keeps of it between tasks."""
+
+
+def _do(
+    about: tuple[str, Storage, Any, dict[str, str]],
+    work: Callable[..., Any],
+    key: str,
+    arguments: tuple[Any, ...],
+    limit: float | None,
+) -> tuple[str, Any, int]:
+    """Do a task in a process of a node: what :func:`artsim.datasets.worker.answer` says, and how much was done."""
+    global _here
+    run, storage, hub, versions = about
+    counts: list[int] = []
+    if _here is None or _here[0] != run:
+        difference = _difference(versions)
+        if difference is not None:
+            return "failed", difference, 0
+        _here = run, Worker(storage, counts.append, bool)
+    worker = _here[1]
+    worker.tell = counts.append
+    become(worker)
+    with _within(limit, lambda why: hub.is_late.remote(key, why)):
+        kind, value = answer(work, arguments)
+    return kind, value, sum(counts)
+
+
+def _difference(versions: dict[str, str]) -> ArtsimError | None:
+    """The error of a node that has other versions than the driver: its bytes could be others."""
+    for name, wanted in versions.items():
+        if version(name) != wanted:
+            return ConfigError(
+                f"a node has {name} {version(name)}, the driver {wanted}", os.uname().nodename,
+                f"install the same on every node: pip install {name}=={wanted}",
+            )  # fmt: skip
+    return None
+
+
+@contextlib.contextmanager
+def _within(limit: float | None, tell: Callable[[str], Any]) -> Iterator[None]:
+    """End this process where the block takes longer than some seconds, after telling so."""
+    if limit is None:
+        yield
+        return
+
+    def end() -> None:
+        import ray
+
+        ray.get(tell(f"it took over {limit:g} s"))
+        os._exit(1)
+
+    timer = threading.Timer(limit, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
