@@ -36,7 +36,7 @@ _FIXES = {
     "sapien": f"{install_command('sapien')}, then scripts/install-vulkan.sh as root",
     "maniskill": f"{install_command('maniskill')}, then scripts/install-vulkan.sh as root",
     "warp": install_command("warp"),
-    "ray": "none needed: artsim's own processes make its data; pip install ray to spread code of yours over machines",
+    "ray": install_command("ray"),
     "torch": install_command("train"),
 }
 

@@ -123,7 +123,7 @@ def memory(pid: int) -> int:
 def files(pid: int) -> int:
     """Open files of a process; 0 once it is gone."""
     try:
-        return len(os.listdir(f"/proc/{pid}/fd"))
+        return len(list(Path(f"/proc/{pid}/fd").iterdir()))
     except OSError:
         return 0
 

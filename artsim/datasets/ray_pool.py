@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import socket
 import threading
 import time
 import uuid
@@ -33,6 +34,8 @@ _QUEUED = 2
 """Tasks for each processor of the cluster: while one is done, the next is on its way."""
 _LOOK = 5.0
 """Seconds between two looks at how many processors there are."""
+_ANSWER = 10.0
+"""Seconds that the head of a cluster has to answer."""
 _WHOLE_FILE = 1 << 31
 
 
@@ -143,8 +146,11 @@ def _connect(ray: Any, address: str) -> None:
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     try:
         more = {"include_dashboard": False} if address == "local" else {}
+        if ":" in address:  # where nobody listens, Ray would try for minutes
+            host, _, port = address.rpartition(":")
+            socket.create_connection((host, int(port)), _ANSWER).close()
         ray.init(address=address, log_to_driver=False, logging_level="ERROR", **more)
-    except (ConnectionError, RuntimeError, ValueError) as error:
+    except (OSError, RuntimeError, ValueError) as error:
         raise ConfigError(
             f"there is no Ray cluster ({error!s:.200})", f"--ray {address}",
             "start one with: ray start --head; or use --ray local",
