@@ -193,7 +193,7 @@ def _warp() -> tuple[str, float | None]:
 def _ray() -> tuple[str, float | None]:
     import ray
 
-    return f"Ray {ray.__version__} is installed; nothing in artsim needs it", None
+    return f"Ray {ray.__version__}, for generate.py --ray", None
 
 
 def _torch_device() -> str:

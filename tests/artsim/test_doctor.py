@@ -42,7 +42,7 @@ def pretend(monkeypatch: pytest.MonkeyPatch, folder: Path, module: str, source: 
     ("module", "backend", "mend"),
     [("torch", "torch", "[train]"), ("pybullet", "pybullet", "[pybullet]"),
      ("mani_skill", "maniskill", "[maniskill]"), ("sapien", "sapien", "[sapien]"),
-     ("warp", "warp", "[warp]"), ("ray", "ray", "none needed")],
+     ("warp", "warp", "[warp]"), ("ray", "ray", "[ray]")],
 )  # fmt: skip
 def test_what_is_not_installed_is_named_with_its_mend(
     module: str, backend: str, mend: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
