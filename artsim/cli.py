@@ -60,7 +60,7 @@ class Generate:
     """Seed of the first procedural object; the others count up from it."""
     having: Having = ()
     objects: tuple[Path, ...] = ()
-    """URDF, MJCF or USD files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
+    """URDF, MJCF, USD and joint files, object folders, or folders of them (such as an unpacked PartNet-Mobility)."""
     num_samples: int = 1000
     """Samples in all; every object gets about the same number."""
     seed: int = 0
@@ -280,7 +280,7 @@ class View:
     """
 
     path: tyro.conf.Positional[Path]
-    """Dataset folder, or an object: URDF, MJCF or USD file, or its folder."""
+    """Dataset folder, or an object: URDF, MJCF, USD, GLB or joint file, or its folder."""
     out: Path | None = None
     """PNG to write; by default contact_sheet.png in the dataset folder, or <object>.png here."""
     samples: int = 12
@@ -363,7 +363,7 @@ class Inspect:
     """Print an object's tree, joints, limits, boxes, and what was mended while loading it."""
 
     path: tyro.conf.Positional[Path]
-    """URDF, MJCF or USD file, or its folder."""
+    """URDF, MJCF or USD file, GLB or joint file (mobility_v2.json, motion_attributes.json), or its folder."""
     gates: bool = False
     """Also pass the object through the sim-readiness gates, and list what each finds."""
     package_root: PackageRoots = field(default_factory=dict)

@@ -18,12 +18,12 @@ from artsim.appearance.textures import Image
 from artsim.common.files import read_bounded
 from artsim.errors import AssetError
 from artsim.loading.bodies import merge_fixed_links
+from artsim.loading.documents import read_document
 from artsim.loading.mesh_files import Bounds
 from artsim.loading.mesh_files.obj import read_painted
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
+from artsim.loading.object_files import read_urdf
 from artsim.loading.partnet import read_side_files
-from artsim.loading.urdf import read_urdf
-from artsim.loading.urdf_xml import parse_robot
 from artsim.model.objects import ArticulatedObject
 
 _MAX_PICTURE_BYTES = 50_000_000
@@ -43,11 +43,11 @@ def painted_coats(obj: ArticulatedObject) -> tuple[Coat, ...] | None:
     Returns
     -------
     tuple of Coat or None
-        None where its source is no URDF file that is still there, none of its meshes has materials, or its surface is
-        not made up of the files' triangles one by one.
+        None where its source is no URDF or joint file that is still there, none of its meshes has materials, or its
+        surface is not made up of the files' triangles one by one.
     """
     file = Path(obj.source)
-    if file.suffix != ".urdf" or not file.is_file():
+    if file.suffix not in (".urdf", ".json") or not file.is_file():
         return None
     try:
         meshes = _meshes_of_links(file)
@@ -75,8 +75,8 @@ def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
     """Mesh files of each rigid body, keyed by its links, in the order in which :func:`artsim.load` joins them."""
     limits = LoadLimits()
     side = read_side_files(file)
-    robot, repairs = parse_robot(read_urdf(file, limits.max_urdf_bytes), file, limits.max_links, side.helpers)
     reader = MeshReader(file.parent, {}, limits)
+    robot, repairs, _ = read_document(read_urdf(file, limits.max_urdf_bytes), file, reader, side.helpers)
     links = {link.name: link for link in robot.links}
     found: dict[tuple[str, ...], list[Path]] = {}
     for body in merge_fixed_links(robot, file, repairs):

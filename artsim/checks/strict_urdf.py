@@ -17,7 +17,7 @@ from artsim.common.files import read_bounded
 from artsim.errors import ArtsimError
 from artsim.loading.joint_xml import MOVING_TYPES
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
-from artsim.loading.urdf import find_urdf, read_urdf
+from artsim.loading.object_files import find_urdf, read_urdf
 from artsim.loading.urdf_xml import safe_xml
 from artsim.model.convex_bodies import is_convex
 from artsim.model.kinematics import Array

@@ -18,7 +18,7 @@ from artsim.checks.strict_urdf import (
     strict_urdf,
 )
 from artsim.errors import ArtsimError
-from artsim.loading.urdf import find_urdf, is_urdf
+from artsim.loading.object_files import find_urdf, is_urdf
 from artsim.model.collision import Collision, Sweep
 from artsim.model.convex_bodies import is_convex
 from artsim.model.inertia import part_inertia

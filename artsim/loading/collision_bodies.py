@@ -12,8 +12,8 @@ from lxml import etree
 from artsim.common.products import matmul
 from artsim.loading.bodies import RigidBody, merge_fixed_links
 from artsim.loading.meshes import LoadLimits, MeshReader
+from artsim.loading.object_files import find_urdf, read_urdf
 from artsim.loading.partnet import read_side_files
-from artsim.loading.urdf import find_urdf, read_urdf
 from artsim.loading.urdf_xml import parse_robot, safe_xml
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import ArticulatedObject, Body, Mesh, Part, Repair

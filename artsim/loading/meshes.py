@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from artsim.common.files import read_bounded
 from artsim.errors import AssetError
 from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
+from artsim.loading.mesh_files.gltf import Key, Owner, read_gltf_parts
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
 from artsim.loading.urdf_document import Geometry, MeshFile
@@ -180,6 +181,39 @@ class MeshReader:
         self.notes += [Repair(f"mesh {name!r}", text) for text in surface.notes]
         self._read[path] = surface, contents
         return self._read[path]
+
+    def scene(self, filename: str, owner: Owner[Key]) -> tuple[dict[Key, Surface], list[str]]:
+        """Surfaces of the parts of a glTF file, and names of nodes that belong to none.
+
+        Parameters
+        ----------
+        filename : str
+        owner : callable
+            See :func:`artsim.loading.mesh_files.gltf.read_gltf_parts`.
+
+        Raises
+        ------
+        AssetError
+            When it cannot be read, lies outside the allowed folders, or is over a limit.
+        """
+        path = self.resolve(filename)
+        data = read_bounded(path, self.limits.max_mesh_bytes, "mesh")
+        contents = [data]
+        self._check_bytes(len(data), path)
+
+        def neighbour(beside: str) -> bytes:
+            contents.append(self._beside(path, beside))
+            return contents[-1]
+
+        try:
+            with np.errstate(all="ignore"):  # as for every mesh: numbers out of range are found at the end
+                bounds = Bounds(path, self.limits.max_faces)
+                surfaces, strays, notes = read_gltf_parts(data, bounds, neighbour, owner)
+        except UnusableMeshError as problem:
+            raise AssetError(f"mesh {filename!r} {problem}", path, "export it again as glTF 2.0") from problem
+        self._take(contents, path)
+        self.notes += [Repair(f"mesh {filename!r}", text) for text in notes]
+        return surfaces, strays
 
     def _beside(self, path: Path, name: str) -> bytes:
         """The content of a file that a mesh file names, confined like the mesh file itself."""

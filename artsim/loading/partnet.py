@@ -68,7 +68,8 @@ def read_side_files(file: Path) -> SideFiles:
     """Read what stands beside an object's file, where it exists; broken side files are reported.
 
     These are ``meta.json``, and ``semantics.txt`` and ``mobility_v2.json``, or, of GAPartNet's URDF file, its own
-    annotation. A link that leads out of the folder is reported, not followed.
+    annotation. An annotation of joints in JSON says itself what its parts are. A link that leads out of the folder is
+    reported, not followed.
     """
     folder = file.parent
     contents: list[bytes] = []
@@ -101,8 +102,8 @@ def read_side_files(file: Path) -> SideFiles:
     own = meta.get("artsim")
     own = own if isinstance(own, dict) else {}
 
-    if file.name == GAPARTNET:  # the other files are about the links of mobility.urdf
-        labels = _gapartnet_labels(parsed(_GAPARTNET_LINKS))
+    if file.name == GAPARTNET or file.suffix == ".json":  # the other files are about the links of mobility.urdf
+        labels = _gapartnet_labels(parsed(_GAPARTNET_LINKS)) if file.name == GAPARTNET else {}
         return SideFiles(
             object_id=_word(object_id) if isinstance(object_id, (str, int)) else None,
             category=_word(category) if isinstance(category, str) else None,

@@ -1,4 +1,4 @@
-"""Where objects come from: URDF, MJCF and USD files and folders of them, and the procedural families."""
+"""Where objects come from: files of every format that is read, folders of them, and the procedural families."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make_constrained, source_name
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 from artsim.loading.meshes import LoadLimits
-from artsim.loading.urdf import OTHER_FILES, find_urdf, load, max_bytes, read_urdf
+from artsim.loading.object_files import OTHER_FILES, find_urdf, max_bytes, read_urdf
+from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
 
 
@@ -24,7 +25,7 @@ class FileSource:
     Attributes
     ----------
     path : Path
-        URDF, MJCF or USD file.
+        URDF, MJCF, USD or joint file.
     name : str
         Path from the folder that was named (or holds the file that was) on: stable when that folder moves.
     sha256 : str
@@ -127,9 +128,10 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
     Parameters
     ----------
     paths : sequence of path
-        URDF, MJCF or USD files, object folders, or folders of object folders: below a folder, every ``mobility.urdf``
-        is taken, where there is none, every ``*.urdf``, and where there is none of these, ``mobility.xml`` (MJCF) or
-        ``mobility.usda`` (USD).
+        URDF, MJCF, USD and joint files, object folders, or folders of object folders: below a folder, every
+        ``mobility.urdf`` is taken, where there is none, every ``*.urdf``, and where there is none of these,
+        ``mobility.xml`` (MJCF), ``mobility.usda`` (USD), ``mobility_v3.json``, ``mobility_v2.json`` or
+        ``motion_attributes.json``.
     package_roots : mapping, optional
 
     Raises
@@ -142,7 +144,9 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         if given.is_dir():
             found = _below(given)
             if not found:
-                raise AssetError("no URDF, MJCF or USD file below this folder", given, "name a folder that holds some")
+                raise AssetError(
+                    "no URDF, MJCF, USD or joint file below this folder", given, "name a folder that holds some"
+                )
         else:
             found = [find_urdf(given)]
         for file in found:

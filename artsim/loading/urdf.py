@@ -1,20 +1,18 @@
-"""``artsim.load``: a URDF, MJCF or USD file or a PartNet-Mobility folder becomes an :class:`ArticulatedObject`.
+"""``artsim.load``: a file of joints and shapes, or its folder, becomes an :class:`ArticulatedObject`.
 
-Separate steps: the document is checked and parsed (``urdf_xml``, ``mjcf``, ``usd``), links are merged into rigid bodies
-(``bodies``), their meshes are read (``meshes``), and here joints are rewritten in the rest frame, and the rest state is
-chosen.
+Separate steps: the document is checked and parsed (``documents``), links are merged into rigid bodies (``bodies``),
+their meshes are read (``meshes``), and here joints are rewritten in the rest frame, and the rest state is chosen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.files import read_bounded
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.errors import AssetError
 from artsim.loading.bodies import (
@@ -26,22 +24,17 @@ from artsim.loading.bodies import (
     without_empty_leaves,
 )
 from artsim.loading.described_bodies import with_described_bodies
-from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_shapes, merge_shapes
-from artsim.loading.mjcf_xml import is_mjcf
+from artsim.loading.documents import read_document
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, merge_shapes
+from artsim.loading.object_files import category_of_folder, find_urdf, max_bytes, object_id, read_urdf
 from artsim.loading.packages import MissingFileError
-from artsim.loading.partnet import GAPARTNET, read_side_files
+from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
-from artsim.loading.urdf_xml import parse_robot
-from artsim.loading.usd_layers import SUFFIXES
-from artsim.loading.xml_repair import xacro_error
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic, transform_points
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
-
-OTHER_FILES = ("mobility.xml", "mobility.usda", "mobility.usdc", "mobility.usd")
-"""Names of an object's file, in a folder without a URDF file, in MJCF and in USD."""
 
 _FAR = 20.0
 """Times the object's size that no slide goes: a cart on its track goes once, a drawer less."""
@@ -62,8 +55,8 @@ def load(
     Parameters
     ----------
     path : str or Path
-        A URDF, MJCF or USD file, a folder that holds one (such as a PartNet-Mobility folder), or an ``.npz`` object
-        file out of a generated dataset.
+        A URDF, MJCF or USD file, a JSON file of joints (of PartNet-Mobility or Shape2Motion), the glTF file beside one,
+        a folder that holds one of these, or an ``.npz`` object file out of a generated dataset.
     category : str, optional
         Category whose rest state and rest frame are wanted; by default what the side files say, else "unknown", for
         which both are as the file has them.
@@ -93,17 +86,18 @@ def load(
     side = read_side_files(file)
     roots = _roots(package_roots or {})
     reader = MeshReader(file.parent, roots, limits)
-    robot, repairs, contents = _read_document(data, file, reader, side.helpers)
+    robot, repairs, contents = read_document(data, file, reader, side.helpers)
 
     repairs += side.repairs
-    category = canonical_category(category or side.category or "unknown")
+    category = canonical_category(category or side.category or category_of_folder(file) or "unknown")
     bodies = merge_fixed_links(robot, file, repairs)
     _read_geometry(bodies, robot, reader, file, repairs)
     repairs += reader.paths.repairs
-    bodies = join_screws(without_empty_leaves(bodies, repairs), side.helpers, repairs, guessed=not robot.explicit)
+    helpers = (*side.helpers, *robot.helpers)
+    bodies = join_screws(without_empty_leaves(bodies, repairs), helpers, repairs, guessed=not robot.explicit)
     bodies, exported = in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
-    parts = [body.part(side.labels) for body in bodies]
+    parts = [body.part({**robot.labels, **side.labels}) for body in bodies]
     if side.num_movable is not None and len(tree) - 1 != side.num_movable:
         repairs.append(
             Repair("file", f"moves {len(tree) - 1} parts where its annotation lists {side.num_movable}: taken as it is")
@@ -118,7 +112,7 @@ def load(
     repairs += reasons
     repairs += _far_slides(tree, parts)
     return ArticulatedObject(
-        object_id=_object_id(file, side.object_id),
+        object_id=object_id(file, side.object_id),
         category=category,
         parts=tuple(parts),
         native_tree=tree,
@@ -128,28 +122,6 @@ def load(
         source=str(file),
         source_joints=source_joints,
     )
-
-
-def _read_document(
-    data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str]
-) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
-    """Links and joints of a file of any format, what was mended, and what other files it is made of."""
-    limits = reader.limits
-    if file.suffix.lower() in SUFFIXES:
-        from artsim.loading.usd import read_usd
-
-        return read_usd(file, limits)
-    if is_mjcf(data, file):
-        from artsim.loading.mjcf import read_mjcf
-
-        return read_mjcf(data, file, reader, limits)
-    check_shapes(data, file, limits)
-    return *parse_robot(data, file, limits.max_links, helpers), []
-
-
-def max_bytes(file: Path, limits: LoadLimits) -> int:
-    """Size that an object's file may have: that of USD holds its meshes."""
-    return limits.max_mesh_bytes if file.suffix.lower() in SUFFIXES else limits.max_urdf_bytes
 
 
 def _far_slides(tree: KinematicTree, parts: list[Part]) -> list[Repair]:
@@ -168,89 +140,12 @@ def _far_slides(tree: KinematicTree, parts: list[Part]) -> list[Repair]:
     ]
 
 
-def read_urdf(file: Path, max_bytes: int) -> bytes:
-    """The content of an object's file, which lies in its folder once links are followed.
-
-    The folder itself may be reached through links: then its meshes are there, too.
-
-    Raises
-    ------
-    AssetError
-        When it cannot be read, is too large, or is a link that leads out of its folder.
-    """
-    what = "URDF file" if file.suffix == ".urdf" else "object's file"
-    if file.is_symlink() and not file.resolve().is_relative_to(file.parent.resolve()):
-        raise AssetError(
-            f"the {what} is a link that leads out of its folder", file, f"pass the file itself: {file.resolve()}"
-        )
-    return read_bounded(file, max_bytes, what)
-
-
-def is_urdf(file: Path) -> bool:
-    """Whether an object's file is URDF, and not MJCF, USD or an object file.
-
-    Raises
-    ------
-    AssetError
-        When it cannot be read.
-    """
-    if file.suffix.lower() in (".npz", *SUFFIXES):
-        return False
-    return not is_mjcf(read_urdf(file, LoadLimits().max_urdf_bytes), file)
-
-
-def find_urdf(path: Path) -> Path:
-    """The file that a path names: itself, or the URDF file in a folder; without one, its MJCF or USD file.
-
-    Raises
-    ------
-    AssetError
-        When there is none, or several to choose from.
-    """
-    try:
-        if path.is_file():
-            return path
-        found_folder = path.is_dir()
-    except OSError:  # a name that is too long for the system
-        found_folder = False
-    if not found_folder:
-        raise AssetError("no such file or folder", path, "pass a URDF, MJCF or USD file, or a folder that holds one")
-    for mobility in (path / "mobility.urdf", path / GAPARTNET):
-        if mobility.is_file():
-            return mobility
-    found = sorted(p for p in path.glob("*.urdf") if p.is_file())
-    if len(found) == 1:
-        return found[0]
-    if not found:
-        other = next((path / name for name in OTHER_FILES if (path / name).is_file()), None)
-        if other is not None:
-            return other
-        macros = sorted(path.glob("*.xacro"))
-        if macros:
-            raise xacro_error("the folder holds no URDF file, but macros", macros[0])
-        raise AssetError("the folder holds no URDF file", path, "pass a folder with a mobility.urdf or one *.urdf")
-    raise AssetError(f"the folder holds {len(found)} URDF files", path, f"pass one of them, such as {found[0].name}")
-
-
 def _roots(declared: Mapping[str, str | Path]) -> dict[str, Path]:
     roots = {name: Path(folder).expanduser().absolute() for name, folder in declared.items()}
     for name, folder in roots.items():
         if not folder.is_dir():
             raise AssetError("no such folder", f"package root {name}={folder}", "name the folder of the package")
     return roots
-
-
-def _object_id(file: Path, annotated: str | None) -> str:
-    """PartNet-Mobility's own number is the folder's name; ``meta.json`` may carry an older one."""
-    if file.stem != "mobility" and file.name != GAPARTNET:
-        return _encodable(file.stem)
-    folder = file.resolve().parent.name
-    return _encodable(folder) if folder.isdigit() or annotated is None else annotated
-
-
-def _encodable(name: str) -> str:
-    """A file's name as text that can be written; names of files may be any bytes."""
-    return name.encode("utf-8", "replace").decode("utf-8")
 
 
 def _read_geometry(

@@ -5,7 +5,8 @@ Other formats are written as the same links and joints.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,8 +175,14 @@ class UrdfRobot:
     explicit : bool
         Whether it says of every joint that follows another that it does. PartNet-Mobility's URDF files leave it unsaid
         how far a screw goes for each turn.
+    labels : mapping of str to str
+        What links are, where the document says so.
+    helpers : tuple of str
+        Links without a shape between the two joints of a screw.
     """
 
     links: tuple[UrdfLink, ...]
     joints: tuple[UrdfJoint, ...]
     explicit: bool = False
+    labels: Mapping[str, str] = field(default_factory=dict)
+    helpers: tuple[str, ...] = ()

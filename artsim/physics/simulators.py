@@ -28,7 +28,8 @@ from lxml import etree
 
 from artsim.common.extras import needs
 from artsim.errors import ArtsimError
-from artsim.loading.urdf import find_urdf, load
+from artsim.loading.object_files import find_urdf
+from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject

@@ -26,7 +26,7 @@ class Vary:
     """
 
     path: tyro.conf.Positional[Path]
-    """URDF, MJCF or USD file, or its folder."""
+    """URDF, MJCF, USD, GLB or joint file, or its folder."""
     out: Path
     """Folder to write to; made if missing."""
     count: int = 10

@@ -26,8 +26,9 @@ from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.loading.collision_bodies import read_bodies
+from artsim.loading.object_files import find_urdf, is_urdf
 from artsim.loading.sources import find_sources
-from artsim.loading.urdf import find_urdf, is_urdf, load
+from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.objects import ArticulatedObject
 from artsim.variation.operations import OPERATIONS
@@ -117,7 +118,7 @@ def write_variations(
     Parameters
     ----------
     path : path
-        URDF, MJCF or USD file, or its folder.
+        URDF, MJCF, USD, GLB or joint file, or its folder.
     out : path
         Folder; made if missing. Each variation goes to a folder of its own, named by its seed.
     count : int

@@ -294,6 +294,7 @@ def corpus() -> tuple[Seed, ...]:
 
 def _seeds(folder: Path) -> Iterator[Seed]:
     yield from _robots()
+    yield from _joints()
     yield from _meshes()
     yield from _clouds()
     yield from _pictures()
@@ -337,6 +338,42 @@ def _meshes() -> Iterator[Seed]:
     for name, (suffix, content, form) in contents.items():
         files = {"mobility.urdf": _MESH_ROBOT.format(suffix).encode(), f"m.{suffix}": content}
         yield Seed("mesh", name, files, f"m.{suffix}", form)
+
+
+def _joints() -> Iterator[Seed]:
+    """Annotations of joints in JSON, and what says which meshes they are about."""
+    import trimesh
+
+    axis = {"origin": [0, 0, None], "direction": [0, 1, 0]}
+    turn = {"axis": axis, "limit": {"a": 90, "b": -10, "noLimit": False}}
+    screw = {"axis": axis, "limit": {"a": 0, "b": 0.2, "noLimit": False, "rotates": True, "rotationLimit": 720}}
+    rows: list[dict[str, Any]] = [
+        {"id": 0, "parent": -1, "joint": "static", "name": "body", "parts": [{"id": 7, "name": "frame"}]},
+        {"id": 1, "parent": 0, "joint": "hinge", "name": "door", "parts": [{"id": 8, "name": "board"}]},
+        {"id": 2, "parent": 1, "joint": "slider", "name": "knob", "parts": [{"id": 9, "name": "knob"}]},
+        {"id": 3, "parent": -1, "joint": "junk", "name": "other", "parts": []},
+    ]
+    rows[1]["jointData"], rows[2]["jointData"] = turn, screw
+    leaves = [{"id": part, "name": "x", "objs": [f"o{part}"]} for part in (7, 8, 9)]
+    tree = json.dumps([{"id": 1, "name": "root", "children": leaves}]).encode()
+    files = {"mobility_v2.json": json.dumps(rows).encode(), "result.json": tree}
+    files |= {f"textured_objs/o{part}.obj": _OBJ for part in (7, 8, 9)}
+    yield Seed("joints", "version_2", files, "mobility_v2.json", "json")
+    yield Seed("joints", "result", files, "result.json", "json")
+    scene = trimesh.Scene()
+    for part in (7, 8, 9):
+        scene.add_geometry(trimesh.creation.box((1, 2, part)), node_name=f"{part}_0", geom_name=f"{part}_0")
+    version_3 = json.dumps({"partnet": [], "mobility": rows}).encode()
+    whole = {"mobility_v3.json": version_3, "model.glb": scene.export(file_type="glb")}
+    yield Seed("joints", "version_3", whole, "mobility_v3.json", "json")
+    yield Seed("joints", "glb", whole, "model.glb", "glb")
+    child = {"dof_name": "d_1", "motion_type": "rotation", "center": [0, 0, 1], "direction": [0, 1, 0], "children": []}
+    node = {**child, "dof_name": "dof_rootd", "motion_type": "none", "children": [child]}
+    meshes = {f"part_objs/{name}.obj": _OBJ for name in ("none_motion", "d_1")}
+    yield Seed(
+        "joints", "shape2motion", {"motion_attributes.json": json.dumps(node).encode(), **meshes},
+        "motion_attributes.json", "json",
+    )  # fmt: skip
 
 
 def _tetrahedron() -> tuple[list[list[float]], list[list[int]]]:

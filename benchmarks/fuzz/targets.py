@@ -36,6 +36,12 @@ def _urdf(folder: Path) -> None:
     _check_object(artsim.load(min(folder.glob("mobility.*"))))
 
 
+def _joints(folder: Path) -> None:
+    import artsim
+
+    _check_object(artsim.load(folder))
+
+
 def _object(folder: Path) -> None:
     import artsim
 
@@ -119,6 +125,7 @@ class Target:
 TARGETS = {
     "urdf": Target(_urdf, 20),
     "side": Target(_urdf, 4),
+    "joints": Target(_joints, 8),
     "mesh": Target(_urdf, 30),
     "object": Target(_object, 12),
     "cloud": Target(_cloud, 14),

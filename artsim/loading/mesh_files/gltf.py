@@ -7,8 +7,8 @@ frame has y up, but robots' files are exported with their link's frame in it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -38,6 +38,8 @@ _NOT_READ = (0, 1, 2, 3)
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_DEPTH = 500
 
+Key = TypeVar("Key", bound=Hashable)
+
 
 def read_gltf(data: bytes, bounds: Bounds, neighbour: Callable[[str], bytes]) -> Surface:
     """The surface of the scene that a glTF file shows.
@@ -55,6 +57,66 @@ def read_gltf(data: bytes, bounds: Bounds, neighbour: Callable[[str], bytes]) ->
     UnusableMeshError
     AssetError
     """
+    draft = Draft()
+    for _, piece in _scene(data, bounds, neighbour, draft).pieces():
+        draft.add(*piece)
+    return draft.surface()
+
+
+Owner = Callable[[str, Mapping[str, Any]], Key | None]
+"""Says whose a node is by its name and ``extras``; None where it does not tell."""
+
+
+def read_gltf_parts(
+    data: bytes, bounds: Bounds, neighbour: Callable[[str], bytes], owner: Owner[Key]
+) -> tuple[dict[Key, Surface], list[str], tuple[str, ...]]:
+    """The surface of each of the parts that the nodes of a glTF file belong to.
+
+    Parameters
+    ----------
+    data, bounds, neighbour
+        As for :func:`read_gltf`.
+    owner : callable
+        Where it does not tell of a node, what carries the node counts.
+
+    Returns
+    -------
+    surfaces : dict
+        By what ``owner`` gives.
+    strays : list of str
+        Names of nodes that show something and belong to no part.
+    notes : tuple of str
+        What was left out, assumed or mended.
+
+    Raises
+    ------
+    UnusableMeshError
+    AssetError
+    """
+    whole = Draft()
+    scene = _scene(data, bounds, neighbour, whole)
+    drafts: dict[Key, Draft] = {}
+    strays: dict[str, None] = {}
+    for line, piece in scene.pieces():
+        told = (owner(str(node.value.get("name", "")), _extras(node)) for node in line)
+        own = next((key for key in told if key is not None), None)
+        if own is None:
+            strays[quote_name(line[0].value.get("name", "without a name"))] = None
+            continue
+        drafts.setdefault(own, Draft()).add(*piece)
+        whole.add(*piece)
+    surfaces = {key: draft.surface() for key, draft in drafts.items()}
+    notes = whole.surface().notes if surfaces else tuple(whole.notes)
+    return surfaces, list(strays), notes
+
+
+def _extras(node: Items) -> Mapping[str, Any]:
+    extras = node.value.get("extras")  # anything, by glTF
+    return extras if isinstance(extras, dict) else {}
+
+
+def _scene(data: bytes, bounds: Bounds, neighbour: Callable[[str], bytes], draft: Draft) -> _Scene:
+    """The scene of a file."""
     text, chunk = _chunks(data)
     try:
         root = parse_json(text)
@@ -64,10 +126,7 @@ def read_gltf(data: bytes, bounds: Bounds, neighbour: Callable[[str], bytes]) ->
         raise UnusableMeshError("its JSON is no glTF")
     document = Items(root)
     _check_version(document)
-    draft = Draft()
-    scene = _Scene(document, Buffers(document, chunk, neighbour, bounds), bounds, draft)
-    scene.read()
-    return draft.surface()
+    return _Scene(document, Buffers(document, chunk, neighbour, bounds), bounds, draft)
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
@@ -114,10 +173,11 @@ class _Scene:
         self._document, self._buffers, self._bounds, self._draft = document, buffers, bounds, draft
         self._meshes: dict[tuple[int, tuple[float, ...]], tuple[Array, Indices]] = {}
         self._nodes = document.list("nodes")
+        self._carrier: dict[int, Items] = {}
         self._num_primitives = 0
 
-    def read(self) -> None:
-        """Count what the scene shows, then read it."""
+    def pieces(self) -> Iterator[tuple[list[Items], tuple[Array, Indices]]]:
+        """Count what the scene shows, then read it: each piece with its node, and the nodes that carry that."""
         shown = self._shown()
         copies = [self._placements(node, T) for node, T in shown]
         self._bounds.check_pieces(sum(map(len, copies)))
@@ -128,11 +188,12 @@ class _Scene:
         meshes = [self._mesh(node) for node, _ in shown]
         sizes = [len(vertices) * len(places) for (vertices, _), places in zip(meshes, copies, strict=True)]
         self._bounds.check(sum(sizes), "vertices")
-        for (vertices, faces), places in zip(meshes, copies, strict=True):
+        self._tell_unseen([node for node, _ in shown])
+        for (node, _), (vertices, faces), places in zip(shown, meshes, copies, strict=True):
             self._draft.accounted += len(faces) * len(places)
             for T in places:
-                self._draft.add(transform_affine(T, vertices), faces[:, ::-1] if mirrors(T) else faces)
-        self._tell_unseen([node for node, _ in shown])
+                piece = transform_affine(T, vertices), faces[:, ::-1] if mirrors(T) else faces
+                yield self._line(node), piece
 
     def _shown(self) -> list[tuple[Items, Array]]:
         """Each node with a mesh in the scene, and the transform to the file's frame."""
@@ -149,8 +210,17 @@ class _Scene:
             if "mesh" in node.value:
                 shown.append((node, T))
                 self._bounds.check_pieces(len(shown))
-            waiting += [(integer(child, len(self._nodes)), T, depth + 1) for child in reversed(node.array("children"))]
+            for child in reversed(node.array("children")):
+                waiting.append((integer(child, len(self._nodes)), T, depth + 1))
+                self._carrier[id(self._nodes[waiting[-1][0]].value)] = node
         return shown
+
+    def _line(self, node: Items) -> list[Items]:
+        """A node, what carries it, and so on to the root."""
+        line = [node]
+        while id(line[-1].value) in self._carrier:
+            line.append(self._carrier[id(line[-1].value)])
+        return line
 
     def _roots(self) -> list[int]:
         scenes = self._document.list("scenes")

@@ -1,0 +1,83 @@
+"""An object's file of any format as the links and joints of a URDF document."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from artsim.common.files import parse_json
+from artsim.errors import AssetError
+from artsim.loading.akb48 import with_meshes_of_unity
+from artsim.loading.meshes import MeshReader, check_shapes
+from artsim.loading.mjcf_xml import is_mjcf
+from artsim.loading.mobility_json import is_mobility, read_mobility
+from artsim.loading.object_files import UNITY
+from artsim.loading.shape2motion import is_shape2motion, read_shape2motion
+from artsim.loading.urdf_document import UrdfRobot
+from artsim.loading.urdf_xml import parse_robot
+from artsim.loading.usd_layers import SUFFIXES
+from artsim.model.objects import Repair
+
+
+def read_document(
+    data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str]
+) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
+    """Links and joints of a file of any format.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the file.
+    file : Path
+    reader : MeshReader
+        Reads its meshes.
+    helpers : sequence of str
+        Links that are known to be without a shape.
+
+    Returns
+    -------
+    robot : UrdfRobot
+    repairs : list of Repair
+    contents : list of bytes
+        Of other files that it is made of, but for meshes.
+
+    Raises
+    ------
+    AssetError
+        When the file cannot be read.
+    ConfigError
+        When MuJoCo (MJCF) or usd-core (USD) is not installed.
+    """
+    limits = reader.limits
+    if file.suffix.lower() in SUFFIXES:
+        from artsim.loading.usd import read_usd
+
+        return read_usd(file, limits)
+    if file.suffix.lower() == ".json":
+        return _read_json(data, file, reader)
+    if is_mjcf(data, file):
+        from artsim.loading.mjcf import read_mjcf
+
+        return read_mjcf(data, file, reader, limits)
+    check_shapes(data, file, limits)
+    robot, repairs = parse_robot(data, file, limits.max_links, helpers)
+    if file.name == UNITY:
+        robot = with_meshes_of_unity(robot, repairs)
+    return robot, repairs, []
+
+
+def _read_json(data: bytes, file: Path, reader: MeshReader) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
+    """Links and joints of an annotation in JSON, told by what it holds."""
+    try:
+        document = parse_json(data)
+    except ValueError as error:
+        raise AssetError(f"it is not JSON ({error})", file, "restore the file, or make it again") from error
+    if is_mobility(document):
+        return read_mobility(document, file, reader)
+    if is_shape2motion(document):
+        return read_shape2motion(document, file, reader)
+    raise AssetError(
+        "it is JSON, but tells of no joints that are read",
+        file,
+        "pass PartNet-Mobility's mobility_v2.json or mobility_v3.json, or Shape2Motion's motion_attributes.json",
+    )
