@@ -36,7 +36,7 @@ from artperl.evaluation.metrics import rest_centers, true_poses
 from artperl.evaluation.pictures import overlays
 from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS, samples_of
 from artperl.methods.full import Estimator
-from artperl.perception.network import Perceived
+from artperl.perception.network import Perceived, Votes
 from artsim.common.files import atomic_file, write_atomic
 from artsim.common.progress import track
 from artsim.errors import ConfigError
@@ -79,13 +79,14 @@ class Told(Estimator):
 
     sample: Sample
 
-    def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
+    def perceive(self, clouds: Clouds, clock: Clock) -> tuple[Perceived | Votes, Array]:
         """What is perceived, but for the parts."""
-        perceived = super().perceive(clouds, clock)
+        perceived, own = super().perceive(clouds, clock)
+        assert isinstance(perceived, Perceived), "categories have named parts"
         metres = (clouds.points[0] * clouds.scale + clouds.center).cpu().numpy()
         part = torch.from_numpy(self.sample.part[cKDTree(self.sample.points).query(metres)[1]].astype(np.int64))
         true = torch.nn.functional.one_hot(part, perceived.part_logits.shape[-1]).to(perceived.part_logits)
-        return replace(perceived, part_logits=_SURE * true[None])
+        return replace(perceived, part_logits=_SURE * true[None]), own
 
 
 def main(options: Options) -> None:

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.core.batch import Batch
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate, points_at_rest
+from artperl.core.kd_tree import KDTree
+from artperl.core.neighbours import planes
 from artperl.perception.network import Perceived
 from artperl.perception.preprocess import Cloud
 
@@ -134,11 +135,9 @@ class Evidence(Batch):
 
 def roughness(points: Tensor) -> Tensor:
     """() median distance, root mean square, of some of the points (N, 3) and their neighbours from planes, metres."""
-    cloud = points.numpy()
-    tree = cKDTree(cloud, balanced_tree=False)
-    index = tree.query(cloud[:_LOOKED_AT], range(1, min(_NEIGHBOURS, len(cloud)) + 1))[1]
-    near = points[torch.from_numpy(index)]
-    return torch.linalg.svdvals(near - near.mean(1, keepdim=True))[:, -1].median() / near.shape[1] ** 0.5
+    cloud, count = points.double().numpy(), min(_NEIGHBOURS, len(points))
+    spread = planes(cloud, KDTree.of(cloud).nearest(cloud[:_LOOKED_AT], count)[1])[0]
+    return torch.from_numpy(np.sqrt(spread[:, 0].clip(min=0.0) / count)).median().to(points.dtype)
 
 
 def _candidates(

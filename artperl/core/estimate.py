@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from torch import Tensor
 
 from artperl.core.confidence import PartSymptoms, Symptoms
+from artperl.core.kd_tree import KDTree
 from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
@@ -190,7 +190,7 @@ def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
     seen = np.zeros(len(points))
     cloud, part = observed.points[0].numpy(), observed.part[0].numpy()
     for k in np.unique(part):
-        near = cKDTree(cloud[part == k]).query(points[k], distance_upper_bound=_SEEN * float(shapes.diagonal[0]))[0]
+        near = KDTree.of(cloud[part == k]).nearest(points[k], 1, _SEEN * float(shapes.diagonal[0]))[0]
         seen[k] = np.isfinite(near).mean()
     return seen
 

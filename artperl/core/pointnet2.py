@@ -67,13 +67,16 @@ class Neighbourhoods:
     @staticmethod
     @torch.no_grad()
     @exact
-    def of(points: Tensor, sizes: Sequence[int], neighbours: int) -> Neighbourhoods:
-        """Neighbourhoods of (B, N, 3) clouds in random order, with ``sizes`` points at the coarser levels."""
+    def of(points: Tensor, sizes: Sequence[int], neighbours: Sequence[int]) -> Neighbourhoods:
+        """Neighbourhoods of (B, N, 3) clouds in random order, with ``sizes`` points at the coarser levels.
+
+        Each of these has so many neighbours.
+        """
         levels, down, up = [points], [], []
-        for size in sizes:
+        for size, count in zip(sizes, neighbours, strict=True):
             fine = levels[-1]
             coarse = fine[:, :size]
-            down.append(nearest_points(coarse, fine, min(neighbours, fine.shape[1]))[1])
+            down.append(nearest_points(coarse, fine, min(count, fine.shape[1]))[1])
             squared, index = nearest_points(fine, coarse, min(3, coarse.shape[1]))
             weight = 1.0 / (squared + 1e-8)
             up.append((weight / weight.sum(2, keepdim=True), index))
@@ -158,24 +161,33 @@ class PointNet2(nn.Module):
         )
         self.point_channels, self.cloud_channels = width, channels[-1]
 
-    def forward(self, points: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, points: Tensor, standard: int = 0) -> tuple[Tensor, Tensor]:
         """Features of clouds.
+
+        A cloud with fewer points than the standard gives the features of one that repeats its points until there are so
+        many: the coarser levels keep as many points as they can, and neighbourhoods reach as far.
 
         Parameters
         ----------
         points : (B, N, 3) float
             Centred, of unit radius, in random order.
+        standard : int
+            Points that clouds have as a rule.
 
         Returns
         -------
         (B, N, point_channels) and (B, cloud_channels)
         """
-        neighbours = max(_FEWEST, points.shape[1] // _NEIGHBOURHOOD)
-        sizes = [max(1, points.shape[1] // _COARSER ** (level + 1)) for level in range(len(self.down))]
-        near = Neighbourhoods.of(points, sizes, neighbours)
+        count = points.shape[1]
+        full = max(count, standard)
+        neighbours = max(_FEWEST, full // _NEIGHBOURHOOD)
+        nominal = [max(1, full // _COARSER**level) for level in range(len(self.down) + 1)]
+        sizes = [min(count, size) for size in nominal]
+        own = [max(1, round(neighbours * size / most)) for size, most in zip(sizes[:-1], nominal[:-1], strict=True)]
+        near = Neighbourhoods.of(points, sizes[1:], own)
         features = [self.stem(points)]
         for level, layer in enumerate(self.down):
-            radius = (neighbours / near.points[level].shape[1]) ** 0.5
+            radius = (neighbours / nominal[level]) ** 0.5
             features.append(layer(features[-1], near.points[level], near.points[level + 1], near.down[level], radius))
         cloud = self.whole(features[-1]).amax(1)
         decoded = torch.cat([features[-1], cloud[:, None].expand(-1, features[-1].shape[1], -1)], dim=-1)

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from artperl.core.kd_tree import KDTree
 from artperl.core.neighbours import planes
 from artperl.core.pose import Theta, clamp_state, pose_parts
 from artperl.core.rotations import rotation_from_vector
@@ -43,8 +43,7 @@ def normals_of(points: Array) -> tuple[NDArray[np.int64], Array]:
     Normals have either sign.
     """
     count = min(_NEIGHBOURS, len(points))
-    index = cKDTree(points, balanced_tree=False).query(points[:_LOOKED_AT], range(1, count + 1))[1]
-    spread, normal = planes(points[index])
+    spread, normal = planes(points, KDTree.of(points).nearest(points[:_LOOKED_AT], count)[1])
     flat = np.flatnonzero((spread[:, 0] < _FLAT**2 * spread[:, 1]) & (spread[:, 1] > 0.0))
     return flat, normal[flat]
 

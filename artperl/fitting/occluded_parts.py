@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from artperl.core.kd_tree import KDTree
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Shapes
 
@@ -38,7 +38,7 @@ _LESS_LIKELY = 4.0
 class _View:
     """What a camera sees: depths, by where rays meet the plane at depth 1, and how far apart these are there."""
 
-    rays: cKDTree
+    rays: KDTree
     depth: Array
     apart: float
 
@@ -48,8 +48,8 @@ class _View:
         rays, first = np.unique(points[:, :2] / points[:, 2:], axis=0, return_index=True)
         if len(rays) < 2:
             return None
-        tree = cKDTree(rays, balanced_tree=False)
-        return _View(tree, points[first, 2], float(tree.query(rays, [2])[0].mean()))
+        tree = KDTree.of(rays)
+        return _View(tree, points[first, 2], float(np.sqrt(tree.nearest(rays, 2)[0][:, 1]).mean()))
 
     @property
     def density(self) -> float:
@@ -57,9 +57,9 @@ class _View:
         return 0.25 / self.apart**2
 
     def would_show(self, points: Array, margin: float) -> NDArray[np.bool_]:
-        """(...) whether surfaces at points (..., 3) would be seen, beside or before what is seen."""
-        distance, nearest = self.rays.query(points[..., :2] / points[..., 2:])
-        return (distance > _GAP * self.apart) | (points[..., 2] < self.depth[nearest] - margin)
+        """(N,) whether surfaces at points (N, 3) would be seen, beside or before what is seen."""
+        squared, nearest = (values[:, 0] for values in self.rays.nearest(points[:, :2] / points[:, 2:], 1))
+        return (squared > (_GAP * self.apart) ** 2) | (points[:, 2] < self.depth[nearest] - margin)
 
 
 def pose_occluded_parts(shapes: Shapes, theta: Theta, points: Array, part: NDArray[np.int64]) -> Theta:
@@ -116,6 +116,6 @@ def _log_likelihood(shapes: Shapes, theta: Theta, k: int, states: Array, view: _
     # Roots of Poisson counts have a variance of a quarter; half as sure, since surfaces are a reference's.
     likelihood: Array = -0.5 * np.maximum(np.sqrt(more) - np.sqrt(len(own)), 0.0) ** 2
     if len(own):
-        off = np.stack([cKDTree(here).query(own)[0] for here in surface]) / (_OFF * unit)
+        off = np.stack([np.sqrt(KDTree.of(here).nearest(own, 1)[0][:, 0]) for here in surface]) / (_OFF * unit)
         likelihood -= 0.5 * (np.minimum(off, _FAR) ** 2).sum(1)
     return likelihood

@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
+import numpy as np
 import torch
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from artperl.boxes.evidence import BoxContext, Evidence
 from artperl.boxes.network import Boxes
@@ -26,7 +27,7 @@ from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import find_fit
 from artperl.perception.cloud_checks import cloud_warnings
-from artperl.perception.label_smoothing import smooth_labels, smooth_perceived
+from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.perception.part_grouping import group_votes
 from artperl.perception.preprocess import Cloud
@@ -41,6 +42,9 @@ _OWN = 0.9
 the object that is left out is missed by nobody."""
 _MOST_FOREIGN = 0.5
 """Share of points that may be taken for something else; masks as bad as that are no masks of the object."""
+_MOVED = 0.03
+"""Scales of a cloud by which others move its middle, or change its scale, before it is looked at again. Clean clouds
+stay below: of these, single points are taken for something else."""
 
 
 @dataclass(eq=False)
@@ -157,38 +161,36 @@ class Estimator:
     def _perceive_own(self, cloud: Cloud, clock: Clock) -> tuple[Cloud, Clouds, Perceived, float]:
         """The points of the object, what is perceived of them, and the share of the others.
 
-        Points of something else move the middle and the scale of the cloud, by which a network sees it. So it looks
-        again without those that it takes for something else. Where these are most of the cloud, it does not know such
-        an object, and nothing is left out.
+        Points of something else move the middle and the scale of the cloud, by which a network sees it. Where they have
+        moved them, it looks again without those that it takes for something else. Where these are most of the cloud, it
+        does not know such an object, and nothing is left out.
         """
         clouds = Clouds.of(cloud.tensor(self.perception.device))
-        with clock("perception"):
-            first = self.perception(clouds.points)
-        own, share = first.own_logits[0].sigmoid().double().cpu().numpy(), 0.0
+        seen, own = self.perceive(clouds, clock)
         foreign = own < _OWN
-        if foreign.any():
-            with clock("label smoothing"):
-                points, diagonal = clouds.points[0].double().cpu().numpy(), float(first.log_diagonal.exp()[0])
-                foreign = smooth_labels(points, own[:, None], diagonal)[:, 0] < _OWN
-            share = float(foreign.mean())
-        if not 0.0 < share < _MOST_FOREIGN:
-            return cloud, clouds, self._parts(clouds, first, clock), share
-        cloud = cloud.without(foreign, self.options.num_points)
-        clouds = Clouds.of(cloud.tensor(self.perception.device))
-        return cloud, clouds, self.perceive(clouds, clock), share
-
-    def perceive(self, clouds: Clouds, clock: Clock) -> Perceived:
-        """What is perceived of one cloud."""
-        with clock("perception"):
-            seen = self.perception(clouds.points)
-        return self._parts(clouds, seen, clock)
-
-    def _parts(self, clouds: Clouds, seen: Perceived | Votes, clock: Clock) -> Perceived:
-        """What a network has seen of one cloud, smoothed, its votes grouped."""
-        if self.options.label_smoothing:
-            with clock("label smoothing"):
-                seen = smooth_perceived(clouds, seen)
+        share = float(foreign.mean())
+        if 0.0 < share < _MOST_FOREIGN:
+            kept = torch.from_numpy(~foreign).to(clouds.points.device)
+            rest = Clouds.of(clouds.points[:, kept])
+            moved = max(float(torch.linalg.vector_norm(rest.center)), abs(float(rest.scale) - 1.0))
+            if moved > _MOVED:
+                cloud = cloud.without(foreign, self.options.num_points)
+                clouds = Clouds.of(cloud.tensor(self.perception.device))
+                seen, _ = self.perceive(clouds, clock)
+            else:
+                cloud, seen = cloud.keep(~foreign), seen.of_points(kept)
+                clouds = replace(clouds, points=clouds.points[:, kept])
         if not isinstance(seen, Votes):
-            return seen
+            return cloud, clouds, seen, share
         with clock("part grouping"):
-            return group_votes(seen)
+            return cloud, clouds, group_votes(seen), share
+
+    def perceive(self, clouds: Clouds, clock: Clock) -> tuple[Perceived | Votes, NDArray[np.float64]]:
+        """What a network sees of one cloud, smoothed; and the probability of each point to be of the object."""
+        with clock("perception"):
+            seen = self.perception(clouds.points, self.options.num_points)
+            own = seen.own_logits[0].sigmoid().double().cpu().numpy()
+        if not (self.options.label_smoothing or (own < _OWN).any()):
+            return seen, own
+        with clock("label smoothing"):
+            return smooth_perceived(clouds, seen, self.options.label_smoothing)

@@ -7,7 +7,8 @@ layer, and give the fitting a start within a few degrees.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -52,6 +53,10 @@ class Perceived(Batch):
         last = self.valid_logits.cumsum(1).argmax(1, keepdim=True)
         return torch.arange(self.valid_logits.shape[1], device=last.device) <= last
 
+    def of_points(self, chosen: Tensor) -> Perceived:
+        """Of those points alone that are chosen (N,) bool."""
+        return _of_points(self, chosen, ("part_logits", "canonical", "spread", "own_logits"))
+
     @property
     def part_probability(self) -> Tensor:
         """(B, N, P) of each point to belong to each of the parts that the object has."""
@@ -92,6 +97,17 @@ class Votes(Batch):
     joint: Tensor
     level_logits: Tensor
 
+    def of_points(self, chosen: Tensor) -> Votes:
+        """Of those points alone that are chosen (N,) bool."""
+        return _of_points(self, chosen, ("canonical", "spread", "own_logits", "box", "joint", "level_logits"))
+
+
+Seen = TypeVar("Seen", Perceived, Votes)
+
+
+def _of_points(seen: Seen, chosen: Tensor, names: tuple[str, ...]) -> Seen:
+    return replace(seen, **{name: getattr(seen, name)[:, chosen] for name in names})
+
 
 class Perception(nn.Module):
     """PointNet++ with a dense head for points and one for the cloud.
@@ -121,9 +137,12 @@ class Perception(nn.Module):
         """Where the network is."""
         return self.context.weight.device
 
-    def forward(self, points: Tensor) -> Perceived | Votes:
-        """(B, N, 3) points as in :class:`artperl.core.clouds.Clouds`."""
-        return self._read(*(values.float() for values in self.backbone(points)))
+    def forward(self, points: Tensor, standard: int = 0) -> Perceived | Votes:
+        """(B, N, 3) points as in :class:`artperl.core.clouds.Clouds`, which have so many as a rule.
+
+        See :meth:`artperl.core.pointnet2.PointNet2.forward`.
+        """
+        return self._read(*(values.float() for values in self.backbone(points, standard)))
 
     @exact
     def _read(self, features: Tensor, cloud: Tensor) -> Perceived | Votes:

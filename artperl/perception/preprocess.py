@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 from torch import Tensor
 
+from artperl.core.kd_tree import KDTree
 from artsim.errors import ArtsimError
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Cloud:
 
     @staticmethod
     def of(points: ArrayLike, count: int) -> Cloud:
-        """A cloud without outliers, of which a network sees so many points.
+        """A cloud without outliers, of which a network sees so many points, or all if there are fewer.
 
         Raises
         ------
@@ -62,8 +62,7 @@ class Cloud:
         """
         every = as_cloud(points)
         good = clean(every)
-        chosen = good[draw(len(good), count, np.random.default_rng(0))]
-        return Cloud(every, good, every[chosen].astype(np.float32))
+        return Cloud(every, good, _some(every, good, count))
 
     def without(self, foreign: NDArray[np.bool_], count: int) -> Cloud:
         """The cloud without seen points (M,) that show something else, and those given points that are nearest to them.
@@ -71,8 +70,14 @@ class Cloud:
         A network sees so many points of what is left.
         """
         good = self.good[~foreign[self._nearest]]
-        chosen = good[draw(len(good), count, np.random.default_rng(0))]
-        return Cloud(self.points, good, self.points[chosen].astype(np.float32))
+        return Cloud(self.points, good, _some(self.points, good, count))
+
+    def keep(self, own: NDArray[np.bool_]) -> Cloud:
+        """The cloud of those seen points (M,) that are chosen, and of the given points that are nearest to them."""
+        kept = own[self._nearest]
+        cloud = Cloud(self.points, self.good[kept], self.seen[own])
+        cloud.__dict__["_nearest"] = (np.cumsum(own) - 1)[self._nearest[kept]]  # what was found stays found
+        return cloud
 
     def tensor(self, device: torch.device) -> Tensor:
         """(1, M, 3) points that a network sees."""
@@ -85,14 +90,19 @@ class Cloud:
     @cached_property
     def _nearest(self) -> NDArray[np.int64]:
         """(G,) of the seen points, the nearest to each that shows the object."""
-        index: NDArray[np.int64] = cKDTree(self.seen).query(self.points[self.good], workers=1)[1]
-        return index
+        return KDTree.of(self.seen).nearest(self.points[self.good], 1)[1][:, 0]
 
     def for_every_point(self, values: NDArray[Any], outlier: Any) -> NDArray[Any]:
         """(N, ...) of values (M, ...) of the seen points, that of the nearest; outliers have one of their own."""
         every = np.full((len(self.points), *values.shape[1:]), outlier, dtype=values.dtype)
         every[self.good] = values[self._nearest]
         return every
+
+
+def _some(points: Array, good: NDArray[np.int64], count: int) -> NDArray[np.float32]:
+    """(<= count, 3) of the good points, each once, in random order."""
+    chosen = good[draw(len(good), min(count, len(good)), np.random.default_rng(0))]
+    return points[chosen].astype(np.float32)
 
 
 def as_cloud(points: ArrayLike) -> Array:
@@ -132,11 +142,11 @@ def clean(points: Array) -> NDArray[np.int64]:
     good = np.flatnonzero(is_measured(points))
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
-        tree = cKDTree(points[known])
-        usual = np.median(tree.query(points[known[:1024]], [_NEIGHBOURS + 1])[0])
+        tree = KDTree.of(points[known])
+        usual = np.sqrt(np.median(tree.nearest(points[known[:1024]], _NEIGHBOURS + 1)[0][:, -1]))
         within = max(_OUTLIER * usual, 1e-9)
         alone = ~_is_crowded(points[good], points[known], within)
-        apart = tree.query(points[good[alone]], [_FEW_NEIGHBOURS + 1], distance_upper_bound=within)[0][:, 0]
+        apart = tree.nearest(points[good[alone]], _FEW_NEIGHBOURS + 1, within)[0][:, -1]
         alone[alone] = ~np.isfinite(apart)
         good = good[~alone]
     if len(good) < _FEWEST or np.ptp(points[good], axis=0).max() < _SMALLEST:

@@ -63,7 +63,7 @@ class Oracle(Perception):
         super().__init__(rows, width=16)
         self.sample = sample
 
-    def forward(self, points: torch.Tensor) -> Perceived:
+    def forward(self, points: torch.Tensor, standard: int = 0) -> Perceived:
         rows = training_rows(self.sample, 2048, self.num_rows)
         clouds, truth = to_batch({k: torch.from_numpy(np.asarray(v)[None]) for k, v in rows.items()})
         nearest = torch.cdist(points, clouds.points).argmin(-1)[0]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import torch
 
-from artperl.core.pointnet2 import Neighbourhoods, interpolate, strongest
+from artperl.core.pointnet2 import Neighbourhoods, PointNet2, interpolate, strongest
 
 
 def test_neighbours_are_the_nearest() -> None:
     points = torch.randn(2, 40, 3, generator=torch.Generator().manual_seed(0))
-    near = Neighbourhoods.of(points, (10, 4), 5)
+    near = Neighbourhoods.of(points, (10, 4), (5, 5))
     apart = torch.cdist(points[:, :10], points)
     for b in range(2):
         for i in range(10):
@@ -45,3 +45,17 @@ def test_interpolated_is_the_weighted_sum_over_neighbours_with_its_gradient() ->
     (one,) = torch.autograd.grad((found**2).sum(), features, retain_graph=True)
     (other,) = torch.autograd.grad((direct**2).sum(), features)
     torch.testing.assert_close(one, other)
+
+
+def test_a_sparse_cloud_has_the_features_of_one_that_repeats_its_points() -> None:
+    torch.manual_seed(0)
+    network = PointNet2(8).eval()
+    few = torch.nn.functional.normalize(torch.randn(1, 256, 3), dim=-1)
+    many = few.repeat(1, 4, 1)
+    with torch.no_grad():
+        point, cloud = network(few, 1024)
+        points, clouds = network(many)
+    torch.testing.assert_close(cloud, clouds, atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(point, points[:, :256], atol=1e-5, rtol=1e-4)
+    with torch.no_grad():
+        assert (network(few)[1] - cloud).abs().max() > 0.01  # its own levels are coarser

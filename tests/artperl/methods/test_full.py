@@ -97,7 +97,7 @@ class Voter(Oracle):
 
     votes = True
 
-    def forward(self, points: torch.Tensor) -> Votes:  # type: ignore[override]
+    def forward(self, points: torch.Tensor, standard: int = 0) -> Votes:  # type: ignore[override]
         rows = training_rows(self.sample, 2048, self.num_rows)
         clouds, truth = to_batch({k: torch.from_numpy(np.asarray(v)[None]) for k, v in rows.items()})
         nearest = torch.cdist(points, clouds.points).argmin(-1)[0]

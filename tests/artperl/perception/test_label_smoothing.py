@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artperl.evaluation.artimage import real_objects
-from artperl.perception.label_smoothing import smooth_labels
+from artperl.perception.label_smoothing import Walks, smooth_labels
 from artsim.model.kinematics import Array
 from tests.artperl.worlds import made, view
 
@@ -86,3 +86,19 @@ def test_a_few_points_are_enough(count: int) -> None:
     points = np.random.default_rng(0).standard_normal((count, 3))
     out = smooth_labels(points, np.full((count, 2), 0.5), 1.0)
     np.testing.assert_allclose(out, 0.5)
+
+
+def test_the_mean_over_ends_is_that_of_a_hundred_steps() -> None:
+    """Steps one after the other, by a dense matrix."""
+    points, values = plane(300, 0.0, 3), np.random.default_rng(0).random((300, 11))
+    walks = Walks.of(points, 1.0)
+    step = np.zeros((300, 300))
+    for i in range(300):
+        here = slice(walks.first[i], walks.first[i + 1])
+        step[i, walks.target[here]] += walks.share[here]
+    np.testing.assert_allclose(step.sum(1) + walks.stay, 1.0)
+    own = values[walks.order]
+    ends = own
+    for _ in range(100):
+        ends = walks.stay[:, None] * own + step @ ends
+    np.testing.assert_allclose(walks.mean_of_ends(values)[walks.order], ends, atol=1e-4)

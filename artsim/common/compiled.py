@@ -1,0 +1,70 @@
+"""Loops that numba compiles: the one place that decides how.
+
+A function is compiled when it is first called, and the machine code is kept on the disk, so that only the first process
+on a machine compiles. Nothing here imports numba before that call.
+
+Functions that call one another belong in one file: numba's cache notices changes of the file of the function that was
+called, not of others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from typing_extensions import ParamSpec
+
+from artsim.common.extras import needs
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_MATHS = {"contract", "reassoc", "nsz"}
+"""Liberties that do not touch infinities and NaN: sums in any order, and fused products, so that loops use wide
+registers."""
+
+
+class Compiled(Generic[P, R]):
+    """A function that numba compiles once it is called, without Python's lock.
+
+    Parameters
+    ----------
+    function : callable
+        Loops over NumPy arrays and numbers; it may call other compiled functions of its module.
+
+    Attributes
+    ----------
+    python : callable
+        The function as it is written, for tests.
+    """
+
+    def __init__(self, function: Callable[P, R]):
+        self.python = function
+        self.__doc__, self.__name__, self.__module__ = function.__doc__, function.__name__, function.__module__
+        self._dispatcher: Any = None
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        if self._dispatcher is None:
+            self._prepare()
+        result: R = self._dispatcher(*args, **kwargs)
+        return result
+
+    def _prepare(self) -> Any:
+        """Numba's own function, which others of the module then call by the same name."""
+        if self._dispatcher is None:
+            with needs("compiled loops"):
+                import numba
+            try:
+                self._dispatcher = numba.njit(cache=True, nogil=True, fastmath=_MATHS, error_model="numpy")(self.python)
+            except RuntimeError:  # no folder can be written to
+                self._dispatcher = numba.njit(nogil=True, fastmath=_MATHS, error_model="numpy")(self.python)
+            known = self.python.__globals__
+            for name, value in list(known.items()):
+                if isinstance(value, Compiled):
+                    known[name] = value._prepare()
+        return self._dispatcher
+
+
+def compiled(function: Callable[P, R]) -> Compiled[P, R]:
+    """Decorate a function to be compiled: see :class:`Compiled`."""
+    return Compiled(function)
