@@ -55,7 +55,7 @@ class Train:
     """Processor threads of the network; by default torch's choice."""
 
     # From here on: fields of TrainOptions under their own names, then those of its parts.
-    method: Literal["full", "artperl", "ancsh", "sporeagent"] | None = None
+    method: Literal["full", "artperl", "ancsh", "omad", "sporeagent"] | None = None
     """full: the method that comes with trained weights; artperl: section 4 of the paper as printed; the others: the
     baselines that the paper compares with."""
     categories: Annotated[tuple[str, ...] | None, tyro.conf.arg(name="category")] = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import torch
@@ -36,6 +36,10 @@ _SPARE = 2
 """Times the points of a cloud that are made where some may be left out."""
 
 
+MoreRows = Callable[[Source, int, Sample], dict[str, Array]]
+"""Of a source, a number and the sample of that number: arrays of equal shapes that a method learns besides."""
+
+
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch.
 
@@ -44,8 +48,9 @@ class _Rows(IterableDataset[dict[str, Array]]):
 
     def __init__(
         self, samples: Source, noisy: Sequence[Source], num_points: int, batch_size: int, first: int,
-        options: DataOptions,
+        options: DataOptions, more: MoreRows | None,
     ):  # fmt: skip
+        self.more = more
         self.samples, self.noisy, self.num_points = samples, noisy, num_points
         self.batch_size, self.first, self.options = batch_size, first, options
 
@@ -55,7 +60,9 @@ class _Rows(IterableDataset[dict[str, Array]]):
         batch = self.first // self.batch_size + worker
         while True:
             for i in range(batch * self.batch_size, (batch + 1) * self.batch_size):
-                yield training_rows(self._sample(i), self.num_points, self.samples.num_rows)
+                sample = self._sample(i)
+                more = {} if self.more is None else self.more(self.samples, i, sample)
+                yield training_rows(sample, self.num_points, self.samples.num_rows) | more
             batch += workers
 
     def _sample(self, i: int) -> Sample:
@@ -99,12 +106,21 @@ def batches(
     workers : int
         Processes that make samples; 0 makes them in this one.
     """
+    for rows in row_batches(data, num_rows, num_points, batch_size, first_batch, seed, workers):
+        yield to_batch(rows)
+
+
+def row_batches(
+    data: DataOptions, num_rows: int, num_points: int = 1024, batch_size: int = 32, first_batch: int = 0,
+    seed: int = 0, workers: int = 1, more: MoreRows | None = None,
+) -> Iterator[dict[str, Tensor]]:  # fmt: skip
+    """Batches as :func:`batches` makes them, as rows for :func:`artperl.data.truth.to_batch`, and more rows."""
     spare = (data.stretched or data.degraded) and data.dataset is None
     made_points = _SPARE * num_points if spare else num_points
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
     samples = data.source(num_rows, made_points, seed, fresh)
     sensed = [data.source(num_rows, made_points, seed, fresh, sensor) for sensor in SENSORS] if data.noisy else []
-    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data)
+    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data, more)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=ignore_interrupt
     )
@@ -112,7 +128,7 @@ def batches(
     for n, made in enumerate(loader, begin):
         window.append({name: values.clone() for name, values in made.items()})  # out of the workers' shared memory
         if n >= first_batch:
-            yield to_batch(_mixed(window, batch_size, np.random.default_rng([seed, n])))
+            yield _mixed(window, batch_size, np.random.default_rng([seed, n]))
 
 
 def _mixed(window: Sequence[dict[str, Tensor]], batch_size: int, rng: np.random.Generator) -> dict[str, Tensor]:

@@ -17,11 +17,12 @@ METHODS = {
     "full": "artperl.methods.full:Estimator",
     "artperl": "artperl.methods.artperl:ArtPERL",
     "ancsh": "artperl.methods.ancsh:ANCSH",
+    "omad": "artperl.methods.omad:OMAD",
     "sporeagent": "artperl.methods.sporeagent:SporeAgent",
 }
 """Module and class of each method: full, which comes with trained weights; artperl, section 4 of the paper; and the
 baselines that the paper compares with."""
-STORED_METHODS = ("full", "artperl", "ancsh", "sporeagent")
+STORED_METHODS = ("full", "artperl", "ancsh", "omad", "sporeagent")
 """Those that are trained and written down; others make themselves for a category."""
 
 

@@ -17,7 +17,7 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 
 T = TypeVar("T")
-Method = Literal["full", "artperl", "ancsh", "sporeagent"]
+Method = Literal["full", "artperl", "ancsh", "omad", "sporeagent"]
 _WITH_AGENT = ("artperl", "sporeagent")
 """Methods that retrieve a reference by a network and fit it by an agent."""
 _MOST = 1_000_000_000
@@ -27,7 +27,7 @@ _AT_LEAST_ONE = (
     "validate_every", "test_objects", "validation_views", "test_views",
 )  # fmt: skip
 _AT_LEAST_ZERO = (
-    "perception_steps", "dense_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
+    "perception_steps", "dense_steps", "prior_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
     "foreign_categories", "seed",
 )  # fmt: skip
 
@@ -84,6 +84,8 @@ class TrainOptions:
     degraded: float = 0.0
     """Share of all of them that are cut by an occluder or the image's border, have points of the table or a neighbour,
     or are of few points."""
+    prior_steps: int = 0
+    """Batches that the keypoints of the method omad learn from."""
     retrieval_steps: int = 0
     """Batches that the Siamese network of the method artperl learns from."""
     perception_rate: float = 2e-3
@@ -138,6 +140,12 @@ class TrainOptions:
                 f"the method {self.method} has no agent, and no network for retrieval",
                 "agent_rollouts, retrieval_steps", f"leave them out, or use the method {' or '.join(_WITH_AGENT)}",
             )  # fmt: skip
+        if self.method != "omad" and self.prior_steps:
+            raise ConfigError("only the method omad has a prior of keypoints", "prior_steps", "leave it out")
+        if self.method == "omad" and (self.stretched or self.degraded):
+            raise ConfigError(
+                "the method omad learns from whole objects", "stretched, degraded", "leave them out, or use --noisy"
+            )
         if not self.categories and not self.files:
             raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
 
@@ -213,6 +221,15 @@ ANCSH_PRESETS = {
 }  # fmt: skip
 """Presets of the method ancsh."""
 
+OMAD_PRESETS = {
+    "quick": TrainOptions(
+        method="omad", base_objects=32, reference_points=96, width=32, prior_steps=600, perception_steps=500,
+        batch_size=16, num_points=768, test_objects=20, test_views=2,
+    ),
+    "full": TrainOptions(method="omad", prior_steps=4000),
+}  # fmt: skip
+"""Presets of the method omad."""
+
 _REGISTRATION = PPOOptions(lambda_rotation=0.5, lambda_translation=0.5, lambda_scale=0.0, epochs=2)
 SPOREAGENT_PRESETS = {
     "quick": replace(PAPER_PRESETS["quick"], method="sporeagent", agent_rate=1e-3, ppo=_REGISTRATION),
@@ -224,6 +241,7 @@ METHOD_PRESETS: dict[Method, dict[str, TrainOptions]] = {
     "full": PRESETS,
     "artperl": PAPER_PRESETS,
     "ancsh": ANCSH_PRESETS,
+    "omad": OMAD_PRESETS,
     "sporeagent": SPOREAGENT_PRESETS,
 }
 """Presets of each method."""

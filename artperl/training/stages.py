@@ -17,6 +17,7 @@ from artperl.training.ancsh_stages import ancsh_estimator, ancsh_run_networks, a
 from artperl.training.boxes import BoxStage
 from artperl.training.context import Context
 from artperl.training.objects import TrainingObjects
+from artperl.training.omad_stages import omad_estimator, omad_run_networks, omad_stages
 from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
 from artperl.training.perception import PerceptionStage
@@ -104,6 +105,7 @@ PROGRAMMES = {
     "full": Programme(_full_networks, _full_stages, _full_estimator),
     "artperl": Programme(paper_networks, paper_stages, paper_estimator),
     "ancsh": Programme(ancsh_run_networks, ancsh_stages, ancsh_estimator, _one_tree),
+    "omad": Programme(omad_run_networks, omad_stages, omad_estimator, _one_tree),
     "sporeagent": Programme(sporeagent_run_networks, sporeagent_stages, sporeagent_estimator),
 }
 """By the name of the method."""
