@@ -27,6 +27,7 @@ from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
 
 _OPEN_SHARDS = 64
+"""Files that are open at most, of the least recently read shards the first to be closed. Their indices are kept."""
 _FAR = 1_000_000_007
 
 
@@ -58,8 +59,9 @@ class Dataset:
         self.split = split
         self.shards = [s for s in shards if split in (None, s.split)]
         self._ends = np.cumsum([s.end - s.first for s in self.shards]).tolist()
-        self._readers: OrderedDict[str, ShardReader] = OrderedDict()
-        self._owner = os.getpid()
+        self._readers: dict[str, ShardReader] = {}
+        self._open: OrderedDict[str, ShardReader] = OrderedDict()
+        self._owner, self._repair = os.getpid(), repair_command(self.folder)
         self.objects = ObjectCache(self.folder, below="objects")
 
     def __len__(self) -> int:
@@ -90,13 +92,17 @@ class Dataset:
 
     def _reader(self, name: str) -> ShardReader:
         if self._owner != os.getpid():  # forked: a shared file position would mix up reads
-            self._readers, self._owner = OrderedDict(), os.getpid()
+            for opened in self._open.values():
+                opened.close()
+            self._open, self._owner = OrderedDict(), os.getpid()
         if name not in self._readers:
-            self._readers[name] = ShardReader(self.folder / name, repair_command(self.folder))
-            if len(self._readers) > _OPEN_SHARDS:
-                self._readers.popitem(last=False)[1].close()
-        self._readers.move_to_end(name)
-        return self._readers[name]
+            self._readers[name] = ShardReader(self.folder / name, self._repair)
+        reader = self._readers[name]
+        self._open[name] = reader
+        self._open.move_to_end(name)
+        if len(self._open) > _OPEN_SHARDS:
+            self._open.popitem(last=False)[1].close()
+        return reader
 
     def __getstate__(self) -> dict[str, Any]:
         return {"folder": self.folder, "split": self.split}

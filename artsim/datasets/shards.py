@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 import tarfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from artsim.common.files import atomic_file, open_image, parse_npy
-from artsim.common.names import printable
 from artsim.common.storage import FolderStorage, Storage
+from artsim.datasets.tar_index import read_index
 from artsim.errors import DatasetError
 from artsim.observing.sample import Sample
 
@@ -31,7 +32,6 @@ _SCALARS = ("width", "height", "category", "object_id", "object_sha256", "scale"
 _OTHER = (*_CLOUD, *_PNG, "depth", "noise", *_STRINGS, *_SCALARS)
 _ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in _OTHER)
 
-_MAX_MEMBER = 1 << 30
 MAX_PIXELS = 8192 * 8192
 """Of the largest images that are made."""
 _AGAIN = "make it again"
@@ -228,7 +228,7 @@ def _tar_member(name: str, content: bytes) -> bytes:
 
 
 class ShardReader:
-    """Random access to the samples of one shard file.
+    """Random access to the samples of one shard file. Once the file has been indexed, closing it loses nothing.
 
     Parameters
     ----------
@@ -244,42 +244,56 @@ class ShardReader:
 
     def __init__(self, path: Path, fix: str = _AGAIN):
         self.path, self.fix = path, fix
-        self._members: dict[str, dict[str, tuple[int, int]]] = {}
-        if not path.is_file():  # to open a pipe would wait for somebody who writes to it
-            raise DatasetError("is missing, or no file", path, fix)
+        self._file: BinaryIO | None = None
         try:
-            size = path.stat().st_size
-            with tarfile.open(path, "r:") as tar:
-                for info in tar:
-                    key, _, suffix = info.name.partition(".")
-                    inside = 0 <= info.size <= min(_MAX_MEMBER, size - info.offset_data)
-                    if info.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or info.issparse() or not inside:
-                        raise DatasetError(f"unexpected member {printable(info.name)}", path, fix)
-                    self._members.setdefault(key, {})[suffix] = (info.offset_data, info.size)
-            self._file = path.open("rb")
+            file = self._opened()
+            self._index = read_index(file, os.fstat(file.fileno()).st_size)
         except (tarfile.TarError, OSError, EOFError, ValueError) as error:
+            self.close()
             raise DatasetError(f"cannot read the shard ({error})", path, fix) from error
 
     def __len__(self) -> int:
-        return len(self._members)
+        return len(self._index)
 
     def keys(self) -> list[str]:
         """Sample keys in the order of the file."""
-        return list(self._members)
+        return self._index.in_file_order()
 
     def read(self, key: str) -> Sample:
         """One sample by its key."""
-        members = self._members.get(key)
-        if members is None:
+        members = self._index.members(key)
+        if not members:
             raise DatasetError(f"holds no sample {key}", self.path, self.fix)
-        contents = {}
-        for suffix, (offset, size) in members.items():
-            self._file.seek(offset)
-            contents[suffix] = self._file.read(size)
-            if len(contents[suffix]) != size:
-                raise DatasetError("the shard is cut short", self.path, self.fix)
+        # Members of a sample stand side by side, each behind its header: one read takes them all.
+        start = min(offset for _, offset, _ in members)
+        end = max(offset + size for _, offset, size in members)
+        try:
+            if end - start <= sum(size + 2 * tarfile.BLOCKSIZE for _, _, size in members):
+                block = self._bytes(start, end - start)
+                contents = {suffix: block[offset - start : offset - start + size] for suffix, offset, size in members}
+            else:
+                contents = {suffix: self._bytes(offset, size) for suffix, offset, size in members}
+        except OSError as error:
+            raise DatasetError(f"cannot read the shard ({error})", self.path, self.fix) from error
         return sample_from_members(contents, f"{self.path}: sample {key}", self.fix)
 
+    def _bytes(self, offset: int, size: int) -> bytes:
+        file = self._opened()
+        file.seek(offset)
+        content = file.read(size)
+        if len(content) != size:
+            raise DatasetError("the shard is cut short", self.path, self.fix)
+        return content
+
+    def _opened(self) -> BinaryIO:
+        if self._file is None:
+            if not self.path.is_file():  # to open a pipe would wait for somebody who writes to it
+                raise DatasetError("is missing, or no file", self.path, self.fix)
+            self._file = self.path.open("rb", buffering=0)
+        return self._file
+
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file until it is next read."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None

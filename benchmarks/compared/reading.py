@@ -34,7 +34,7 @@ def shuffled(folder: Path, shards: int) -> Callable[[], Work]:
     from artsim import SampleOptions, generate, open_dataset
     from artsim.loading.sources import family_sources
 
-    samples, reads = 12_800, 500
+    samples, reads = 6_400, 500
     generate(
         family_sources(["laptop"], 2),
         folder / "dataset",
