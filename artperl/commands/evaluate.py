@@ -45,6 +45,9 @@ class Evaluate:
     """Conditions of robustness, such as occluded_40 leak_7; by default all."""
     real_weights: Path | None = None
     """For the row real_trained: folder of the estimators that have learnt from real objects, too."""
+    root: Path | None = None
+    """For the benchmark artimage: folder of the original ArtImage, whose test split is read instead of views that are
+    made here. Any --method then; without --views, all frames."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
     """For the rows of real objects: unpacked PartNet-Mobility; by default what ARTSIM_PARTNET_DIR names."""
     category: tuple[str, ...] = ()
@@ -76,7 +79,9 @@ class Evaluate:
     """Write the figures to this file."""
 
     def run(self) -> None:
-        if self.method != "full" and (self.ablation or self.benchmark):
+        if self.root is not None and (self.benchmark != "artimage" or self.ablation or self.rows):
+            raise ConfigError("the original images are those of a benchmark", "root", "use --benchmark artimage alone")
+        if self.method != "full" and self.root is None and (self.ablation or self.benchmark):
             raise ConfigError("a benchmark and the ablation are of the method full", "method", "leave it out")
         if self.ablation:
             self._ablation()
@@ -121,6 +126,8 @@ class Evaluate:
         from artperl.evaluation.artimage import ROWS, VIEWS
         from artperl.evaluation.benchmark import run_benchmark
 
+        if self.root is not None:
+            return self._original(self.root)
         if self.benchmark == "robustness":
             return self._robustness()
         if self.conditions or "real_all" in self.rows:
@@ -142,6 +149,13 @@ class Evaluate:
             rows, self.category or tuple(ARTIMAGE), self.estimator, self.real_weights, self.partnet, self.objects,
             self.views or VIEWS, self.num_points, True, say, self.seen_from,
         )  # fmt: skip
+
+    def _original(self, root: Path) -> dict[str, Any]:
+        from artperl.data.categories import ARTIMAGE
+        from artperl.evaluation.benchmark import run_original
+
+        categories = self.category or tuple(ARTIMAGE)
+        return run_original(root, categories, self.estimator, self.method, self.views, self.num_points, True, say)
 
     def _single(self) -> dict[str, Any]:
         from artperl.data.categories import objects_of

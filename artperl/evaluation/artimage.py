@@ -1,7 +1,7 @@
 """Regenerated ArtImage: its five categories, seen as it sees them, objects that no estimator was trained on.
 
-The original images are not public; objects and views are made here, so that figures are not to be mixed with published
-ones. Rows:
+Objects and views are made here, so that figures are not to be mixed with published ones, which are of the original
+images; :mod:`artperl.evaluation.artimage_files` reads those. Rows:
 
 - ``procedural``: 40 objects of each category, seeds that streams, bases and validation never reach;
 - ``real``: PartNet-Mobility objects of the frozen test half, weights that have never seen a real object;

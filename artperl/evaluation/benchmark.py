@@ -6,19 +6,79 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, load_estimator
 from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_train_half, row_objects, row_samples
+from artperl.evaluation.artimage_files import ArtImageFiles
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.evaluation.tables import against_published, summary, table
 from artperl.methods.full import Estimator
+from artsim.common.progress import track
+from artsim.errors import DatasetError
 
 
 def find_estimator(folder: Path | None, category: str, **changes: Any) -> Estimator:
     """The estimator of a category in a folder of them (or of training runs); the one that comes with the package."""
+    return load_estimator(category_folder(folder, category), **changes)
+
+
+def category_folder(folder: Path | None, category: str) -> Path:
+    """Where the estimator of a category is, in a folder of them or of training runs; by default the package's."""
     folder = folder or WEIGHTS
     run = folder / category / "best"
-    return load_estimator(run if run.is_dir() else folder / category, **changes)
+    return run if run.is_dir() else folder / category
+
+
+def run_original(
+    root: Path, categories: Sequence[str], weights: Path | None = None, method: str = "full", views: int | None = None,
+    num_points: int = NUM_POINTS, progress: bool = False, say: Callable[[str], None] = print,
+) -> dict[str, Any]:  # fmt: skip
+    """Evaluate a method on the test split of the original ArtImage, and print each category as it comes.
+
+    Parameters
+    ----------
+    root : Path
+        Folder in the layout of :mod:`artperl.evaluation.artimage_files`.
+    categories : sequence of str
+        Those of which there is no folder are left out, which is said.
+    weights : Path, optional
+        Folder of estimators by category; by default those that come with the package, of the method full.
+    method : str
+    views : int, optional
+        The most of each category, evenly spread over the split; by default all.
+    num_points : int
+    progress : bool
+    say : callable
+        Gets the lines.
+
+    Returns
+    -------
+    dict
+        ``{"original": {category: figures}}`` as of :func:`run_benchmark`.
+
+    Raises
+    ------
+    DatasetError
+        When a file is missing or damaged, or there is no frame of any category.
+    """
+    result: dict[str, Any] = {}
+    for category in categories:
+        if not (root / category).is_dir():
+            say(f"{category}: left out, since there is no folder {root / category}")
+            continue
+        files = ArtImageFiles(root, category, "test", num_points)
+        samples = list(files.samples(views))
+        estimator = load_estimator(category_folder(weights, category), method=method)
+        figures = summary(evaluate(estimator, track(category, samples, unit="view", shown=progress)))
+        figures[category]["objects"] = len({sample.object_id for sample in samples})
+        result |= figures
+        say(f"{table(figures)}\n{against_published(category, figures[category])}")
+    if not result:
+        raise DatasetError(
+            "there is no category of ArtImage", root, f"name the folder that holds {', '.join(ARTIMAGE)}"
+        )
+    return {"original": result}
 
 
 def run_benchmark(
