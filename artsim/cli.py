@@ -10,14 +10,13 @@ import tyro
 
 from artsim.common.program import cores, run_program
 from artsim.datasets.plan import SampleOptions
-from artsim.errors import ConfigError, DatasetError
+from artsim.drawing.scene_command import Scene
+from artsim.errors import DatasetError
 from artsim.families.constraints import Constraints
 from artsim.formats.base import FormatName
 from artsim.formats.command import Convert
 from artsim.loading.roots import PackageRoots
 from artsim.physics.episode import EpisodeOptions
-from artsim.renderers import RendererName
-from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
 from artsim.variation.command import Vary
 
 _LISTED = 50
@@ -219,56 +218,6 @@ class Record:
         episode = replace(self.episode, categories=_categories(self.episode.categories))
         folder = record(self.out, episode, self.motions, self.frames, self.seed)
         print(f"{folder}: {self.motions} motions of {self.frames} frames; read them with artsim.physics.open_motions")
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Make scenes: several articulated objects on a table or a floor, in colour, with the ground truth of each.
-
-    Every view becomes a folder: rgb.png, depth.npy, instance_ids.png, part_ids.png, scene.json, a cloud with its full
-    record for each object, and overview.png, which shows it all.
-
-    Example: artsim scene --categories laptop stapler box --seed 3 --scenes 10 --views 2 --out out/scenes
-    """
-
-    out: Path
-    """Folder to write to; made if missing."""
-    scenes: int = 1
-    """Scenes, seeds counting up."""
-    views: int = 1
-    """Cameras that look at each."""
-    seed: int = 0
-    """Seed of the first scene: the same seed and options make the same files."""
-    scene: Annotated[SceneOptions, tyro.conf.arg(name="")] = field(default_factory=SceneOptions)
-    camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
-    renderer: RendererName = "sapien"
-    """Only sapien, pybullet and pybullet-egl make colour images."""
-    rgb_samples: int = 8
-    """Pictures that each colour image is the mean of: more give softer shadows and smoother edges."""
-    num_points: int = 2048
-    """Points of each object's cloud."""
-    noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
-    """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
-
-    def run(self) -> None:
-        from artsim.drawing.scene_overview import write_overview
-        from artsim.scenes.ground_truth import observe_scene
-        from artsim.scenes.random_scene import make_scene, scene_camera
-
-        if min(self.scenes, self.views) < 1:
-            raise ConfigError("there is nothing to make", "scenes, views", "use 1 or more of each")
-        for seed in range(self.seed, self.seed + self.scenes):
-            made = make_scene(self.scene, seed)
-            cameras = [scene_camera(made, self.camera, seed, view) for view in range(self.views)]
-            seen = observe_scene(made, cameras, self.num_points, self.renderer, self.noise, seed, self.rgb_samples)
-            for number, view in enumerate(seen):
-                folder = self.out / f"{seed:06d}_{number}"
-                write_overview(view, folder)
-                shown = [
-                    f"{thing.obj.category} {100 * fraction:.0f}%"
-                    for thing, fraction in zip(made.instances, view.visible_fraction, strict=True)
-                ]
-                print(f"wrote {folder}: {', '.join(shown)} visible")
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,8 @@ class Material:
         Metres that the texture covers where a coat says nothing of how it lies.
     emission : float
         Share of the colour that it sends out by itself.
+    transmission : float
+        Share of the light that passes through. Depth sensors see less of such a surface; renderers draw it opaque.
     """
 
     colour: Colour
@@ -44,6 +46,7 @@ class Material:
     texture: Image | None = None
     tile: float = 0.5
     emission: float = 0.0
+    transmission: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,9 +29,13 @@ def texture_finish(texture: str, tile: float, roughness: float, metallic: float 
     return finish
 
 
-def plain_finish(roughness: float, metallic: float = 0.0, specular: float = 0.5) -> Finish:
+def plain_finish(roughness: float, metallic: float = 0.0, specular: float = 0.5, transmission: float = 0.0) -> Finish:
     """A finish of one colour."""
-    return lambda rng, tone: Material(tone, roughness * rng.uniform(0.85, 1.15), metallic, specular)
+
+    def finish(rng: np.random.Generator, tone: Colour) -> Material:
+        return Material(tone, roughness * rng.uniform(0.85, 1.15), metallic, specular, transmission=transmission)
+
+    return finish
 
 
 FINISHES: dict[str, Finish] = {
@@ -46,7 +50,7 @@ FINISHES: dict[str, Finish] = {
     "plastic": plain_finish(0.45),
     "gloss": plain_finish(0.2, specular=0.7),
     "shell": plain_finish(0.4),
-    "smoke": plain_finish(0.12, specular=0.8),
+    "smoke": plain_finish(0.12, specular=0.8, transmission=0.8),
     "rubber": plain_finish(0.85, specular=0.2),
     "enamel": plain_finish(0.28, specular=0.6),
     "chrome": plain_finish(0.22, metallic=0.85),

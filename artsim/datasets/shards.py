@@ -292,6 +292,26 @@ class ShardReader:
             self._file = self.path.open("rb", buffering=0)
         return self._file
 
+    def suffixes(self, key: str) -> list[str]:
+        """Members that a key has."""
+        return [suffix for suffix, _, _ in self._index.members(key)]
+
+    def member(self, key: str, suffix: str) -> bytes:
+        """Content of one member.
+
+        Raises
+        ------
+        DatasetError
+            When there is none, or the file is cut short.
+        """
+        place = next((place for name, *place in self._index.members(key) if name == suffix), None)
+        if place is None:
+            raise DatasetError(f"holds no {key}.{suffix}", self.path, self.fix)
+        try:
+            return self._bytes(*place)
+        except OSError as error:
+            raise DatasetError(f"cannot read the shard ({error})", self.path, self.fix) from error
+
     def close(self) -> None:
         """Close the file until it is next read."""
         if self._file is not None:

@@ -29,10 +29,16 @@ def overview(view: SceneView) -> NDArray[np.uint8]:
     return np.vstack([top, np.hstack([parts_picture(view), instances_picture(view)])])
 
 
+def overview_files(view: SceneView) -> dict[str, bytes]:
+    """``overview.png``, by its name."""
+    return {"overview.png": png_bytes(overview(view))}
+
+
 def write_overview(view: SceneView, folder: Path) -> None:
     """Write a view's files (see :func:`artsim.scenes.ground_truth.write_view`), and ``overview.png``."""
     write_view(view, folder)
-    write_atomic(folder / "overview.png", png_bytes(overview(view)))
+    for name, content in overview_files(view).items():
+        write_atomic(folder / name, content)
 
 
 def colour_picture(view: SceneView) -> NDArray[np.uint8]:

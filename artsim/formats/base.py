@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from artsim.common.files import write_atomic
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
 from artsim.observing.sample import Sample
@@ -39,26 +38,6 @@ class Piece:
     def name(self) -> str:
         """Unique within a conversion."""
         return f"{self.split or 'objects'}-{self.number:06d}"
-
-
-@dataclass
-class Output:
-    """The folder of a conversion, and which files were written to it.
-
-    Attributes
-    ----------
-    folder : Path
-    files : dict
-        Size and SHA-256 of each file that was written, by its path within the folder.
-    """
-
-    folder: Path
-    files: dict[str, tuple[int, str]] = field(default_factory=dict)
-
-    def write(self, name: str, data: bytes) -> None:
-        """Write a whole file and note it."""
-        write_atomic(self.folder / name, data)
-        self.files[name] = len(data), hashlib.sha256(data).hexdigest()
 
 
 class Format(Protocol):

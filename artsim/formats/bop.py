@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
-from artsim.formats.base import Output, Piece, require_images
+from artsim.formats.base import Piece, require_images
 from artsim.formats.images import depth_png, mask_png, png_bytes
 from artsim.formats.pinhole import integer_centre_K
 from artsim.formats.ply import mesh_ply
@@ -57,15 +58,9 @@ class BopFormat:
             size = dataset.plan.sample.scale
             obj = sample_scale(dataset.objects[planned.key], size, np.random.default_rng(0))
             for k in np.flatnonzero(obj.has_surface).tolist():
-                model = f"{first[planned.key] + k:06d}"
-                vertices, faces = obj.parts[k].vertices * (obj.scale * _MM), obj.parts[k].faces
-                output.write(f"models/obj_{model}.ply", mesh_ply(vertices, faces, PALETTE[k % len(PALETTE)]))
-                low, extent = (obj.box_center[k] - obj.box_size[k] / 2) * _MM, obj.box_size[k] * _MM
-                entry: dict[str, Any] = {"diameter": _diameter(vertices[np.unique(faces)])}
-                entry |= {f"min_{axis}": low[i] for i, axis in enumerate("xyz")}
-                entry |= {f"size_{axis}": extent[i] for i, axis in enumerate("xyz")}
-                names = {"category": obj.category, "object_id": obj.object_id, "part": k, "name": obj.parts[k].label}
-                info[str(int(model))] = {**entry, **names}
+                model = first[planned.key] + k
+                output.write(*model_file(obj, k, model))
+                info[str(model)] = model_info(obj, k)
         return info
 
     def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
@@ -82,17 +77,17 @@ class BopFormat:
             if sample.rgb is not None:
                 output.write(f"{folder}/rgb/{image:06d}.png", png_bytes(sample.rgb))
             parts = np.flatnonzero(obj.has_surface).tolist()
-            whole = _whole_masks(obj, sample)
+            whole = whole_masks(obj, sample)
             for number, k in enumerate(parts):
                 name = f"{image:06d}_{number:06d}.png"
                 output.write(f"{folder}/mask/{name}", mask_png(whole[k]))
                 output.write(f"{folder}/mask_visib/{name}", mask_png(sample.part_mask == k))
             key, first_id = str(image), first[dataset.planned(sample.index).key]
-            cameras[key] = _camera(sample, unit)
-            truths[key] = [{**_model_pose(sample.T_camera_part[k]), "obj_id": first_id + k} for k in parts]
-            infos[key] = [_truth_info(obj, sample, k, whole[k]) for k in parts]
-            articulations[key] = _articulation(obj, sample, first_id)
-            answer["camera"] = answer["camera"] or _shared_camera(sample, unit)
+            cameras[key] = camera_record(sample, unit)
+            truths[key] = [{**model_pose(sample.T_camera_part[k]), "obj_id": first_id + k} for k in parts]
+            infos[key] = [truth_info(obj, sample, k, whole[k]) for k in parts]
+            articulations[key] = articulation(obj, sample, first_id)
+            answer["camera"] = answer["camera"] or shared_camera(sample, unit)
             for k, info in zip(parts, infos[key], strict=True):
                 if info["visib_fract"] >= _TARGET_VISIBLE:
                     target = {"im_id": image, "inst_count": 1, "obj_id": first_id + k, "scene_id": piece.number}
@@ -100,7 +95,7 @@ class BopFormat:
         for name, content in (
             ("camera", cameras), ("gt", truths), ("gt_info", infos), ("articulation", articulations)
         ):  # fmt: skip
-            output.write(f"{folder}/scene_{name}.json", _json(content))
+            output.write(f"{folder}/scene_{name}.json", json_bytes(content))
         return answer
 
     def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
@@ -109,13 +104,13 @@ class BopFormat:
         for piece, answer in answers:
             if not piece.split:
                 models |= answer
-        output.write("models/models_info.json", _json(models))
+        output.write("models/models_info.json", json_bytes(models))
         scenes = [(piece, answer) for piece, answer in answers if piece.split]
         if scenes:
-            output.write("camera.json", _json(scenes[0][1]["camera"]))
+            output.write("camera.json", json_bytes(scenes[0][1]["camera"]))
         targets = [target for piece, answer in scenes if piece.split == "test" for target in answer["targets"]]
         if targets:
-            output.write("test_targets_bop19.json", _json(targets))
+            output.write("test_targets_bop19.json", json_bytes(targets))
 
 
 def _first_ids(dataset: Dataset) -> dict[str, int]:
@@ -127,7 +122,23 @@ def _first_ids(dataset: Dataset) -> dict[str, int]:
     return ids
 
 
-def _json(content: Any) -> bytes:
+def model_file(obj: ArticulatedObject, k: int, model: int) -> tuple[str, bytes]:
+    """Name and content of the mesh of part k, as a model of a number; millimetres, rest frame."""
+    vertices = obj.parts[k].vertices * (obj.scale * _MM)
+    return f"models/obj_{model:06d}.ply", mesh_ply(vertices, obj.parts[k].faces, PALETTE[k % len(PALETTE)])
+
+
+def model_info(obj: ArticulatedObject, k: int) -> dict[str, Any]:
+    """What ``models_info.json`` says of part k."""
+    vertices = obj.parts[k].vertices * (obj.scale * _MM)
+    low, extent = (obj.box_center[k] - obj.box_size[k] / 2) * _MM, obj.box_size[k] * _MM
+    entry: dict[str, Any] = {"diameter": _diameter(vertices[np.unique(obj.parts[k].faces)])}
+    entry |= {f"min_{axis}": low[i] for i, axis in enumerate("xyz")}
+    entry |= {f"size_{axis}": extent[i] for i, axis in enumerate("xyz")}
+    return {**entry, "category": obj.category, "object_id": obj.object_id, "part": k, "name": obj.parts[k].label}
+
+
+def json_bytes(content: Any) -> bytes:
     """Readable JSON; numbers of NumPy are written as numbers, infinite ones as null."""
     return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
 
@@ -145,11 +156,12 @@ def _diameter(points: Array) -> float:
     return max(float(cdist(points[i : i + step], points).max()) for i in range(0, len(points), step))
 
 
-def _model_pose(T_camera_part: Array) -> dict[str, Any]:
+def model_pose(T_camera_part: Array) -> dict[str, Any]:
+    """Pose of a model in the camera frame, millimetres."""
     return {"cam_R_m2c": T_camera_part[:3, :3].ravel().tolist(), "cam_t_m2c": (T_camera_part[:3, 3] * _MM).tolist()}
 
 
-def _camera(sample: Sample, unit: float) -> dict[str, Any]:
+def camera_record(sample: Sample, unit: float) -> dict[str, Any]:
     """Intrinsics, pose in the world, and millimetres that 1 stands for in the depth image."""
     T_camera_world = invert_transform(sample.T_world_camera)
     return {
@@ -160,7 +172,7 @@ def _camera(sample: Sample, unit: float) -> dict[str, Any]:
     }
 
 
-def _shared_camera(sample: Sample, unit: float) -> dict[str, Any]:
+def shared_camera(sample: Sample, unit: float) -> dict[str, Any]:
     """What ``camera.json`` says; scenes have the camera of each image."""
     K = integer_centre_K(sample.K)
     focal = {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]}
@@ -173,16 +185,17 @@ def _depth_scale(unit: float) -> float:
     return float(f"1e{round(float(np.log10(unit))) + 3}")
 
 
-def _whole_masks(obj: ArticulatedObject, sample: Sample) -> list[NDArray[np.bool_]]:
+def whole_masks(obj: ArticulatedObject, sample: Sample, T_world_object: Array | None = None) -> list[NDArray[np.bool_]]:
     """(H, W) mask of each part as if nothing hid it."""
     camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
-    posed = pose(obj, sample.joint_state, camera)
+    posed = pose(obj, sample.joint_state, camera, T_world_object)
     assert sample.part_mask is not None
     # A rasteriser may cover a pixel more than rays do at an outline: what is seen belongs to the whole.
     return [(render_posed(posed, only=k).part_ids == k) | (sample.part_mask == k) for k in range(len(obj))]
 
 
-def _truth_info(obj: ArticulatedObject, sample: Sample, k: int, whole: NDArray[np.bool_]) -> dict[str, Any]:
+def truth_info(obj: ArticulatedObject, sample: Sample, k: int, whole: NDArray[np.bool_]) -> dict[str, Any]:
+    """Boxes, pixel counts and visible fraction of part k, whose mask is ``whole`` where nothing hides it."""
     assert sample.depth is not None
     assert sample.part_mask is not None
     seen = sample.part_mask == k
@@ -221,7 +234,7 @@ def _outline_box(obj: ArticulatedObject, sample: Sample, k: int) -> list[int]:
     return [left, top, right + 1 - left, bottom + 1 - top]
 
 
-def _articulation(obj: ArticulatedObject, sample: Sample, first_id: int) -> dict[str, Any]:
+def articulation(obj: ArticulatedObject, sample: Sample, first_id: int) -> dict[str, Any]:
     """Joints of an object, whose axes and origins are in the frame of the models; lengths in millimetres."""
     parts = []
     for k, kind in enumerate(sample.joint_type):

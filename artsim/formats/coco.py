@@ -12,10 +12,11 @@ import orjson
 from numpy.typing import NDArray
 
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key
-from artsim.formats.base import Output, Piece, PlainFormat, require_images
-from artsim.formats.images import png_bytes
+from artsim.formats.base import Piece, PlainFormat, require_images
+from artsim.formats.images import grey_depth, png_bytes
 from artsim.observing.sample import Sample
 
 
@@ -66,13 +67,7 @@ def _picture(sample: Sample) -> NDArray[np.uint8]:
     if sample.rgb is not None:
         return sample.rgb
     assert sample.depth is not None
-    seen = sample.depth > 0
-    grey = np.zeros(sample.depth.shape, np.uint8)
-    if seen.any():
-        near, far = float(sample.depth[seen].min()), float(sample.depth[seen].max())
-        share = (far - sample.depth[seen]) / max(far - near, 1e-9)
-        grey[seen] = np.rint(55.0 + 200.0 * share).astype(np.uint8)
-    return grey
+    return grey_depth(sample.depth)
 
 
 def _parts(sample: Sample) -> list[dict[str, Any]]:
@@ -81,22 +76,18 @@ def _parts(sample: Sample) -> list[dict[str, Any]]:
     found = []
     for k, name in enumerate(sample.part_names):
         mask = sample.part_mask == k
-        if not mask.any():
-            continue
-        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        left, top = int(columns[0]), int(rows[0])
-        box = [left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top]
-        found.append(
-            {
-                "segmentation": {"size": list(mask.shape), "counts": run_lengths(mask)},
-                "area": int(mask.sum()),
-                "bbox": box,
-                "iscrowd": 0,
-                "name": name,
-                "part": k,
-            }
-        )
+        if mask.any():
+            found.append({**mask_record(mask), "iscrowd": 0, "name": name, "part": k})
     return found
+
+
+def mask_record(mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """What COCO says of a mask (H, W) that is not empty: ``segmentation`` as run lengths, ``area``, ``bbox``."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    left, top = int(columns[0]), int(rows[0])
+    box = [left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top]
+    segmentation = {"size": list(mask.shape), "counts": run_lengths(mask)}
+    return {"segmentation": segmentation, "area": int(mask.sum()), "bbox": box}
 
 
 def run_lengths(mask: NDArray[np.bool_]) -> str:

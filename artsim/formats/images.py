@@ -48,3 +48,14 @@ def depth_png(depth: NDArray[np.float32]) -> tuple[bytes, float]:
     values = np.rint(depth.astype(np.float64) / unit)
     values[depth > 0] = np.maximum(values[depth > 0], 1)  # what is seen stays seen
     return png_bytes(values.astype(np.uint16)), unit
+
+
+def grey_depth(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(H, W) depth as grey: near is bright, no return is black."""
+    seen = depth > 0
+    grey = np.zeros(depth.shape, np.uint8)
+    if seen.any():
+        near, far = float(depth[seen].min()), float(depth[seen].max())
+        share = (far - depth[seen]) / max(far - near, 1e-9)
+        grey[seen] = np.rint(55.0 + 200.0 * share).astype(np.uint8)
+    return grey

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.files import write_atomic
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
+from artsim.datasets.pieces import Output
 from artsim.datasets.shards import sample_key
-from artsim.formats.base import Output, Piece, PlainFormat
+from artsim.formats.base import Piece, PlainFormat
 from artsim.observing.sample import Sample
 
 _TYPES = {"<f4": "float", "|u1": "uchar", "<i4": "int"}

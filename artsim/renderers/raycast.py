@@ -271,11 +271,27 @@ class _Nearest:
         return self.distance * np.float32(scale), self.part_ids
 
 
+def hit_faces(posed: PosedObject, k: int, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) first face of part k that the ray through the centre of each pixel meets; -1 where it meets none."""
+    origins, directions = _part_rays(posed, k, posed.image_plane(row, column))
+    faces = ray_surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="INTERSECT")
+    return np.asarray(faces, dtype=np.int64)
+
+
 def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArray[np.float32]:
     """Native z-depth at which rays from the camera meet part k, ``_MISS`` or more where they do not.
 
     ``plane`` is (2, N), what :meth:`PosedObject.image_plane` gives.
     """
+    origins, directions = _part_rays(posed, k, plane)
+    distance: NDArray[np.float32] = ray_surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="DISTANCE")
+    return distance
+
+
+def _part_rays(
+    posed: PosedObject, k: int, plane: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Origins (N, 3) and directions (3, N) of rays from the camera, in the frame of part k."""
     # Row by row of the rotation, not by BLAS: see `artsim.common.products`.
     x, y, z = posed.rotations[k][..., None]
     directions = plane[0] * x
@@ -284,8 +300,7 @@ def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArra
     # All rays start at the camera: one origin, seen N times through a stride of 0.
     shape = (plane.shape[1], 3)
     origins: NDArray[np.float32] = np.ndarray(shape, np.float32, posed.origins[k].copy(), strides=(0, 4))
-    distance: NDArray[np.float32] = ray_surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="DISTANCE")
-    return distance
+    return origins, directions
 
 
 def visibility(posed: PosedObject, parts: Sequence[int], max_rays: int) -> NDArray[np.int64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from artsim.renderers import Renderer
 from artsim.renderers.raycast import pose, render_posed
 from artsim.renderers.scene import Scene, SceneFrame, Thing
 from artsim.renderers.scene_renderer import render_scene
+from artsim.scenes.missing_returns import MissingReturns, missing_returns
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,7 @@ def observe_scene(
     noise: str | Sensor = "none",
     seed: int = 0,
     rgb_samples: int = 8,
+    misses: bool = False,
 ) -> list[SceneView]:
     """Look at a scene and write down what is true of each articulated object in it.
 
@@ -87,6 +89,9 @@ def observe_scene(
         Of noise, and of the choice of points; stored in the records.
     rgb_samples : int
         Pictures that each colour image is the mean of.
+    misses : bool
+        The sensor gets no return from patches of shiny and transparent surfaces: see
+        :func:`artsim.scenes.missing_returns.missing_share`.
 
     Returns
     -------
@@ -95,7 +100,7 @@ def observe_scene(
     """
     if num_points < 1:
         raise ConfigError(f"a cloud of {num_points} points is empty", "num_points", "ask for at least 1")
-    sensor, name = find_sensor(noise), renderer if isinstance(renderer, str) else renderer.name
+    preset, name = find_sensor(noise), renderer if isinstance(renderer, str) else renderer.name
     views = []
     for number, (camera, frame) in enumerate(
         zip(cameras, render_scene(scene, cameras, renderer, rgb_samples), strict=True)
@@ -103,6 +108,10 @@ def observe_scene(
         # Every instance is read with the same chance, so that its points are those of the depth image.
         chance = [seed, 4, number]
         key = int(np.random.default_rng(chance).integers(2**63))
+        sensor = preset
+        if misses:
+            missed = missing_returns(scene, frame, camera, np.random.default_rng([seed, 7, number]))
+            sensor = replace(preset, name=f"{preset.name}+misses", steps=(*preset.steps, MissingReturns(missed)))
         depth = sensor.read_image(frame.depth, camera, key) if sensor.steps else frame.depth
         samples, fractions, boxes = [], [], []
         for i, thing in enumerate(scene.instances):
@@ -151,18 +160,25 @@ def _box(shown: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 
 def write_view(view: SceneView, folder: Path) -> None:
-    """Write a view as files.
-
-    ``rgb.png`` (where there is colour), ``depth.npy`` (metres), ``instance_ids.png`` and ``part_ids.png`` (a byte each,
-    255 = none), ``scene.json`` (camera, and everything that stands in the scene by its instance id), and for each
-    instance ``instance_<id>.*``, the members of a dataset's sample.
+    """Write a view as files; see :func:`view_files`.
 
     Raises
     ------
     ConfigError
         When the folder cannot be written to.
     """
-    frame, files = view.frame, {}
+    for name, content in view_files(view).items():
+        write_atomic(folder / name, content)
+
+
+def view_files(view: SceneView) -> dict[str, bytes]:
+    """A view as files, by name.
+
+    ``rgb.png`` (where there is colour), ``depth.npy`` (metres), ``instance_ids.png`` and ``part_ids.png`` (a byte each,
+    255 = none), ``scene.json`` (camera, and everything that stands in the scene by its instance id), and for each
+    instance ``instance_<id>.*``, the members of a dataset's sample.
+    """
+    frame, files = view.frame, dict[str, bytes]()
     files["depth.npy"] = npy_bytes(view.depth)
     pictures = {"instance_ids": frame.instance_ids, "part_ids": frame.part_ids, "rgb": frame.rgb}
     files |= {f"{name}.png": png_bytes(image) for name, image in pictures.items() if image is not None}
@@ -170,8 +186,7 @@ def write_view(view: SceneView, folder: Path) -> None:
         if sample is not None:
             files |= {f"instance_{i}.{member}": content for member, content in sample_members(sample).items()}
     files["scene.json"] = orjson.dumps(_description(view), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
-    for name, content in files.items():
-        write_atomic(folder / name, content)
+    return files
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:

@@ -58,10 +58,13 @@ class Arrangement:
     ----------
     area : Area
     things : list of Thing
+    crowded : bool
+        Things may hide one another, and the tall need not stand at the back.
     """
 
     area: Area
     things: list[Thing] = field(default_factory=list)
+    crowded: bool = False
 
     def put(
         self,
@@ -111,8 +114,10 @@ class Arrangement:
                 continue
             found += 1
             off = (place - 0.5 * (np.add(self.area.low, self.area.high))) / np.subtract(self.area.high, self.area.low)
-            cost = float(abs(off[0] - 0.4 * np.clip((tall - _TALL) / _TALL, -1.0, 1.0)) + 0.5 * abs(off[1]))
-            cost += sum(_hides(thing, other) + _hides(other, thing) for other in self.things)
+            back = 0.0 if self.crowded else 0.4 * np.clip((tall - _TALL) / _TALL, -1.0, 1.0)
+            cost = float(abs(off[0] - back) + 0.5 * abs(off[1]))
+            if not self.crowded:
+                cost += sum(_hides(thing, other) + _hides(other, thing) for other in self.things)
             if cost < least:
                 best, least = thing, cost
             if found == _CHOICE:

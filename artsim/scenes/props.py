@@ -149,7 +149,7 @@ def _bottle(rng: np.random.Generator) -> tuple[Solid, list[Material]]:
     throat = cylinder((0, 0, shoulder), (0, 0, 0.82 * height), radius, neck, sections=48)
     stem = cylinder((0, 0, 0.82 * height), (0, 0, 0.93 * height), neck, sections=48)
     cap = cylinder((0, 0, 0.92 * height), (0, 0, height), 1.15 * neck, sections=32)
-    skin = draw_material("gloss", rng)
+    skin = draw_material("smoke", rng)  # dark glass
     return body + throat + stem + cap, [skin, skin, skin, draw_material("plastic", rng)]
 
 

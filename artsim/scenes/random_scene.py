@@ -18,7 +18,7 @@ from artsim.common.products import norm
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.roots import PackageRoots
-from artsim.loading.sources import find_sources
+from artsim.loading.sources import Source, find_sources
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, transform_points
@@ -31,6 +31,7 @@ _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""
 _DRAWS = 12  # of a procedural object until one is small enough for a table
 _CROWD = 2.5  # of the sum of footprints: the area that things are spread over
+_CLOSER = 0.6  # of that area in a crowded scene
 _ATTEMPTS = 4  # arrangements that are begun before a scene is given up
 _KIN = {"knife": "folding_knife", "table": "drawer"}
 """Families whose sizes the real objects of other categories have."""
@@ -85,6 +86,14 @@ class SceneOptions:
     """table or floor; auto: on the floor if any object is too large for a table."""
     distractors: int = 3
     """Everyday things besides: books, cans, mugs, fruit."""
+    count: tuple[int, int] | None = None
+    """Draw so many objects for each scene, LOW to HIGH, from the categories and files that are named. By default all of
+    them are in every scene, once each."""
+    diagonal: tuple[float, float] | None = None
+    """Metres, LOW HIGH: each object is made as large as is drawn from this range, measured at rest from corner to
+    corner of its box. By default sizes are usual ones."""
+    crowded: bool = False
+    """Things stand close together, and before one another: more of each is hidden."""
     states: StateOptions = field(default_factory=lambda: StateOptions(fraction_open=(0.3, 0.7)))
     obj: Annotated[tuple[ArticulatedObject, ...], tyro.conf.Suppress] = ()
     """Objects as they are, besides."""
@@ -92,6 +101,10 @@ class SceneOptions:
     def __post_init__(self) -> None:
         if self.distractors < 0:
             raise ConfigError(f"{self.distractors} is not a count", "distractors", "use 0 or more")
+        if self.count is not None and not 1 <= self.count[0] <= self.count[1]:
+            raise ConfigError(f"{self.count} is no range of counts", "count", "write LOW HIGH, such as 3 6")
+        if self.diagonal is not None and not 0 < self.diagonal[0] <= self.diagonal[1] < np.inf:
+            raise ConfigError(f"{self.diagonal} is no range of metres", "diagonal", "write LOW HIGH, such as 0.18 0.38")
         if self.place not in ("auto", "table", "floor"):
             raise ConfigError(f"there is no place {self.place!r}", "place", "use auto, table or floor")
         if not (self.categories or self.objects or self.obj):
@@ -132,8 +145,8 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
     )
     solids = [*zip(objects, states, coats, strict=True), *((obj, np.zeros(1), coat) for obj, coat in others)]
     for attempt in range(_ATTEMPTS):
-        area = _area(solids, on_table, attempt)
-        things = _arrange(solids, area, rng)
+        area = _area(solids, on_table, attempt, options.crowded)
+        things = _arrange(solids, area, rng, options.crowded)
         if things is not None:
             break
     else:
@@ -169,10 +182,27 @@ def with_appearance(scene: Scene, seed: int) -> Scene:
 def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
     """The objects of a scene, files in a usual size."""
     rng = np.random.default_rng([seed, 0])
-    made = [_draw_object(category, options.place != "floor", rng) for category in options.categories]
-    sources = find_sources(options.objects, options.package_root) if options.objects else []
-    loaded = [source.load() for source in sources]
-    return [*made, *(_in_usual_size(obj, int(rng.integers(2**31))) for obj in loaded), *options.obj]
+    categories: Sequence[str] = options.categories
+    sources: Sequence[Source] = find_sources(options.objects, options.package_root) if options.objects else ()
+    own: Sequence[ArticulatedObject] = options.obj
+    if options.count is not None:
+        choice = np.random.default_rng([seed, 5])
+        number = int(choice.integers(options.count[0], options.count[1] + 1))
+        # Kinds come as often as they are named, files each once; with replacement, as on real tables.
+        drawn = choice.integers(len(categories) + len(sources) + len(own), size=number).tolist()
+        places = np.cumsum([0, len(categories), len(sources), len(own)]).tolist()
+        categories, sources, own = (
+            [kind[i - low] for i in sorted(drawn) if low <= i < low + len(kind)]
+            for kind, low in zip((categories, sources, own), places, strict=False)
+        )
+    small = options.place != "floor" and options.diagonal is None
+    made = [_draw_object(category, small, rng) for category in categories]
+    loaded = [_in_usual_size(source.load(), int(rng.integers(2**31))) for source in sources]
+    objects = [*made, *loaded, *own]
+    if options.diagonal is not None:
+        sizes = np.random.default_rng([seed, 6])
+        objects = [obj.with_diagonal(float(sizes.uniform(*options.diagonal))) for obj in objects]
+    return objects
 
 
 def _draw_object(category: str, small: bool, rng: np.random.Generator) -> ArticulatedObject:
@@ -195,22 +225,27 @@ def _in_usual_size(obj: ArticulatedObject, seed: int) -> ArticulatedObject:
 _Placeable = tuple[ArticulatedObject, Array, tuple[Coat, ...]]
 
 
-def _area(solids: list[_Placeable], on_table: bool, attempt: int) -> Area:
+def _area(solids: list[_Placeable], on_table: bool, attempt: int, crowded: bool = False) -> Area:
     """Room for some things, more of it with each attempt; a table has its limits."""
     sizes = np.array([np.sort(obj.bounds[1] - obj.bounds[0])[1:] for obj, _, _ in solids])
     crowd = _CROWD if on_table else 2.0 * _CROWD  # so that what is small need not stand behind furniture
+    crowd *= _CLOSER if crowded else 1.0
     total = crowd * (1.0 + 0.3 * attempt) * float((sizes + 0.06).prod(axis=1).sum())
     longest = float(norm(sizes).max()) + 0.1
     width = max(np.sqrt(1.6 * total), longest)
     depth = max(total / width, 0.8 * longest)
-    if on_table:
+    if on_table and crowded:
+        width, depth = min(width, 1.8), min(depth, 0.95)
+    elif on_table:
         width, depth = min(max(width, 0.9), 1.8), min(max(depth, 0.55), 0.95)
     return Area((-0.5 * depth, -0.5 * width), (0.5 * depth, 0.5 * width))
 
 
-def _arrange(solids: list[_Placeable], area: Area, rng: np.random.Generator) -> list[Thing] | None:
+def _arrange(
+    solids: list[_Placeable], area: Area, rng: np.random.Generator, crowded: bool = False
+) -> list[Thing] | None:
     """All things put down, the largest first; None where they do not fit."""
-    arrangement = Arrangement(area)
+    arrangement = Arrangement(area, crowded=crowded)
     placed: dict[int, Thing] = {}
     for number in sorted(range(len(solids)), key=lambda n: -solids[n][0].diagonal):
         thing = arrangement.put(*solids[number], rng)

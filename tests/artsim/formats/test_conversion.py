@@ -15,10 +15,11 @@ import pytest
 import artsim
 from artsim import Dataset
 from artsim.cli import Generate
+from artsim.datasets.pieces import JOURNAL
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.formats.base import FormatName
-from artsim.formats.conversion import DONE, FORMATS, JOURNAL, convert
+from artsim.formats.conversion import DONE, FORMATS, convert
 from artsim.loading.sources import family_sources
 from tests.artsim.formats.conftest import contents
 

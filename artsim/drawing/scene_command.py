@@ -1,0 +1,93 @@
+"""The verb ``artsim scene``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from artsim.common.program import cores
+from artsim.datasets.sample_options import SensorName
+from artsim.renderers import RendererName
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
+
+_LISTED = 12
+"""Views that are printed one by one; the others are counted."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Make scenes: several articulated objects on a table or a floor, in colour, with the ground truth of each.
+
+    Every view becomes a folder: rgb.png, depth.npy, instance_ids.png, part_ids.png, scene.json, a cloud with its full
+    record for each object, and overview.png, which shows it all. With --shard-size, tar files hold the same.
+    scenes.json lists all views. Stop it at any moment: the same command goes on where it stopped, and a larger --scenes
+    adds to what is there. The result depends on the options and the seed alone, never on the number of workers.
+
+    Example: artsim scene --categories laptop stapler box --seed 3 --scenes 10 --views 2 --out out/scenes
+
+    Small things in metres, crowded, as a camera sees them: artsim scene --categories box stapler cutter scissors drawer
+    --count 3 6 --diagonal 0.18 0.38 --crowded --noise d435 --misses --scenes 100 --shard-size 20 --formats coco --out
+    out/mix
+    """
+
+    out: Path
+    """Folder to write to; made if missing."""
+    scenes: int = 1
+    """Scenes, seeds counting up."""
+    views: int = 1
+    """Cameras that look at each."""
+    seed: int = 0
+    """Seed of the first scene: the same seed and options make the same files."""
+    workers: int = field(default_factory=cores)
+    """Worker processes; by default one for each core."""
+    shard_size: int = 0
+    """Scenes of each tar file; 0 writes a folder for each view."""
+    scene: Annotated[SceneOptions, tyro.conf.arg(name="")] = field(default_factory=SceneOptions)
+    camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
+    renderer: RendererName = "sapien"
+    """Only sapien, pybullet and pybullet-egl make colour images."""
+    rgb_samples: int = 8
+    """Pictures that each colour image is the mean of: more give softer shadows and smoother edges."""
+    num_points: int = 2048
+    """Points of each object's cloud."""
+    noise: SensorName = "none"
+    """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
+    misses: bool = False
+    """The sensor gets nothing back from patches of shiny and transparent surfaces."""
+    overviews: int = 12
+    """Write overview.png for the views of so many scenes, the first ones."""
+    formats: tuple[Literal["coco", "bop"], ...] = ()
+    """Also write the finished scenes in these formats, into the folder <out>_<format>. coco: images and instance masks.
+    bop: models, poses and masks of parts."""
+
+    def run(self) -> None:
+        from artsim.drawing.scene_overview import overview_files
+        from artsim.scenes.convert import convert_scenes
+        from artsim.scenes.dataset import open_scenes
+        from artsim.scenes.generate import SceneRun, generate_scenes
+
+        run = SceneRun(
+            self.scene, self.camera, self.views, self.renderer, self.rgb_samples, self.num_points, self.noise,
+            self.misses,
+        )  # fmt: skip
+        try:
+            result = generate_scenes(
+                run, self.out, self.scenes, self.seed, self.shard_size, self.workers, overview_files, self.overviews
+            )
+            converted = [convert_scenes(run, self.out, name, self.workers) for name in self.formats]
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole files are kept in {self.out}: the same command goes on from there")
+            raise
+        for entry in open_scenes(self.out).entries[:_LISTED]:
+            seen = ", ".join(f"{obj.category} {100 * obj.visible_fraction:.0f}%" for obj in entry.objects)
+            print(f"{entry.key}: {seen} visible")
+        if result.made == 0:
+            print(f"{result.folder}: already complete, {result.scenes} scenes")
+        else:
+            rate = 60.0 * result.made / result.seconds
+            print(f"{result.folder}: {result.scenes} scenes, {result.made} of them made now, {rate:.0f} a minute")
+        for folder in converted:
+            print(f"wrote {folder}")

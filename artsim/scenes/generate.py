@@ -1,0 +1,203 @@
+"""Scenes on disk: drawn, seen and written by worker processes, resumably; see :mod:`artsim.datasets.pieces`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from artsim.datasets.pieces import Answer, Output, Run, Task, run_pieces
+from artsim.datasets.sample_options import SensorName
+from artsim.datasets.shards import write_tar
+from artsim.datasets.worker import StoppedError, report, stop_if_asked
+from artsim.errors import ConfigError
+from artsim.loading.sources import find_sources
+from artsim.renderers import RendererName
+from artsim.scenes.dataset import DESCRIPTION, FORMAT
+from artsim.scenes.ground_truth import SceneView, observe_scene, view_files
+from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera
+
+Extra = Callable[[SceneView], Mapping[str, bytes]]
+"""More files of a view, by name."""
+
+
+@dataclass(frozen=True)
+class SceneRun:
+    """How scenes are drawn and seen.
+
+    Attributes
+    ----------
+    scene : SceneOptions
+    camera : SceneCameraOptions
+    views : int
+        Cameras that look at each scene.
+    renderer : str
+    rgb_samples, num_points, noise, misses
+        As in :func:`artsim.scenes.observe_scene`.
+    """
+
+    scene: SceneOptions = field(default_factory=SceneOptions)
+    camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
+    views: int = 1
+    renderer: RendererName = "sapien"
+    rgb_samples: int = 8
+    num_points: int = 2048
+    noise: SensorName = "none"
+    misses: bool = False
+
+    def observe(self, seed: int) -> list[SceneView]:
+        """All views of the scene of a seed."""
+        scene = make_scene(self.scene, seed)
+        cameras = [scene_camera(scene, self.camera, seed, view) for view in range(self.views)]
+        return observe_scene(
+            scene, cameras, self.num_points, self.renderer, self.noise, seed, self.rgb_samples, self.misses
+        )
+
+    def recipe(self) -> dict[str, Any]:
+        """All that the files follow from, in JSON's terms: files of objects by name and digest."""
+        own = {name: value for name, value in vars(self).items() if name not in ("scene", "camera")}
+        scene = {
+            name: value for name, value in vars(self.scene).items() if name not in ("objects", "package_root", "obj")
+        }
+        sources = find_sources(self.scene.objects, self.scene.package_root) if self.scene.objects else []
+        objects = [*((s.name, s.sha256) for s in sources), *((obj.object_id, obj.sha256) for obj in self.scene.obj)]
+        scene |= {"states": asdict(self.scene.states), "objects": objects}
+        return {**own, "scene": scene, "camera": asdict(self.camera)}
+
+
+@dataclass(frozen=True)
+class ScenesResult:
+    """What a call of :func:`generate_scenes` did.
+
+    Attributes
+    ----------
+    folder : Path
+    scenes : int
+        Of the whole dataset.
+    made : int
+        Scenes made by this call.
+    seconds : float
+    """
+
+    folder: Path
+    scenes: int
+    made: int
+    seconds: float
+
+
+def generate_scenes(
+    run: SceneRun,
+    out: str | Path,
+    scenes: int = 1,
+    seed: int = 0,
+    shard_size: int = 0,
+    workers: int = 2,
+    extra: Extra | None = None,
+    extra_scenes: int = 0,
+    progress: bool = True,
+) -> ScenesResult:
+    """Write scenes, or go on with a run that was stopped, or add to one that is complete.
+
+    The same bytes come out whatever the number of workers and however often the run was stopped. A complete dataset is
+    checked and left alone; damaged files are made again.
+
+    Parameters
+    ----------
+    run : SceneRun
+    out : path
+        Folder; made if missing.
+    scenes : int
+        Scenes in all. A larger number adds to what is there.
+    seed : int
+        Of the first scene; the others count up from it.
+    shard_size : int
+        Scenes of each tar file; 0 writes a folder for each view.
+    workers : int
+        Processes.
+    extra : callable, optional
+        Gives more files for each view of the first ``extra_scenes`` scenes: a function of a module.
+    extra_scenes : int
+    progress : bool
+
+    Raises
+    ------
+    ConfigError
+        When an option makes no sense, or a scene cannot be made.
+    DatasetError
+        When the folder holds something else, or is in use.
+    KeyboardInterrupt
+        On Ctrl-C, after the workers have stopped; the same call goes on.
+    """
+    start = time.perf_counter()
+    for name, value, least in (
+        ("scenes", scenes, 1), ("views", run.views, 1), ("workers", workers, 1), ("seed", seed, 0),
+        ("shard_size", shard_size, 0), ("overviews", extra_scenes, 0),
+    ):  # fmt: skip
+        if value < least:
+            raise ConfigError(f"{value} is not a count", name, f"use {least} or more")
+    folder = Path(out)
+    recipe = {
+        "format": FORMAT, "artsim_version": version("artsim"), "scenes": scenes, "seed": seed,
+        "shard_size": shard_size, "overviews": extra_scenes if extra else 0, **run.recipe(),
+    }  # fmt: skip
+    step = shard_size or 1
+    tasks = {
+        f"{first:06d}-{min(first + step, seed + scenes):06d}": Task(
+            write_scenes,
+            (folder.absolute(), run, first, min(first + step, seed + scenes), (first - seed) // step, shard_size > 0,
+             extra, seed + extra_scenes),
+            min(first + step, seed + scenes) - first,
+        )
+        for first in range(seed, seed + scenes, step)
+    }  # fmt: skip
+    made = run_pieces(
+        Run(folder, recipe, DESCRIPTION, "set of scenes", "scene", "scenes", progress), tasks, _nothing_more, workers
+    ).made
+    return ScenesResult(folder, scenes, made, time.perf_counter() - start)
+
+
+def _nothing_more(values: Mapping[str, Any], output: Output) -> dict[str, Any]:
+    return {}
+
+
+def write_scenes(
+    folder: Path, run: SceneRun, first: int, end: int, number: int, as_shard: bool, extra: Extra | None, until: int
+) -> Answer | None:
+    """Write some scenes, in a worker; None when asked to stop before all are written."""
+    output, entries = Output(folder), list[dict[str, Any]]()
+    where = f"scenes-{number:06d}.tar"
+
+    def views() -> Iterator[tuple[str, dict[str, bytes]]]:
+        for seed in range(first, end):
+            stop_if_asked()
+            for n, view in enumerate(run.observe(seed)):
+                key = f"{seed:06d}_{n}"
+                entries.append({"key": key, "scene": seed, "view": n, "file": where if as_shard else key,
+                                "objects": _objects(view)})  # fmt: skip
+                yield key, view_files(view) | dict(extra(view) if extra is not None and seed < until else {})
+            report(1)
+
+    try:
+        if as_shard:
+            output.files[where] = write_tar(folder / where, views())
+        else:
+            for key, files in views():
+                for name, content in files.items():
+                    output.write(f"{key}/{name}", content)
+    except StoppedError:
+        return None
+    return Answer(output.files, entries)
+
+
+def _objects(view: SceneView) -> list[dict[str, Any]]:
+    """What the description says of each articulated object in a view."""
+    return [
+        {
+            "category": thing.obj.category, "object_id": thing.obj.object_id, "parts": len(thing.obj),
+            "visible_fraction": round(float(fraction), 4), "box": [int(v) for v in box],
+        }
+        for thing, fraction, box in zip(view.scene.instances, view.visible_fraction, view.boxes, strict=True)
+    ]  # fmt: skip
