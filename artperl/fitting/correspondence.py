@@ -26,15 +26,15 @@ from artperl.core.shapes import Observed, Shapes
 
 TANGENT_WEIGHT = 0.4
 """Of offsets along a surface against those from it: with none, flat parts would slide along themselves."""
-_DISC_RADIUS = 0.7
+DISC_RADIUS = 0.7
 """Of the disc that a point stands for, over the spacing of points."""
 _OUTLINE_GAP = 2.0
 """Gap within an outline over the mean distance of neighbouring rays: for random rays, few points have a wider one."""
-_OUTLINE_POINTS = 32
+OUTLINE_POINTS = 32
 """Points of each part that must lie within the outline; the first ones are spread as evenly as all."""
 _BLOCK = 64
 """Points that are matched together."""
-_BACK_FACE = 10.0
+BACK_FACE = 10.0
 """Squared distance, in diagonals, added for a disc that faces away from the camera: it cannot be seen."""
 
 
@@ -162,7 +162,7 @@ def match(shapes: Shapes, target: Target, theta: Theta, outline_weight: float) -
     points = posed.points(shapes.points, shapes.box_center)
     rows = [_surface_residuals(shapes, target, posed, points)]
     if outline_weight > 0:
-        rows.append(_outline_residuals(shapes, target, points[:, :, :_OUTLINE_POINTS], outline_weight))
+        rows.append(_outline_residuals(shapes, target, points[:, :, :OUTLINE_POINTS], outline_weight))
     return Matches(theta, posed, *(torch.cat(column, dim=1) for column in zip(*rows, strict=True)))
 
 
@@ -182,7 +182,7 @@ def _surface_residuals(shapes: Shapes, target: Target, posed: Posed, points: Ten
     offset = (apart * normal).sum(-1)
     tangent = apart - offset[..., None] * normal
     length = torch.linalg.vector_norm(tangent, dim=-1)
-    radius = (_DISC_RADIUS * posed.scale.mean(-1) * shapes.spacing).gather(1, observed.part)
+    radius = (DISC_RADIUS * posed.scale.mean(-1) * shapes.spacing).gather(1, observed.part)
     excess = (length - radius).clamp(min=0.0) / unit
     tangent = tangent / length.clamp(min=1e-12)[..., None]
     # A part without a surface is at no distance from the points that are labelled as it.
@@ -224,7 +224,7 @@ def _nearest_disc(target: Target, points: Tensor, normals: Tensor) -> Tensor:
     facing = (points * normals).sum(-1) < 0.0  # the camera is at the origin
     weight = TANGENT_WEIGHT**2
     height = (n * y).sum(-1, keepdim=True)
-    constant = height**2 + weight * (y * y).sum(-1, keepdim=True) + _BACK_FACE * (~facing)[..., None]
+    constant = height**2 + weight * (y * y).sum(-1, keepdim=True) + BACK_FACE * (~facing)[..., None]
     linear = -2.0 * (height * n + weight * y)
     # Products of different coordinates (zx, xy, yz) count twice.
     discs = torch.cat([n * n, 2.0 * n * n.roll(1, -1), linear, constant], dim=-1)

@@ -15,18 +15,13 @@ from torch import Tensor
 from artperl.core.batch import Batch
 from artperl.core.pose import AxisPrior, Theta, clamp_state
 from artperl.core.shapes import Observed, Shapes
+from artperl.fitting.compiled_refinement import refine_each
 from artperl.fitting.correspondence import Matches, Target, match
+from artperl.fitting.damping import DAMPING, DAMPING_FALL, DAMPING_RISE, LEAST_DAMPING, MOST_DAMPING, RIGID_ITERATIONS
 from artperl.fitting.jacobian import lean_axes, retract
 from artperl.fitting.normal_equations import NormalEquations
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.shape_prior import ShapePrior
-
-_RIGID_ITERATIONS = 2
-"""First iterations that keep the reference's shape: a shape that is free at once makes up for a wrong pose."""
-_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-2, 1e-3, 1e8
-"""Of the first step, and bounds: below the least, steps are those of Gauss-Newton."""
-_DAMPING_FALL, _DAMPING_RISE = 0.3, 10.0
-"""Factors after a step that lowers the energy, and after one that fails."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +80,25 @@ def refine(
     prior = ShapePrior.of(shapes, unit, options, axis_prior)
     start = replace(start, state=clamp_state(shapes.trees, start.state))
     target = Target.of(observed, unit)
+    if unit.device.type == "cpu":
+        return Refined(*refine_each(shapes, target, start, prior, options, rigid))
+    return _refine_together(shapes, target, start, prior, options, rigid)
+
+
+def _refine_together(
+    shapes: Shapes, target: Target, start: Theta, prior: ShapePrior, options: RefineOptions, rigid: bool
+) -> Refined:
+    """All objects at once, by torch."""
+    unit = target.unit
     current, lean = match(shapes, target, start, options.outline_weight), torch.zeros_like(start.shift)
     current_cost = prior.cost(start, lean)
     start_energy = robust_mean(current, options.robust_end) + current_cost
-    damping = torch.full_like(unit, _DAMPING)
+    damping = torch.full_like(unit, DAMPING)
     steps = torch.zeros_like(unit, dtype=torch.int64)
     converged = torch.zeros_like(unit, dtype=torch.bool)
     width, equations, posed_shapes = options.robust_start, None, shapes
     for i in range(options.iterations):
-        keeps_shape = rigid or i < _RIGID_ITERATIONS
+        keeps_shape = rigid or i < RIGID_ITERATIONS
         if equations is None:
             equations = NormalEquations.of(posed_shapes, target, current, lean, prior, width, keeps_shape)
         step = equations.step(damping, prior.active.shape[1])
@@ -111,10 +116,10 @@ def refine(
         if width == options.robust_end and not keeps_shape:
             decrease = torch.where(better, before - after, equations.predicted_decrease(step))
             converged |= decrease < options.tolerance * before
-        factor = torch.where(better, _DAMPING_FALL, _DAMPING_RISE)
-        damping = (factor * damping).clamp(_LEAST_DAMPING, _MOST_DAMPING)
+        factor = torch.where(better, DAMPING_FALL, DAMPING_RISE)
+        damping = (factor * damping).clamp(LEAST_DAMPING, MOST_DAMPING)
         last_width, width = width, max(options.robust_end, options.narrowing * width)
-        if bool(better.any()) or width != last_width or i + 1 == _RIGID_ITERATIONS:
+        if bool(better.any()) or width != last_width or i + 1 == RIGID_ITERATIONS:
             equations = None  # they are of another state, of other weights or of fewer parameters
         if bool(converged.all()):
             break

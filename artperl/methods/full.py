@@ -42,7 +42,7 @@ _OWN = 0.9
 the object that is left out is missed by nobody."""
 _MOST_FOREIGN = 0.5
 """Share of points that may be taken for something else; masks as bad as that are no masks of the object."""
-_MOVED = 0.03
+_MOVED = 0.01
 """Scales of a cloud by which others move its middle, or change its scale, before it is looked at again. Clean clouds
 stay below: of these, single points are taken for something else."""
 

@@ -1,0 +1,224 @@
+"""Compiled normal equations and steps of one object: :mod:`artperl.fitting.normal_equations`, in double precision.
+
+Only parameters that move take part. Columns stand as :class:`artperl.fitting.jacobian.Columns` has them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artperl.fitting.arrays import Array, Indices, Reference, State, Tree, View
+from artperl.fitting.correspondence import TANGENT_WEIGHT
+from artperl.fitting.match_loops import Posed, Rows
+from artsim.common.compiled import compiled
+
+
+class Equations(NamedTuple):
+    """See :class:`artperl.fitting.normal_equations.NormalEquations`, for the ``columns`` that move."""
+
+    curvature: Array
+    gradient: Array
+    free: NDArray[np.bool_]
+    columns: Indices
+
+
+@compiled
+def normal_equations(
+    tree: Tree, shape: Reference, view: View, state: State, posed: Posed, rows: Rows, deviations: Array,
+    precision: Array, columns: Indices, width: float, rigid: bool, leans: bool,
+) -> Equations:  # fmt: skip
+    """See :meth:`artperl.fitting.normal_equations.NormalEquations.of`.
+
+    Parameters
+    ----------
+    deviations, precision : (D,), (D, D) float
+        From the reference's shape, and what they cost.
+    columns : (d,) int64
+        Of these, those that move.
+    """
+    P, d = len(tree.parent), len(columns)
+    squares, pulls = _sums(shape, view, posed, rows, P, width)
+    curvature, gradient = np.zeros((d, d)), np.zeros(d)
+    for a in range(d):
+        for b in range(d):
+            curvature[a, b] = precision[columns[a], columns[b]]
+            gradient[a] += precision[columns[a], columns[b]] * deviations[columns[b]]
+    seen = np.zeros(P, dtype=np.bool_)
+    for r in range(len(rows.weight)):
+        if rows.weight[r] > 0.0:
+            seen[rows.part[r]] = True
+    size = 6 if rigid else 9
+    rates, own, product = np.empty((9, len(deviations))), np.empty((size, d)), np.empty((size, d))
+    for k in range(P):
+        if not seen[k]:
+            continue
+        _part_rates(tree, shape, view, state, posed, k, rigid, leans, rates)
+        for i in range(size):
+            for a in range(d):
+                own[i, a] = rates[i, columns[a]] / view.unit
+        for i in range(size):
+            for a in range(d):
+                product[i, a] = 0.0
+            for j in range(size):
+                for a in range(d):
+                    product[i, a] += squares[k, i, j] * own[j, a]
+        for i in range(size):
+            for a in range(d):
+                if own[i, a] != 0.0:
+                    gradient[a] += own[i, a] * pulls[k, i]
+                    for b in range(d):
+                        curvature[a, b] += own[i, a] * product[i, b]
+    free = np.ones(d, dtype=np.bool_)
+    for a in range(d):
+        k = columns[a] - 6
+        if 0 <= k < P:
+            held = state.state[k] <= tree.lower[k] and gradient[a] > 0.0
+            free[a] = not (held or (state.state[k] >= tree.upper[k] and gradient[a] < 0.0))
+    for a in range(d):
+        for b in range(d):
+            if not (free[a] and free[b]):
+                curvature[a, b] = 0.0
+    return Equations(curvature, gradient, free, columns)
+
+
+@compiled
+def _sums(shape: Reference, view: View, posed: Posed, rows: Rows, P: int, width: float) -> tuple[Array, Array]:
+    """Weighted sums of products of the residual's rates by the nine numbers of its part, and with the residual.
+
+    (P, 9, 9) and (P, 9); see :func:`artperl.fitting.jacobian.residual_rates`.
+    """
+    squares, pulls, rate, wide = np.zeros((P, 9, 9)), np.zeros((P, 9)), np.empty(9), width * width
+    for r in range(len(rows.weight)):
+        first, second = rows.residual[r, 0], TANGENT_WEIGHT * rows.residual[r, 1]
+        share = wide / (wide + first * first + second * second)
+        weight = rows.weight[r] * share * share
+        if weight == 0.0:
+            continue
+        k = rows.part[r]
+        x, y, z = (
+            rows.point[r, 0] - view.middle[0],
+            rows.point[r, 1] - view.middle[1],
+            rows.point[r, 2] - view.middle[2],
+        )
+        for kind in range(2):
+            if kind == 0:
+                u, v, w, residual = rows.normal[r, 0], rows.normal[r, 1], rows.normal[r, 2], first
+            elif second > 0.0:
+                u, v, w = rows.tangent[r, 0], rows.tangent[r, 1], rows.tangent[r, 2]
+                u, v, w, residual = TANGENT_WEIGHT * u, TANGENT_WEIGHT * v, TANGENT_WEIGHT * w, second
+            else:
+                continue
+            rate[0], rate[1], rate[2] = z * v - y * w, x * w - z * u, y * u - x * v
+            rate[3], rate[4], rate[5] = -u, -v, -w
+            for i in range(3):
+                along = u * posed.rotation[k, 0, i] + v * posed.rotation[k, 1, i] + w * posed.rotation[k, 2, i]
+                rate[6 + i] = -along * posed.scale[k, i] * (rows.local[r, i] - shape.box_center[k, i])
+            for i in range(9):
+                scaled = weight * rate[i]
+                pulls[k, i] += scaled * residual
+                for j in range(9):
+                    squares[k, i, j] += scaled * rate[j]
+    return squares, pulls
+
+
+@compiled
+def _part_rates(
+    tree: Tree, shape: Reference, view: View, state: State, posed: Posed, k: int, rigid: bool, leans: bool, rates: Array
+) -> None:
+    """Row k of :func:`artperl.fitting.jacobian.part_rates`, into (9, D)."""
+    P = len(tree.parent)
+    rates[:] = 0.0
+    for i in range(6):
+        rates[i, i] = 1.0
+    axis, arm = np.empty(3), np.empty(3)
+    if not rigid:
+        for i in range(3):
+            center = np.exp(state.log_scale[i]) * shape.box_center[k, i]
+            for x in range(3):
+                rates[3 + x, 6 + P + i] = posed.rotation[k, x, i] * center
+            rates[6 + i, 6 + P + i] = 1.0
+            rates[6 + i, 9 + P + 3 * k + i] = 1.0
+    for j in range(P):
+        if not tree.carries[j, k]:
+            continue
+        above, turn = posed.above[j], tree.turn[j]
+        for x in range(3):
+            axis[x], arm[x] = 0.0, posed.anchor[j, x] - view.middle[x]
+            for i in range(3):
+                axis[x] += above[x, i] * tree.axis[j, i]
+                arm[x] += above[x, i] * posed.origin[j, i]
+        column, factor = 6 + tree.source[j], tree.multiplier[j]
+        slide = tree.slide[j] * posed.reach[j]
+        for x in range(3):
+            y, z = (x + 1) % 3, (x + 2) % 3
+            rates[x, column] += factor * turn * axis[x]
+            rates[3 + x, column] += factor * (slide * axis[x] - turn * (axis[y] * arm[z] - axis[z] * arm[y]))
+        if rigid:
+            continue
+        value = tree.rest[j] + tree.offset[j]
+        if tree.multiplier[j] != 0.0:
+            value = tree.multiplier[j] * state.state[tree.source[j]] + tree.offset[j]
+        step = (value - tree.rest[j]) * tree.slide[j]
+        for i in range(3):
+            whole = np.exp(state.log_scale[i])
+            longer = step * (whole * tree.axis[j, i]) ** 2 / posed.reach[j]
+            for x in range(3):
+                anchor = (above[x, i] - posed.rotation[j, x, i]) * whole * tree.origin[j, i]
+                rates[3 + x, 6 + P + i] += anchor + axis[x] * longer
+                rates[3 + x, 9 + 4 * P + 3 * j + i] = above[x, i]
+        if leans:
+            for i in range(3):
+                column = 9 + 7 * P + 3 * j + i
+                for x in range(3):
+                    rates[x, column] = turn * (above[x, i] - posed.rotation[j, x, i])
+                for x in range(3):
+                    y, z = (x + 1) % 3, (x + 2) % 3
+                    rates[3 + x, column] = rates[z, column] * arm[y] - rates[y, column] * arm[z]
+
+
+@compiled
+def damped_step(equations: Equations, damping: float, count: int, total: int) -> tuple[Array, float]:
+    """See :meth:`artperl.fitting.normal_equations.NormalEquations.step` and ``predicted_decrease``.
+
+    Parameters
+    ----------
+    count : int
+        Parameters, whether they move or not, by which the mean curvature is counted.
+    total : int
+        Length of the step.
+    """
+    d = len(equations.columns)
+    mean = 0.0
+    for a in range(d):
+        mean += equations.curvature[a, a]
+    floor = 1e-6 * mean / count + 1e-30
+    lower, step = np.zeros((d, d)), np.empty(d)
+    for a in range(d):  # Cholesky's factor
+        for b in range(a + 1):
+            value = equations.curvature[a, b]
+            if a == b:
+                value += damping * value + floor + (0.0 if equations.free[a] else 1.0)
+            for c in range(b):
+                value -= lower[a, c] * lower[b, c]
+            lower[a, b] = np.sqrt(max(value, 1e-300)) if a == b else value / lower[b, b]
+    for a in range(d):
+        value = -equations.gradient[a] if equations.free[a] else 0.0
+        for c in range(a):
+            value -= lower[a, c] * step[c]
+        step[a] = value / lower[a, a]
+    for a in range(d - 1, -1, -1):
+        value = step[a]
+        for c in range(a + 1, d):
+            value -= lower[c, a] * step[c]
+        step[a] = value / lower[a, a]
+    every, decrease = np.zeros(total), 0.0
+    for a in range(d):
+        every[equations.columns[a]] = step[a]
+        change = 2.0 * equations.gradient[a]
+        for b in range(d):
+            change += equations.curvature[a, b] * step[b]
+        decrease -= step[a] * change
+    return every, decrease
