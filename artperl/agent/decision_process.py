@@ -8,13 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.agent.actions import NOTHING, action_mask, apply, expert
 from artperl.core.batch import Batch
 from artperl.core.pose import Posed, Theta, joint_axes, pose_parts
 from artperl.core.shapes import Observed, Shapes, faces_camera
+from artsim.common.compiled import compiled_finite
+
+Single = NDArray[np.float32]
 
 FAR = 1e6
 """Coordinate of reference points that stand for nothing: parts without a surface."""
@@ -119,9 +124,9 @@ class Fitting:
         local = (points - self.center[:, None, None]) / self.radius[:, None, None, None]
         self.reference = torch.where(self.shown[..., None], local, FAR)
         reference, shown = self.reference.flatten(1, 2), self.shown.flatten(1)
-        there = nearest_distance(self._local, reference).mean(1)
-        back = nearest_distance(reference, self._local).clamp(max=_FARTHEST) * shown
-        self.distance = 0.5 * (there + back.sum(1) / shown.sum(1).clamp(min=1))
+        there, back = nearest_distances(self._local, reference)
+        back = back.clamp(max=_FARTHEST) * shown
+        self.distance = 0.5 * (there.mean(1) + back.sum(1) / shown.sum(1).clamp(min=1))
 
     def view(self) -> View:
         """What the agent sees now."""
@@ -169,6 +174,36 @@ class Fitting:
     def done(self) -> bool:
         """Whether the episodes have come to their last step."""
         return self.steps_taken >= self.options.steps * self._levels
+
+
+def nearest_distances(points: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+    """(B, N) distances of points (B, N, 3) from the nearest of others (B, M, 3), and (B, M) the other way round."""
+    if points.device.type != "cpu":
+        return nearest_distance(points, others), nearest_distance(others, points)
+    pairs = zip(points.detach().float().numpy(), others.detach().float().mT.contiguous().numpy(), strict=True)
+    found = [_nearest_squared(*pair) for pair in pairs]
+    there, back = (torch.from_numpy(np.sqrt(np.stack(values))) for values in zip(*found, strict=True))
+    return there.to(points.dtype), back.to(points.dtype)
+
+
+@compiled_finite
+def _nearest_squared(points: Single, others: Single) -> tuple[Single, Single]:
+    """Squared distances between points (N, 3) and others (3, M), each from the nearest: (N,) and (M,)."""
+    N, M = len(points), others.shape[1]
+    there, back, apart = np.empty(N, dtype=np.float32), np.full(M, np.inf, dtype=np.float32), np.empty(M, np.float32)
+    for n in range(N):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        for m in range(M):
+            dx, dy, dz = others[0, m] - x, others[1, m] - y, others[2, m] - z
+            apart[m] = dx * dx + dy * dy + dz * dz
+        least = np.float32(np.inf)
+        for m in range(M):
+            if apart[m] < least:
+                least = apart[m]
+        for m in range(M):
+            back[m] = min(back[m], apart[m])
+        there[n] = least
+    return there, back
 
 
 def nearest_distance(asked: Tensor, offered: Tensor) -> Tensor:

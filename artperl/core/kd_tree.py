@@ -18,7 +18,7 @@ from artsim.common.compiled import compiled
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_LEAF = 10
+_LEAF = 16
 """Most points of a leaf."""
 _DEEPEST = 64
 """Nodes that wait while one point is searched for; a tree of 2^63 leaves would need as many."""
@@ -46,11 +46,10 @@ class KDTree:
     @staticmethod
     def of(points: ArrayLike) -> KDTree:
         """The tree of finite points (N, 2 or 3), N of at least 1."""
-        own = _in_space(points)
+        own = _in_space(points).copy()
         order = np.arange(len(own))
         levels = 1 + max(0, int(np.ceil(np.log2(len(own) / _LEAF))))
-        low, high = _build(own, order, levels)
-        return KDTree(own[order], order, low, high)
+        return KDTree(own, order, *_build(own, order, levels))
 
     def nearest(self, queries: ArrayLike, count: int, within: float = np.inf) -> tuple[Array, Indices]:
         """The nearest points to each query, nearest first.
@@ -84,7 +83,7 @@ def _in_space(points: ArrayLike) -> Array:
 
 @compiled
 def _build(points: Array, order: Indices, levels: int) -> tuple[Array, Array]:
-    """Sort the points' indices for a tree of so many levels; boxes of its nodes."""
+    """Sort points, and their indices with them, for a tree of so many levels; boxes of its nodes."""
     count = len(points)
     low, high = np.empty((2**levels - 1, 3)), np.empty((2**levels - 1, 3))
     for level in range(levels):
@@ -92,33 +91,35 @@ def _build(points: Array, order: Indices, levels: int) -> tuple[Array, Array]:
             node = 2**level - 1 + place
             begin, end = (count * place) >> level, (count * (place + 1)) >> level
             for axis in range(3):
-                least, most = np.inf, -np.inf
-                for i in range(begin, end):
-                    value = points[order[i], axis]
-                    least, most = min(least, value), max(most, value)
-                low[node, axis], high[node, axis] = least, most
+                low[node, axis], high[node, axis] = np.inf, -np.inf
+            for i in range(begin, end):
+                for axis in range(3):
+                    low[node, axis] = min(low[node, axis], points[i, axis])
+                    high[node, axis] = max(high[node, axis], points[i, axis])
             if level + 1 < levels:
                 side = high[node] - low[node]
                 axis = 0 if side[0] >= side[1] and side[0] >= side[2] else 1 if side[1] >= side[2] else 2
-                _split(points[:, axis], order, begin, end, (count * (2 * place + 1)) >> (level + 1))
+                _split(points, axis, order, begin, end, (count * (2 * place + 1)) >> (level + 1))
     return low, high
 
 
 @compiled
-def _split(values: Array, order: Indices, begin: int, end: int, middle: int) -> None:
-    """Reorder indices from begin to end: no value before the middle is larger than any behind (Hoare 1961)."""
+def _split(points: Array, axis: int, order: Indices, begin: int, end: int, middle: int) -> None:
+    """Reorder points from begin to end: none before the middle is farther along an axis than one behind."""
     left, right = begin, end - 1
     while left < right:
-        first, half, last = values[order[left]], values[order[(left + right) >> 1]], values[order[right]]
+        first, half, last = points[left, axis], points[(left + right) >> 1, axis], points[right, axis]
         pivot = max(min(first, half), min(max(first, half), last))
         i, j = left, right
         while i <= j:
-            while values[order[i]] < pivot:
+            while points[i, axis] < pivot:
                 i += 1
-            while values[order[j]] > pivot:
+            while points[j, axis] > pivot:
                 j -= 1
             if i <= j:
                 order[i], order[j] = order[j], order[i]
+                for n in range(3):
+                    points[i, n], points[j, n] = points[j, n], points[i, n]
                 i += 1
                 j -= 1
         if middle <= j:

@@ -11,8 +11,10 @@ from torch import Tensor
 
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
+from artsim.common.compiled import compiled, compiled_finite
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
 Values = TypeVar("Values", Array, Tensor)
 
 _SURFACE_SIGMA = 0.03
@@ -45,10 +47,37 @@ def labels_by_surface(shapes: Shapes, observed: Observed, theta: Theta, logits: 
     """
     N, P = observed.part.shape[1], shapes.trees.num_rows
     points = pose_parts(shapes.trees, theta, shapes.box_center).points(shapes.points, shapes.box_center)
-    distance = torch.cdist(observed.points[:, None].expand(-1, P, -1, -1), points).amin(-1).transpose(1, 2)
+    distance = nearest_distance(observed.points, points)
     sigma = shapes.diagonal[:, None, None] * _SURFACE_SIGMA
     score = label_log_odds(logits[:, :N, :P].log_softmax(-1), distance, sigma)
     return score.masked_fill(~shapes.has_surface[:, None], -torch.inf).argmax(-1)
+
+
+def nearest_distance(points: Tensor, surface: Tensor) -> Tensor:
+    """(B, N, P) distance of points (B, N, 3) from the nearest point of each part (B, P, M, 3)."""
+    if points.device.type != "cpu":
+        every: Tensor = torch.cdist(points[:, None].expand(-1, surface.shape[1], -1, -1), surface).amin(-1)
+        return every.transpose(1, 2)
+    pairs = zip(points.float().numpy(), surface.float().transpose(2, 3).contiguous().numpy(), strict=True)
+    squared = np.stack([_nearest_squared(own, parts) for own, parts in pairs])
+    return torch.from_numpy(np.sqrt(squared)).to(points.dtype)
+
+
+@compiled_finite
+def _nearest_squared(points: Single, surface: Single) -> Single:
+    """(N, P) squared distance of points (N, 3) from the nearest point of each part (P, 3, M)."""
+    found = np.empty((len(points), len(surface)), dtype=np.float32)
+    for n in range(len(points)):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        for k in range(len(surface)):
+            least = np.float32(np.inf)
+            for m in range(surface.shape[2]):
+                dx, dy, dz = surface[k, 0, m] - x, surface[k, 1, m] - y, surface[k, 2, m] - z
+                squared = dx * dx + dy * dy + dz * dz
+                if squared < least:
+                    least = squared
+            found[n, k] = least
+    return found
 
 
 def labels_by_boxes(
@@ -67,9 +96,30 @@ def labels_by_boxes(
     sigma : float
         Metres that weigh as much as odds of 1 to e.
     """
-    distance = np.stack([
-        np.linalg.norm(np.maximum(np.abs((points - T[:3, 3]) @ T[:3, :3] - middle) - 0.5 * whole, 0.0), axis=1)
-        for T, middle, whole in zip(T_camera_part, center, size, strict=True)
-    ], axis=1)  # fmt: skip
-    score = label_log_odds(log_odds[:, : len(size)], distance, sigma)
-    return np.where(np.isnan(score).any(axis=1), -1, score.argmax(axis=1))
+    given = (points, T_camera_part, center, 0.5 * size, log_odds)
+    own, T, middle, half, prior = (np.ascontiguousarray(values, dtype=np.float64) for values in given)
+    return _likeliest_boxes(own, T, middle, half, prior, sigma)
+
+
+@compiled
+def _likeliest_boxes(
+    points: Array, T_camera_part: Array, center: Array, half: Array, log_odds: Array, sigma: float
+) -> NDArray[np.int64]:
+    """See :func:`labels_by_boxes`; log-odds are those of :func:`label_log_odds`."""
+    label = np.empty(len(points), dtype=np.int64)
+    for n in range(len(points)):
+        best, label[n] = -np.inf, 0
+        for k in range(len(center)):
+            squared = 0.0
+            for i in range(3):
+                place = -center[k, i]
+                for x in range(3):
+                    place += (points[n, x] - T_camera_part[k, x, 3]) * T_camera_part[k, x, i]
+                squared += max(abs(place) - half[k, i], 0.0) ** 2
+            score = log_odds[n, k] - squared / (sigma * sigma)
+            if np.isnan(score):
+                label[n] = -1
+                break
+            if score > best:
+                best, label[n] = score, k
+    return label

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -72,7 +72,7 @@ def tree_of(shapes: Shapes, row: int) -> Tree:
     """The tree of one object."""
     trees = shapes.trees
     names = ("parent", "axis", "origin", "lower", "upper", "rest", "turn", "slide", "source", "multiplier", "offset")
-    fields = {name: _double(getattr(trees, name)[row]) for name in (*names, "carries")}
+    fields: dict[str, Any] = {name: _double(getattr(trees, name)[row]) for name in (*names, "carries")}
     return Tree(**fields, order=np.argsort(trees.depth[row].numpy(), kind="stable"))
 
 

@@ -13,13 +13,12 @@ import torch
 from torch import Tensor
 
 from artperl.core.pose import Theta
-from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Shapes
 from artperl.fitting.arrays import Array, Reference, State, Tree, View, reference_of, state_of, tree_of, view_of
 from artperl.fitting.correspondence import Target
 from artperl.fitting.damping import DAMPING, DAMPING_FALL, DAMPING_RISE, LEAST_DAMPING, MOST_DAMPING, RIGID_ITERATIONS
 from artperl.fitting.jacobian import Columns
-from artperl.fitting.match_loops import match, robust_mean
+from artperl.fitting.match_loops import match, robust_mean, rotation_of_vector
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.shape_prior import ShapePrior
 from artperl.fitting.step_loops import damped_step, normal_equations
@@ -56,13 +55,13 @@ class _Problem:
         """The tree with axes that lean by rotation vectors (P, 3)."""
         if not lean.any():
             return self.tree
-        turn = rotation_from_vector(torch.from_numpy(lean)).numpy()
-        return self.tree._replace(axis=np.einsum("kij,kj->ki", turn, self.tree.axis))
+        axes = [rotation_of_vector(own) @ axis for own, axis in zip(lean, self.tree.axis, strict=True)]
+        return self.tree._replace(axis=np.stack(axes))
 
     def retract(self, state: State, lean: Array, step: Array) -> tuple[State, Array]:
         """See :func:`artperl.fitting.jacobian.retract`."""
         columns, pivot = self.columns, self.view.middle
-        turn = rotation_from_vector(torch.from_numpy(step[:3])).numpy()
+        turn = rotation_of_vector(step[:3])
         limited = np.clip(state.state + step[columns.state], self.tree.lower, self.tree.upper)
         after = State(
             turn @ state.rotation, turn @ (state.translation - pivot) + pivot + step[3:6],
@@ -133,5 +132,5 @@ def refine_each(
     states, axes, energy, first, steps = zip(*found, strict=True)
     like = start.state
     theta = Theta(*(torch.from_numpy(np.stack(values)).to(like) for values in zip(*states, strict=True)))
-    numbers = (torch.tensor(values).to(like) for values in (energy, first))
-    return theta, torch.from_numpy(np.stack(axes)).to(like), *numbers, torch.tensor(steps)
+    axis = torch.from_numpy(np.stack(axes)).to(like)
+    return theta, axis, torch.tensor(energy).to(like), torch.tensor(first).to(like), torch.tensor(steps)

@@ -106,6 +106,18 @@ def rotate_about(axis: Array, angle: float, out: Array) -> None:
 
 
 @compiled
+def rotation_of_vector(vector: Array) -> Array:
+    """(3, 3) rotation by the length of a vector (3,), radians, about it."""
+    out, axis = np.eye(3), np.empty(3)
+    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if angle > 0.0:
+        for i in range(3):
+            axis[i] = vector[i] / angle
+        rotate_about(axis, angle, out)
+    return out
+
+
+@compiled
 def match(tree: Tree, shape: Reference, view: View, state: State, outline_weight: float) -> tuple[Posed, Rows]:
     """See :func:`artperl.fitting.correspondence.match`."""
     posed = pose(tree, shape.box_center, state)

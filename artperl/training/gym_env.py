@@ -1,6 +1,7 @@
 """The fitting process for gymnasium: ``artperl/PoseFitting-v0``, for any reinforcement-learning library.
 
 One environment fits one object; what it does and what is seen are :class:`artperl.agent.decision_process.Fitting`'s.
+``gymnasium.make_vec("artperl/PoseFitting-v0", 64)`` makes many that step as one batch: :class:`PoseFittingVectorEnv`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from artperl.retrieval.shape_base import ShapeBase
 ENV_ID = "artperl/PoseFitting-v0"
 _FAR = np.float32(1e3)
 """Bound of what is observed: far beyond any episode."""
-_SEEDS = 2_000_000
+SEEDS = 2_000_000
+"""Seed of the first object that references are chosen from."""
 
 
 class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
@@ -51,24 +53,12 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
 
     def __init__(self, category: str = "laptop", references: int = 16, options: FittingOptions | None = None):
         self.options = options or FittingOptions()
-        self.base = by_boxes(ShapeBase.of(objects_of([category], references, _SEEDS), self.options.reference_points))
+        self.base = by_boxes(ShapeBase.of(objects_of([category], references, SEEDS), self.options.reference_points))
         self.category = category
-        P, N, M = self.base.shapes.trees.num_rows, self.options.observed_points, self.options.reference_points
+        P = self.base.shapes.trees.num_rows
         self._shape = (P, NUM_AXES)
-        self.action_space: spaces.MultiDiscrete = spaces.MultiDiscrete(np.full(P * NUM_AXES, NUM_BINS), dtype=np.int64)
-        self.observation_space = spaces.Dict(
-            {
-                "observed": _anything(N, 3),
-                "part": spaces.MultiDiscrete(np.full(N, P), dtype=np.int64),
-                "reference": _anything(P, M, 3),
-                "shown": spaces.MultiBinary((P, M)),
-                "joint": _anything(P, 6),
-                "kind": spaces.MultiDiscrete(np.full(P, len(KINDS)), dtype=np.int64),
-                "parent": spaces.MultiDiscrete(np.full(P, P), dtype=np.int64),
-                "valid": spaces.MultiBinary(P),
-                "state": _anything(P, 2),
-            }
-        )
+        self.action_space: spaces.MultiDiscrete = action_space(P)
+        self.observation_space = observation_space(P, self.options)
         self._problem: Problem | None = None
         self._fitting: Fitting | None = None
 
@@ -91,11 +81,7 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
         return self._observation(), reward, False, fitting.done, self._info()
 
     def _observation(self) -> dict[str, NDArray[Any]]:
-        view = self._running().view()
-        # Copies, since what is kept from one step to the next is the caller's.
-        fields: dict[str, NDArray[Any]] = {name: tensor[0].numpy().copy() for name, tensor in vars(view).items()}
-        fields = {k: np.clip(v, -_FAR, _FAR) if v.dtype == np.float32 else v for k, v in fields.items()}
-        return fields | {name: fields[name].astype(np.int8) for name in ("valid", "shown")}
+        return {name: values[0] for name, values in observations(self._running()).items()}
 
     def _info(self) -> dict[str, Any]:
         fitting, problem = self._running(), self._problem
@@ -109,6 +95,36 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
         return self._fitting
 
 
+def action_space(rows: int) -> spaces.MultiDiscrete:
+    """A bin for each axis of each of P rows for parts."""
+    return spaces.MultiDiscrete(np.full(rows * NUM_AXES, NUM_BINS), dtype=np.int64)
+
+
+def observation_space(rows: int, options: FittingOptions) -> spaces.Dict:
+    """Fields of :class:`artperl.agent.decision_process.View`, of P rows for parts."""
+    N, M = options.observed_points, options.reference_points
+    return spaces.Dict(
+        {
+            "observed": _anything(N, 3),
+            "part": spaces.MultiDiscrete(np.full(N, rows), dtype=np.int64),
+            "reference": _anything(rows, M, 3),
+            "shown": spaces.MultiBinary((rows, M)),
+            "joint": _anything(rows, 6),
+            "kind": spaces.MultiDiscrete(np.full(rows, len(KINDS)), dtype=np.int64),
+            "parent": spaces.MultiDiscrete(np.full(rows, rows), dtype=np.int64),
+            "valid": spaces.MultiBinary(rows),
+            "state": _anything(rows, 2),
+        }
+    )
+
+
+def observations(fitting: Fitting) -> dict[str, NDArray[Any]]:
+    """What is seen of each environment, as :func:`observation_space` has it; the arrays are the caller's."""
+    fields: dict[str, NDArray[Any]] = {name: tensor.numpy().copy() for name, tensor in vars(fitting.view()).items()}
+    fields = {k: np.clip(v, -_FAR, _FAR) if v.dtype == np.float32 else v for k, v in fields.items()}
+    return fields | {name: fields[name].astype(np.int8) for name in ("valid", "shown")}
+
+
 def nothing(env: PoseFittingEnv) -> NDArray[np.int64]:
     """The action that changes nothing."""
     return np.full(len(env.action_space.nvec), NOTHING, dtype=np.int64)
@@ -118,4 +134,8 @@ def _anything(*shape: int) -> spaces.Box:
     return spaces.Box(-_FAR, _FAR, shape, np.float32)
 
 
-gym.register(ENV_ID, entry_point=f"{__name__}:PoseFittingEnv")
+gym.register(
+    ENV_ID,
+    entry_point=f"{__name__}:PoseFittingEnv",
+    vector_entry_point="artperl.training.gym_vector_env:PoseFittingVectorEnv",
+)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 import torch
 
-from artperl.agent.decision_process import FAR, Fitting, FittingOptions, nearest_distance
+from artperl.agent.decision_process import FAR, Fitting, FittingOptions, nearest_distance, nearest_distances
 from artperl.data.fitting_problems import Problem
 from tests.artperl.worlds import small_problem
 
@@ -87,6 +87,9 @@ def test_the_nearest_distance_is_that_of_all_pairs() -> None:
     generator = torch.Generator().manual_seed(0)
     asked, offered = (torch.randn(7, n, 3, generator=generator) for n in (20, 30))
     torch.testing.assert_close(nearest_distance(asked, offered), torch.cdist(asked, offered).amin(-1))
+    there, back = nearest_distances(asked, offered)
+    torch.testing.assert_close(there, torch.cdist(asked, offered).amin(-1))
+    torch.testing.assert_close(back, torch.cdist(offered, asked).amin(-1))
 
 
 def test_parts_without_a_surface_are_near_nothing(problem: Problem) -> None:

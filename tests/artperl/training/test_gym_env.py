@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import gymnasium as gym
+import numpy as np
 import pytest
 import torch
 from gymnasium.utils.env_checker import check_env
 
+from artperl.agent.actions import NOTHING
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.training.gym_env import ENV_ID, PoseFittingEnv, nothing
+from artperl.training.gym_vector_env import PoseFittingVectorEnv
 from tests.conftest import installed
 
 OPTIONS = FittingOptions(steps=4, observed_points=64, reference_points=32)
@@ -67,3 +70,51 @@ def test_ppo_of_stable_baselines_runs_on_it_unchanged(env: PoseFittingEnv) -> No
     after = list(model.policy.parameters())
     assert any(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
     assert all(bool(torch.isfinite(p).all()) for p in after)
+
+
+def test_many_environments_are_those_of_one_process_and_start_again_together() -> None:
+    envs = gym.make_vec(ENV_ID, 3, references=2, options=OPTIONS)
+    assert isinstance(envs.unwrapped, PoseFittingVectorEnv)
+    observed, _ = envs.reset(seed=5)
+    assert envs.observation_space.contains(observed)
+    problem = envs.unwrapped._problem
+    assert problem is not None
+    fitting = Fitting(problem.shapes, problem.observed, problem.start, OPTIONS)
+    for step in range(STEPS):
+        action = fitting.expert(problem.goal)
+        observed, reward, ended, truncated, info = envs.step(action.flatten(1).numpy())
+        np.testing.assert_array_equal(reward, fitting.step(action).numpy())
+        assert not ended.any()
+        assert truncated.tolist() == [step == STEPS - 1] * 3
+    assert envs.observation_space.contains(observed)
+    assert envs.observation_space.contains(info["final_obs"])
+    np.testing.assert_array_equal(info["final_info"]["chamfer"], fitting.distance.numpy())
+    assert not np.array_equal(observed["observed"], info["final_obs"]["observed"])  # other objects
+    again, _ = envs.reset(seed=5)
+    np.testing.assert_array_equal(again["observed"], fitting.view().observed.numpy())
+
+
+def test_environments_in_a_batch_do_not_touch_each_other() -> None:
+    envs = PoseFittingVectorEnv(3, references=2, options=OPTIONS)
+    some = np.full((3, len(envs.single_action_space.nvec)), NOTHING)
+    other = some.copy()
+    other[1] = NOTHING + 3
+    seen = []
+    for actions in (some, other):
+        envs.reset(seed=1)
+        seen.append(envs.step(actions)[0]["reference"])
+    np.testing.assert_array_equal(seen[0][[0, 2]], seen[1][[0, 2]])
+    assert not np.array_equal(seen[0][1], seen[1][1])
+
+
+@pytest.mark.slow
+def test_ppo_of_stable_baselines_learns_from_many_at_once() -> None:
+    baselines = installed("stable_baselines3")
+    from artperl.training.stable_baselines import StableBaselinesEnvs
+
+    envs = StableBaselinesEnvs(gym.make_vec(ENV_ID, 4, references=2, options=OPTIONS))
+    model = baselines.PPO("MultiInputPolicy", envs, n_steps=2 * STEPS, batch_size=16, n_epochs=1, device="cpu", seed=0)
+    before = [p.detach().clone() for p in model.policy.parameters()]
+    model.learn(4 * 2 * STEPS)
+    assert model.num_timesteps == 4 * 2 * STEPS
+    assert any(not torch.equal(a, b) for a, b in zip(before, model.policy.parameters(), strict=True))
