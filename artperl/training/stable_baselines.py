@@ -21,7 +21,7 @@ from gymnasium.vector import VectorEnv
 Array = NDArray[Any]
 
 
-class StableBaselinesEnvs(VecEnv):  # type: ignore[misc]
+class StableBaselinesEnvs(VecEnv):
     """Gymnasium's environments that are reset in the step that ends them, as a ``VecEnv``.
 
     Parameters
