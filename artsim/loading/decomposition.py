@@ -26,12 +26,17 @@ from artsim.model.convex_bodies import DEFAULT_DENSITY, convex_hull
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Body, Mesh
 
-_THIN = 1e-3
+THIN = 1e-3
 """Least thickness of a piece, over the object's diagonal."""
 _GRID = 1e-6
 """Corners nearer than this, over the diagonal, are one."""
-_SEARCH = {"resolution": 1000, "mcts_nodes": 10, "mcts_iterations": 40, "mcts_max_depth": 2, "seed": 0}
-"""Settings of CoACD's search: half of its accuracy at a tenth of its time."""
+_SEARCH = {"resolution": 500, "mcts_nodes": 10, "mcts_iterations": 10, "mcts_max_depth": 1, "seed": 0}
+"""Settings of CoACD's search, which looks one cut ahead. Its defaults look three ahead, for many times the cost and a
+third fewer pieces of the same concavity."""
+_FINER = (1.0, 0.5, 0.25)
+"""Factors on the concavity that are tried, until the volume of a closed surface is held."""
+VOLUME = 0.05
+"""Share of the volume that a surface encloses, by which pieces may miss it."""
 _MAX_FILE = 1 << 26
 
 
@@ -39,8 +44,8 @@ _MAX_FILE = 1 << 26
 class DecompositionOptions:
     """How closely convex pieces follow a surface."""
 
-    concavity: float = 0.04
-    """How deep a hull may bridge a hollow, over the object's diagonal."""
+    concavity: float = 0.02
+    """How deep a hull may bridge a hollow, over the object's diagonal: a small drawer is a twentieth of it deep."""
     most_pieces: int = 32
     """Of each piece of surface that is cut."""
     cache: Path | None = None
@@ -80,7 +85,7 @@ def decompose(
         part, diagonal = parts[k], obj.diagonal / obj.scale
         pieces = convex_pieces(part.vertices / diagonal, part.faces, options)
         meshes = tuple((vertices * diagonal, faces) for vertices, faces in pieces)
-        solid = convex_hull(part.vertices[np.unique(part.faces)], _THIN * diagonal)
+        solid = convex_hull(part.vertices[np.unique(part.faces)], THIN * diagonal)
         parts[k] = replace(part, body=Body(meshes, DEFAULT_DENSITY, solid))
     return replace(obj, parts=tuple(parts))
 
@@ -101,7 +106,7 @@ def convex_pieces(
         used, index = np.unique(faces[own], return_inverse=True)
         corners, triangles = vertices[used], index.reshape(-1, 3).astype(np.int32)
         if hollow(corners, triangles) <= options.concavity:
-            pieces.append(convex_hull(corners, _THIN))
+            pieces.append(convex_hull(corners, THIN))
         else:
             pieces += _cut(corners, triangles, options)
     return tuple(pieces)
@@ -141,20 +146,13 @@ def hollow(vertices: Array, faces: NDArray[np.int32]) -> float:
 
 def _cut(vertices: Array, faces: NDArray[np.int32], options: DecompositionOptions) -> Sequence[Mesh]:
     """Convex pieces by CoACD, out of the cache where they are known."""
-    with needs("convex decomposition", extra="sim"):
-        import coacd
-
-    recipe = repr((sorted(_SEARCH.items()), options.concavity, options.most_pieces, _version()))
+    recipe = repr((sorted(_SEARCH.items()), "real metric", options.concavity, options.most_pieces, _version()))
     digest = hashlib.sha256(recipe.encode() + vertices.tobytes() + faces.tobytes()).hexdigest()
     file = _cache(options) / f"{digest}.npz"
     known = _read(file)
     if known is not None:
         return known
-    coacd.set_log_level("off")
-    found = coacd.run_coacd(
-        coacd.Mesh(vertices, faces), threshold=options.concavity, max_convex_hull=options.most_pieces, **_SEARCH
-    )
-    pieces = [convex_hull(np.asarray(corners, dtype=np.float64), _THIN) for corners, _ in found]
+    pieces = _searched(vertices, faces, options)
     buffer = io.BytesIO()
     arrays: dict[str, Any] = {
         f"{kind}{i}": array for i, piece in enumerate(pieces) for kind, array in zip("vf", piece, strict=True)
@@ -163,6 +161,59 @@ def _cut(vertices: Array, faces: NDArray[np.int32], options: DecompositionOption
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(file, buffer.getvalue())
     return pieces
+
+
+def _searched(vertices: Array, faces: NDArray[np.int32], options: DecompositionOptions) -> list[Mesh]:
+    """Convex pieces that hold the volume of a closed surface; of thin walls, that takes a finer concavity."""
+    volume = closed_volume(vertices, faces)
+    best: list[Mesh] = []
+    least = np.inf
+    for finer in _FINER if volume is not None else _FINER[:1]:
+        pieces = _run_coacd(vertices, faces, finer * options.concavity, options.most_pieces)
+        if volume is None:
+            return pieces
+        error = abs(union_volume(pieces) / volume - 1.0)
+        if error < least:
+            best, least = pieces, error
+        if least <= VOLUME:
+            break
+    return best
+
+
+def _run_coacd(vertices: Array, faces: NDArray[np.int32], concavity: float, most: int) -> list[Mesh]:
+    with needs("convex decomposition", extra="sim"):
+        import coacd
+
+    coacd.set_log_level("off")
+    found = coacd.run_coacd(
+        coacd.Mesh(vertices, faces),
+        threshold=concavity,
+        real_metric=True,  # the threshold in units of the mesh: else it would be a share of the piece's own size
+        max_convex_hull=most,
+        **_SEARCH,
+    )
+    return [convex_hull(np.asarray(corners, dtype=np.float64), THIN) for corners, _ in found]
+
+
+def closed_volume(vertices: Array, faces: NDArray[np.int32]) -> float | None:
+    """What a surface encloses, in units of the object's diagonal; None where it is open, or encloses a mere sheet."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.merge_vertices()
+    if not (mesh.is_watertight and mesh.is_winding_consistent):
+        return None
+    volume = abs(float(mesh.volume))  # some are turned inside out
+    return volume if 2.0 * volume >= THIN * float(mesh.area) else None
+
+
+def union_volume(pieces: Sequence[Mesh]) -> float:
+    """What convex pieces hold together."""
+    with needs("convex decomposition", extra="sim"):
+        from manifold3d import Manifold, OpType
+
+    hulls = [Manifold.hull_points(vertices) for vertices, _ in pieces]
+    return float(Manifold.batch_boolean(hulls, OpType.Add).volume())
 
 
 def _version() -> str:

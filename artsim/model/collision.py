@@ -93,6 +93,14 @@ class Sweep:
         pairs = [pair for pair in combinations(range(len(self.obj)), 2) if pair not in self.joined]
         return self._overlaps(pairs, states, lambda pair, volume, depth: depth > PENETRATION)
 
+    def added_overlaps(self, own: Sweep, depth: float, states: Array | None = None) -> Iterator[Collision]:
+        """Overlaps of these surfaces deeper than ``depth`` in states in which those of ``own`` do not cross.
+
+        Any pair of parts counts; at most one overlap for each. ``own`` is the same object with other surfaces.
+        """
+        pairs = list(combinations(range(len(self.obj)), 2))
+        return self._overlaps(pairs, states, lambda pair, volume, deep: deep > depth, own)
+
     def joined_overlaps(self, states: Array | None = None) -> Iterator[Collision]:
         """Overlaps of parts that a joint connects, larger than ``JOINED_OVERLAP``; at most one for each pair."""
 
@@ -107,6 +115,7 @@ class Sweep:
         pairs: Sequence[tuple[int, int]],
         states: Array | None,
         matters: Callable[[tuple[int, int], float, float], bool],
+        unless: Sweep | None = None,
     ) -> Iterator[Collision]:
         states = sweep_states(self.obj) if states is None else states
         T = self.obj.tree.forward_kinematics(states)
@@ -121,6 +130,8 @@ class Sweep:
                 # Closed solids are compared at rest even if no surfaces cross: one may lie inside the other.
                 solid = self.solids[i] is not None and self.solids[j] is not None
                 if not (near[n] == 0 and solid) and not self._crossing(i, j, relative[n]):
+                    continue
+                if unless is not None and unless._crossing(i, j, relative[n]):
                     continue
                 volume, depth = self._overlap(i, j, relative[n])
                 if matters((i, j), volume, depth):

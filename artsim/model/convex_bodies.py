@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,17 @@ from numpy.typing import NDArray
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Body, Mesh, Part
 
+if TYPE_CHECKING:
+    import trimesh
+
 DEFAULT_DENSITY = 150.0
 """kg/m^3 of the convex hull of a part whose source says nothing about it: boards around air."""
 _SPECK = 0.01
 """Least side of the box that stands for a part without volume, over the object's diagonal."""
+_SHEET = 1e-3
+"""Thickness that a part has where it collides whose surface lies in a plane, over the object's diagonal."""
+_PLANE = 1e-5
+"""Share of its length as which the thickness of a plane passes."""
 _FLAT = 1e-3
 """A hull that fills less of its box has no volume worth the name."""
 _SHORT = 1e-6
@@ -39,8 +47,8 @@ def add_bodies(obj: ArticulatedObject) -> ArticulatedObject:
 def add_surface_bodies(obj: ArticulatedObject) -> ArticulatedObject:
     """The object with its surfaces as they are, a body for every part, proper names, and joints that are 0 at rest.
 
-    Parts with a body keep it. A part of a loaded object collides as its source file says of its surface: as it is. Its
-    mass is that of its convex hull (see :func:`add_bodies`).
+    Parts with a body keep it. A part of a loaded object collides as its source file says of its surface: as it is, or
+    as a thin plate where it lies in a plane. Its mass is that of its convex hull (see :func:`add_bodies`).
     """
     used: set[str] = set()
     joints = [_proper_name(joint.name, used) for joint in obj.native_tree.joints]
@@ -48,8 +56,11 @@ def add_surface_bodies(obj: ArticulatedObject) -> ArticulatedObject:
     for k, part in enumerate(obj.parts):
         body = part.body
         if body is None:
-            hull = convex_hull(_points(obj, k), _SPECK * obj.diagonal / obj.scale)
+            native = obj.diagonal / obj.scale
+            hull = convex_hull(_points(obj, k), _SPECK * native)
             pieces = ((part.vertices, part.faces),) if len(part.faces) else ()
+            if pieces and is_flat(_points(obj, k)):  # no simulator takes a sheet for a body
+                pieces = (convex_hull(_points(obj, k), _SHEET * native),)
             body = Body(pieces, DEFAULT_DENSITY, hull)
         parts.append(
             replace(part, name=_proper_name(part.name, used), label=_proper_name(part.label, set()), body=body)
@@ -95,19 +106,47 @@ def _add_body(obj: ArticulatedObject, k: int) -> Part:
 
 
 def convex_hull(points: Array, thickness: float) -> Mesh:
-    """Convex hull of points; where it has next to no volume, a box around them with sides of at least ``thickness``."""
+    """Convex hull of points; where it has next to no volume, made ``thickness`` thick in every direction."""
     import trimesh
-    from scipy.spatial import QhullError
 
     low, high = points.min(axis=0), points.max(axis=0)
-    try:
-        hull = trimesh.convex.convex_hull(points)
-    except (QhullError, ValueError):
-        hull = None
-    if hull is None or not hull.volume > _FLAT * np.prod(np.maximum(high - low, thickness)):
+    hull = _hull(points)
+    with np.errstate(divide="ignore", invalid="ignore"):  # one without a volume, which is what is asked
+        flat = hull is None or not hull.volume > _FLAT * np.prod(np.maximum(high - low, thickness))
+    if flat:
+        hull = _hull(_thickened(points, thickness))
+    if hull is None:  # of coordinates so large that the thickness is lost in them
         hull = trimesh.creation.box(np.maximum(high - low, thickness))
         hull.apply_translation(0.5 * (low + high))
     return np.asarray(hull.vertices, dtype=np.float64), np.asarray(hull.faces, dtype=np.int32)
+
+
+def is_flat(points: Array) -> bool:
+    """Whether points lie in a plane, as near as a file in single precision can tell."""
+    from_middle = points - points.mean(axis=0)
+    extents = np.ptp(from_middle @ np.linalg.svd(from_middle, full_matrices=True)[2].T, axis=0)
+    return bool(extents.min() <= _PLANE * extents.max())
+
+
+def _hull(points: Array) -> trimesh.Trimesh | None:
+    """Convex hull; None where the points lie in a plane."""
+    import trimesh
+    from scipy.spatial import QhullError
+
+    try:
+        return trimesh.convex.convex_hull(points)
+    except (QhullError, ValueError):
+        return None
+
+
+def _thickened(points: Array, thickness: float) -> Array:
+    """Points, moved both ways along each of their principal axes along which they take up less than a thickness."""
+    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)
+    for axis in axes:
+        lacking = thickness - float(np.ptp(points @ axis))
+        if lacking > 0:
+            points = np.concatenate([points - 0.5 * lacking * axis, points + 0.5 * lacking * axis])
+    return points
 
 
 def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:

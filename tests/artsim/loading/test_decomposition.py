@@ -51,6 +51,7 @@ def test_hollow_is_how_far_the_hull_is_from_the_surface() -> None:
     assert hollow(np.eye(3), np.array([[0, 1, 2]])) == 0.0
 
 
+@pytest.mark.slow
 def test_a_tray_is_cut_into_its_walls_and_kept_in_the_cache(tmp_path: Path) -> None:
     installed("coacd")
     options = DecompositionOptions(cache=tmp_path)
