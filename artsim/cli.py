@@ -49,8 +49,8 @@ class Generate:
     To load objects: python generate.py --objects path/to/partnet_mobility/Laptop --out out/real --num-samples 500
     """
 
-    out: Path
-    """Folder of the dataset; made if missing."""
+    out: Annotated[str, tyro.conf.arg(metavar="FOLDER|URL")]
+    """Folder of the dataset, made if missing; or a URL such as s3://bucket/first."""
     categories: tuple[str, ...] = ()
     """Procedural categories, such as laptop or drawer; 'all' for every one."""
     objects_per_category: int = 50
@@ -69,6 +69,8 @@ class Generate:
     ray: str | None = None
     """Use a Ray cluster instead: auto (the one that this machine belongs to), local (starts one), or HOST:PORT. Nodes
     need the same artsim, and no disk in common."""
+    part: Annotated[str | None, tyro.conf.arg(metavar="I/N")] = None
+    """Do the part of machine I of N, from 0/N on, that share --out: for array jobs. Then artsim merge completes it."""
     sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
     """Shares of each category's objects in train, val and test: by object, never by view."""
@@ -87,14 +89,19 @@ class Generate:
 
     def run(self) -> None:
         from artsim.common.names import printable
+        from artsim.common.storage import is_url
         from artsim.datasets.generate import generate
+        from artsim.datasets.parts import Part
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
 
+        part = None if self.part is None else Part.parse(self.part)
         if self.format is not None:  # before hours are spent on a dataset that it does not take
             from artsim.formats.conversion import FORMATS
 
-            FORMATS[self.format].check(self.sample, self.out)
+            if is_url(self.out) or part is not None:
+                raise ConfigError("a whole dataset in a folder is converted", "format", "leave --format out")
+            FORMATS[self.format].check(self.sample, Path(self.out))
         sources: list[Source] = [*find_sources(self.objects, self.package_root)]
         sources += family_sources(
             _categories(self.categories), self.objects_per_category, self.first_object, _constraints(self.having)
@@ -113,13 +120,18 @@ class Generate:
                 strict=self.strict,
                 load_limit=self.load_limit,
                 ray=self.ray,
+                part=part,
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")
             raise
         for reason in result.left_out:
             print(f"left out: {printable(reason, 1000)}")
-        for line in object_lines(result.folder, result.objects):
+        if part is not None:
+            print(f"{result.folder}: part {part} is done, {result.made} samples made now")
+            print(f"when all are: artsim merge {result.folder}")
+            return
+        for line in object_lines(Path(result.folder), result.objects):
             print(line)
         if result.grown_from is not None:
             kept = result.num_samples - result.made
@@ -133,7 +145,7 @@ class Generate:
             print(f"{result.folder}: {result.num_samples} samples, {made} of them made now, {rate:.0f} samples/s")
             print(f"look at them: artsim view {result.folder}")
         if self.format is not None:
-            Convert(self.out, self.format, Path(f"{self.out}_{self.format}"), workers=self.workers).run()
+            Convert(Path(self.out), self.format, Path(f"{self.out}_{self.format}"), workers=self.workers).run()
 
 
 @dataclass(frozen=True)
@@ -395,6 +407,30 @@ class Repair:
 
 
 @dataclass(frozen=True)
+class Merge:
+    """Complete a dataset that several machines made with generate.py --part.
+
+    Nothing is complete before: shards that are missing are named, with the parts to run again.
+
+    Example: artsim merge s3://bucket/first --check
+    """
+
+    path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER|URL")]
+    """Folder or URL that the parts wrote to."""
+    check: bool = False
+    """Read every file again, and compare its checksum; otherwise sizes alone are compared."""
+
+    def run(self) -> None:
+        from artsim.datasets.merge import merge
+
+        result = merge(self.path, self.check)
+        if result.already:
+            print(f"{result.place}: already complete, {result.num_samples} samples")
+        else:
+            print(f"{result.place}: {result.num_samples} samples in {result.num_shards} shards, complete")
+
+
+@dataclass(frozen=True)
 class Doctor:
     """Try every backend: does it work, on which device, how fast, and what to do if not."""
 
@@ -431,6 +467,7 @@ Verb = (
     | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
     | Annotated[Repair, tyro.conf.subcommand("repair")]
+    | Annotated[Merge, tyro.conf.subcommand("merge")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )

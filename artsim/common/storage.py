@@ -14,7 +14,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol, TypeAlias, TypeVar
+from typing import Any, BinaryIO, Protocol, TypeAlias, TypeVar, cast
 
 from artsim.common.extras import install_command, needs
 from artsim.common.files import read_bounded, write_atomic, write_error
@@ -26,8 +26,6 @@ _ATTEMPTS = 8
 """Of one request: a storage that fails every tenth one then fails once in a hundred million."""
 _FIRST_PAUSE, _LONGEST_PAUSE = 0.1, 10.0
 """Seconds before the second attempt, doubled from then on; half of it is random: workers do not come together."""
-_WHOLE = 64_000_000
-"""Bytes up to which a file is opened as one request: a shard of 1,000 clouds."""
 _MISSING = "restore it, or make the dataset again"
 
 
@@ -252,23 +250,23 @@ class UrlStorage:
 
     def read(self, name: str, most: int) -> bytes:
         """See :meth:`Storage.read`."""
-        size = self._size(name)
-        if size > most:
-            raise DatasetError(
-                f"{size / 1e6:.0f} MB are over the limit of {most / 1e6:.0f} MB", f"{self.place}/{name}", _MISSING
-            )
-        data: bytes = self._reading(name, lambda: self._system()[0].cat_file(self._path(name)))
+        data = self.range(name, 0, most + 1)  # to ask for the size before would be another request
+        if len(data) > most:
+            raise DatasetError(f"is over the limit of {most / 1e6:.0f} MB", f"{self.place}/{name}", _MISSING)
         return data
 
     def _size(self, name: str) -> int:
         return int(self._reading(name, lambda: self._system()[0].info(self._path(name))["size"]))
 
     def open(self, name: str) -> tuple[BinaryIO, int]:
-        """See :meth:`Storage.open`: a shard as one request, a larger file piece by piece."""
+        """See :meth:`Storage.open`: each read is a request of just these bytes."""
         size = self._size(name)
-        if size <= _WHOLE:
-            return io.BytesIO(self.read(name, size)), size
-        return self._reading(name, lambda: self._system()[0].open(self._path(name), "rb")), size
+        return cast(BinaryIO, _Ranges(self, name, size)), size
+
+    def range(self, name: str, start: int, end: int) -> bytes:
+        """Bytes ``start`` to ``end`` (exclusive) of a file."""
+        data: bytes = self._reading(name, lambda: self._system()[0].cat_file(self._path(name), start=start, end=end))
+        return data
 
     def write(self, name: str, data: bytes) -> None:
         """See :meth:`Storage.write`."""
@@ -319,3 +317,31 @@ class UrlStorage:
                             system.rm_file(path)
 
             self._writing("", work)
+
+
+class _Ranges(io.RawIOBase):
+    """A file at a URL of which only what is read is requested."""
+
+    def __init__(self, storage: UrlStorage, name: str, size: int):
+        self._storage, self._name, self._size, self._at = storage, name, size, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        self._at = max(0, offset + (0, self._at, self._size)[whence])
+        return self._at
+
+    def read(self, size: int = -1) -> bytes:
+        end = self._size if size < 0 else min(self._at + size, self._size)
+        if end <= self._at:
+            return b""
+        data = self._storage.range(self._name, self._at, end)
+        self._at += len(data)
+        return data

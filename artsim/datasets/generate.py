@@ -8,23 +8,26 @@ presence means that the dataset is complete.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from artsim.common.files import write_atomic
-from artsim.common.storage import Place
+from artsim.common.storage import FolderStorage, Place, is_url, storage_of
 from artsim.datasets.description import DESCRIPTION, JOURNAL, StartedDataset, read_started
+from artsim.datasets.merge import merge
 from artsim.datasets.new_plan import new_plan
 from artsim.datasets.origins import Origins, write_origins
-from artsim.datasets.plan import FORMAT, MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
+from artsim.datasets.parts import Part, PartRun
+from artsim.datasets.plan import MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
 from artsim.datasets.ray_pool import RayPool
 from artsim.datasets.restore import journal_line, remove_leftovers, restore
+from artsim.datasets.same_plan import check_same_plan
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares
 from artsim.datasets.state import State, examine, leftover_problems
+from artsim.datasets.worker import PARTS
 from artsim.datasets.worker_pool import WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
@@ -40,7 +43,8 @@ class GenerateResult:
 
     Attributes
     ----------
-    folder : Path
+    folder : Path or str
+        A str is the URL, or the place of a part.
     num_samples : int
         Of the whole dataset.
     made : int
@@ -56,7 +60,7 @@ class GenerateResult:
         Samples that the dataset had before it was extended.
     """
 
-    folder: Path
+    folder: Path | str
     num_samples: int
     made: int
     seconds: float
@@ -80,6 +84,7 @@ def generate(
     strict: bool = False,
     load_limit: float = LOAD_LIMIT,
     ray: str | None = None,
+    part: Part | None = None,
 ) -> GenerateResult:
     """Generate a dataset, or go on with one that was stopped, extend it, or repair it.
 
@@ -91,8 +96,9 @@ def generate(
     ----------
     sources : sequence of Source
         The objects; see :func:`artsim.loading.sources.find_sources` and :func:`artsim.loading.sources.family_sources`.
-    out : path
-        Folder of the dataset; made if missing.
+    out : path or str
+        Folder of the dataset, made if missing; or URL for fsspec, such as ``s3://bucket/first``. At a URL, files are
+        told by their size alone, and a dataset does not grow.
     num_samples, seed : int
     sample : SampleOptions, optional
     workers : int
@@ -113,6 +119,9 @@ def generate(
     ray : str, optional
         Use a Ray cluster instead of processes of this machine: "auto", "local", or HOST:PORT of its head. The result
         does not depend on it.
+    part : Part, optional
+        Do the part of one of several machines that share the folder or URL; :func:`artsim.datasets.merge.merge`
+        completes the dataset.
 
     Returns
     -------
@@ -133,6 +142,16 @@ def generate(
     folder = Path(out)
     asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), (), strict, version("artsim"))
     _check_options(asked, workers, load_limit, sources)
+    if is_url(out) or part is not None:
+        storage, share = storage_of(out), part or Part()
+        with _team(storage, workers, ray) as team:
+            run = PartRun(storage, asked, sources, share, team, skip_broken, load_limit, progress)
+            plan, document, made = run.run()
+        if isinstance(storage, FolderStorage):
+            write_origins(storage.folder, sources)
+        if part is None:
+            merge(storage, progress=progress)
+        return _result(storage.place, StartedDataset(document, plan, (), part is None, ()), made, start)
     if (folder / DESCRIPTION).exists():  # else it is not complete, and perhaps another run is at it
         begun = _start(folder, asked, sources)
         if begun is not None and _is_sound(folder, begun, num_samples, workers, progress):
@@ -175,7 +194,7 @@ def _is_sound(folder: Path, begun: StartedDataset, num_samples: int, workers: in
     return not leftover_problems(folder, begun) and not examine(folder, begun, workers, progress)
 
 
-def _result(folder: Path, begun: StartedDataset, made: int, start: float) -> GenerateResult:
+def _result(folder: Path | str, begun: StartedDataset, made: int, start: float) -> GenerateResult:
     left_out = tuple(str(entry["why"]) for entry in begun.document["left_out"])
     seconds = time.perf_counter() - start
     return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
@@ -223,32 +242,13 @@ def _start(folder: Path, asked: Plan, sources: Sequence[Source]) -> StartedDatas
         return None
     if not folder.is_dir():
         raise ConfigError("cannot write (it is a file)", folder, "choose another folder")
+    if (folder / PARTS).exists():
+        raise DatasetError("several machines are making it in parts", folder, "artsim merge completes it, then go on")
     begun = read_started(folder)
     if begun is None:
         _refuse_strangers(folder)
         return None
-    if begun.plan.format != FORMAT:
-        raise DatasetError(
-            f"the folder holds a dataset of format {begun.plan.format}, which opens but is not gone on with",
-            folder,
-            "choose another --out folder",
-        )
-    wanted = asked.to_dict()
-    del wanted["objects"]
-    if asked.num_samples > begun.plan.num_samples:
-        del wanted["num_samples"]  # it is to grow
-    differing = _differences(wanted, begun.document)
-    document = begun.document
-    have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
-    if have != {(s.name, s.sha256) for s in sources}:
-        differing.append("objects")
-    if differing:
-        fix = "choose another --out folder, or the options it was begun with (see its plan.json)"
-        if differing == ["num_samples"]:
-            fix = f"a dataset grows, but does not shrink: choose another --out folder, or {begun.plan.num_samples}"
-        raise DatasetError(
-            f"the folder holds a dataset of another plan (different: {', '.join(differing)})", folder, fix
-        )
+    check_same_plan(str(folder), begun.document, asked, sources)
     return begun
 
 
@@ -259,18 +259,6 @@ def _refuse_strangers(folder: Path) -> None:
     if found:
         name = found[0].relative_to(folder).as_posix()
         raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
-
-
-def _differences(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Names of the entries of ``wanted`` that are stored otherwise, such as 'sample.views.fov'."""
-    names: list[str] = []
-    for name, value in wanted.items():
-        there = stored.get(name)
-        if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
-            names += _differences(value, there, f"{prefix}{name}.")
-        elif value != there:
-            names.append(prefix + name)
-    return names
 
 
 def _extend(folder: Path, begun: StartedDataset, num_samples: int) -> StartedDataset:

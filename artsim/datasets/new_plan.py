@@ -70,20 +70,52 @@ def new_plan(
         for i, answer in team.run(compile_source, tasks, load_limit):
             answers[i] = RefusedSource(f"{sources[i].name}: {answer.why}") if isinstance(answer, WorkerLost) else answer
             bar.update()
-    used, repeated, left_out = _sort_out(sources, [answers[i] for i in range(len(sources))])
+    document, files = plan_document(asked, sources, [answers[i] for i in range(len(sources))], skip_broken)
+    for staged, file in files:
+        (staging / staged).replace(folder / file)
+    return document
+
+
+def plan_document(
+    asked: Plan, sources: Sequence[Source], answers: Sequence[CompiledSource | RefusedSource], skip_broken: bool
+) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """What loaded sources make of a plan: a function of its arguments alone, so that every machine finds the same.
+
+    Parameters
+    ----------
+    asked : Plan
+        Without objects.
+    sources : sequence of Source
+    answers : sequence
+        What became of each source.
+    skip_broken : bool
+
+    Returns
+    -------
+    document : dict
+        Content of ``plan.json``.
+    files : list of (str, str)
+        Provisional name of each object's file, and the one that it has to have.
+
+    Raises
+    ------
+    AssetError
+        Naming the sources that cannot be used.
+    """
+    used, repeated, left_out = _sort_out(sources, answers)
     if (left_out and not skip_broken) or not used:
-        raise _unusable(left_out, len(sources), asked.strict)
+        raise unusable(left_out, len(sources), asked.strict)
     objects = list(planned_objects([source for source, _ in used], [compiled for _, compiled in used], asked))
-    for planned, (_, compiled) in zip(objects, used, strict=True):
-        (staging / compiled.staged).replace(folder / planned.file)
+    files = [(compiled.staged, planned.file) for planned, (_, compiled) in zip(objects, used, strict=True)]
     order = showing_order([(planned.category, planned.split) for planned in objects])
     plan = replace(asked, objects=tuple(objects[n] for n in order)).to_dict()
-    return {
+    document = {
         **plan,
         "versions": {name: version(name) for name in VERSIONS_OF},
         "left_out": left_out,
         "repeated": repeated,
     }
+    return document, files
 
 
 def _sort_out(
@@ -124,7 +156,7 @@ def planned_objects(
         )
 
 
-def _unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> AssetError:
+def unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> AssetError:
     """The error that names what cannot be used."""
     reasons = [entry["why"] for entry in left_out[:_LISTED]]
     if len(left_out) > _LISTED:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import multiprocessing
 import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from multiprocessing.connection import Connection
 from typing import Any
@@ -31,8 +32,8 @@ _STEP = 16  # samples between two reports
 
 PARTS = "parts"
 """Folder of what several machines have done of a dataset that is not complete."""
-PREPARED = f"{PARTS}/objects"
-"""Objects before they have a name in the plan: each is called by the digest of its file."""
+PREPARED, RECORDS = f"{PARTS}/objects", f"{PARTS}/shards"
+"""Objects before they have a name in the plan: each is called by the digest of its file. Records of finished shards."""
 
 
 @dataclass
@@ -140,7 +141,7 @@ def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> Shar
     sha256 : str or None
         What its digest has to be, if that is known: any other bytes are not written.
     prepared : bool
-        Take the objects from where several machines prepared them.
+        Several machines make the dataset: the objects are where they prepared them, and the shard gets a record.
 
     Returns
     -------
@@ -155,7 +156,10 @@ def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> Shar
     except StoppedError:
         return None
     recipe = _worker.plan.recipe(shard)
-    return ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
+    record = ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
+    if prepared:
+        _worker.storage.write(f"{RECORDS}/{shard.name}.json", json.dumps(asdict(record)).encode())
+    return record
 
 
 def _samples(worker: Worker, shard: Shard, prepared: bool) -> Iterator[Sample]:

@@ -1,0 +1,68 @@
+"""Whether a dataset that was begun is the one that is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from artsim.datasets.plan import FORMAT, Plan
+from artsim.errors import DatasetError
+from artsim.loading.sources import Source
+
+
+def check_same_plan(
+    place: str, document: Mapping[str, Any], asked: Plan, sources: Sequence[Source], grows: bool = True
+) -> None:
+    """Refuse to go on with a dataset of another plan.
+
+    Parameters
+    ----------
+    place : str
+        Where it lies, for messages.
+    document : mapping
+        Content of its ``plan.json``.
+    asked : Plan
+        Without objects.
+    sources : sequence of Source
+    grows : bool
+        Whether more samples may be asked for than it has.
+
+    Raises
+    ------
+    DatasetError
+        Naming the options that differ.
+    """
+    if document["format"] != FORMAT:
+        raise DatasetError(
+            f"the folder holds a dataset of format {document['format']}, which opens but is not gone on with",
+            place,
+            "choose another --out folder",
+        )
+    wanted = asked.to_dict()
+    del wanted["objects"]
+    if grows and asked.num_samples > document["num_samples"]:
+        del wanted["num_samples"]
+    differing = _differences(wanted, document)
+    have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
+    if have != {(s.name, s.sha256) for s in sources}:
+        differing.append("objects")
+    if differing:
+        fix = "choose another --out folder, or the options it was begun with (see its plan.json)"
+        if differing == ["num_samples"]:
+            does = "grows, but does not shrink" if grows else "made by several machines does not grow"
+            fix = f"a dataset {does}: choose another --out folder, or {document['num_samples']}"
+        raise DatasetError(
+            f"the folder holds a dataset of another plan (different: {', '.join(differing)})", place, fix
+        )
+
+
+def _differences(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Names of the entries of ``wanted`` that are stored otherwise, such as 'sample.views.fov'."""
+    names: list[str] = []
+    for name, value in wanted.items():
+        there = stored.get(name)
+        if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
+            names += _differences(value, there, f"{prefix}{name}.")
+        elif value != there:
+            names.append(prefix + name)
+    return names
