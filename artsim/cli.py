@@ -131,7 +131,7 @@ class Generate:
             print(f"{result.folder}: part {part} is done, {result.made} samples made now")
             print(f"when all are: artsim merge {result.folder}")
             return
-        for line in object_lines(Path(result.folder), result.objects):
+        for line in object_lines(str(result.folder), result.objects):
             print(line)
         if result.grown_from is not None:
             kept = result.num_samples - result.made

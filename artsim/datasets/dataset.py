@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
+from artsim.common.storage import FolderStorage, Place, storage_of
 from artsim.datasets.description import read_description
+from artsim.datasets.epochs import EpochStream
 from artsim.datasets.padding import PaddedDataset, PaddedStream
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.problems import repair_command
@@ -40,8 +42,8 @@ class Dataset:
 
     Parameters
     ----------
-    folder : path
-        Folder that ``generate.py`` wrote.
+    folder : path or str
+        Folder that ``generate.py`` wrote, or URL for fsspec, such as ``s3://bucket/first``.
     split : str, optional
         "train", "val" or "test"; all samples by default.
 
@@ -51,9 +53,9 @@ class Dataset:
         When the folder holds no complete dataset.
     """
 
-    def __init__(self, folder: str | Path, split: str | None = None):
-        self.folder = Path(folder)
-        self.plan, shards, self.description = read_description(self.folder)
+    def __init__(self, folder: Place, split: str | None = None):
+        self.storage = storage_of(folder)
+        self.plan, shards, self.description = read_description(self.storage)
         if split is not None and split not in SPLITS:
             raise ConfigError(f"there is no split {split!r}", fix=f"use one of {', '.join(SPLITS)}")
         self.split = split
@@ -61,8 +63,21 @@ class Dataset:
         self._ends = np.cumsum([s.end - s.first for s in self.shards]).tolist()
         self._readers: dict[str, ShardReader] = {}
         self._open: OrderedDict[str, ShardReader] = OrderedDict()
-        self._owner, self._repair = os.getpid(), repair_command(self.folder)
-        self.objects = ObjectCache(self.folder, below="objects")
+        self._owner, self.fix = os.getpid(), repair_command(self.storage.place)
+        self.objects = ObjectCache(self.storage, below="objects")
+
+    @property
+    def folder(self) -> Path:
+        """Where it lies.
+
+        Raises
+        ------
+        ConfigError
+            When that is a URL.
+        """
+        if not isinstance(self.storage, FolderStorage):
+            raise ConfigError("this needs a dataset in a folder", self.storage.place, "copy it to a disk")
+        return self.storage.folder
 
     def __len__(self) -> int:
         return self._ends[-1] if self._ends else 0
@@ -71,7 +86,7 @@ class Dataset:
         if not -len(self) <= i < len(self):
             raise IndexError(f"sample {i} of {len(self)}")
         shard, index = self._place(int(i) % len(self))
-        return self._reader(shard.name).read(sample_key(index))
+        return self._reader(shard).read(sample_key(index))
 
     def _place(self, i: int) -> tuple[ShardRecord, int]:
         """Shard and number in the whole dataset of sample ``i``."""
@@ -81,22 +96,23 @@ class Dataset:
 
     def __str__(self) -> str:
         """What it holds, on one screen."""
-        return summary(self.folder, self.plan, self.shards, self.description, self.split)
+        return summary(self.storage.place, self.plan, self.shards, self.description, self.split)
 
     def __repr__(self) -> str:
         split = "" if self.split is None else f", split={self.split!r}"
-        return f"<Dataset {str(self.folder)!r}{split}: {len(self)} samples of {len(self.plan.objects)} objects>"
+        return f"<Dataset {self.storage.place!r}{split}: {len(self)} samples of {len(self.plan.objects)} objects>"
 
     def __iter__(self) -> Iterator[Sample]:
         return (self[i] for i in range(len(self)))
 
-    def _reader(self, name: str) -> ShardReader:
+    def _reader(self, shard: ShardRecord) -> ShardReader:
+        name = shard.name
         if self._owner != os.getpid():  # forked: a shared file position would mix up reads
             for opened in self._open.values():
                 opened.close()
             self._open, self._owner = OrderedDict(), os.getpid()
         if name not in self._readers:
-            self._readers[name] = ShardReader(self.folder / name, self._repair)
+            self._readers[name] = ShardReader.at(self.storage, name, shard.bytes, shard.sha256, self.fix)
         reader = self._readers[name]
         self._open[name] = reader
         self._open.move_to_end(name)
@@ -105,10 +121,10 @@ class Dataset:
         return reader
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"folder": self.folder, "split": self.split}
+        return {"storage": self.storage, "split": self.split}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["folder"], state["split"])  # type: ignore[misc]
+        self.__init__(state["storage"], state["split"])  # type: ignore[misc]
 
     def object_key(self, i: int) -> str:
         """Name, unique in the dataset, of the object that sample ``i`` shows, without reading it."""
@@ -125,7 +141,7 @@ class Dataset:
         try:
             return self.plan.object_of(index)
         except IndexError as error:
-            raise DatasetError(f"it has no sample {index}", self.folder, repair_command(self.folder)) from error
+            raise DatasetError(f"it has no sample {index}", self.storage.place, self.fix) from error
 
     def object_of(self, sample: Sample) -> ArticulatedObject:
         """The object that a sample shows, at the sample's scale."""
@@ -154,7 +170,13 @@ class Dataset:
         start, step : int
             See :class:`SampleStream`.
         """
-        return SampleStream(self.plan, self.folder, split, self.plan.seed + _FAR if seed is None else seed, start, step)
+        return SampleStream(
+            self.plan, self.storage, split, self.plan.seed + _FAR if seed is None else seed, start, step
+        )
+
+    def shuffled(self, seed: int = 0) -> EpochStream:
+        """Every sample once in each epoch, in a random order; read shard by shard, as object storage wants it."""
+        return EpochStream(self, seed)
 
 
 class SampleStream:
@@ -167,20 +189,20 @@ class SampleStream:
     Parameters
     ----------
     plan : Plan
-    folder : Path
-        Dataset folder that holds the objects.
+    place : path, str or Storage
+        Of the dataset that holds the objects.
     split : str
     seed : int
     start, step : int
     """
 
-    def __init__(self, plan: Plan, folder: Path, split: str = "train", seed: int = 1, start: int = 0, step: int = 1):
+    def __init__(self, plan: Plan, place: Place, split: str = "train", seed: int = 1, start: int = 0, step: int = 1):
         if split not in SPLITS or not plan.objects_of[split]:
             raise ConfigError(f"split {split!r} has no objects", fix="choose one that has, or other shares")
         if seed < 0 or start < 0 or step < 1:
             raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", fix="count from 0 upwards")
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
-        self.objects = ObjectCache(Path(folder), below="objects")
+        self.objects = ObjectCache(place, below="objects")
         self._renderer: Renderer | None = None
         self._rank: tuple[int, int] | None = None
         register_with_torch(SampleStream)
@@ -222,5 +244,5 @@ class SampleStream:
 
 
 def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:
-    """Open a dataset that ``generate.py`` wrote; see :class:`Dataset`."""
+    """Open a dataset that ``generate.py`` wrote, in a folder or at a URL; see :class:`Dataset`."""
     return Dataset(folder, split)

@@ -6,9 +6,9 @@ import hashlib
 import io
 import os
 import tarfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -227,14 +227,24 @@ def _tar_member(name: str, content: bytes) -> bytes:
     return b"".join((header, content, bytes(-len(content) % tarfile.BLOCKSIZE)))
 
 
+def _open_file(path: Path, fix: str) -> tuple[BinaryIO, int]:
+    if not path.is_file():  # to open a pipe would wait for somebody who writes to it
+        raise DatasetError("is missing, or no file", path, fix)
+    file = path.open("rb", buffering=0)
+    return file, os.fstat(file.fileno()).st_size
+
+
 class ShardReader:
     """Random access to the samples of one shard file. Once the file has been indexed, closing it loses nothing.
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
+        A str is a name for messages.
     fix : str
         What its errors advise.
+    opener : callable, optional
+        Opens the file, and says how large it is; by default that at ``path``.
 
     Raises
     ------
@@ -242,12 +252,13 @@ class ShardReader:
         When the file is missing or is not a whole tar file.
     """
 
-    def __init__(self, path: Path, fix: str = _AGAIN):
+    def __init__(self, path: Path | str, fix: str = _AGAIN, opener: Callable[[], tuple[BinaryIO, int]] | None = None):
         self.path, self.fix = path, fix
+        self._opener = opener or partial(_open_file, Path(path), fix)
         self._file: BinaryIO | None = None
         try:
-            file = self._opened()
-            self._index = read_index(file, os.fstat(file.fileno()).st_size)
+            self._file, size = self._opener()
+            self._index = read_index(self._file, size)
         except (tarfile.TarError, OSError, EOFError, ValueError) as error:
             self.close()
             raise DatasetError(f"cannot read the shard ({error})", path, fix) from error
@@ -287,9 +298,7 @@ class ShardReader:
 
     def _opened(self) -> BinaryIO:
         if self._file is None:
-            if not self.path.is_file():  # to open a pipe would wait for somebody who writes to it
-                raise DatasetError("is missing, or no file", self.path, self.fix)
-            self._file = self.path.open("rb", buffering=0)
+            self._file = self._opener()[0]
         return self._file
 
     def suffixes(self, key: str) -> list[str]:
@@ -311,6 +320,35 @@ class ShardReader:
             return self._bytes(*place)
         except OSError as error:
             raise DatasetError(f"cannot read the shard ({error})", self.path, self.fix) from error
+
+    @staticmethod
+    def of_bytes(storage: Storage, name: str, size: int, sha256: str, fix: str = _AGAIN) -> ShardReader:
+        """A shard that is read as a whole, at once, into memory, and whose checksum is compared.
+
+        Parameters
+        ----------
+        storage : Storage
+        name : str
+        size : int
+            That it has to have, bytes.
+        sha256 : str
+            That it has to have.
+        fix : str
+        """
+        where, data = f"{storage.place}/{name}", storage.read(name, size)
+        if len(data) != size or hashlib.sha256(data).hexdigest() != sha256:
+            raise DatasetError("has another checksum than when it was written", where, fix)
+        return ShardReader(where, fix, lambda: (io.BytesIO(data), size))
+
+    @staticmethod
+    def at(storage: Storage, name: str, size: int, sha256: str, fix: str = _AGAIN) -> ShardReader:
+        """A shard that is read as a whole once, for its index; then each sample is a request of just its bytes."""
+        if isinstance(storage, FolderStorage):
+            return ShardReader(storage.folder / name, fix)
+        reader = ShardReader.of_bytes(storage, name, size, sha256, fix)
+        reader.close()
+        reader._opener = partial(storage.open, name)
+        return reader
 
     def close(self) -> None:
         """Close the file until it is next read."""

@@ -6,7 +6,6 @@ import re
 import shlex
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from artsim.common.names import printable
@@ -19,13 +18,14 @@ _NAMES_SHOWN = 8
 
 
 def summary(
-    folder: Path, plan: Plan, shards: Sequence[ShardRecord], description: Mapping[str, Any], split: str | None
+    place: str, plan: Plan, shards: Sequence[ShardRecord], description: Mapping[str, Any], split: str | None
 ) -> str:
     """Samples of each split, categories, options, versions and repairs of a dataset.
 
     Parameters
     ----------
-    folder : Path
+    place : str
+        Folder or URL.
     plan : Plan
     shards : sequence of ShardRecord
     description : mapping
@@ -37,7 +37,7 @@ def summary(
     size = sum(record.bytes for record in shards) / 1e6
     chosen = "" if split is None else f", split {split}"
     lines = [
-        f"{folder}{chosen}: {sum(map(len, shards))} samples in {len(shards)} shards, {size:.4g} MB",
+        f"{place}{chosen}: {sum(map(len, shards))} samples in {len(shards)} shards, {size:.4g} MB",
         "samples     " + ", ".join(f"{name} {plan.sizes[name]}" for name in SPLITS),
         "objects     " + ", ".join(f"{name} {len(plan.objects_of[name])}" for name in SPLITS),
         f"categories  {_categories(plan)}",
@@ -51,10 +51,10 @@ def summary(
     versions = description.get("versions")
     if isinstance(versions, dict):
         lines[-1] += "".join(f", {name} {value}" for name, value in versions.items() if name != "artsim")
-    lines += object_lines(folder, plan.objects, 3)
+    lines += object_lines(place, plan.objects, 3)
     left_out = len(description["left_out"])
     if left_out:
-        lines.append(f"{left_out} sources were left out (see left_out in {folder / 'dataset.json'})")
+        lines.append(f"{left_out} sources were left out (see left_out in {place}/dataset.json)")
     return "\n".join(printable(line, 240) for line in lines)
 
 
@@ -69,12 +69,12 @@ def _value(value: Any) -> str:
     return value if isinstance(value, str) else " to ".join(f"{v:g}" for v in value)
 
 
-def object_lines(folder: Path, objects: Sequence[PlannedObject], kinds: int = _KINDS_SHOWN) -> list[str]:
+def object_lines(place: str, objects: Sequence[PlannedObject], kinds: int = _KINDS_SHOWN) -> list[str]:
     """What there is to know about the objects: those that cannot move, and those that were repaired.
 
     Parameters
     ----------
-    folder : Path
+    place : str
         Of the dataset.
     objects : sequence of PlannedObject
     kinds : int
@@ -87,10 +87,10 @@ def object_lines(folder: Path, objects: Sequence[PlannedObject], kinds: int = _K
         more = len(rigid) - _NAMES_SHOWN
         names = ", ".join(rigid[:_NAMES_SHOWN]) + ("" if more <= 0 else f", and {more} more")
         lines.append(f"{len(rigid)} {verb} no moving joint: {names}")
-    return [*lines, *_repair_lines(folder, objects, kinds)]
+    return [*lines, *_repair_lines(place, objects, kinds)]
 
 
-def _repair_lines(folder: Path, objects: Sequence[PlannedObject], shown: int) -> Iterator[str]:
+def _repair_lines(place: str, objects: Sequence[PlannedObject], shown: int) -> Iterator[str]:
     repaired = [planned for planned in objects if planned.repairs]
     if not repaired:
         return
@@ -105,7 +105,7 @@ def _repair_lines(folder: Path, objects: Sequence[PlannedObject], shown: int) ->
         yield f"  {len(alike)} x  {printable(text, 200)}  ({printable(planned.source, 60)})"
     if len(ranked) > shown:
         yield f"  and {len(ranked) - shown} more kinds"
-    yield f"details: artsim inspect {shlex.quote(str(folder / ranked[0][0][0].file))}"
+    yield f"details: artsim inspect {shlex.quote(f'{place}/{ranked[0][0][0].file}')}"
 
 
 def _kind(where: str, what: str) -> str:

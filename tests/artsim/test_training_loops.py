@@ -73,6 +73,34 @@ def test_datasets_and_their_streams_can_be_written_to(folder: Path) -> None:
     assert dataset.padded()[0]["T_camera_part"].dtype == np.float64
 
 
+def _epochs(rank: int, ranks: int, folder: str, results: str) -> None:
+    if ranks > 1:
+        distributed.init_process_group("gloo", init_method=f"file://{results}/group", rank=rank, world_size=ranks)
+    stream = artsim.open_dataset(folder).shuffled(seed=3)
+    loader = DataLoader(stream.padded(), batch_size=5, num_workers=2, multiprocessing_context="spawn")
+    seen = []
+    for epoch in range(2):
+        stream.set_epoch(epoch)
+        seen.append(indices(loader, 1000))
+        assert len(seen[-1]) == len(stream)
+    Path(results, f"{rank}.json").write_text(json.dumps(seen))
+    if ranks > 1:
+        distributed.destroy_process_group()
+
+
+@pytest.mark.slow
+def test_two_nodes_of_two_workers_see_each_sample_once_in_an_epoch(tmp_path: Path) -> None:
+    out = tmp_path / "made"
+    generate(family_sources(["laptop"], 3), out, 83, sample=SMALL, workers=1, shard_size=7, progress=False)
+    multiprocessing.spawn(_epochs, (2, str(out), str(tmp_path)), nprocs=2)
+    nodes = [json.loads((tmp_path / f"{rank}.json").read_text()) for rank in range(2)]
+    epochs = [[*one, *two] for one, two in zip(*nodes, strict=True)]
+    assert all(sorted(seen) == list(range(83)) for seen in epochs)
+    assert epochs[0] != epochs[1]
+    assert {len(seen) for node in nodes for seen in node} == {41, 42}
+    assert np.corrcoef(epochs[0], range(83))[0, 1] < 0.5  # shuffled
+
+
 def _rank(rank: int, file: str, results: str) -> None:
     distributed.init_process_group("gloo", init_method=f"file://{file}", rank=rank, world_size=2)
     stream = FamilyStream(["laptop"], SMALL, views_per_object=1).padded(max_parts=2)

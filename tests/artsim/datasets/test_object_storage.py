@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import artsim
@@ -18,6 +19,7 @@ from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
 from tests.artsim.datasets.troublesome import digests
 from tests.artsim.object_storage import Faulty, object_storage
+from tests.conftest import in_another_process
 
 pytestmark = pytest.mark.slow
 
@@ -58,6 +60,14 @@ def test_a_url_holds_what_a_folder_does(bucket: tuple[str, Faulty], local: Path)
     assert make(url).made == 120
     assert contents(url) == digests(local)
     assert server.failed > 2
+    here, there = artsim.open_dataset(local, "train"), artsim.open_dataset(url, "train")
+    assert str(there).partition(":")[2].splitlines()[1:] == str(here).partition(":")[2].splitlines()[1:]
+    for i in (0, 33, -1):
+        np.testing.assert_array_equal(here[i].points, there[i].points)
+    assert there.object_of(there[0]).sha256 == there[0].object_sha256
+    assert sorted(sample.index for sample in there.shuffled()) == sorted(sample.index for sample in here)
+    assert [s.index for s in there.shuffled(1)] == [s.index for s in here.shuffled(1)]
+    np.testing.assert_array_equal(in_another_process(there, 7).points, here[7].points)
     assert make(url).made == 0
     UrlStorage(url).remove(["train-000001.tar"])
     assert make(url).made == 10
