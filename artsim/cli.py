@@ -11,7 +11,7 @@ import tyro
 from artsim.common.program import cores, run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.drawing.scene_command import Scene
-from artsim.errors import DatasetError
+from artsim.errors import ConfigError, DatasetError
 from artsim.families.constraints import Constraints
 from artsim.formats.base import FormatName
 from artsim.formats.command import Convert
