@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
+from itertools import tee
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import tyro
 
+from artperl.commands.estimate_record import arrays_of, record_of
+from artperl.commands.resumed_lines import line_name
 from artsim.common.files import atomic_file, write_atomic
 from artsim.common.progress import track
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ConfigError
 
 if TYPE_CHECKING:
-    from artperl.core.estimate import Estimate as Result
-    from artperl.inputs import Cloud, InputOptions
+    from artperl.inputs import InputOptions
     from artperl.methods.protocol import Method
 
 _STDOUT = Path("-")
-_NAMED = 8
-"""Files that are named where some are left out."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,9 @@ class Estimate:
     From a depth image: artperl estimate depth.png --mask mask.png --intrinsics camera.json --category laptop
 
     From a folder, or several files, one line of JSON each: artperl estimate FOLDER --category laptop --out poses.jsonl
+
+    From a dataset or its shards, in four processes: artperl estimate DATASET --category laptop --out poses.jsonl
+    --workers 4. A line names the shard and the sample.
 
     Clouds: .npy and .npz (N, 3), (N, 4 or more) of which the first three columns count, (H, W, 3), or records with
     x, y, z; .ply; .pcd; .xyz .txt .csv .pts .asc with any separator; vertices of .obj .stl .off. Camera frame (x right,
@@ -57,7 +62,7 @@ class Estimate:
     """
 
     clouds: tyro.conf.Positional[tuple[Path, ...]]
-    """Files, or folders of them; all is read in one process."""
+    """Files, or folders of them; datasets of artsim, and shards (.tar)."""
     category: str = "laptop"
     """An estimator that comes with the package, by its name; or its folder; or the folder of a training run."""
     out: Path | None = None
@@ -93,19 +98,20 @@ class Estimate:
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
     method: Literal["full", "artperl"] = "full"
     """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed."""
+    workers: int = 1
+    """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""
 
     def run(self) -> None:
         from artperl.estimator import load_estimator
 
-        several = len(self.clouds) != 1 or self.clouds[0].is_dir()
+        several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"
         self._check(several)
-        files = self._files() if several else list(self.clouds)
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
-        estimator = load_estimator(estimator_folder(self.category), method=self.method, **told)
+        load = partial(load_estimator, estimator_folder(self.category), method=self.method, **told)
         if several:
-            self._estimate_all(files, estimator)
+            self._estimate_all(load)
         else:
-            self._estimate_one(files[0], estimator)
+            self._estimate_one(self.clouds[0], load())
 
     def _check(self, several: bool) -> None:
         kinds = (".jsonl",) if several else (".json", ".npz")
@@ -114,6 +120,8 @@ class Estimate:
                 f"{self.out} is no {' or '.join(kinds)} file", "out",
                 f"name one for {'several files' if several else 'one file'}, or - for JSON",
             )  # fmt: skip
+        if not several and self.workers != 1:
+            raise ConfigError("one cloud takes one process", "workers", "leave it out")
         if several and self.view is not None:
             raise ConfigError("a page shows one object", "view", "give one file, or leave it out")
 
@@ -150,65 +158,30 @@ class Estimate:
         elif self.out is not None:
             write_atomic(self.out, (json.dumps(record, indent=1) + "\n").encode())
 
-    def _files(self) -> list[Path]:
-        """The files to read, those of folders by name; what else is in the folders is said."""
-        from artperl.inputs.reading import is_readable
-
-        options, files, skipped = self._options(), list[Path](), list[Path]()
-        apart = {path.resolve() for path in (self.intrinsics, self.mask, self.out) if path is not None}
-        for path in self.clouds:
-            if not path.is_dir():
-                files.append(path)
-                continue
-            for file in sorted(path.iterdir()):
-                if file.resolve() in apart or file.name.startswith("."):
-                    continue
-                (files if file.is_file() and is_readable(file, options) else skipped).append(file)
-        if skipped:
-            names = ", ".join(path.name for path in skipped[:_NAMED]) + (", ..." if len(skipped) > _NAMED else "")
-            kind = "clouds" if self.intrinsics is None else "depth images"
-            print(f"note: left out, since they are no {kind}: {names}", file=sys.stderr)
-        if not files:
-            hint = "" if self.intrinsics else "; depth images need --intrinsics camera.json"
-            raise ConfigError(
-                "there is no file to estimate",
-                self.clouds[0] if self.clouds else None,
-                f"name clouds, or a folder of them{hint}",
-            )
-        return files
-
-    def _estimate_all(self, files: list[Path], estimator: Method) -> None:
-        """A line of JSON for each file, written as soon as it is known, so that Ctrl-C loses nothing."""
+    def _estimate_all(self, load: Callable[[], Method]) -> None:
+        """A line of JSON for each cloud, written as soon as it is known, so that Ctrl-C loses nothing."""
+        from artperl.commands.estimate_many import Clouds, Estimating
         from artperl.commands.resumed_lines import Lines
+        from artperl.core.processes import each
 
-        setup = {"estimator": self.category, "seen_from": self.seen_from, **vars(self._options())}
+        options = self._options()
+        clouds = Clouds.of(self.clouds, options, (self.intrinsics, self.mask, self.out))
+        setup = {"estimator": self.category, "seen_from": self.seen_from, **vars(options)}
         with Lines(None if self.out in (None, _STDOUT) else self.out, setup) as lines:
-            failed = 0
-            done = lines.done()
+            failed, done, total = 0, lines.done(), len(clouds)
             if done:
                 print(f"note: {len(done)} lines are in {self.out} already", file=sys.stderr)
-            for file in track("estimate", files, unit="file"):
-                if str(file) in done:
-                    continue
-                record = self._line(file, estimator)
-                failed += "error" in record
-                lines.write(file, record)
+            asked, told = tee(entry for entry in clouds if line_name(entry.file, entry.sample) not in done)
+            records = each(Estimating(load, options), asked, self.workers)
+            with closing(records), track("estimate", total=total, initial=len(done), unit="cloud") as progress:
+                for entry, record in zip(told, records, strict=True):
+                    failed += "error" in record
+                    lines.write(entry.file, record, entry.sample)
+                    progress.update()
         if failed:
-            print(f"error: {failed} of {len(files)} files failed; each line with an 'error' says why", file=sys.stderr)
+            kind = "clouds" if clouds.shards else "files"
+            print(f"error: {failed} of {total} {kind} failed; each line with an 'error' says why", file=sys.stderr)
             sys.exit(1)
-
-    def _line(self, file: Path, estimator: Method) -> dict[str, Any]:
-        from artperl.inputs import read_cloud
-
-        try:
-            cloud = read_cloud(file, self._options())
-            record = record_of(estimator(cloud.points), cloud)
-        except (ArtsimError, OSError) as error:
-            return {"error": str(error)}
-        except (ArithmeticError, IndexError, RuntimeError, ValueError) as error:
-            # One strange file of a thousand must not lose the others; its line names what no check has caught.
-            return {"error": f"{file}: no estimate ({type(error).__name__}: {error})"}
-        return record
 
 
 def estimator_folder(name: str) -> Path:
@@ -234,30 +207,6 @@ def estimator_folder(name: str) -> Path:
     )
 
 
-def record_of(result: Result, cloud: Cloud) -> dict[str, Any]:
-    """An estimate in JSON's terms, but for the part of every point; null for what is infinite."""
-    record = {name: _plain(value) for name, value in vars(result).items() if name not in ("part", "part_symptoms")}
-    record["state_unit"] = list(result.state_unit)
-    record["notes"], record["warnings"] = list(cloud.notes), [*cloud.warnings, *result.warnings]
-    return record
-
-
-def arrays_of(result: Result, cloud: Cloud) -> dict[str, Any]:
-    """An estimate as arrays, the part of every point among them."""
-    values = {name: value for name, value in vars(result).items() if name not in ("milliseconds", "part_symptoms")}
-    values |= {"state_unit": result.state_unit, "warnings": (*cloud.warnings, *result.warnings), "notes": cloud.notes}
-    texts = ("joint_type", "part_names", "state_unit", "warnings", "notes", "reference")
-    return {name: np.asarray(value, dtype=str if name in texts else None) for name, value in values.items()}
-
-
 def _warn(texts: Iterable[str]) -> None:
     for text in texts:
         print(f"warning: {text}", file=sys.stderr)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

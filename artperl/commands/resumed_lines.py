@@ -32,7 +32,7 @@ class Lines:
     def __init__(self, path: Path | None, setup: dict[str, Any]):
         self.path = path
         self._setup = hashlib.sha256(json.dumps(setup, sort_keys=True, default=str).encode()).hexdigest()[:12]
-        self._done: dict[str, float | None] = {}
+        self._done: dict[str, tuple[str, float | None]] = {}
         self._file: TextIO = sys.stdout
 
     def __enter__(self) -> Lines:
@@ -52,12 +52,14 @@ class Lines:
             self._file.close()
 
     def done(self) -> frozenset[str]:
-        """Files that have a line, without an error, and have not changed since."""
-        return frozenset(name for name, changed in self._done.items() if _modification_time(Path(name)) == changed)
+        """Names (:func:`line_name`) that have a line, without an error, and whose file has not changed since."""
+        now = {file: _modification_time(Path(file)) for file, _ in self._done.values()}
+        return frozenset(name for name, (file, changed) in self._done.items() if now[file] == changed)
 
-    def write(self, file: Path, record: dict[str, Any]) -> None:
-        """Add the line of a file; it is on the disk, or sent on, when this returns."""
-        line = {"file": str(file), **record, "setup": self._setup, "changed": _modification_time(file)}
+    def write(self, file: Path, record: dict[str, Any], sample: str | None = None) -> None:
+        """Add the line of a file, or of a sample in it; it is on the disk, or sent on, when this returns."""
+        own = {} if sample is None else {"sample": sample}
+        line = {"file": str(file), **own, **record, "setup": self._setup, "changed": _modification_time(file)}
         try:
             self._file.write(json.dumps(line) + "\n")
             self._file.flush()
@@ -76,7 +78,8 @@ class Lines:
                     break
                 try:
                     line = json.loads(raw)
-                    name, setup, changed = line["file"], line["setup"], line["changed"]
+                    file_name, setup, changed = line["file"], line["setup"], line["changed"]
+                    name = line_name(Path(file_name), line.get("sample"))
                 except (ValueError, KeyError, TypeError, RecursionError):
                     raise ConfigError("it holds something else", self.path, "name another file for --out") from None
                 if setup != self._setup:
@@ -86,8 +89,13 @@ class Lines:
                 size += len(raw)
                 self._done.pop(name, None)
                 if "error" not in line:
-                    self._done[name] = changed
+                    self._done[name] = file_name, changed
         return size
+
+
+def line_name(file: Path, sample: str | None) -> str:
+    """What tells the line of a file, or of a sample in it, from others."""
+    return str(file) if sample is None else f"{file}#{sample}"
 
 
 def _modification_time(file: Path) -> float | None:

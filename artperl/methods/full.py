@@ -5,6 +5,7 @@ In the order of the paper: perception and retrieval (4.2), the fit on Theta (4.1
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -26,6 +27,7 @@ from artperl.fitting.occluded_parts import pose_occluded_parts
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import find_fit
+from artperl.methods.many import estimate_many
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
@@ -34,6 +36,7 @@ from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.references import retrieve_references
 from artperl.retrieval.shape_base import ShapeBase
+from artsim.errors import ArtsimError
 
 _LATE_POINTS = 8192
 """Points that occluded parts and normals are posed by."""
@@ -104,6 +107,10 @@ class Estimator:
                 return estimate
             with clock("boxes"):
                 return place_boxes(self.boxes, estimate, known)
+
+    def many(self, clouds: Iterable[ArrayLike], workers: int = 1) -> Iterator[Estimate | ArtsimError]:
+        """Estimates of many clouds, in several processes: :func:`artperl.methods.many.estimate_many`."""
+        return estimate_many(self, clouds, workers)
 
     def evidence(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""

@@ -12,7 +12,12 @@ import pytest
 
 from artperl import cli
 from artperl.commands.estimate import estimator_folder
+from artperl.evaluation.metrics import translation_error, true_poses
+from artsim.datasets.dataset import open_dataset
+from artsim.datasets.generate import generate
+from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
+from artsim.loading.sources import family_sources
 
 pytestmark = pytest.mark.slow
 
@@ -115,6 +120,38 @@ def test_a_folder_is_a_line_for_each_file_and_goes_on(program: Program, tmp_path
     program(folder, "--out", out, "--unit", "mm")
     assert program.code == 2  # another setup does not go on with these
     assert len(out.read_text().splitlines()) == 4
+
+
+def _lines(path: Path) -> list[dict[str, Any]]:
+    """Lines of a file, but for how long they took."""
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    return [{name: value for name, value in line.items() if name != "milliseconds"} for line in lines]
+
+
+def test_samples_of_a_dataset_are_a_line_each_whatever_the_number_of_processes(
+    program: Program, tmp_path: Path
+) -> None:
+    folder, one, two = tmp_path / "set", tmp_path / "one.jsonl", tmp_path / "two.jsonl"
+    options = SampleOptions(num_points=1024)
+    generate(family_sources(["laptop"], 2), folder, num_samples=6, sample=options, progress=False)
+    program(folder, "--out", one)
+    assert program.code == 0
+    lines = _lines(one)
+    assert len({(line["file"], line["sample"]) for line in lines}) == 6
+    for line, sample in zip(lines, open_dataset(folder), strict=True):
+        center = true_poses(sample)[1]
+        assert translation_error(np.array(line["translation"]), center, sample.diagonal).min() < 0.1  # it is this one
+    whole = one.read_bytes()
+    two.write_bytes(whole[: whole.index(b"\n") + 100])  # stopped in the second line
+    program(folder, "--out", two, "--workers", 2)
+    assert program.code == 0
+    assert _lines(two) == lines
+    shard = min(folder.glob("*.tar"))
+    shard.write_bytes(shard.read_bytes()[:3000])
+    _, err = program(shard, "--out", tmp_path / "bad.jsonl")
+    assert program.code == 1
+    assert "1 of 1 clouds failed" in err
+    assert "cannot read the shard" in _lines(tmp_path / "bad.jsonl")[0]["error"]
 
 
 def test_a_folder_of_depth_images_with_a_folder_of_masks(program: Program, tmp_path: Path) -> None:
