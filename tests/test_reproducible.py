@@ -78,7 +78,7 @@ MODULES = {
     "making": ("assembly", "solids"),
     "model": ("camera", "draws", "kinematics", "objects"),
     "observing": ("capture", "noise", "sample", "sensor"),
-    "renderers": ("raycast", "scene", "view_batch"),
+    "renderers": ("outlines", "ray_kernels", "raycast", "scene", "view_batch"),
     "scenes": ("placement", "props", "random_scene"),
 }
 PATH_OF_THE_BYTES = [ROOT / room / f"{name}.py" for room, names in MODULES.items() for name in names]

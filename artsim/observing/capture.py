@@ -18,7 +18,8 @@ from artsim.observing.noise import Look, PixelView
 from artsim.observing.sample import ARTSIM_VERSION, IMAGES, Sample
 from artsim.observing.sensor import Sensor, find_sensor
 from artsim.renderers import Renderer, shared_renderer
-from artsim.renderers.raycast import PosedObject, cast, pose, render_posed, visibility
+from artsim.renderers.compiled import count_cloud, kernels
+from artsim.renderers.raycast import PosedObject, cast, cast_counted, pose, render_posed, visibility
 
 
 def observe(
@@ -78,6 +79,7 @@ def observe(
     if unknown:
         raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")
     rng = rng or np.random.default_rng(0)
+    count_cloud()
     name, sensor = renderer if isinstance(renderer, str) else renderer.name, find_sensor(noise)
     key = int(rng.integers(2**63)) if sensor.steps else 0
     posed = pose(obj, q, camera, T_world_object)
@@ -94,12 +96,11 @@ def observe(
         visible_fraction = rays.visible_fraction()
     if len(pixels) == 0:
         raise RenderError("the camera does not see the object", obj.object_id, "move the camera or the object")
-    points = true_points = camera.unproject(pixels, depth)
-    if sensor.steps:
-        true_points = camera.unproject(pixels, look(*np.divmod(pixels, camera.width))[0])
-        if "depth" in images:
-            assert frame is not None
-            frame = replace(frame, depth=sensor.read_image(frame.depth, camera, key))
+    true_depth = look(*np.divmod(pixels, camera.width))[0] if sensor.steps else depth
+    if sensor.steps and "depth" in images:
+        assert frame is not None
+        frame = replace(frame, depth=sensor.read_image(frame.depth, camera, key))
+    points, npcs = _labelled(pixels, depth, true_depth, part, posed)
     wanted = {image: None if frame is None else getattr(frame, field) for image, field in _FRAME_FIELDS.items()}
     if "rgb" in images and wanted["rgb"] is None:
         raise ConfigError(
@@ -108,9 +109,9 @@ def observe(
     tree = obj.tree
     axis_camera, origin_camera = tree.posed_joints(posed.T_camera_part)
     return Sample(
-        points=points.astype(np.float32),
+        points=points,
         part=part,
-        npcs=_npcs(true_points, part, posed).astype(np.float32, order="C"),
+        npcs=npcs,
         T_camera_part=posed.T_camera_part,
         box_center=obj.box_center,
         box_size=obj.box_size,
@@ -205,8 +206,7 @@ def draw_visible(
     """
     first, end = posed.candidates()
     up_to = np.cumsum(end - first)  # candidates in the rows so far
-    shift = end - up_to  # from a candidate's number to its column
-    total = int(up_to[-1])
+    total, width, compiled = int(up_to[-1]), posed.camera.width, kernels()
     fresh = np.ones(total, dtype=bool)
     hits: list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]] = []
     found = visited = 0
@@ -215,22 +215,14 @@ def draw_visible(
         share = found / visited if found else 0.82 / (1 + visited)
         missing = num_points - found
         wanted = min(int((missing + 2.5 * np.sqrt(missing * (1.03 - share))) / share) + 16, total)
-        left = total - visited
-        if wanted > left // 2:
-            rest = fresh.nonzero()[0]
-            local = rest if wanted > 0.7 * left else np.sort(rng.permutation(rest)[:wanted])
-        else:
-            # Numbers drawn with replacement repeat each other and earlier rounds: so many leave ``wanted`` new ones.
-            drawn = np.zeros(total, dtype=bool)
-            drawn[rng.integers(0, total, size=int(-total * log(1.0 - wanted / left)))] = True
-            local = (drawn & fresh).nonzero()[0]  # in order: neighbouring rays share memory
-        fresh[local] = False
-        row = np.searchsorted(up_to, local, side="right")
-        column = local + shift[row]
+        row, column = _draw_candidates(wanted, total - visited, fresh, up_to, end, rng)
         depth, part = look(row, column)
-        hit = (part != BACKGROUND).nonzero()[0]
-        hits.append((row[hit] * posed.camera.width + column[hit], depth[hit], part[hit]))
-        visited, found = visited + len(local), found + len(hit)
+        if compiled is None:
+            hit = (part != BACKGROUND).nonzero()[0]
+            hits.append((row[hit] * width + column[hit], depth[hit], part[hit]))
+        else:
+            hits.append(compiled.hits(row, column, depth, part, width))
+        visited, found = visited + len(row), found + len(hits[-1][0])
     if found == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.uint8)
     # Every visible pixel has had the same chance so far, so that any choice among those found is uniform.
@@ -239,6 +231,36 @@ def draw_visible(
         chosen = np.concatenate([chosen, rng.integers(0, found, size=num_points - found)])
     pixels, depth, part = (np.concatenate(column)[chosen] for column in zip(*hits, strict=True))
     return pixels, depth, part
+
+
+def _draw_candidates(
+    wanted: int,
+    left: int,
+    fresh: NDArray[np.bool_],
+    up_to: NDArray[np.int64],
+    end: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns, in order, of about so many of the candidates ``left``: the ``fresh`` ones."""
+    compiled = kernels()
+    if wanted > left // 2:
+        rest = fresh.nonzero()[0]
+        local = rest if wanted > 0.7 * left else np.sort(rng.permutation(rest)[:wanted])
+    else:
+        # Numbers drawn with replacement repeat each other and earlier rounds: so many leave ``wanted`` new ones.
+        drawn = rng.integers(0, len(fresh), size=int(-len(fresh) * log(1.0 - wanted / left)))
+        if compiled is not None:
+            pixels: tuple[NDArray[np.int64], NDArray[np.int64]] = compiled.unvisited(np.sort(drawn), fresh, up_to, end)
+            return pixels
+        chosen = np.zeros(len(fresh), dtype=bool)
+        chosen[drawn] = True
+        local = (chosen & fresh).nonzero()[0]  # in order: neighbouring rays share memory
+    fresh[local] = False
+    if compiled is not None:
+        pixels = compiled.pixels_of(local, up_to, end)
+        return pixels
+    row = np.searchsorted(up_to, local, side="right")
+    return row, local + (end - up_to)[row]
 
 
 class _Rays:
@@ -255,9 +277,9 @@ class _Rays:
     def __call__(
         self, row: NDArray[np.int64], column: NDArray[np.int64]
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        depth, part, met = cast(self.posed, row, column)
+        depth, part, met, saw = cast_counted(self.posed, row, column)
         self.met += met
-        self.saw += np.bincount(part, minlength=BACKGROUND + 1)[: len(self.met)]
+        self.saw += saw
         return depth, part
 
     def visible_fraction(self) -> Array:
@@ -281,6 +303,27 @@ def _exact_visible_fraction(posed: PosedObject, frame: Frame) -> Array:
     # A rasteriser may cover a pixel more than the rays do at a silhouette.
     fraction: Array = np.minimum(visible / np.maximum(amodal, 1), 1.0)
     return fraction
+
+
+def _labelled(
+    pixels: NDArray[np.int64],
+    depth: NDArray[np.float32],
+    true_depth: NDArray[np.float32],
+    part: NDArray[np.uint8],
+    posed: PosedObject,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(N, 3) points that are reported, and (N, 3) normalised coordinates of the places that their rays truly meet."""
+    camera, obj, compiled = posed.camera, posed.obj, kernels()
+    if compiled is not None:
+        K, T = np.array(camera.K, dtype=np.float64, order="C"), np.ascontiguousarray(posed.T_camera_part)
+        both: tuple[NDArray[np.float32], NDArray[np.float32]] = compiled.labels(
+            pixels, depth, true_depth, part, camera.width, K, T, obj.box_center, obj.box_size
+        )
+        return both
+    points = true_points = camera.unproject(pixels, depth)
+    if true_depth is not depth:
+        true_points = camera.unproject(pixels, true_depth)
+    return points.astype(np.float32), _npcs(true_points, part, posed).astype(np.float32, order="C")
 
 
 def _npcs(points: Array, part: NDArray[np.uint8], posed: PosedObject) -> Array:

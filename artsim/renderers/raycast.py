@@ -7,9 +7,8 @@ have z = 1 in the camera frame, which makes the ray parameter the z-depth itself
 
 from __future__ import annotations
 
-import contextlib
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,12 +17,13 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.elementary import cos, tan
-from artsim.common.products import apply, matmul, unit
+from artsim.common.products import apply, matmul
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
+from artsim.renderers.compiled import kernels
+from artsim.renderers.outlines import bounding_corners, outline_spans
 
 _MISS = np.float32(1e30)
 
@@ -58,37 +58,6 @@ def ray_surface(part: Part) -> RaySurface:
     return made
 
 
-def bounding_corners(points: Array) -> Array:
-    """Corners of the bounding polytope with 26 faces: normal to the axes, and to a cube's edges and corners.
-
-    Parameters
-    ----------
-    points : (N, 3) float
-
-    Returns
-    -------
-    (C, 3) float
-        Their convex hull contains the points.
-    """
-    from scipy.spatial import HalfspaceIntersection, QhullError
-
-    reach = matmul(points, _NORMALS.T)
-    low, high = reach.min(axis=0), reach.max(axis=0)
-    slack = 1e-5 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
-    faces = np.concatenate([np.column_stack([_NORMALS, -high - slack]), np.column_stack([-_NORMALS, low - slack])])
-    with contextlib.suppress(QhullError):
-        corners = HalfspaceIntersection(faces, points.mean(axis=0)).intersections
-        around = matmul(corners, _NORMALS.T)
-        if np.isfinite(around).all() and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
-            return corners
-    box = np.stack([points.min(axis=0), points.max(axis=0)])
-    return np.array([(box[a, 0], box[b, 1], box[c, 2]) for a in (0, 1) for b in (0, 1) for c in (0, 1)])
-
-
-_NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)])
-_NORMALS = unit(_NORMALS)
-
-
 @dataclass(frozen=True, eq=False)
 class PosedObject:
     """An object in front of a camera: what rays need to know, worked out once per view.
@@ -112,19 +81,33 @@ class PosedObject:
     row_ranges: NDArray[np.int64]
 
     @cached_property
-    def rotations(self) -> NDArray[np.float32]:
-        """(K, 3, 3) rotations from each part to the camera."""
-        return self.T_camera_part[:, :3, :3].astype(np.float32)
+    def intrinsics(self) -> NDArray[np.float32]:
+        """(3, 3) matrix of the camera in single precision."""
+        return np.array(self.camera.K, dtype=np.float32, order="C")
 
     @cached_property
+    def _set_out(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        compiled, T = kernels(), np.ascontiguousarray(self.T_camera_part)
+        if compiled is not None:
+            known: tuple[NDArray[np.float32], NDArray[np.float32]] = compiled.set_out(T, float(self.obj.scale))
+            return known
+        rotation, translation = T[:, :3, :3], T[:, :3, 3]
+        origins = apply(np.swapaxes(rotation, 1, 2), translation) / -self.obj.scale
+        return rotation.astype(np.float32, order="C"), origins.astype(np.float32, order="C")
+
+    @property
+    def rotations(self) -> NDArray[np.float32]:
+        """(K, 3, 3) rotations from each part to the camera."""
+        return self._set_out[0]
+
+    @property
     def origins(self) -> NDArray[np.float32]:
         """(K, 3) position of the camera in each part's rest frame, native units."""
-        rotation, translation = self.T_camera_part[:, :3, :3], self.T_camera_part[:, :3, 3]
-        return (apply(np.swapaxes(rotation, 1, 2), translation) / -self.obj.scale).astype(np.float32)
+        return self._set_out[1]
 
     def image_plane(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.float32]:
         """(2, N) x and y of the directions of the rays through pixel centres, camera frame, where z = 1."""
-        K = self.camera.K.astype(np.float32)
+        K = self.intrinsics
         plane = np.empty((2, len(row)), dtype=np.float32)
         plane[1] = (row.astype(np.float32) + (np.float32(0.5) - K[1, 2])) / K[1, 1]
         plane[0] = (column.astype(np.float32) + (np.float32(0.5) - K[0, 2]) - K[0, 1] * plane[1]) / K[0, 0]
@@ -132,6 +115,10 @@ class PosedObject:
 
     def candidates(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(H,) first and end column, in each row, of the pixels that the whole object can cover."""
+        compiled = kernels()
+        if compiled is not None:
+            columns: tuple[NDArray[np.int64], NDArray[np.int64]] = compiled.columns(self.spans, self.camera.width)
+            return columns
         return _columns(self.spans[:, 0].min(axis=0), self.spans[:, 1].max(axis=0), self.camera.width)
 
 
@@ -159,46 +146,7 @@ def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: A
     if T_world_object is not None:
         T_camera_rest = matmul(T_camera_rest, np.asarray(T_world_object, dtype=np.float64))
     T_camera_part = matmul(T_camera_rest, obj.tree.forward_kinematics(q))
-    return PosedObject(obj, camera, T_camera_part, *_spans(obj, camera, T_camera_part))
-
-
-_TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right
-_TANGENTS = tan(_TILTS)[:, None]
-_SLOPES = np.stack([_TANGENTS, -_TANGENTS]).astype(np.float32)  # for the left side, and for the negated right side
-_MARGIN = 0.05  # pixels: covers single precision
-_MARGINS = _MARGIN / cos(_TILTS)
-
-
-def _spans(
-    obj: ArticulatedObject, camera: Camera, T_camera_part: Array
-) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Row spans of the parts' outlines, and their rows.
-
-    A convex body in front of the camera has a convex image: it lies between its highest and lowest corners, and
-    between the lines of any slope that touch it.
-    """
-    seen = matmul(T_camera_part[:, :3, :3], _corners(obj) * obj.scale) + T_camera_part[:, :3, 3, None]
-    depth = seen[:, 2]
-    u, v, _ = np.swapaxes(matmul(camera.K, seen) / np.where(depth > 0, depth, np.inf)[:, None], 0, 1).clip(-1e6, 1e6)
-    heights = np.stack([v.min(axis=1) - _MARGIN, v.max(axis=1) + 1.0 + _MARGIN], axis=1)
-    row_ranges = np.clip(np.ceil(heights - 0.5), 0, camera.height).astype(np.int64)
-    # u + tan * v of the corners: the line through the outermost bounds the outline. Spans count from pixel centres.
-    across = u[:, None] + v[:, None] * _TANGENTS
-    bounds = np.stack([across.min(axis=2) - _MARGINS, -across.max(axis=2) - _MARGINS], axis=1)
-    bounds -= [[0.5], [-0.5]]
-    first_row, end_row = row_ranges[:, 0].min(), row_ranges[:, 1].max()
-    rows = np.arange(first_row, end_row, dtype=np.float32) + np.float32(0.5)
-    spans = np.full((len(obj), 2, camera.height), np.inf, dtype=np.float32)
-    lines = bounds.astype(np.float32)[..., None] - _SLOPES * rows
-    spans[:, :, first_row:end_row] = lines.max(axis=2)
-    spans[:, 1] *= -1.0
-    for k in range(len(obj)):
-        spans[k, 1, : row_ranges[k, 0]] = spans[k, 1, row_ranges[k, 1] :] = -np.inf
-    around = (depth <= 0).any(axis=1)  # reaches behind the camera: it may cover any pixel
-    spans[around], row_ranges[around] = np.array([[-np.inf], [np.inf]]), (0, camera.height)
-    hidden = (depth <= 0).all(axis=1) | ~obj.has_surface
-    spans[hidden], row_ranges[hidden] = np.array([[np.inf], [-np.inf]]), 0
-    return spans, row_ranges
+    return PosedObject(obj, camera, T_camera_part, *outline_spans(obj, _corners(obj), camera, T_camera_part))
 
 
 def _corners(obj: ArticulatedObject) -> Array:
@@ -238,15 +186,33 @@ def cast(
     amodal : (K,) int64
         Rays that hit each part, hidden or not.
     """
+    return cast_counted(posed, row, column)[:3]
+
+
+def cast_counted(
+    posed: PosedObject, row: NDArray[np.int64], column: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
+    """As :func:`cast`; and of each part (K,) how many rays see it."""
+    compiled = kernels()
+    if compiled is not None:
+        rays, directions, ends = compiled.ray_set_up(
+            row, column, posed.row_ranges, posed.spans, posed.rotations, posed.intrinsics
+        )
+        distance = _cast_directions(posed, range(len(posed.obj)), directions, ends)
+        found: tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]
+        found = compiled.nearest(rays, ends, distance, len(row), _MISS, np.float32(posed.obj.scale))
+        return found
     nearest = _Nearest(len(row), len(posed.obj))
     plane = posed.image_plane(row, column)
     for k, (start, end) in enumerate(np.searchsorted(row, posed.row_ranges).tolist()):
         low, high = posed.spans[k]
         near_row, near_column = row[start:end], column[start:end]
-        rays = ((near_column >= low[near_row]) & (near_column <= high[near_row])).nonzero()[0] + start
-        if len(rays):
-            nearest.update(k, rays, _cast_part(posed, k, plane.take(rays, axis=1)))
-    return (*nearest.result(posed.obj.scale), nearest.amodal)
+        mine = ((near_column >= low[near_row]) & (near_column <= high[near_row])).nonzero()[0] + start
+        if len(mine):
+            nearest.update(k, mine, _cast_part(posed, k, plane.take(mine, axis=1)))
+    depth, part_ids = nearest.result(posed.obj.scale)
+    seen = np.bincount(part_ids, minlength=BACKGROUND + 1)[: len(posed.obj)]
+    return depth, part_ids, nearest.amodal, seen
 
 
 class _Nearest:
@@ -273,8 +239,8 @@ class _Nearest:
 
 def hit_faces(posed: PosedObject, k: int, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
     """(N,) first face of part k that the ray through the centre of each pixel meets; -1 where it meets none."""
-    origins, directions = _part_rays(posed, k, posed.image_plane(row, column))
-    faces = ray_surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="INTERSECT")
+    directions = _part_directions(posed, k, posed.image_plane(row, column))
+    faces = ray_surface(posed.obj.parts[k]).scene.run(_origins(posed, k, len(row)), directions, query="INTERSECT")
     return np.asarray(faces, dtype=np.int64)
 
 
@@ -283,24 +249,42 @@ def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArra
 
     ``plane`` is (2, N), what :meth:`PosedObject.image_plane` gives.
     """
-    origins, directions = _part_rays(posed, k, plane)
-    distance: NDArray[np.float32] = ray_surface(posed.obj.parts[k]).scene.run(origins, directions.T, query="DISTANCE")
-    return distance
+    return _distance(posed, k, _part_directions(posed, k, plane))
 
 
-def _part_rays(
-    posed: PosedObject, k: int, plane: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Origins (N, 3) and directions (3, N) of rays from the camera, in the frame of part k."""
+def _part_directions(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(N, 3) directions of rays in the frame of part k."""
     # Row by row of the rotation, not by BLAS: see `artsim.common.products`.
     x, y, z = posed.rotations[k][..., None]
     directions = plane[0] * x
     directions += plane[1] * y
     directions += z
-    # All rays start at the camera: one origin, seen N times through a stride of 0.
-    shape = (plane.shape[1], 3)
-    origins: NDArray[np.float32] = np.ndarray(shape, np.float32, posed.origins[k].copy(), strides=(0, 4))
-    return origins, directions
+    return directions.T
+
+
+def _origins(posed: PosedObject, k: int, count: int) -> NDArray[np.float32]:
+    """(count, 3) origins of rays in the frame of part k: all at the camera, seen through a stride of 0."""
+    return np.ndarray((count, 3), np.float32, posed.origins, offset=12 * k, strides=(0, 4))
+
+
+def _distance(posed: PosedObject, k: int, directions: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Native z-depth along directions (N, 3) in the frame of part k."""
+    scene = ray_surface(posed.obj.parts[k]).scene
+    distance: NDArray[np.float32] = scene.run(_origins(posed, k, len(directions)), directions, query="DISTANCE")
+    return distance
+
+
+def _cast_directions(
+    posed: PosedObject, parts: Iterable[int], directions: NDArray[np.float32], ends: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Native z-depth along directions, of which those up to ``ends[i + 1]`` are cast at the i-th of some parts."""
+    distance = np.empty(len(directions), np.float32)
+    last = ends.tolist()
+    for i, k in enumerate(parts):
+        if last[i + 1] > last[i]:
+            mine = slice(last[i], last[i + 1])
+            distance[mine] = _distance(posed, k, directions[mine])
+    return distance
 
 
 def visibility(posed: PosedObject, parts: Sequence[int], max_rays: int) -> NDArray[np.int64]:
@@ -317,23 +301,42 @@ def visibility(posed: PosedObject, parts: Sequence[int], max_rays: int) -> NDArr
     -------
     (len(parts), 2) int
     """
+    row, column, owner = _met_pixels(posed, parts, max_rays)
     counts = np.zeros((len(parts), 2), dtype=np.int64)
-    found: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []
-    for i, k in enumerate(parts):
-        row, column = _span_pixels(posed, k)
-        step = max(1, len(row) // max_rays)
-        row, column = row[step // 2 :: step], column[step // 2 :: step]
-        if len(row):
-            met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
-            found.append((row[met], column[met], np.full(np.count_nonzero(met), i)))
-    if found:
-        row, column, owner = (np.concatenate(pieces) for pieces in zip(*found, strict=True))
+    if len(row):
         order = np.argsort(row, kind="stable")
         _, part_ids, _ = cast(posed, row[order], column[order])
         owner = owner[order]
         counts[:, 0] = np.bincount(owner, minlength=len(parts))
         counts[:, 1] = np.bincount(owner[part_ids == np.asarray(parts)[owner]], minlength=len(parts))
     return counts
+
+
+def _met_pixels(
+    posed: PosedObject, parts: Sequence[int], max_rays: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Row, column and the number of the part of pixels, every n-th of a part's spans, whose rays meet that part."""
+    low, high = posed.spans[parts, 0], posed.spans[parts, 1]
+    first, end = _columns(low, high, posed.camera.width)
+    compiled = kernels()
+    if compiled is not None:
+        row, column, ends = compiled.every_nth(first, end, max_rays)
+        directions = compiled.part_directions(row, column, ends, posed.rotations[parts], posed.intrinsics)
+        met = (_cast_directions(posed, parts, directions, ends) < _MISS).nonzero()[0]
+        return row[met], column[met], np.searchsorted(ends, met, side="right") - 1
+    nothing = np.zeros(0, np.int64)
+    found = [(nothing, nothing, nothing)]
+    for i, k in enumerate(parts):
+        up_to = np.cumsum(end[i] - first[i])
+        step = max(1, int(up_to[-1]) // max_rays)
+        number = np.arange(step // 2, int(up_to[-1]), step)
+        row = np.searchsorted(up_to, number, side="right")
+        column = number + (end[i] - up_to)[row]
+        if len(row):
+            met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
+            found.append((row[met], column[met], np.full(np.count_nonzero(met), i)))
+    rows, columns, owners = (np.concatenate(pieces) for pieces in zip(*found, strict=True))
+    return rows, columns, owners
 
 
 def render_posed(posed: PosedObject, only: int | None = None) -> Frame:

@@ -6,6 +6,8 @@ import hashlib
 import os
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,8 @@ def _samples(objects: Sequence[Any], **options: Any) -> Callable[[], Work]:
     from artsim.renderers import make_renderer
 
     renderer, asked = make_renderer("raycast"), SampleOptions(**options)
+    with suppress(ImportError):  # as after the first hundreds of clouds of a process
+        import_module("artsim.renderers.compiled").compile_now()
 
     def work() -> Work:
         made = [
@@ -97,7 +101,7 @@ def end_to_end(folder: Path, workers: int) -> Callable[[], Work]:
     from artsim import generate
     from artsim.loading.sources import family_sources
 
-    samples = 1500
+    samples = 3000
 
     def work() -> Work:
         out = folder / "dataset"

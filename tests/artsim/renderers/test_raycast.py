@@ -18,7 +18,8 @@ from artsim.model.kinematics import Joint
 from artsim.model.objects import Part
 from artsim.observing.capture import draw_visible
 from artsim.renderers import make_renderer
-from artsim.renderers.raycast import bounding_corners, cast, pose
+from artsim.renderers.outlines import bounding_corners
+from artsim.renderers.raycast import cast, pose
 from tests.conftest import ASSETS, DEMO, rigid, solid
 
 

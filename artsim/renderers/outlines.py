@@ -1,0 +1,101 @@
+"""Outlines of parts in the image: bounds that are never too small, from a few corners around each part."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.common.elementary import cos, tan
+from artsim.common.products import matmul, unit
+from artsim.model.camera import Camera
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.renderers.compiled import kernels
+
+
+def bounding_corners(points: Array) -> Array:
+    """Corners of the bounding polytope with 26 faces: normal to the axes, and to a cube's edges and corners.
+
+    Parameters
+    ----------
+    points : (N, 3) float
+
+    Returns
+    -------
+    (C, 3) float
+        Their convex hull contains the points.
+    """
+    from scipy.spatial import HalfspaceIntersection, QhullError
+
+    reach = matmul(points, _NORMALS.T)
+    low, high = reach.min(axis=0), reach.max(axis=0)
+    slack = 1e-5 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
+    faces = np.concatenate([np.column_stack([_NORMALS, -high - slack]), np.column_stack([-_NORMALS, low - slack])])
+    with contextlib.suppress(QhullError):
+        corners = HalfspaceIntersection(faces, points.mean(axis=0)).intersections
+        around = matmul(corners, _NORMALS.T)
+        if np.isfinite(around).all() and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
+            return corners
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    return np.array([(box[a, 0], box[b, 1], box[c, 2]) for a in (0, 1) for b in (0, 1) for c in (0, 1)])
+
+
+_NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)])
+_NORMALS = unit(_NORMALS)
+
+
+_TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right
+_TANGENTS = tan(_TILTS)[:, None]
+_SLOPES = np.stack([_TANGENTS, -_TANGENTS]).astype(np.float32)  # for the left side, and for the negated right side
+_MARGIN = 0.05  # pixels: covers single precision
+_MARGINS = _MARGIN / cos(_TILTS)
+_LINES = (_TANGENTS[:, 0].copy(), _SLOPES[..., 0].copy(), _MARGINS, _MARGIN)
+
+
+def outline_spans(
+    obj: ArticulatedObject, corners: Array, camera: Camera, T_camera_part: Array
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Row spans of the parts' outlines, and their rows; see :class:`artsim.renderers.raycast.PosedObject`.
+
+    A convex body in front of the camera has a convex image: it lies between its highest and lowest corners, and
+    between the lines of any slope that touch it.
+
+    Parameters
+    ----------
+    obj : ArticulatedObject
+    corners : (K, 3, C) float
+        Of a convex body around each part, native units.
+    camera : Camera
+    T_camera_part : (K, 4, 4) float
+    """
+    compiled = kernels()
+    if compiled is not None:
+        T, K = np.ascontiguousarray(T_camera_part), np.array(camera.K, dtype=np.float64, order="C")
+        outlines: tuple[NDArray[np.float32], NDArray[np.int64]] = compiled.spans(
+            T, corners, float(obj.scale), obj.has_surface, K, camera.height, *_LINES
+        )
+        return outlines
+    seen = matmul(T_camera_part[:, :3, :3], corners * obj.scale) + T_camera_part[:, :3, 3, None]
+    depth = seen[:, 2]
+    u, v, _ = np.swapaxes(matmul(camera.K, seen) / np.where(depth > 0, depth, np.inf)[:, None], 0, 1).clip(-1e6, 1e6)
+    heights = np.stack([v.min(axis=1) - _MARGIN, v.max(axis=1) + 1.0 + _MARGIN], axis=1)
+    row_ranges = np.clip(np.ceil(heights - 0.5), 0, camera.height).astype(np.int64)
+    # u + tan * v of the corners: the line through the outermost bounds the outline. Spans count from pixel centres.
+    across = u[:, None] + v[:, None] * _TANGENTS
+    bounds = np.stack([across.min(axis=2) - _MARGINS, -across.max(axis=2) - _MARGINS], axis=1)
+    bounds -= [[0.5], [-0.5]]
+    first_row, end_row = row_ranges[:, 0].min(), row_ranges[:, 1].max()
+    rows = np.arange(first_row, end_row, dtype=np.float32) + np.float32(0.5)
+    spans = np.full((len(obj), 2, camera.height), np.inf, dtype=np.float32)
+    lines = bounds.astype(np.float32)[..., None] - _SLOPES * rows
+    spans[:, :, first_row:end_row] = lines.max(axis=2)
+    spans[:, 1] *= -1.0
+    for k in range(len(obj)):
+        spans[k, 1, : row_ranges[k, 0]] = spans[k, 1, row_ranges[k, 1] :] = -np.inf
+    around = (depth <= 0).any(axis=1)  # reaches behind the camera: it may cover any pixel
+    spans[around], row_ranges[around] = np.array([[-np.inf], [np.inf]]), (0, camera.height)
+    hidden = (depth <= 0).all(axis=1) | ~obj.has_surface
+    spans[hidden], row_ranges[hidden] = np.array([[np.inf], [-np.inf]]), 0
+    return spans, row_ranges
