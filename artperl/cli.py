@@ -1,4 +1,4 @@
-"""The program ``artperl``: train, evaluate, estimate, calibrate."""
+"""The program ``artperl``: train, evaluate, estimate, report, calibrate."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import tyro
 from artperl.commands.calibrate import Calibrate
 from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
+from artperl.commands.report import Report
 from artperl.commands.train import Train
 from artsim.common.program import run_program
 
@@ -16,6 +17,7 @@ Verb = (
     Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Estimate, tyro.conf.subcommand("estimate")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
 )
 

@@ -40,7 +40,7 @@ _ALONE_EVERY, _ALONE = 10, 24
 
 def sporeagent_run_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     """New networks of the method, by name."""
-    return sporeagent_networks(SporeAgentSizes(num_rows, segmentation=options.width, policy=options.width))
+    return sporeagent_networks(SporeAgentSizes(num_rows, segmentation=options.width, policy=max(1, options.width // 2)))
 
 
 def sporeagent_estimator(context: Context) -> SporeAgent:

@@ -1,0 +1,69 @@
+"""The verb ``artperl report``."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from artsim.common.progress import say
+
+
+@dataclass(frozen=True)
+class Report:
+    """Compare all methods on a benchmark: train or load each, test each on the same views, and write one report.
+
+    The report is OUT/report.html, one page with everything in it; report.md and report.json have its figures. Stop it
+    at any moment with Ctrl-C: the same command goes on where it stopped. Each step says how long it took.
+
+    To see what a report is, in some minutes: artperl report --quick
+
+    The tables of the paper, in hours on two cores: artperl report --benchmark artimage
+
+    Of some methods and categories: artperl report --category laptop --methods full ancsh omad
+    """
+
+    benchmark: Literal["artimage", "robotarm"] = "artimage"
+    """artimage: regenerated ArtImage, tables 1 and 2 of the paper; robotarm: an arm of seven parts with depth noise,
+    its table 3."""
+    out: Path | None = None
+    """Folder of the report; by default out/report-BENCHMARK."""
+    quick: bool = False
+    """One category, trainings of seconds, few views: to see the report. Its figures say nothing of the methods."""
+    category: tuple[str, ...] = ()
+    """Categories of the benchmark; by default all."""
+    methods: tuple[Literal["full", "artperl", "ancsh", "omad", "sporeagent"], ...] = ()
+    """By default all of the benchmark."""
+    preset: Literal["quick", "full"] = "full"
+    """Of the trainings: quick ones take some minutes each, full ones an hour and more."""
+    retrain_full: bool = False
+    """Train the method full, too, instead of taking the estimators that come with the package."""
+    objects: int = 40
+    """Unseen objects of each category."""
+    views: int = 120
+    """Views of each category, at least."""
+    workers: int = 1
+    """Processes that make training clouds; the result does not depend on it."""
+
+    def run(self) -> None:
+        from artsim.common.extras import needs
+
+        with needs("training"):
+            from artperl.training.comparison_run import ComparisonOptions, run_comparison
+
+        options = ComparisonOptions(
+            self.benchmark, self.category, self.methods, self.preset, self.objects, self.views,
+            retrain_full=self.retrain_full,
+        )  # fmt: skip
+        if self.quick:
+            from artperl.training.comparison_run import quick_comparison
+
+            options = quick_comparison(options)
+        out = self.out or Path("out") / f"report-{self.benchmark}{'-quick' if self.quick else ''}"
+        try:
+            run_comparison(options, out, self.workers, True, say)
+        except KeyboardInterrupt:
+            print(f"stopped; the same command goes on from {out}", file=sys.stderr)
+            sys.exit(130)
+        print((out / "report.md").read_text(), end="")

@@ -1,0 +1,189 @@
+"""A comparison of methods as Markdown, and as one HTML page with everything in it."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from artperl.evaluation.comparison import mean_over_parts
+from artperl.evaluation.published import ARTIMAGE_PUBLISHED, ROBOTARM_PUBLISHED, TITLES, Published
+from artsim.common.names import printable
+
+Rows = Mapping[str, Mapping[str, dict[str, Any]]]
+"""Records of :func:`artperl.evaluation.comparison.row_record` by category and method."""
+
+COLUMNS: tuple[tuple[str, str, float, int, str], ...] = (
+    ("rotation_deg", "rotation, deg", 1.0, 2, "rotation"),
+    ("translation_partnet", "translation, PartNet units", 1.0, 3, "translation"),
+    ("translation_metres", "translation, m", 1.0, 3, "translation"),
+    ("translation_percent_diagonal", "translation, % of the diagonal", 1.0, 2, ""),
+    ("iou_exact", "exact IoU, %", 100.0, 1, ""),
+    ("iou_omad_legacy", "IoU as OMAD's, %", 100.0, 1, "iou"),
+)
+"""Metric, title, factor, decimals, and the name among published figures."""
+
+
+_OF_ALL = {"rotation_deg", "translation_percent_diagonal", "iou_exact", "iou_omad_legacy"}
+_SHOWN = {"artimage": _OF_ALL | {"translation_partnet"}, "robotarm": _OF_ALL | {"translation_metres"}}
+"""Metrics that a benchmark has a table of."""
+
+
+def published_of(benchmark: str, category: str) -> dict[str, Published]:
+    """Published figures of a category of a benchmark, by method."""
+    return ROBOTARM_PUBLISHED if benchmark == "robotarm" else ARTIMAGE_PUBLISHED.get(category, {})
+
+
+def markdown(benchmark: str, rows: Rows, notes: Sequence[str]) -> str:
+    """The report as text.
+
+    Parameters
+    ----------
+    benchmark : str
+    rows : Rows
+    notes : sequence of str
+        Of how it was made.
+    """
+    lines = [f"# {benchmark}, compared", "", *(f"- {note}" for note in notes), ""]
+    for category, methods in rows.items():
+        lines += [f"## {category}", ""]
+        for name, title, _, _, _ in COLUMNS:
+            if name in _SHOWN[benchmark] and all(name in record["parts"][0] for record in methods.values()):
+                lines += [f"### {title}", "", *_table(benchmark, category, methods, name), ""]
+        lines += ["### Views", "", *_views(benchmark, category, methods), ""]
+        for where, unit in (("visibility", "share of the part that shows"), ("azimuth", "degrees from the front")):
+            lines += [f"### Rotation error by {unit}", "", *_ranges(methods, where), ""]
+    lines += ["## All categories", "", *_means(rows), ""]
+    return "\n".join(lines)
+
+
+def _table(benchmark: str, category: str, methods: Mapping[str, dict[str, Any]], name: str) -> list[str]:
+    _, _, factor, digits, key = next(column for column in COLUMNS if column[0] == name)
+    parts = max(len(record["parts"]) for record in methods.values())
+    known = published_of(benchmark, category) if key else {}
+    head = ["method", *(f"part {k}" for k in range(parts)), *(f"published, part {k}" for k in range(parts) if known)]
+    lines = [_line(head), _line(["---"] * len(head))]
+    told_by = [method for method, published in known.items() if getattr(published, key)]
+    for method in dict.fromkeys([*methods, *told_by]):
+        cells = [TITLES.get(method, method)]
+        for k in range(parts):
+            cells.append(_cell(methods[method]["parts"], k, name, factor, digits) if method in methods else "")
+        told = getattr(known[method], key) if method in known and key else ()
+        # Nothing that is measured here stands in these columns: the images differ.
+        cells += [f"{factor * told[k]:.{digits}f}" if k < len(told) else "" for k in range(parts) if known]
+        lines.append(_line(cells))
+    return lines
+
+
+def _cell(parts: Sequence[dict[str, Any]], k: int, name: str, factor: float, digits: int) -> str:
+    """Mean, and its interval."""
+    if k >= len(parts):
+        return ""
+    own = {at: f"{factor * value:.{digits}f}" for at, value in parts[k][name].items()}
+    return f"{own['mean']} [{own['low']}, {own['high']}]"
+
+
+def _views(benchmark: str, category: str, methods: Mapping[str, dict[str, Any]]) -> list[str]:
+    known = published_of(benchmark, category)
+    head = ["method", "views", "objects", "failures", "right, %", "seconds", "seconds, published"]
+    lines = [_line(head), _line(["---"] * len(head))]
+    for method, record in methods.items():
+        told = known[method].seconds if method in known else None
+        lines.append(_line([
+            TITLES.get(method, method), str(record["views"]), str(record["objects"]), str(record["failures"]),
+            f"{100 * record['right']:.0f}", f"{record['seconds']:.2f}", "" if told is None else f"{told:.1f}",
+        ]))  # fmt: skip
+    return lines
+
+
+def _ranges(methods: Mapping[str, dict[str, Any]], where: str) -> list[str]:
+    first = next(iter(methods.values()))[where]
+    head = ["method", *(f"{own['low']:g} to {own['high']:g} ({own['count']})" for own in first)]
+    lines = [_line(head), _line(["---"] * len(head))]
+    for method, record in methods.items():
+        cells = [f"{own['mean']:.1f}" if own["count"] else "" for own in record[where]]
+        lines.append(_line([TITLES.get(method, method), *cells]))
+    return lines
+
+
+def _means(rows: Rows) -> list[str]:
+    """Means over all parts of all categories that every method has."""
+    methods = [m for m in next(iter(rows.values())) if all(m in own for own in rows.values())] if rows else []
+    names = [(name, title, factor, digits) for name, title, factor, digits, _ in COLUMNS if name in _OF_ALL]
+    lines = [_line(["method", *(title for _, title, _, _ in names)]), _line(["---"] * (len(names) + 1))]
+    for method in methods:
+        cells = [TITLES.get(method, method)]
+        for name, _, factor, digits in names:
+            weights = [len(own[method]["parts"]) for own in rows.values()]
+            means = [mean_over_parts(own[method], name) for own in rows.values()]
+            value = sum(w * m for w, m in zip(weights, means, strict=True)) / sum(weights)
+            cells.append(f"{factor * value:.{digits}f}")
+        lines.append(_line(cells))
+    return lines
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def html_page(text: str, title: str, pictures: Mapping[str, bytes], views: Mapping[str, str]) -> str:
+    """The report as one page.
+
+    Parameters
+    ----------
+    text : str
+        :func:`markdown`.
+    title : str
+    pictures : mapping of str to bytes
+        PNG files by their captions.
+    views : mapping of str to str
+        Pages to turn estimates in, by their captions.
+    """
+    body = _html_of(text)
+    for caption, png in pictures.items():
+        data = base64.b64encode(png).decode()
+        told = html.escape(printable(caption, 120))
+        body += f'<h2>{told}</h2><img alt="{told}" src="data:image/png;base64,{data}">\n'
+    for caption, page in views.items():
+        told, inner = html.escape(printable(caption, 120)), html.escape(page)
+        frame = f'<iframe title="{told}" loading="lazy" sandbox="allow-scripts" srcdoc="{inner}"></iframe>'
+        body += f"<h2>{told}</h2>{frame}\n"
+    return _PAGE.format(title=html.escape(title), body=body)
+
+
+def _html_of(text: str) -> str:
+    """Headings, lists and tables of :func:`markdown` in HTML."""
+    out: list[str] = []
+    before = ""
+    for line in text.splitlines():
+        table, was_table = line.startswith("|"), before.startswith("|")
+        if table != was_table:
+            out.append("<table>" if table else "</table>")
+        if table and not line.startswith("| ---"):
+            tag = "td" if was_table else "th"
+            cells = (html.escape(cell.strip()) for cell in line[1:-1].split("|"))
+            out.append("<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>")
+        elif line.startswith("#"):
+            level = len(line.split()[0])
+            out.append(f"<h{level}>{html.escape(line.lstrip('# '))}</h{level}>")
+        elif line.startswith("- "):
+            out.append(f"<li>{html.escape(line[2:])}</li>")
+        before = line
+    return "\n".join([*out, "</table>" if before.startswith("|") else ""])
+
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1.5em auto; max-width: 72em; padding: 0 1em; color: #1b1b1b; }}
+table {{ border-collapse: collapse; margin: 0.4em 0 1.2em; display: block; overflow-x: auto; }}
+th, td {{ border-bottom: 1px solid #ddd; padding: 0.25em 0.8em 0.25em 0; text-align: right; white-space: nowrap; }}
+th:first-child, td:first-child {{ text-align: left; }}
+h3 {{ margin: 1em 0 0.2em; font-size: 1em; }}
+img {{ max-width: 100%; }} iframe {{ width: 100%; height: 44em; border: 1px solid #ddd; }}
+</style></head><body>
+{body}
+</body></html>
+"""

@@ -1,0 +1,304 @@
+"""A comparison of methods from nothing: each is trained, or loaded, and scored on the same views.
+
+Every step is written down when it is done, so that a stopped comparison goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from artperl.data.categories import ARTIMAGE
+from artperl.estimator import WEIGHTS, load_estimator
+from artperl.evaluation.artimage import row_objects, row_samples
+from artperl.evaluation.comparison import row_record
+from artperl.evaluation.comparison_page import html_page, markdown
+from artperl.evaluation.pictures import curves, overlays
+from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, samples_of
+from artperl.evaluation.scoring import evaluate, object_symmetries
+from artperl.methods.protocol import Method
+from artperl.training.options import PRESETS, TrainOptions, preset_of
+from artperl.training.options import Method as MethodName
+from artperl.training.run import Training
+from artperl.viewer import page
+from artsim.common.files import read_json, write_atomic
+from artsim.datasets.plan import SampleOptions
+from artsim.errors import ArtsimError, ConfigError
+from artsim.export import export
+from artsim.families import make
+from artsim.model.objects import ArticulatedObject
+from artsim.observing.sample import Sample
+
+Benchmark = Literal["artimage", "robotarm"]
+Preset = Literal["quick", "full"]
+
+METHODS: dict[Benchmark, tuple[MethodName, ...]] = {
+    "artimage": ("full", "artperl", "ancsh", "omad", "sporeagent"),
+    "robotarm": ("full", "artperl", "ancsh"),
+}
+"""Methods of a benchmark, as in the paper."""
+ARM = "robot_arm"
+"""The category of the benchmark robotarm."""
+_ARM_SEED = TEST_SEEDS + 25
+"""The first arm of the test seeds that has seven parts in a chain."""
+_STAGES = ("perception_steps", "retrieval_steps", "prior_steps", "agent_rollouts")
+_MAX_ROW = 4_000_000
+_OVERLAYS = 4
+"""Views of a category that are drawn."""
+
+
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """What a comparison depends on.
+
+    Raises
+    ------
+    ConfigError
+        When a method or a category is not of the benchmark, or there is nothing to test.
+    """
+
+    benchmark: Benchmark = "artimage"
+    categories: tuple[str, ...] = ()
+    """Of ArtImage; by default all. The benchmark robotarm has one."""
+    methods: tuple[MethodName, ...] = ()
+    """By default those of the paper's table, and full."""
+    preset: Preset = "full"
+    """Of the trainings."""
+    objects: int = 40
+    """Unseen objects of each category; robotarm has one arm in other states."""
+    views: int = 120
+    """Of each category, at least."""
+    num_points: int = NUM_POINTS
+    train: dict[str, Any] | None = None
+    """Other values of fields of TrainOptions, for every training."""
+    retrain_full: bool = False
+    """The method full is trained, too; by default the estimators that come with the package are taken."""
+
+    def __post_init__(self) -> None:
+        known = tuple(ARTIMAGE) if self.benchmark == "artimage" else (ARM,)
+        for name, given, offered in (
+            ("category", self.categories, known), ("methods", self.methods, METHODS[self.benchmark])
+        ):  # fmt: skip
+            wrong = set(given) - set(offered)
+            if wrong:
+                raise ConfigError(
+                    f"{self.benchmark} has no {', '.join(sorted(wrong))}", name, f"use {', '.join(offered)}"
+                )
+        if self.objects < 1 or self.views < 1:
+            raise ConfigError("there is nothing to test", "objects, views", "use at least 1 of each")
+
+    @property
+    def of_categories(self) -> tuple[str, ...]:
+        """Categories, all if none is named."""
+        return self.categories or (tuple(ARTIMAGE) if self.benchmark == "artimage" else (ARM,))
+
+    @property
+    def of_methods(self) -> tuple[MethodName, ...]:
+        """Methods, all if none is named."""
+        return self.methods or METHODS[self.benchmark]
+
+
+def quick_comparison(options: ComparisonOptions) -> ComparisonOptions:
+    """The same benchmark with one category, trainings of seconds, and few views."""
+    return replace(
+        options, categories=options.of_categories[:1], preset="quick", objects=2, views=4, num_points=2048,
+        train={
+            "base_objects": 4, "reference_points": 48, "width": 16, "perception_steps": 8, "batch_size": 4,
+            "num_points": 256, "retrieval_steps": 4, "prior_steps": 20, "agent_rollouts": 2, "episodes": 4,
+            "dense_steps": 0, "box_views": 0, "test_objects": 2, "test_views": 1, "validation_views": 1,
+            "foreign_categories": 1,
+        },
+    )  # fmt: skip
+
+
+def run_comparison(
+    options: ComparisonOptions, out: Path, workers: int = 1, progress: bool = True, say: Callable[[str], None] = print
+) -> dict[str, Any]:  # fmt: skip
+    """Train or load every method, score it, and write ``report.md``, ``report.json`` and ``report.html``.
+
+    Parameters
+    ----------
+    options : ComparisonOptions
+    out : Path
+        Folder of the report: ``train`` holds the trainings, ``rows`` the figures of each method on each category.
+    workers : int
+        Processes that make training clouds.
+    progress : bool
+    say : callable
+        Gets a line before and after each step, with the time that it took.
+
+    Returns
+    -------
+    dict
+        The content of ``report.json``.
+
+    Raises
+    ------
+    ConfigError
+        When the folder holds rows of other options.
+    """
+    steps = [(category, method) for category in options.of_categories for method in options.of_methods]
+    say(f"{len(steps)} rows: {', '.join(options.of_methods)} on {', '.join(options.of_categories)}")
+    rows: dict[str, dict[str, Any]] = {category: {} for category in options.of_categories}
+    tested: dict[str, tuple[list[ArticulatedObject], list[Sample]]] = {}
+    for number, (category, method) in enumerate(steps, 1):
+        kept = out / "rows" / f"{category}-{method}.json"
+        asked = _asked(options, method)
+        row = _kept_row(kept, asked)
+        if row is None:
+            begun = time.perf_counter()
+            estimator = trained(options, category, method, out, workers, progress, say)
+            learnt = time.perf_counter() - begun
+            if category not in tested:
+                tested[category] = tested_views(options, category, out)
+            objects, samples = tested[category]
+            scored = evaluate(estimator, samples, progress, object_symmetries(objects))
+            row = {
+                "options": asked, "training_minutes": learnt / 60.0,
+                "testing_minutes": (time.perf_counter() - begun - learnt) / 60.0, "record": row_record(scored, samples),
+            }  # fmt: skip
+            write_atomic(kept, (json.dumps(row, indent=1) + "\n").encode())
+        rows[category][method] = row["record"]
+        say(
+            f"{number} of {len(steps)}, {method} on {category}: training {row['training_minutes']:.1f} min, test "
+            f"{row['testing_minutes']:.1f} min, {_told(row['record'])}"
+        )
+    report = {"options": asdict(options), "rows": rows}
+    text = markdown(options.benchmark, rows, notes(options))
+    write_atomic(out / "report.json", (json.dumps(report, indent=1) + "\n").encode())
+    write_atomic(out / "report.md", text.encode())
+    pictures, views = drawn(options, out, tested, say)
+    write_atomic(out / "report.html", html_page(text, f"{options.benchmark}, compared", pictures, views).encode())
+    say(f"report: {out / 'report.html'}, report.md, report.json")
+    return report
+
+
+def _told(record: dict[str, Any]) -> str:
+    turns = " ".join(f"{part['rotation_deg']['mean']:.1f}" for part in record["parts"])
+    return f"rotation {turns} deg, {record['seconds']:.2f} s"
+
+
+def _asked(options: ComparisonOptions, method: MethodName) -> dict[str, Any]:
+    """What a row depends on, in JSON's terms."""
+    own = asdict(options)
+    for name in ("categories", "methods"):
+        own.pop(name)
+    own["method"] = method
+    return dict(json.loads(json.dumps(own)))
+
+
+def _kept_row(path: Path, asked: dict[str, Any]) -> dict[str, Any] | None:
+    """A row that was measured before; None if there is none."""
+    if not path.is_file():
+        return None
+    row = read_json(path, "the row of the report", ConfigError, _MAX_ROW)
+    if not isinstance(row, dict) or row.get("options") != asked or not isinstance(row.get("record"), dict):
+        raise ConfigError("it holds figures of other options", path, "name another --out, or remove it")
+    return row
+
+
+def training_options(options: ComparisonOptions, category: str, method: MethodName, out: Path) -> TrainOptions:
+    """What a method learns from, for a category of a comparison."""
+    if options.benchmark == "artimage":
+        own = replace(preset_of(method, options.preset), categories=(category,))
+    else:
+        arm = str(arm_folder(out))
+        preset = PRESETS["joint"] if method == "full" else preset_of(method, options.preset)
+        own = replace(preset, categories=(), files=(arm,), parts="any", sample=SampleOptions(noise="d435"))
+        if method == "full":  # as benchmarks/robot_arm.py does
+            own = replace(own, start_from="any", perception_steps=2000)
+    # Stages that a method does not have stay without steps.
+    changes = {
+        name: value for name, value in (options.train or {}).items() if name not in _STAGES or getattr(own, name)
+    }
+    if own.start_from is not None:
+        changes.pop("width", None)  # that of the estimator that it begins with
+    return replace(own, **changes)
+
+
+def trained(
+    options: ComparisonOptions, category: str, method: MethodName, out: Path, workers: int, progress: bool,
+    say: Callable[[str], None],
+) -> Method:  # fmt: skip
+    """A method for a category: one that comes with the package, or one that is trained here, or was before."""
+    if method == "full" and options.benchmark == "artimage" and not options.retrain_full:
+        return load_estimator(WEIGHTS / category)
+    folder = out / "train" / f"{category}-{method}"
+    say(f"training {method} on {category} in {folder}: it may be stopped, and goes on by the same command")
+    Training(training_options(options, category, method, out), folder, workers, progress).run()
+    name: str = method
+    return load_estimator(folder / "best", method=name)
+
+
+def tested_views(options: ComparisonOptions, category: str, out: Path) -> tuple[list[ArticulatedObject], list[Sample]]:
+    """Objects that nothing was learnt from, and views of them: always the same ones."""
+    if options.benchmark == "artimage":
+        objects = row_objects("procedural", category, None, options.objects)
+        return objects, row_samples("procedural", objects, options.views, options.num_points)
+    objects = [seven_part_arm()]
+    sample = SampleOptions(num_points=options.num_points, noise="d435")
+    return objects, samples_of(objects, options.views, sample)
+
+
+def seven_part_arm() -> ArticulatedObject:
+    """The arm of the benchmark robotarm: seven parts in a chain, as the paper's has."""
+    return make(ARM, _ARM_SEED)
+
+
+def arm_folder(out: Path) -> Path:
+    """The folder of the arm's files, written if they are not there."""
+    folder = out / "arm"
+    if not (folder / "mobility.urdf").is_file():
+        export(seven_part_arm(), folder)
+    return folder
+
+
+def notes(options: ComparisonOptions) -> list[str]:
+    """How a report is made, for people."""
+    train = "" if not options.train else f", with {json.dumps(options.train)}"
+    lines = [
+        f"Trainings have the preset {options.preset}{train}.",
+        "Objects and views are made here. Published figures are of other images, in columns of their own.",
+        "Brackets have the 95 % interval of the mean, by a bootstrap over objects.",
+        "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",
+    ]
+    if options.benchmark == "artimage":
+        full = "is trained like the others" if options.retrain_full else "has the weights that come with the package"
+        lines.append(f"The method full {full}; it may have learnt longer than the others.")
+    else:
+        lines.append("One procedural arm of seven parts, as an Intel D435 sees it; learnt and tested in other states.")
+    return lines
+
+
+def drawn(
+    options: ComparisonOptions, out: Path, tested: dict[str, tuple[list[ArticulatedObject], list[Sample]]],
+    say: Callable[[str], None],
+) -> tuple[dict[str, bytes], dict[str, str]]:  # fmt: skip
+    """Pictures and pages of a report: overlays of the best method, its estimates to turn, and curves of the agent."""
+    pictures, views = {}, {}
+    first = options.of_methods[0]
+    for category in options.of_categories:
+        if category not in tested:
+            tested[category] = tested_views(options, category, out)
+        samples = tested[category][1]
+        try:
+            estimator = trained(options, category, first, out, 0, False, say) if first == "full" and (
+                options.benchmark == "artimage" and not options.retrain_full
+            ) else load_estimator(out / "train" / f"{category}-{first}" / "best", method=f"{first}")  # fmt: skip
+            shown = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _OVERLAYS).astype(int))]
+            pictures[f"{category}: estimates of {first}, true boxes dashed"] = overlays(estimator, shown)
+            estimate = estimator(shown[0].points)
+            last = replace(estimate, trajectory=estimate.trajectory[-1:])
+            views[f"{category}: an estimate of {first} to turn"] = page(last, shown[0].points)
+            events = out / "train" / f"{category}-artperl" / "events"
+            if events.is_dir():
+                pictures[f"{category}: how artperl learnt"] = curves(events)
+        except ArtsimError as error:  # without matplotlib there are no pictures
+            say(f"no pictures of {category}: {error}")
+    return pictures, views

@@ -1,0 +1,69 @@
+"""A comparison trains what it needs, goes on where it stopped, and refuses rows of other options."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from artperl.training.comparison_run import (
+    ComparisonOptions,
+    arm_folder,
+    quick_comparison,
+    run_comparison,
+    seven_part_arm,
+    training_options,
+)
+from artsim.errors import ConfigError
+from artsim.loading.urdf import load
+
+TINY = replace(
+    quick_comparison(ComparisonOptions(methods=("full", "ancsh"))), views=2, objects=1, num_points=512,
+)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_report_has_every_method_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    said: list[str] = []
+    report = run_comparison(TINY, tmp_path, 0, False, said.append)
+    assert set(report["rows"]["laptop"]) == {"full", "ancsh"}
+    assert report["rows"]["laptop"]["full"]["parts"][0]["rotation_deg"]["mean"] < 5.0
+    assert any("training 0.0 min" in line and "full" in line for line in said)
+    text = (tmp_path / "report.md").read_text()
+    assert "| A-NCSH |" in text
+    assert json.loads((tmp_path / "report.json").read_text())["rows"] == report["rows"]
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<iframe") == 1
+    assert "data:image/png" in page
+
+    row = tmp_path / "rows" / "laptop-ancsh.json"
+    known = json.loads(row.read_text())
+    known["record"]["seconds"] = 1234.5  # a row that is measured is not measured again
+    row.write_text(json.dumps(known))
+    (tmp_path / "rows" / "laptop-full.json").unlink()
+    again = run_comparison(TINY, tmp_path, 0, False, said.append)
+    assert again["rows"]["laptop"]["ancsh"]["seconds"] == 1234.5
+    with pytest.raises(ConfigError, match="figures of other options"):
+        run_comparison(replace(TINY, views=1), tmp_path, 0, False, said.append)
+
+
+def test_methods_and_categories_are_those_of_the_benchmark() -> None:
+    with pytest.raises(ConfigError, match="robotarm has no omad"):
+        ComparisonOptions("robotarm", methods=("omad",))
+    with pytest.raises(ConfigError, match=r"artimage has no faucet.*laptop"):
+        ComparisonOptions(categories=("faucet",))
+    assert len(ComparisonOptions().of_categories) == 5
+
+
+def test_the_arm_has_seven_parts_in_a_chain_and_all_of_its_methods_learn_from_its_file(tmp_path: Path) -> None:
+    arm = load(arm_folder(tmp_path))
+    assert len(arm) == len(seven_part_arm()) == 7
+    assert arm.tree.parents.tolist() == [-1, 0, 1, 2, 3, 4, 5]
+    options = ComparisonOptions("robotarm")
+    for method in options.of_methods:
+        learning = training_options(options, "robot_arm", method, tmp_path)
+        assert learning.files == (str(tmp_path / "arm"),)
+        assert learning.sample.noise == "d435"
+        assert learning.method == method
