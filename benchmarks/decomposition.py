@@ -49,7 +49,7 @@ class Options:
     partnet: tyro.conf.Positional[Path]
     """Folder of PartNet-Mobility objects."""
     objects: int = 0
-    """Objects, categories in turn; 0 takes all."""
+    """Objects, categories in turn; 0 takes all. Drawers are looked for in all."""
     drawers: int = 20
     """Opened drawers that a box is put into."""
     record: Path = Path("out/decomposition.jsonl")
@@ -60,8 +60,8 @@ class Options:
 def main(options: Options) -> None:
     """Decompose, and print."""
     warnings.filterwarnings("ignore", category=RuntimeWarning)  # trimesh, on surfaces without a volume
-    sources = in_turn(find_sources([options.partnet]))
-    sources = sources[: options.objects] if options.objects else sources
+    every = in_turn(find_sources([options.partnet]))
+    sources = every[: options.objects] if options.objects else every
     rows = {row["name"]: row for row in _read(options.record)}
     options.record.parent.mkdir(parents=True, exist_ok=True)
     with options.record.open("a") as file:
@@ -72,7 +72,7 @@ def main(options: Options) -> None:
             file.flush()
     chosen = [rows[source.name] for source in sources]
     print("\n".join(_report(chosen)))
-    boxes = try_drawers(sources, options) if options.drawers else []
+    boxes = try_drawers(every, options) if options.drawers else []
     print(json.dumps({**_totals(chosen), "drawers": len(boxes), "boxes_that_stay": sum(boxes)}))
 
 

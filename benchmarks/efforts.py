@@ -101,7 +101,7 @@ def in_pybullet(folder: Path, joints: list[LinkJoint], way: float, seconds: floa
 
 
 def in_sapien(folder: Path, joints: list[LinkJoint], way: float, seconds: float) -> Run:
-    """By velocity drives at the speed limit, as strong as the effort limit."""
+    """By velocity drives at the speed limit, as strong as the effort limit; PhysX is told the velocity limits."""
     import sapien
 
     scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
@@ -118,6 +118,7 @@ def in_sapien(folder: Path, joints: list[LinkJoint], way: float, seconds: float)
         own = robot.active_joints[order[joint.name]]
         own.set_drive_properties(0.0, _DRIVE, force_limit=joint.effort)
         own.set_drive_velocity_target(way * joint.velocity)
+        own.set_max_velocity(joint.velocity)
     chosen = [order[joint.name] for joint in joints]
     states, speeds = [], []
     for _ in range(round(480 * seconds)):

@@ -24,6 +24,12 @@ STOP = {"solreflimit": _SOLREF, "solimplimit": _SOLIMP}
 BELOW = 1.0 - 1e-6
 """Share of the effort limit that a motor has at most. At the limit itself MuJoCo's implicit integrator forgets what the
 motor loses with speed, and light parts dart off."""
+TIME_STEP = 0.002
+"""Seconds: MuJoCo's default."""
+ROTOR_TIME = TIME_STEP
+"""Seconds in which a motor alone reaches its speed, by the inertia of its rotor (``armature``). Without a rotor, light
+joints reach it in microseconds. MuJoCo's implicit integrator then divides every force on them, that of their stops too,
+by the time step over this time: a button sinks into its stop by a tenth of its travel."""
 POSITION_TIME = 0.1
 """Seconds in which a position actuator, held by damping alone, would be where it is told."""
 
@@ -44,7 +50,7 @@ def mjcf_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) 
     root = etree.Element("mujoco", model=robot.name)
     # Fused, a root that no joint moves would become part of the world.
     # The integrator treats damping and what motors lose with speed implicitly: light parts stay stable.
-    etree.SubElement(root, "option", integrator="implicitfast")
+    etree.SubElement(root, "option", integrator="implicitfast", timestep=number(TIME_STEP))
     etree.SubElement(root, "compiler", angle="radian", meshdir="meshes", autolimits="true", fusestatic="false")
     default = etree.SubElement(root, "default")
     for group, more in (("visual", {"group": "2", "contype": "0", "conaffinity": "0"}), ("collision", {"group": "3"})):
@@ -66,6 +72,9 @@ def mjcf_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) 
         parent = world if joint is None else bodies[joint.parent]
         offset = link.origin if joint is None else link.origin - robot.links[joint.parent].origin
         bodies.append(_add_body(parent, numbers(offset), link, joint, finish.looks.get(link.name, ())))
+        if joint is not None and joint.mimic is None and options.actuators != "none":
+            rotor = ROTOR_TIME * _lost(joint)
+            bodies[-1].find("joint").set("armature", number(rotor))
         if joint is None and options.base == "free":
             bodies[-1].insert(0, etree.Element("freejoint", name=_unused("root", robot)))
     _add_exclusions(root, robot)
@@ -159,8 +168,8 @@ def _add_actuators(root: etree._Element, robot: Robot, kind: str) -> None:
             continue
         limit = numbers((-joint.effort, joint.effort))
         if kind == "motor":
-            # Control, weight and speed add up to nothing at the velocity limit; the joint's damping has a share.
-            lost = max((1.0 + 1.0 / STRENGTH) * joint.effort / joint.velocity - joint.damping, 0.0)
+            # The joint's damping has a share of what is lost.
+            lost = max(_lost(joint) - joint.damping, 0.0)
             gain, bias, control = number(BELOW * joint.effort), numbers((0.0, 0.0, -lost)), "-1 1"
         else:
             gain_of = joint.effort / max(joint.velocity * POSITION_TIME, 1e-9)
@@ -172,6 +181,11 @@ def _add_actuators(root: etree._Element, robot: Robot, kind: str) -> None:
             actuators, "general", name=joint.name, joint=joint.name, gainprm=gain, biastype="affine", biasprm=bias,
             forcerange=limit, **more,
         )  # fmt: skip
+
+
+def _lost(joint: LinkJoint) -> float:
+    """Effort that a motor loses for each unit of speed: control, weight and speed cancel at the velocity limit."""
+    return (1.0 + 1.0 / STRENGTH) * joint.effort / joint.velocity
 
 
 def _unused(name: str, robot: Robot) -> str:

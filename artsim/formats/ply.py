@@ -15,8 +15,11 @@ from artsim.datasets.dataset import Dataset
 from artsim.datasets.pieces import Output
 from artsim.datasets.shards import sample_key
 from artsim.formats.base import Piece, PlainFormat
+from artsim.model.frame import BACKGROUND
 from artsim.observing.sample import Sample
 
+_OTHER = 128
+"""Grey of points that belong to no part."""
 _TYPES = {"<f4": "float", "|u1": "uchar", "<i4": "int"}
 """What PLY calls NumPy's types."""
 
@@ -45,6 +48,7 @@ def save_ply(sample: Sample, path: str | Path) -> None:
 def cloud_ply(sample: Sample) -> bytes:
     """The cloud of a sample as binary PLY: x, y, z in the camera frame, metres; the part's colour; ``part``."""
     colours = PALETTE[sample.part % len(PALETTE)]
+    colours = np.where((sample.part == BACKGROUND)[:, None], np.uint8(_OTHER), colours)  # other things are no part
     return _header("vertex", rows := _vertices(sample.points, colours, sample.part)) + b"end_header\n" + rows.tobytes()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -140,6 +141,26 @@ class Sample(Showable):
     def _page(self, **more: Any) -> str:
         # By name: pictures stand floors above samples, which use none of them themselves.
         return str(import_module("artsim.drawing.page").sample_page([self], **more))
+
+    def save_ply(self, path: str | Path) -> Path:
+        """Write the cloud as PLY, in the camera frame and metres, each point in the colour of its part.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ConfigError
+            When it cannot be written.
+        """
+        import_module("artsim.formats.ply").save_ply(self, path)  # by name, as the page
+        return Path(path)
 
     @property
     def rest_points(self) -> Array:

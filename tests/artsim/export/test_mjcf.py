@@ -85,6 +85,21 @@ def test_motors_at_full_control_keep_velocity_limits_and_stops(category: str, si
                 assert beyond < 0.02 * (joint.upper - joint.lower)
 
 
+def test_buttons_that_travel_less_than_a_millimetre_stop_where_they_end(tmp_path: Path) -> None:
+    mujoco = installed("mujoco")
+    obj = make("phone", 0)
+    export(obj, tmp_path, ["mjcf"], options=ExportOptions(actuators="motor"))
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / FORMATS["mjcf"]))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 1.0
+    limits, span = model.jnt_range, np.ptp(model.jnt_range, axis=1)
+    assert span.min() < 5e-4
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+        assert np.all(data.qpos < limits[:, 1] + 0.02 * span)
+    assert np.all(data.qpos > limits[:, 1] - 0.02 * span)
+
+
 def test_position_actuators_go_where_they_are_told(tmp_path: Path) -> None:
     mujoco = installed("mujoco")
     obj = make("drawer", 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -137,5 +138,7 @@ def test_trimesh_reads_clouds_with_a_colour_for_each_part(imaged: Dataset, tmp_p
     assert np.array_equal(cloud.vertices, sample.points)
     assert np.array_equal(cloud.colors[:, :3], PALETTE[sample.part])
     assert np.array_equal(cloud.metadata["_ply_raw"]["vertex"]["data"]["part"].ravel(), sample.part)
-    save_ply(sample, tmp_path / "own.ply")
-    assert (tmp_path / "own.ply").read_bytes() == path.read_bytes()
+    assert sample.save_ply(tmp_path / "own.ply").read_bytes() == path.read_bytes()
+    foreign = replace(sample, part=np.where(np.arange(len(sample.part)) < 9, 255, sample.part).astype(np.uint8))
+    save_ply(foreign, tmp_path / "own.ply")
+    assert np.array_equal(trimesh.load(tmp_path / "own.ply").colors[:9, :3], np.full((9, 3), 128))
