@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,9 @@ from artsim.common.extras import needs
 if TYPE_CHECKING:
     from artperl.core.estimate import Estimate
     from artperl.methods.protocol import Method
+    from artperl.scene.estimator import SceneEstimator
 
-__all__ = ["Estimate", "load_estimator"]
+__all__ = ["Estimate", "load_estimator", "load_scene_estimator"]
 
 
 def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Method:
@@ -37,6 +39,27 @@ def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Me
         from artperl.estimator import load_estimator as load  # torch takes seconds to import
 
     return load(name, method=method, **changes)
+
+
+def load_scene_estimator(estimators: Mapping[str, str | Path] | None = None, **changes: Any) -> SceneEstimator:
+    """An estimator of all objects in an image: ``load_scene_estimator()(rgb, depth, K, detections)``.
+
+    Parameters
+    ----------
+    estimators : mapping, optional
+        Name or folder of the estimator of each category; by default those that come with the package, by their names.
+    **changes
+        Of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
+
+    Raises
+    ------
+    ConfigError
+        When torch is not installed.
+    """
+    with needs("artperl"):
+        from artperl.scene.estimator import SceneEstimator  # torch takes seconds to import
+
+    return SceneEstimator(estimators, **changes)
 
 
 def __getattr__(name: str) -> Any:

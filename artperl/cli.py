@@ -1,4 +1,4 @@
-"""The program ``artperl``: train, evaluate, estimate, report, calibrate."""
+"""The program ``artperl``: train, evaluate, estimate, report, calibrate, detections."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated
 import tyro
 
 from artperl.commands.calibrate import Calibrate
+from artperl.commands.detections import MakeDetections
 from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
 from artperl.commands.report import Report
@@ -19,6 +20,7 @@ Verb = (
     | Annotated[Estimate, tyro.conf.subcommand("estimate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
+    | Annotated[MakeDetections, tyro.conf.subcommand("detections")]
 )
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from artperl.inputs import InputOptions
     from artperl.methods.protocol import Method
 
-_STDOUT = Path("-")
+STDOUT = Path("-")
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,9 @@ class Estimate:
     From a cloud: artperl estimate cloud.ply --category laptop --view out.html
 
     From a depth image: artperl estimate depth.png --mask mask.png --intrinsics camera.json --category laptop
+
+    All objects of an image, found by a detector: artperl estimate image.png depth.png --intrinsics camera.json
+    --detections results.json --picture boxes.png
 
     From a folder, or several files, one line of JSON each: artperl estimate FOLDER --category laptop --out poses.jsonl
 
@@ -55,6 +58,10 @@ class Estimate:
     Intrinsics: .json of artsim (fx, fy, cx, cy, or K), BOP (camera.json, scene_camera.json), Open3D, RealSense, ROS
     CameraInfo, NeRF (transforms.json); .yaml of ROS and OpenCV; a 3 x 3 matrix as .txt, .npy or .npz. The centre of the
     first pixel is at 0.5 in artsim's and NeRF's files, and at 0 in all others: see --pixel-center.
+
+    Detections: COCO's results, a list of image_id, category (or category_id beside categories), score, segmentation
+    (run lengths or polygons) or bbox (left, top, width, height). The file may hold those of other images, too:
+    --image-id.
 
     Results are in metres and radians: part_names, joint_type, state and joint_limits (K, 2; those of the reference;
     null where there is none) with state_unit, rotation, translation and size of each box, T_camera_part, confidence,
@@ -93,6 +100,15 @@ class Estimate:
     """Where the intrinsics have the centre of the first pixel. By default as their format has it."""
     image_id: str | None = None
     """Which image of a scene_camera.json; by default that in the depth image's name."""
+    detections: Path | None = None
+    """Objects that a detector has found in an image: name the image in colour and the depth image, and no category."""
+    estimators: tuple[str, ...] = ()
+    """Of an image with detections: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one for
+    each category. By default those that come with the package, by their names."""
+    picture: Path | None = None
+    """Of an image with detections: write the image with boxes and joint axes drawn over it here, as PNG."""
+    skip_bad: bool = False
+    """Leave out detections that cannot be used, and list them, instead of refusing the file."""
     seen_from: tuple[float, float] | None = None
     """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
@@ -104,6 +120,16 @@ class Estimate:
     def run(self) -> None:
         from artperl.estimator import load_estimator
 
+        if self.detections is not None:
+            from artperl.commands.estimate_scene import estimate_scene
+
+            estimate_scene(self)
+            return
+        if self.picture is not None or self.estimators or self.skip_bad:
+            raise ConfigError(
+                "these are of an image with detections", "picture, estimators, skip_bad",
+                "add --detections results.json",
+            )  # fmt: skip
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"
         self._check(several)
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
@@ -115,7 +141,7 @@ class Estimate:
 
     def _check(self, several: bool) -> None:
         kinds = (".jsonl",) if several else (".json", ".npz")
-        if self.out is not None and self.out != _STDOUT and self.out.suffix not in kinds:
+        if self.out is not None and self.out != STDOUT and self.out.suffix not in kinds:
             raise ConfigError(
                 f"{self.out} is no {' or '.join(kinds)} file", "out",
                 f"name one for {'several files' if several else 'one file'}, or - for JSON",
@@ -125,7 +151,8 @@ class Estimate:
         if several and self.view is not None:
             raise ConfigError("a page shows one object", "view", "give one file, or leave it out")
 
-    def _options(self) -> InputOptions:
+    def input_options(self) -> InputOptions:
+        """How the files are to be read."""
         from artperl.inputs import InputOptions
 
         return InputOptions(
@@ -139,14 +166,14 @@ class Estimate:
         from artperl.inputs import read_cloud
         from artperl.viewer import page
 
-        cloud = read_cloud(file, self._options())
+        cloud = read_cloud(file, self.input_options())
         for text in cloud.notes:
             print(f"note: {text}", file=sys.stderr)
         result = estimator(cloud.points)
         record = record_of(result, cloud)
         if self.view is not None:
             write_atomic(self.view, page(result, cloud.points, f"{file.name}: {self.category}").encode())
-        if self.out == _STDOUT:
+        if self.out == STDOUT:
             _warn(record["warnings"])
             print(json.dumps(record, indent=1))
             return
@@ -164,10 +191,10 @@ class Estimate:
         from artperl.commands.resumed_lines import Lines
         from artperl.core.processes import each
 
-        options = self._options()
+        options = self.input_options()
         clouds = Clouds.of(self.clouds, options, (self.intrinsics, self.mask, self.out))
         setup = {"estimator": self.category, "seen_from": self.seen_from, **vars(options)}
-        with Lines(None if self.out in (None, _STDOUT) else self.out, setup) as lines:
+        with Lines(None if self.out in (None, STDOUT) else self.out, setup) as lines:
             failed, done, total = 0, lines.done(), len(clouds)
             if done:
                 print(f"note: {len(done)} lines are in {self.out} already", file=sys.stderr)

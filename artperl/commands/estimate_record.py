@@ -13,9 +13,13 @@ if TYPE_CHECKING:
 
 def record_of(result: Result, cloud: Cloud) -> dict[str, Any]:
     """An estimate in JSON's terms, but for the part of every point; null for what is infinite."""
+    return {**plain_record(result), "notes": list(cloud.notes), "warnings": [*cloud.warnings, *result.warnings]}
+
+
+def plain_record(result: Result) -> dict[str, Any]:
+    """As :func:`record_of`, of what the estimate itself says."""
     record = {name: _plain(value) for name, value in vars(result).items() if name not in ("part", "part_symptoms")}
     record["state_unit"] = list(result.state_unit)
-    record["notes"], record["warnings"] = list(cloud.notes), [*cloud.warnings, *result.warnings]
     return record
 
 

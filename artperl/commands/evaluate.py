@@ -32,9 +32,10 @@ class Evaluate:
     method: str = "full"
     """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; or one
     that you add (CONTRIBUTING.md). A benchmark and the ablation are of the method full."""
-    benchmark: Literal["artimage", "robustness"] | None = None
+    benchmark: Literal["artimage", "robustness", "reartmix"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row. robustness: sensors, occluders,
-    bad masks and few points, at least 100 views in each row; with --json, a run that was stopped goes on."""
+    bad masks and few points, at least 100 views in each row; with --json, a run that was stopped goes on. reartmix:
+    several objects in each image, average precision at 5 degrees, 5 cm and IoU 0.5."""
     ablation: bool = False
     """Measure what each stage brings: the estimators of all categories without one stage after the other, on validation
     objects. With --json, a run that was stopped goes on from the rows of the file."""
@@ -47,7 +48,15 @@ class Evaluate:
     """For the row real_trained: folder of the estimators that have learnt from real objects, too."""
     root: Path | None = None
     """For the benchmark artimage: folder of the original ArtImage, whose test split is read instead of views that are
-    made here. Any --method then; without --views, all frames."""
+    made here. Any --method then; without --views, all frames. For reartmix: folder that artsim scene wrote, or that has
+    the layout of ReArtMix; by default --views scenes, 50, are made in out/reartmix."""
+    detections: Path | None = None
+    """For reartmix: COCO's results, with image_id as artperl detections writes it. By default realistic ones."""
+    skip_bad: bool = False
+    """For reartmix: leave out detections that cannot be used, and list them, instead of refusing the file."""
+    estimators: tuple[str, ...] = ()
+    """For reartmix: CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category. By default
+    those that come with the package, by their names, and any for drawers, whose number varies."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
     """For the rows of real objects: unpacked PartNet-Mobility; by default what ARTSIM_PARTNET_DIR names."""
     category: tuple[str, ...] = ()
@@ -79,6 +88,15 @@ class Evaluate:
     """Write the figures to this file."""
 
     def run(self) -> None:
+        if self.benchmark == "reartmix":
+            from artperl.commands.reartmix import evaluate_reartmix
+
+            evaluate_reartmix(self)
+            return
+        if self.detections is not None or self.estimators or self.skip_bad:
+            raise ConfigError(
+                "these are of a benchmark", "detections, estimators, skip_bad", "add --benchmark reartmix"
+            )
         if self.root is not None and (self.benchmark != "artimage" or self.ablation or self.rows):
             raise ConfigError("the original images are those of a benchmark", "root", "use --benchmark artimage alone")
         if self.method != "full" and self.root is None and (self.ablation or self.benchmark):

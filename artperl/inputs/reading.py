@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artperl.inputs.clouds import READERS, read_cloud_file
-from artperl.inputs.depth_images import ARRAYS, PICTURES, DepthKind, points_of_depth, read_depth
-from artperl.inputs.intrinsics import PixelCenter, check_camera, read_camera
+from artperl.inputs.depth_images import ARRAYS, PICTURES, DepthImage, DepthKind, points_of_depth, read_depth
+from artperl.inputs.intrinsics import Intrinsics, PixelCenter, check_camera, read_camera
 from artperl.inputs.intrinsics_formats import Hints
 from artperl.inputs.masks import MASK_FILES, MaskKind, read_mask
 from artsim.errors import ConfigError
+from artsim.model.camera import Camera
 
 Array = NDArray[np.float64]
 
@@ -121,11 +122,58 @@ def _of_points(path: Path, options: InputOptions) -> Cloud:
     return Cloud(_axes(points * METRES[options.unit or "m"], options), notes)
 
 
-def _of_depth(path: Path, intrinsics: Path, options: InputOptions) -> Cloud:
+@dataclass(frozen=True, eq=False)
+class MetricDepth:
+    """A depth image in metres, and its camera.
+
+    Attributes
+    ----------
+    values : (H, W) float
+        0, or not finite, where nothing was measured.
+    K : (3, 3) float
+        Pixels; the centre of the first pixel is at (0.5, 0.5).
+    notes, warnings : tuple of str
+        As of :class:`Cloud`.
+    """
+
+    values: Array
+    K: Array
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def read_depth_image(path: Path, options: InputOptions) -> MetricDepth:
+    """The depth image of a file, along the camera's axis; ``options.intrinsics`` has to be given.
+
+    Raises
+    ------
+    ConfigError
+        When a file cannot be read, or options do not fit it.
+    """
+    assert options.intrinsics is not None
+    image, camera = _image_and_camera(path, options.intrinsics, options)
+    height, width = image.values.shape
+    metres, said = _metres_of(image.whole, camera.depth_scale, options)
+    depth = image.values * metres
+    if options.depth_kind == "distance":
+        pixels = np.arange(depth.size)
+        rays = Camera(camera.K, width, height, np.eye(4)).directions(pixels)
+        depth = depth / np.linalg.norm(rays, axis=1).reshape(depth.shape)
+    notes, warnings = (*image.notes, *camera.notes, said), (*image.warnings, *camera.warnings)
+    return MetricDepth(depth, camera.K, notes, warnings)
+
+
+def _image_and_camera(path: Path, intrinsics: Path, options: InputOptions) -> tuple[DepthImage, Intrinsics]:
+    """A depth image as it stands in its file, and the camera, which fits it."""
     image = read_depth(path)
     height, width = image.values.shape
     hints = Hints(options.image_id, path.stem, (width, height))
-    camera = check_camera(read_camera(intrinsics, hints, options.pixel_center), (width, height), intrinsics)
+    return image, check_camera(read_camera(intrinsics, hints, options.pixel_center), (width, height), intrinsics)
+
+
+def _of_depth(path: Path, intrinsics: Path, options: InputOptions) -> Cloud:
+    image, camera = _image_and_camera(path, intrinsics, options)
+    height, width = image.values.shape
     notes, warnings = [*image.notes, *camera.notes], [*image.warnings, *camera.warnings]
     shown = None
     if options.mask is not None:

@@ -1,0 +1,157 @@
+"""``artperl estimate`` of an image with detections: all objects, all parts."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from artsim.common.files import write_atomic
+from artsim.errors import ConfigError
+
+if TYPE_CHECKING:
+    from artperl.commands.estimate import Estimate
+    from artperl.inputs.detections import Detections
+    from artperl.scene.estimator import SceneEstimate
+
+
+def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:
+    """Estimators by category: out of CATEGORY=NAME, and of folders with one for each category.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such estimator.
+    """
+    from artperl.commands.estimate import estimator_folder
+
+    found: dict[str, str | Path] = {}
+    for text in texts:
+        category, equals, name = text.partition("=")
+        if equals:
+            found[category] = estimator_folder(name)
+            continue
+        below = [path.parent for path in sorted(Path(text).glob("*/estimator.json"))]
+        runs = [path.parent.parent for path in sorted(Path(text).glob("*/best/estimator.json"))]
+        found |= {folder.name: folder for folder in below} | {run.name: run / "best" for run in runs}
+        if not below and not runs:
+            raise ConfigError(
+                "it is no folder with an estimator for each category", text, "write CATEGORY=NAME, such as drawer=any"
+            )
+    return found
+
+
+def estimate_scene(options: Estimate) -> None:
+    """Estimate, print, and write what is asked for.
+
+    Raises
+    ------
+    ConfigError
+        When a file cannot be used, or an option does not fit.
+    """
+    from artperl.commands.estimate import STDOUT
+    from artperl.inputs.images import read_picture
+    from artperl.inputs.reading import read_depth_image
+    from artperl.scene.drawing import draw_scene
+    from artperl.scene.estimator import SceneEstimator
+
+    _check(options)
+    image, depth_file = options.clouds
+    depth = read_depth_image(depth_file, options.input_options())
+    rgb = _colour(read_picture(image, "image").values, image)
+    detections = _read_detections(options, image, (depth.values.shape[1], depth.values.shape[0]))
+    for text in (*depth.notes, *detections.notes):
+        print(f"note: {text}", file=sys.stderr)
+    for text in (*depth.warnings, *(f"left out: {text}" for text in detections.skipped)):
+        print(f"warning: {text}", file=sys.stderr)
+    told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
+    estimator = SceneEstimator(named_estimators(options.estimators), **told)
+    result = estimator(rgb, depth.values, depth.K, detections.all)
+    if options.picture is not None:
+        write_atomic(options.picture, draw_scene(rgb, depth.K, result))
+    record = scene_record(result, detections)
+    if options.out == STDOUT:
+        print(json.dumps(record, indent=1))
+        return
+    print(result)
+    stages = ", ".join(f"{name} {value:.0f} ms" for name, value in result.milliseconds.items())
+    print(
+        f"\n{len(result.objects)} detections, {sum(o.estimate is not None for o in result.objects)} estimates; {stages}"
+    )
+    if options.out is not None:
+        write_atomic(options.out, (json.dumps(record, indent=1) + "\n").encode())
+
+
+def _check(options: Estimate) -> None:
+    if len(options.clouds) != 2 or any(path.is_dir() for path in options.clouds):
+        raise ConfigError(
+            f"{len(options.clouds)} files are named", "estimate",
+            "name the image in colour, then the depth image: artperl estimate image.png depth.png --intrinsics"
+            " camera.json --detections results.json",
+        )  # fmt: skip
+    if options.intrinsics is None:
+        raise ConfigError("a depth image needs intrinsics", "intrinsics", "add --intrinsics camera.json")
+    if options.out is not None and str(options.out) != "-" and options.out.suffix != ".json":
+        raise ConfigError(f"{options.out} is no .json file", "out", "name one, or - for standard output")
+    given = [name for name in ("mask", "mask_id", "view") if getattr(options, name) is not None]
+    if given or options.method != "full" or options.camera != "opencv":
+        names = ", ".join([*given, *(["method"] if options.method != "full" else [])]) or "camera"
+        raise ConfigError("these do not go with detections", names, "leave them out")
+
+
+def _colour(values: NDArray[Any], path: Path) -> NDArray[np.uint8]:
+    """(H, W, 3) of a picture in colour or grey."""
+    if values.dtype != np.uint8 or values.ndim not in (2, 3):
+        raise ConfigError(
+            f"a picture of {values.dtype} is no image in colour", path,
+            "name the image in colour first, then the depth image",
+        )  # fmt: skip
+    if values.ndim == 3 and values.shape[2] >= 3:
+        return np.ascontiguousarray(values[..., :3])
+    grey = values if values.ndim == 2 else values[..., 0]
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
+def _read_detections(options: Estimate, image: Path, size: tuple[int, int]) -> Detections:
+    """Detections of this one image, whichever of a file's images it is."""
+    from artperl.inputs.detections import image_ids, read_detections
+
+    assert options.detections is not None
+    listed = image_ids(options.detections)
+    named = [key for key, name in listed.items() if name and Path(name).stem in (image.stem, image.parent.name)]
+    chosen = options.image_id
+    if chosen is None and len(named) == 1:
+        chosen = named[0]
+    elif chosen is None and len(listed) <= 1:
+        chosen = next(iter(listed), "0")
+    if chosen is None or (listed and chosen not in listed):
+        known = ", ".join(list(listed)[:8]) + (", ..." if len(listed) > 8 else "")
+        raise ConfigError(
+            f"it is of {len(listed)} images ({known}), and which of them is {image.name} is not said"
+            if chosen is None else f"it has no image {chosen!r:.40} (it has {known})",
+            options.detections, "add --image-id N",
+        )  # fmt: skip
+    return read_detections(options.detections, {chosen: size}, None, options.skip_bad, chosen)
+
+
+def scene_record(result: SceneEstimate, detections: Detections) -> dict[str, Any]:
+    """Estimates of an image in JSON's terms."""
+    from artperl.commands.estimate_record import plain_record
+
+    objects = []
+    for obj in result.objects:
+        found = obj.detection
+        record: dict[str, Any] = {"category": found.category, "detection_score": found.score, "bbox": list(found.box)}
+        if obj.estimate is None:
+            objects.append({**record, "error": obj.problem})
+        else:
+            objects.append({**record, "score": obj.score, **plain_record(obj.estimate)})
+    return {
+        "objects": objects, "skipped": list(detections.skipped), "notes": list(detections.notes),
+        "milliseconds": result.milliseconds,
+    }  # fmt: skip

@@ -1,0 +1,59 @@
+"""``artperl evaluate --benchmark reartmix``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from artsim.common.files import write_atomic
+from artsim.common.program import cores
+from artsim.common.progress import say
+from artsim.errors import ConfigError
+
+if TYPE_CHECKING:
+    from artperl.commands.evaluate import Evaluate
+
+_SCENES = 50
+_FOLDER = Path("out/reartmix")
+
+
+def evaluate_reartmix(options: Evaluate) -> None:
+    """Make or open the images, read or make detections, estimate, print the table.
+
+    Raises
+    ------
+    ConfigError
+        When an option does not fit, or detections cannot be used.
+    DatasetError
+        When the folder holds no images.
+    """
+    from artperl.commands.estimate_scene import named_estimators
+    from artperl.evaluation.reartmix import SCENES, SEEDS, open_images, run_reartmix
+    from artperl.inputs.detections import read_detections
+    from artperl.scene.estimator import SceneEstimator
+    from artsim.scenes import generate_scenes
+
+    own = ("rows", "conditions", "real_weights", "files", "package_root", "states", "preset", "noise", "ablation",
+           "category", "num_points", "estimator", "method")  # fmt: skip
+    given = [name for name in own if getattr(options, name) != getattr(type(options)(), name)]
+    if given:
+        raise ConfigError(
+            "reartmix has images of its own", ", ".join(given), "leave it out; name estimators with --estimators"
+        )
+    root = options.root
+    if root is None:
+        root = _FOLDER
+        generate_scenes(SCENES, root, options.views or _SCENES, SEEDS, 10, cores())
+    images = open_images(root)
+    if options.detections is None:
+        detections = images.own_detections(0)
+    else:
+        detections = read_detections(options.detections, images.sizes, images.names(), options.skip_bad)
+    for text in detections.skipped:
+        say(f"left out: {text}")
+    told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
+    estimator = SceneEstimator({"drawer": "any", **named_estimators(options.estimators)}, **told)
+    figures = run_reartmix(images, detections, estimator, True, say)
+    if options.json is not None:
+        write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())

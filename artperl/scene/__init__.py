@@ -1,0 +1,1 @@
+"""All objects in one image with depth: detections, clouds of each, estimates of all their parts."""

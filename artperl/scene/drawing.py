@@ -1,0 +1,93 @@
+"""Estimates drawn over their image: boxes of parts, joint axes, what each object is and how sure."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from artperl.core.estimate import Estimate
+from artperl.scene.estimator import SceneEstimate
+from artsim.common.names import printable
+from artsim.common.palette import PALETTE
+from artsim.model.camera import Camera
+
+_OVER = 2  # drawn larger, then reduced: smooth lines
+_NEAREST = 1e-3  # metres before the camera: what comes nearer is not drawn
+_AXIS = (235, 25, 45)
+_REACH = 0.18
+"""Half of an axis, over the diagonal of all sizes."""
+_SIGNS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) - 0.5
+_EDGES = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
+
+
+def draw_scene(rgb: NDArray[np.uint8], K: NDArray[np.float64], scene: SceneEstimate) -> bytes:
+    """PNG of an image with the estimates over it.
+
+    Parameters
+    ----------
+    rgb : (H, W, 3) uint8
+    K : (3, 3) float
+    scene : SceneEstimate
+    """
+    height, width = rgb.shape[:2]
+    camera = Camera(K, width, height, np.eye(4))
+    canvas = Image.fromarray(rgb).resize((width * _OVER, height * _OVER), Image.Resampling.BILINEAR)
+    draw = ImageDraw.Draw(canvas)
+    for number, obj in enumerate(scene.objects):
+        if obj.estimate is not None:
+            _draw_boxes(draw, obj.estimate, camera, number)
+            _draw_axes(draw, obj.estimate, camera)
+    for number, obj in enumerate(scene.objects):  # on top of all lines
+        sure = "no estimate" if obj.estimate is None else f"{100 * obj.score:.0f} %"
+        _label(draw, obj.detection.box, f"{number} {printable(obj.detection.category, 40)} {sure}", number, height)
+    buffer = io.BytesIO()
+    canvas.resize((width, height), Image.Resampling.BOX).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def _colour(number: int) -> tuple[int, int, int]:
+    red, green, blue = PALETTE[number % len(PALETTE)].tolist()
+    return red, green, blue
+
+
+def _draw_boxes(draw: ImageDraw.ImageDraw, estimate: Estimate, camera: Camera, number: int) -> None:
+    for k in range(len(estimate.state)):
+        corners = (_SIGNS * estimate.size[k]) @ estimate.rotation[k].T + estimate.translation[k]
+        if (corners[:, 2] > _NEAREST).all():
+            image = camera.project(corners) * _OVER
+            for a, b in _EDGES:
+                draw.line([tuple(image[a]), tuple(image[b])], fill=_colour(3 * number + k), width=_OVER + 1)
+
+
+def _draw_axes(draw: ImageDraw.ImageDraw, estimate: Estimate, camera: Camera) -> None:
+    reach = _REACH * float(np.linalg.norm(estimate.size.max(axis=0)))
+    for k in range(1, len(estimate.state)):
+        axis, origin, center = estimate.joint_axis[k], estimate.joint_origin[k], estimate.translation[k]
+        # A slide has no line of its own, and the origin may lie anywhere on an axis: draw where the part is.
+        middle = center if estimate.joint_type[k] == "prismatic" else origin + axis * ((center - origin) @ axis)
+        ends = np.stack([middle - reach * axis, middle + reach * axis])
+        if (ends[:, 2] <= _NEAREST).any():
+            continue
+        start, end = camera.project(ends) * _OVER
+        length = float(np.hypot(*(end - start)))
+        if length < 1.0:
+            continue
+        along = (end - start) / length
+        tip, side = min(7.0 * _OVER, 0.4 * length), np.array([-along[1], along[0]])
+        draw.line([tuple(start), tuple(end - 0.6 * tip * along)], fill=_AXIS, width=2 * _OVER)
+        draw.polygon([tuple(end), *(tuple(end - tip * along + s * 0.45 * tip * side) for s in (1, -1))], fill=_AXIS)
+
+
+def _label(
+    draw: ImageDraw.ImageDraw, box: tuple[float, float, float, float], text: str, number: int, height: int
+) -> None:
+    left, top, width, tall = (v * _OVER for v in box)
+    colour = _colour(3 * number)
+    draw.rectangle((left, top, left + width - 1, top + tall - 1), outline=colour, width=1)
+    size = 5 * _OVER + height // 50
+    place = (left + 4, max(top - size - 6, 2))
+    draw.rectangle(draw.textbbox(place, text, font_size=size), fill=colour)
+    draw.text(place, text, fill=(255, 255, 255), font_size=size)

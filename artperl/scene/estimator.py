@@ -1,0 +1,176 @@
+"""From an image with depth to the parts of every object: each detection's cloud, its category's estimator."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artperl.core.estimate import Estimate
+from artperl.estimator import WEIGHTS, load_estimator
+from artperl.inputs.depth_images import points_of_depth
+from artperl.inputs.detections import Detection
+from artperl.methods.protocol import Method
+from artsim.errors import ArtsimError, ConfigError
+
+_MOST_POINTS = 8192
+"""Of an object's cloud: what estimators are tested with. More cost time and bring nothing."""
+_FAR, _NEAR = 30.0, 0.05
+"""Metres. No indoor image has its median depth beyond: then the unit is another one."""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneObject:
+    """An object of an image.
+
+    Attributes
+    ----------
+    detection : Detection
+    estimate : Estimate or None
+    problem : str
+        Why there is no estimate.
+    milliseconds : float
+    """
+
+    detection: Detection
+    estimate: Estimate | None
+    problem: str = ""
+    milliseconds: float = 0.0
+
+    @property
+    def score(self) -> float:
+        """How sure it is that the object is there as estimated: the detector's score times the confidence."""
+        return 0.0 if self.estimate is None else self.detection.score * self.estimate.confidence
+
+
+@dataclass(frozen=True, eq=False)
+class SceneEstimate:
+    """All objects of an image, in the order of their detections. Camera frame, metres, radians.
+
+    Attributes
+    ----------
+    objects : tuple of SceneObject
+    milliseconds : dict
+        By stage.
+    """
+
+    objects: tuple[SceneObject, ...]
+    milliseconds: dict[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        lines = []
+        for number, obj in enumerate(self.objects):
+            head = f"{number} {obj.detection.category}, detected {100 * obj.detection.score:.0f} %"
+            lines.append(f"{head}: {obj.problem}" if obj.estimate is None else f"{head}\n{obj.estimate}")
+        return "\n\n".join(lines) or "no object is detected"
+
+    def __repr__(self) -> str:
+        return f"<SceneEstimate: {sum(o.estimate is not None for o in self.objects)} of {len(self.objects)} objects>"
+
+
+class SceneEstimator:
+    """Estimates the parts of every detected object. Estimators are loaded when their category is first seen.
+
+    Parameters
+    ----------
+    estimators : mapping, optional
+        Name or folder of the estimator of each category; by default those that come with the package, by their names.
+    **changes
+        Of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
+    """
+
+    def __init__(self, estimators: Mapping[str, str | Path] | None = None, **changes: Any):
+        shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
+        shipped.pop("any", None)  # of no category
+        self.estimators: dict[str, str | Path] = {**shipped, **(estimators or {})}
+        self._changes, self._loaded = changes, dict[str, Method]()
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Categories that there is an estimator for."""
+        return tuple(sorted(self.estimators))
+
+    def __call__(
+        self, rgb: ArrayLike | None, depth: ArrayLike, K: ArrayLike, detections: Sequence[Detection]
+    ) -> SceneEstimate:
+        """Estimate all objects of an image.
+
+        Objects do not know of each other: two estimates may overlap.
+
+        Parameters
+        ----------
+        rgb : (H, W, 3) uint8 or None
+            Not needed by the estimators; it has to be of the depth image's size.
+        depth : (H, W) float
+            Metres along the camera's axis; 0, or not finite, where nothing was measured.
+        K : (3, 3) float
+            Intrinsic matrix in pixels; the centre of the first pixel is at (0.5, 0.5).
+        detections : sequence of Detection
+
+        Raises
+        ------
+        ConfigError
+            When images are not of one size, or the depth is in another unit. What is wrong with one object is said in
+            its ``problem``: no estimator, no depth, a cloud that cannot be fitted.
+        """
+        depth = np.asarray(depth, dtype=np.float64)
+        check_images(rgb, depth)
+        K, begun = np.asarray(K, dtype=np.float64), time.perf_counter()
+        objects = tuple(self._object(depth, K, detection) for detection in detections)
+        whole = 1e3 * (time.perf_counter() - begun)
+        estimating = sum(obj.milliseconds for obj in objects)
+        return SceneEstimate(objects, {"clouds": whole - estimating, "estimates": estimating})
+
+    def _object(self, depth: NDArray[np.float64], K: NDArray[np.float64], detection: Detection) -> SceneObject:
+        category = detection.category
+        if category not in self.estimators:
+            return SceneObject(
+                detection, None,
+                f"there is no estimator for {category!r}. Fix: name one with --estimators {category}=FOLDER, trained by"
+                f" artperl train --category {category}",
+            )  # fmt: skip
+        estimator = self._estimator(category)
+        try:
+            points = points_of_depth(depth, K, detection.mask)
+            if len(points) > _MOST_POINTS:
+                points = points[np.sort(np.random.default_rng(0).permutation(len(points))[:_MOST_POINTS])]
+            begun = time.perf_counter()
+            estimate = estimator(points)
+        except ArtsimError as error:
+            return SceneObject(detection, None, str(error))
+        return SceneObject(detection, estimate, "", 1e3 * (time.perf_counter() - begun))
+
+    def _estimator(self, category: str) -> Method:
+        if category not in self._loaded:
+            self._loaded[category] = load_estimator(self.estimators[category], **self._changes)
+        return self._loaded[category]
+
+
+def check_images(rgb: ArrayLike | None, depth: NDArray[np.float64]) -> None:
+    """Refuse images of two sizes, and depth in another unit than metres.
+
+    Raises
+    ------
+    ConfigError
+    """
+    if depth.ndim != 2:
+        raise ConfigError(f"an array of shape {depth.shape} is no depth image", "depth", "pass (H, W) metres")
+    if rgb is not None and np.shape(rgb)[:2] != depth.shape:
+        rows, columns = np.shape(rgb)[:2]
+        raise ConfigError(
+            f"the colour image has {columns} x {rows} pixels, and the depth image {depth.shape[1]} x {depth.shape[0]}",
+            "rgb", "give depth that is aligned to the colour image, of its size",
+        )  # fmt: skip
+    seen = depth[np.isfinite(depth) & (depth > 0)]
+    if len(seen) == 0:
+        raise ConfigError("the depth image holds no depth", "depth", "check the file and its unit")
+    middle = float(np.median(seen))
+    if not _NEAR <= middle <= _FAR:
+        unit = "millimetres that are taken for metres" if middle > _FAR else "metres that are taken for millimetres"
+        fix = "--unit mm, or divide by 1000" if middle > _FAR else "--unit m, or multiply by 1000"
+        raise ConfigError(f"the median depth is {middle:.3g} m: these look like {unit}", "depth", f"use {fix}")

@@ -1,0 +1,102 @@
+"""``artperl estimate`` of an image with detections: what is written, and what is refused with which mend."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from artperl.commands.detections import MakeDetections
+from artperl.commands.estimate import Estimate
+from artperl.commands.estimate_scene import named_estimators
+from artperl.commands.evaluate import Evaluate
+from artsim.errors import ConfigError
+from artsim.scenes import SceneCameraOptions, SceneOptions, SceneRun, generate_scenes
+from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
+
+RUN = SceneRun(
+    SceneOptions(("laptop", "stapler"), distractors=0), SceneCameraOptions(width=320, height=180), renderer="raycast",
+    num_points=64,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("image")
+    generate_scenes(RUN, root / "scenes", 1, seed=4, workers=1, progress=False)
+    MakeDetections(root / "scenes", root / "detections.json").run()
+    Image.new("RGB", (320, 180), (90, 90, 90)).save(root / "scenes" / "000004_0" / "rgb.png")
+    return root
+
+
+def command(folder: Path, **changes: object) -> Estimate:
+    view = folder / "scenes" / "000004_0"
+    own = {"clouds": (view / "rgb.png", view / "depth.npy"), "intrinsics": view / "scene.json",
+           "detections": folder / "detections.json"}  # fmt: skip
+    return Estimate(**(own | changes))  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick_workers")
+def test_all_objects_are_written_with_a_picture(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command(folder, out=tmp_path / "out.json", picture=tmp_path / "out.png").run()
+    record = json.loads((tmp_path / "out.json").read_text())
+    told = json.loads((folder / "detections.json").read_text())
+    assert [obj["category"] for obj in record["objects"]] == [d["category"] for d in told]
+    for obj in record["objects"]:
+        if obj["category"] == "stapler":
+            assert "--estimators stapler=" in obj["error"]
+        else:
+            assert np.shape(obj["T_camera_part"])[1:] == (4, 4)
+    assert Image.open(tmp_path / "out.png").size == (320, 180)
+    assert "laptop" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick_workers")
+def test_what_does_not_fit_is_refused_with_its_mend(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    view = folder / "scenes" / "000004_0"
+    depth = np.load(view / "depth.npy")
+    np.save(tmp_path / "mm.npy", 1000 * depth)
+    with pytest.raises(ConfigError, match="--unit mm"):
+        command(folder, clouds=(view / "rgb.png", tmp_path / "mm.npy")).run()
+    command(folder, clouds=(view / "rgb.png", tmp_path / "mm.npy"), unit="mm").run()
+    with pytest.raises(ConfigError, match="name the image in colour"):
+        command(folder, clouds=(view / "rgb.png",)).run()
+    with pytest.raises(ConfigError, match="--intrinsics"):
+        command(folder, intrinsics=None).run()
+    with pytest.raises(ConfigError, match=r"gone\.png"):
+        command(folder, clouds=(tmp_path / "gone.png", view / "depth.npy")).run()
+    with pytest.raises(ConfigError, match="do not go with detections"):
+        command(folder, mask=view / "instance_ids.png").run()
+    with pytest.raises(ConfigError, match="no image '9'"):
+        command(folder, image_id="9").run()
+    bad = json.loads((folder / "detections.json").read_text())
+    bad.append({**bad[0], "bbox": [500, 10, 20, 20]})
+    (tmp_path / "bad.json").write_text(json.dumps(bad))
+    with pytest.raises(ConfigError, match=r"reaches outside the image of 320 x 180.*--skip-bad"):
+        command(folder, detections=tmp_path / "bad.json").run()
+    capsys.readouterr()
+    command(folder, detections=tmp_path / "bad.json", skip_bad=True, out=Path("-")).run()
+    out, err = capsys.readouterr()
+    assert "left out: detection" in err
+    assert len(json.loads(out)["skipped"]) == 1
+    with pytest.raises(ConfigError, match="add --detections"):
+        Estimate((view / "depth.npy",), picture=tmp_path / "x.png").run()
+
+
+def test_options_that_do_not_fit_the_benchmark_are_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="add --benchmark reartmix"):
+        Evaluate(skip_bad=True).run()
+    with pytest.raises(ConfigError, match="noise"):
+        Evaluate(benchmark="reartmix", noise="azure").run()
+    with pytest.raises(ConfigError, match="CATEGORY=NAME"):
+        named_estimators((str(tmp_path),))
+    assert named_estimators(("drawer=any",))["drawer"].name == "any"  # type: ignore[union-attr]
