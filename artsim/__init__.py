@@ -21,31 +21,32 @@ Rooms, from the ground up. Each imports only rooms that come before it (import-l
 
 from __future__ import annotations
 
-import importlib
-from types import ModuleType
+from typing import TYPE_CHECKING
 
-from artsim import errors, stream
-from artsim.datasets.dataset import Dataset, open_dataset
-from artsim.datasets.generate import generate
-from artsim.datasets.plan import SampleOptions
-from artsim.datasets.verify import verify
+from artsim import errors
+from artsim.common.lazy import lazy_names
 from artsim.errors import ArtsimError
-from artsim.families import CATEGORIES, make
-from artsim.loading.meshes import LoadLimits
-from artsim.loading.sources import family_sources, find_sources
-from artsim.loading.urdf import load
-from artsim.model.camera import Camera
-from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
-from artsim.model.frame import Frame
-from artsim.model.kinematics import KinematicTree
-from artsim.model.objects import ArticulatedObject
-from artsim.observing.capture import observe
-from artsim.observing.sample import ARTSIM_VERSION, Sample
-from artsim.observing.sensor import SENSORS, Sensor
-from artsim.renderers import make_renderer, render, render_cameras
-from artsim.variation import vary
 
-__version__ = ARTSIM_VERSION
+if TYPE_CHECKING:
+    from artsim import stream
+    from artsim.datasets.dataset import Dataset, open_dataset
+    from artsim.datasets.generate import generate
+    from artsim.datasets.plan import SampleOptions
+    from artsim.datasets.verify import verify
+    from artsim.families import CATEGORIES, make
+    from artsim.loading.meshes import LoadLimits
+    from artsim.loading.sources import family_sources, find_sources
+    from artsim.loading.urdf import load
+    from artsim.model.camera import Camera
+    from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
+    from artsim.model.frame import Frame
+    from artsim.model.kinematics import KinematicTree
+    from artsim.model.objects import ArticulatedObject
+    from artsim.observing.capture import observe
+    from artsim.observing.sample import Sample, __version__
+    from artsim.observing.sensor import SENSORS, Sensor
+    from artsim.renderers import make_renderer, render, render_cameras
+    from artsim.variation import vary
 
 __all__ = [
     "CATEGORIES",
@@ -81,9 +82,35 @@ __all__ = [
     "verify",
 ]
 
-
-def __getattr__(name: str) -> ModuleType:
-    """The public packages that need more than the core: ``artsim.physics`` works after ``import artsim``."""
-    if name in ("checks", "drawing", "envs", "export", "formats", "physics", "scenes"):
-        return importlib.import_module(f"artsim.{name}")
-    raise AttributeError(f"module 'artsim' has no attribute {name!r}")
+_HOMES = {
+    "Dataset": "datasets.dataset",
+    "open_dataset": "datasets.dataset",
+    "generate": "datasets.generate",
+    "SampleOptions": "datasets.plan",
+    "verify": "datasets.verify",
+    "CATEGORIES": "families",
+    "make": "families",
+    "LoadLimits": "loading.meshes",
+    "family_sources": "loading.sources",
+    "find_sources": "loading.sources",
+    "load": "loading.urdf",
+    "Camera": "model.camera",
+    "StateOptions": "model.draws",
+    "ViewOptions": "model.draws",
+    "sample_state": "model.draws",
+    "sample_view": "model.draws",
+    "Frame": "model.frame",
+    "KinematicTree": "model.kinematics",
+    "ArticulatedObject": "model.objects",
+    "observe": "observing.capture",
+    "Sample": "observing.sample",
+    "SENSORS": "observing.sensor",
+    "Sensor": "observing.sensor",
+    "make_renderer": "renderers",
+    "render": "renderers",
+    "render_cameras": "renderers",
+    "vary": "variation",
+    "__version__": "observing.sample",
+}
+_PACKAGES = ("checks", "drawing", "envs", "export", "formats", "physics", "scenes", "stream")
+__getattr__, __dir__ = lazy_names(__name__, _HOMES, _PACKAGES)

@@ -353,12 +353,16 @@ class Verify:
 
     path: tyro.conf.Positional[Path]
     """Dataset folder."""
+    workers: int = field(default_factory=cores)
+    """Processes that check samples, of a dataset that is worth them."""
 
     def run(self) -> None:
         from artsim.datasets.problems import repair_command
         from artsim.datasets.verify import verify
 
-        problems = verify(self.path)
+        if self.workers < 1:
+            raise ConfigError(f"{self.workers} processes check nothing", "workers", "use 1 or more")
+        problems = verify(self.path, workers=self.workers)
         for problem in problems[:_LISTED]:
             print(problem)
         if len(problems) > _LISTED:

@@ -18,6 +18,7 @@ import stat
 import warnings
 import zipfile
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -375,7 +376,14 @@ def npy_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any], 
     if start[:6] != b"\x93NUMPY" or length > _MAX_NPY_HEADER:
         raise ValueError("it is no array in NumPy's format")
     offset = 10 if start[6:7] == b"\x01" else 12
-    header = io.BytesIO(start[8:] + stream.read(length - (12 - offset)))
+    shape, fortran, dtype = _header_fields(start[8:] + stream.read(length - (12 - offset)), offset)
+    return shape, fortran, dtype, offset + length
+
+
+@lru_cache(maxsize=256)
+def _header_fields(text: bytes, offset: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, order and type; to parse them takes longer than to read a cloud, and all clouds of a dataset have few."""
+    header = io.BytesIO(text)
     read_header = np.lib.format.read_array_header_1_0 if offset == 10 else np.lib.format.read_array_header_2_0
     try:
         shape, fortran, dtype = read_header(header, max_header_size=_MAX_NPY_HEADER)
@@ -383,7 +391,7 @@ def npy_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any], 
         raise ValueError("the header of an array is damaged") from problem
     if any(side < 0 for side in shape):
         raise ValueError(f"there is no shape {shape}")
-    return tuple(int(side) for side in shape), fortran, dtype, offset + length
+    return tuple(int(side) for side in shape), fortran, dtype
 
 
 def _npy(stream: BinaryIO, size: int) -> NDArray[Any]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.state import examine, leftover_problems, strangers
+from artsim.datasets.worker import report
+from artsim.datasets.worker_pool import WorkerLost, WorkerPool
 from artsim.errors import ArtsimError, DatasetError
 from artsim.model.camera import Camera
 from artsim.model.draws import Scale
@@ -24,16 +27,19 @@ from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
+from artsim.renderers.compiled import count_cloud
 from artsim.renderers.raycast import cast, pose
 
 _TOLERANCE = 1e-4
 """Of the object's diagonal: points are stored in single precision."""
 _FIX = "generate the dataset again, into another folder: its checksums are right, its content is not"
+_WORTH_A_PROCESS = 500
+"""Samples that take as long to check as a process takes to start."""
 _STRAY_RAYS = 0.005
 """Share of rays that may end elsewhere on another processor: those that graze an edge."""
 
 
-def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
+def verify(folder: str | Path, progress: bool = True, workers: int = 1) -> list[Problem]:
     """Check every file and sample of a dataset. Nothing is written.
 
     Parameters
@@ -41,6 +47,8 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
     folder : path
     progress : bool
         Show progress bars.
+    workers : int
+        Processes that check samples. A script that asks for several calls this below ``if __name__ == "__main__":``.
 
     Returns
     -------
@@ -73,11 +81,40 @@ def verify(folder: str | Path, progress: bool = True) -> list[Problem]:
     problems += found
     unusable |= {problem.where for problem in found}
     with track("verify", total=len(dataset), unit="sample", shown=progress) as bar:
-        for shard in dataset.shards:
-            if shard.name in state.kept:  # of another, nothing more needs to be known: it is to be made again
-                problems += _shard_problems(dataset, shard, unusable)
-            bar.update(len(shard))
+        # Of another shard, nothing more needs to be known: it is to be made again.
+        shards = [shard for shard in dataset.shards if shard.name in state.kept]
+        bar.update(len(dataset) - sum(map(len, shards)))
+        workers = min(workers, len(shards), 1 + sum(map(len, shards)) // _WORTH_A_PROCESS)
+        if workers > 1:
+            return problems + _by_several(folder, shards, unusable, workers, bar.update)
+        for shard in shards:
+            problems += _shard_problems(dataset, shard, unusable, bar.update)
     return problems
+
+
+def _by_several(
+    folder: Path, shards: Sequence[ShardRecord], unusable: set[str], workers: int, progress: Callable[[int], object]
+) -> list[Problem]:
+    """What is wrong with shards, in their order, found by several processes."""
+    found: dict[str, list[Problem] | WorkerLost] = {}
+    with WorkerPool(folder, workers) as team:
+        found.update(team.run(_check_shard, ((s.name, (folder, s, unusable)) for s in shards), progress=progress))
+    problems = []
+    for shard in shards:
+        answer = found[shard.name]
+        problems += [Problem(shard.name, answer.why, _FIX)] if isinstance(answer, WorkerLost) else answer
+    return problems
+
+
+def _check_shard(folder: Path, shard: ShardRecord, unusable: set[str]) -> list[Problem]:
+    """The task of a worker process."""
+    return list(_shard_problems(_worker_dataset(folder), shard, unusable, report))
+
+
+@lru_cache(maxsize=1)
+def _worker_dataset(folder: Path) -> Dataset:
+    """Read once for all tasks of a process."""
+    return Dataset(folder)
 
 
 def _share_problems(plan: Plan) -> Iterator[Problem]:
@@ -129,12 +166,15 @@ def _object_flaws(obj: ArticulatedObject) -> Iterator[str]:
         yield "its parts are not at rest in its rest state"
 
 
-def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) -> Iterator[Problem]:
+def _shard_problems(
+    dataset: Dataset, shard: ShardRecord, unusable: set[str], progress: Callable[[int], object]
+) -> Iterator[Problem]:
     path, plan = dataset.folder / shard.name, dataset.plan
     try:
         reader = ShardReader(path)
     except DatasetError as error:
         yield Problem(shard.name, error.what, _FIX)
+        progress(len(shard))
         return
     indices = plan.indices(shard)
     wanted, have = [sample_key(index) for index in indices], reader.keys()
@@ -142,9 +182,11 @@ def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) ->
         lost, foreign = sorted({*wanted} - {*have}), sorted({*have} - {*wanted})
         what = f"lacks samples {lost[:5]}, has foreign ones {foreign[:5]}, or holds them out of order"
         yield Problem(shard.name, what, _FIX)
+    there = set(have)
     for index, key in zip(indices, wanted, strict=True):
+        progress(1)
         planned = plan.object_of(index)
-        if key not in have or planned.file in unusable:
+        if key not in there or planned.file in unusable:
             continue
         where = f"{shard.name}: sample {index}"
         try:
@@ -239,7 +281,11 @@ def _form_problems(sample: Sample, num_parts: int) -> Iterator[str]:
 
 
 def _close(one: ArrayLike, two: ArrayLike, tolerance: float) -> bool:
-    return np.allclose(one, two, rtol=0, atol=tolerance)
+    """Whether two arrays are equal within a tolerance, infinite limits included; a fifth of the time of np.allclose."""
+    one, two = np.asarray(one), np.asarray(two)
+    with np.errstate(invalid="ignore"):  # infinity less infinity
+        near = np.abs(one - two) <= tolerance
+    return bool(near.all()) or bool((near | (one == two)).all())
 
 
 def _copy_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
@@ -338,6 +384,7 @@ def _image_problems(sample: Sample, obj: ArticulatedObject, true_points: Array) 
     if sample.part_mask is not None and (sample.part_mask[row, column] != sample.part).any():
         yield "points do not agree with the part mask"
     if sample.renderer == "raycast":
+        count_cloud()
         T_world_object = sample.T_world_camera @ sample.T_camera_part[0]
         if _close(T_world_object, np.eye(4), 1e-9):
             T_world_object = np.eye(4)  # exactly the rays that made the sample

@@ -8,7 +8,7 @@ leaves a gap between parts in every joint state. ``CONTRIBUTING.md`` shows how t
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 
@@ -76,7 +76,27 @@ CATEGORIES = (
 )
 """The registry: each category's name is that of its module."""
 
-FAMILIES: dict[str, Family] = {name: import_module(f"artsim.families.{name}").build for name in CATEGORIES}
+
+class _Registry(Mapping[str, Family]):
+    """Families by category; the module of one is imported when it is first asked for."""
+
+    def __getitem__(self, category: str) -> Family:
+        if category not in self:
+            raise KeyError(category)
+        family: Family = import_module(f"artsim.families.{category}").build
+        return family
+
+    def __contains__(self, category: object) -> bool:
+        return category in CATEGORIES
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(CATEGORIES)
+
+    def __len__(self) -> int:
+        return len(CATEGORIES)
+
+
+FAMILIES: Mapping[str, Family] = _Registry()
 """Every category that :func:`make` knows."""
 
 

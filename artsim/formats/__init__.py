@@ -3,8 +3,21 @@
 Stable names; the modules of this package are private. h5py is imported when HDF5 is first written.
 """
 
-from artsim.formats.conversion import ConvertResult, convert
-from artsim.formats.ply import save_ply
-from artsim.formats.webdataset import decode_values
+from typing import TYPE_CHECKING
+
+from artsim.common.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from artsim.formats.conversion import ConvertResult, convert
+    from artsim.formats.ply import save_ply
+    from artsim.formats.webdataset import decode_values
 
 __all__ = ["ConvertResult", "convert", "decode_values", "save_ply"]
+
+_HOMES = {
+    "ConvertResult": "conversion",
+    "convert": "conversion",
+    "save_ply": "ply",
+    "decode_values": "webdataset",
+}
+__getattr__, __dir__ = lazy_names(__name__, _HOMES)

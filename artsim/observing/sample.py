@@ -19,6 +19,8 @@ from artsim.model.kinematics import Array
 ARTSIM_VERSION = version("artsim")
 """Of this installation; each sample names the one that made it."""
 
+__version__ = ARTSIM_VERSION
+
 IMAGES = ("depth", "part_mask", "rgb")
 """Images that a sample can carry besides its cloud."""
 

@@ -10,7 +10,6 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from artsim.export.robot import BoxShape, Link, MeshShape, Robot
 from artsim.model.kinematics import Array
@@ -118,6 +117,8 @@ def _mass_unit(links: Sequence[Link]) -> float:
 def _create_body(bullet: ModuleType, client: int, robot: Robot, mass_unit: float) -> int:
     """The object as a multibody whose base stands still; joints are free, and at rest at 0."""
     base, *links = robot.links
+    from scipy.spatial.transform import Rotation  # takes longer to import than artsim itself
+
     frames = [Rotation.from_matrix(link.inertia.principal()[1]).as_quat().tolist() for link in links]
     return int(
         bullet.createMultiBody(

@@ -17,7 +17,6 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
-from scipy.spatial.transform import Rotation
 
 from artsim.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.common.extras import needs
@@ -198,6 +197,8 @@ class _World:
 
         The first picture is taken through the pixels' centres; the colour is the mean of all.
         """
+        from scipy.spatial.transform import Rotation  # takes longer to import than artsim itself
+
         for k, body in self._bodies:
             T = T_camera_solid[k]
             quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()

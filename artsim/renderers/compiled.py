@@ -20,7 +20,7 @@ _KERNELS = "artsim.renderers.ray_kernels"
 _PAYS, _PAYS_UNCACHED = 400, 6000
 """Clouds after which kernels pay: each saves about a millisecond. To load them takes 0.4 s, to compile them 6 s."""
 _SAID_AFTER = 1.5
-"""Seconds after which it is said that something is being compiled: to load what was compiled before takes less."""
+"""Seconds after which it is said that something is being compiled."""
 
 
 class _Switch:
@@ -52,7 +52,8 @@ def compile_now() -> bool:
     _Switch.pays = float("inf")  # one attempt
     said = threading.Timer(_SAID_AFTER, _say)
     said.daemon = True
-    said.start()
+    if not _is_cached():
+        said.start()
     try:
         loaded = importlib.import_module(_KERNELS)
         loaded.warm_up()
@@ -71,9 +72,12 @@ def _say() -> None:
 def _threshold() -> float:
     if find_spec("numba") is None:
         return float("inf")
+    return _PAYS if _is_cached() else _PAYS_UNCACHED
+
+
+def _is_cached() -> bool:
     # numba may keep them elsewhere, where this folder cannot be written to: then they are loaded later than they could.
-    cached = any((Path(__file__).parent / "__pycache__").glob("ray_kernels.*.nbi"))
-    return _PAYS if cached else _PAYS_UNCACHED
+    return any((Path(__file__).parent / "__pycache__").glob("ray_kernels.*.nbi"))
 
 
 @contextlib.contextmanager

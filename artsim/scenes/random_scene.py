@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import tyro
 
 from artsim.appearance import Coat, Colour, Lights, Sun
 from artsim.appearance.finishes import draw_coats, repaint_coats
-from artsim.appearance.painted import painted_coats
 from artsim.common.elementary import cos, sin, tan
 from artsim.common.products import norm
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.roots import PackageRoots
-from artsim.loading.sources import Source, find_sources
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, transform_points
@@ -26,6 +24,9 @@ from artsim.model.objects import ArticulatedObject
 from artsim.renderers.scene import Scene, Thing
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
+
+if TYPE_CHECKING:
+    from artsim.loading.sources import Source
 
 _TABLE_DIAGONAL = 0.6
 """Metres: objects with a larger one stand on the floor."""
@@ -132,6 +133,8 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
     AssetError
         When an object does not load.
     """
+    from artsim.appearance.painted import painted_coats  # with it, the readers of meshes come
+
     if seed < 0:
         raise ConfigError(f"seed {seed} is negative", "seed", "use 0 or more")
     objects = _objects(options, seed)
@@ -181,6 +184,8 @@ def with_appearance(scene: Scene, seed: int) -> Scene:
 
 def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
     """The objects of a scene, files in a usual size."""
+    from artsim.loading.sources import find_sources
+
     rng = np.random.default_rng([seed, 0])
     categories: Sequence[str] = options.categories
     sources: Sequence[Source] = find_sources(options.objects, options.package_root) if options.objects else ()

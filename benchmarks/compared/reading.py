@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +12,18 @@ from . import Work
 from .generation import digest_of, real_objects
 
 
-def verified(folder: Path) -> Callable[[], Work]:
-    """A sound dataset verified."""
+def verified(folder: Path, workers: int) -> Callable[[], Work]:
+    """A sound dataset verified, by several processes where that is possible."""
     from artsim import generate, verify
     from artsim.loading.sources import family_sources
 
-    samples = 1000
+    samples = 2000
+    options = {"workers": workers} if workers > 1 and "workers" in signature(verify).parameters else {}
     sources = family_sources(["laptop", "drawer", "scissors", "eyeglasses"], 2)
     generate(sources, folder / "dataset", num_samples=samples, shard_size=100, workers=1, progress=False)
 
     def work() -> Work:
-        problems = verify(folder / "dataset", progress=False)
+        problems = verify(folder / "dataset", progress=False, **options)
         return Work(samples, lambda: f"{len(problems)} problems")
 
     return work

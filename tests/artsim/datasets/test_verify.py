@@ -197,3 +197,27 @@ def test_an_exchanged_object_is_noticed(folder: Path) -> None:
     assert found.where == "objects/laptop-laptop.npz"
     assert found.what == "has another checksum than when it was written"
     assert found.fix == f"artsim repair {folder}"
+
+
+@pytest.mark.slow
+def test_several_processes_find_what_one_finds_in_the_same_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    artsim.generate(
+        find_sources([ASSETS / "laptop"]), tmp_path, num_samples=12, shard_size=3, workers=1, progress=False,
+        sample=SampleOptions(num_points=32),
+    )  # fmt: skip
+    shards = sorted(tmp_path.glob("*.tar"))
+    assert len(shards) >= 4
+    description = json.loads((tmp_path / "dataset.json").read_text())
+    for path in (shards[0], shards[-1]):  # sealed again, so that only the samples themselves tell
+        reader = ShardReader(path)
+        samples = [replace(read, diagonal=2 * read.diagonal) for read in map(reader.read, reader.keys())]
+        size, sha256 = write_shard(path, samples)
+        (record,) = (record for record in description["shards"] if record["name"] == path.name)
+        record["size"], record["sha256"] = size, sha256
+    (tmp_path / "dataset.json").write_bytes(document_bytes(description))
+    monkeypatch.setattr("artsim.datasets.verify._WORTH_A_PROCESS", 1)
+    alone = verify(tmp_path, progress=False)
+    assert {shards[0].name, shards[-1].name} <= {problem.where.split(":")[0] for problem in alone}
+    assert verify(tmp_path, progress=False, workers=2) == alone
