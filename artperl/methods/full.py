@@ -26,8 +26,9 @@ from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.occluded_parts import pose_occluded_parts
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
-from artperl.fitting.search import find_fit
+from artperl.fitting.search import Fit, find_fit
 from artperl.methods.many import estimate_many
+from artperl.methods.tracking import track
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
@@ -100,13 +101,21 @@ class Estimator:
         ArtsimError
             When there is no object to be seen in the cloud.
         """
+        return self.with_fit(points)[0]
+
+    def with_fit(self, points: ArrayLike) -> tuple[Estimate, Fit]:
+        """An estimate, and the fitted reference that it is of."""
         with one_thread(), torch.inference_mode():
             clock = Clock()
-            estimate, known = self._fit(points, clock)
+            estimate, known, fit = self._fit(points, clock)
             if self.boxes is None:
-                return estimate
+                return estimate, fit
             with clock("boxes"):
-                return place_boxes(self.boxes, estimate, known)
+                return place_boxes(self.boxes, estimate, known), fit
+
+    def track(self, clouds: Iterable[ArrayLike]) -> Iterator[Estimate]:
+        """Estimates of the clouds of one moving object, each from the last: :func:`artperl.methods.tracking.track`."""
+        return track(self, clouds)
 
     def many(self, clouds: Iterable[ArrayLike], workers: int = 1) -> Iterator[Estimate | ArtsimError]:
         """Estimates of many clouds, in several processes: :func:`artperl.methods.many.estimate_many`."""
@@ -115,11 +124,11 @@ class Estimator:
     def evidence(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
         with one_thread(), torch.inference_mode():
-            estimate, known = self._fit(points, Clock())
+            estimate, known, _ = self._fit(points, Clock())
             return estimate, *known.evidence(estimate, self.perception.num_rows)
 
-    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, BoxContext]:
-        """The estimate with the boxes of the reference, and what is known for better ones."""
+    def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, BoxContext, Fit]:
+        """The estimate with the boxes of the reference, what is known for better ones, and the fit."""
         options = self.options
         with clock("clean"):
             cloud = Cloud.of(points, options.num_points)
@@ -163,7 +172,7 @@ class Estimator:
                 part_confidence=self.part_calibration(odds, symptoms),
                 part_symptoms=symptoms,
             )
-            return estimate, BoxContext.of(cloud, clouds, perceived)
+            return estimate, BoxContext.of(cloud, clouds, perceived), fit
 
     def _perceive_own(self, cloud: Cloud, clock: Clock) -> tuple[Cloud, Clouds, Perceived, float]:
         """The points of the object, what is perceived of them, and the share of the others.
