@@ -157,4 +157,8 @@ def against_published(category: str, figures: dict[str, Any]) -> str:
         sign = 1.0 if METRICS[name].less_is_better else -1.0
         worse = [k for k, (a, b) in enumerate(zip(own, other, strict=True)) if sign * a >= sign * b]
         texts.append(f"{title} {'better' if not worse else f'not better for part {worse}'}")
-    return f"{'':14s}against ArtPERL's published means: {', '.join(texts)}"
+    return (
+        f"{'':14s}against ArtPERL's published means: {', '.join(texts)}\n"
+        f"{'':14s}OMAD's IoU depends on the frame: here z is up, in ArtImage y. In y-up frames temples and drawers have "
+        "less: python -m benchmarks.legacy_iou"
+    )
