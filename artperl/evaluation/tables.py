@@ -159,6 +159,6 @@ def against_published(category: str, figures: dict[str, Any]) -> str:
         texts.append(f"{title} {'better' if not worse else f'not better for part {worse}'}")
     return (
         f"{'':14s}against ArtPERL's published means: {', '.join(texts)}\n"
-        f"{'':14s}OMAD's IoU depends on the frame: here z is up, in ArtImage y. In y-up frames temples and drawers have "
+        f"{'':14s}OMAD's IoU depends on the frame: here z is up, in ArtImage y. With y up, temples and drawers have "
         "less: python -m benchmarks.legacy_iou"
     )
