@@ -12,6 +12,7 @@ from artsim.common.program import cores, run_program
 from artsim.datasets.plan import SampleOptions
 from artsim.drawing.scene_command import Scene
 from artsim.errors import ConfigError, DatasetError
+from artsim.export.command import Export
 from artsim.families.constraints import Constraints
 from artsim.formats.base import FormatName
 from artsim.formats.command import Convert
@@ -464,6 +465,7 @@ Verb = (
     | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     | Annotated[Families, tyro.conf.subcommand("families")]
     | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
+    | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Vary, tyro.conf.subcommand("vary")]
     | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Scene, tyro.conf.subcommand("scene")]

@@ -1,4 +1,4 @@
-"""Procedural objects as files: PartNet-style URDF folders, MJCF and USD.
+"""Objects as files: PartNet-style URDF folders, MJCF and USD.
 
 All lengths are metres, Z is up and the front towards -X: meshes are written in the object's rest frame, and each link's
 frame stands at its joint's origin with the axes of the rest frame. The root link is the robot's base; MJCF and USD fix
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from artsim.errors import ConfigError
+from artsim.export.loaded import prepare
 from artsim.export.looks import MATERIALS_FILE, NO_FINISH, Finish, draw_finish, looks_text, materials_text
 from artsim.export.options import ExportOptions
 from artsim.export.robot import Robot, as_robot
@@ -36,7 +37,7 @@ def export(
     notes: Mapping[str, Any] | None = None,
     options: ExportOptions = DEFAULTS,
 ) -> dict[str, Any]:
-    """Write a procedural object into a folder.
+    """Write an object into a folder.
 
     ``meta.json`` and, for URDF and MJCF, ``meshes/*.obj`` are shared by all formats; URDF comes with
     ``semantics.txt``. The bytes depend on the object and the formats alone.
@@ -44,7 +45,7 @@ def export(
     Parameters
     ----------
     obj : ArticulatedObject
-        With bodies and at rest at q = 0, as :func:`artsim.make` makes them.
+        With bodies and at rest at q = 0, as :func:`artsim.make` and :func:`prepare` make them.
     folder : path
         Made if missing.
     formats : sequence of str
@@ -148,4 +149,4 @@ def _write_pictures(folder: Path, finish: Finish) -> None:
         (folder / name).write_bytes(content)
 
 
-__all__ = ["FORMATS", "export"]
+__all__ = ["FORMATS", "export", "prepare"]

@@ -159,9 +159,13 @@ def as_robot(obj: ArticulatedObject) -> Robot:
     words = [word for part in obj.parts for word in (part.name, part.label)] + [joint.name for joint in tree.joints]
     for word in words:
         if not _NAME.fullmatch(word):
-            raise AssetError(f"cannot write the name {word!r}", where, "use letters, digits and _ only")
+            raise AssetError(
+                f"cannot write the name {word!r}",
+                where,
+                "use letters, digits and _ only, or pass a loaded object through artsim.export.prepare first",
+            )
     if np.any(tree.rest):
-        raise AssetError("is not at rest at q = 0", where, "only procedural objects (artsim.make) can be exported")
+        raise AssetError("is not at rest at q = 0", where, "pass a loaded object through artsim.export.prepare first")
     own = [part_inertia(obj, k) for k in range(len(obj))]
     carried = [
         combine_inertias(own[j] for j in range(k, len(obj)) if _carries(tree.parents, k, j)) for k in range(len(obj))

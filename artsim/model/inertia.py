@@ -73,7 +73,7 @@ def part_inertia(obj: ArticulatedObject, k: int) -> Inertia:
     part = obj.parts[k]
     where = f"{obj.category} {obj.object_id}: part {part.name!r}"
     if part.body is None:
-        raise AssetError("has no body, so no density", where, "only procedural objects (artsim.make) have one")
+        raise AssetError("has no body, so no density", where, "pass a loaded object through artsim.export.prepare")
     if part.body.inertia is not None:
         return part.body.inertia.scaled(obj.scale)
     vertices, faces = part.body.solid or (part.vertices, part.faces)

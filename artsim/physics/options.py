@@ -30,6 +30,9 @@ class PhysicsOptions:
     """Factor on every joint's damping; 0 takes it away."""
     friction: float = 1.0
     """Factor on every joint's friction; 0 takes it away."""
+    collision: Literal["hull", "pieces"] = "hull"
+    """What other things in PyBullet's world collide with, of loaded parts: the convex hull, or convex pieces (CoACD,
+    the extra sim), which leave drawers open."""
 
     def __post_init__(self) -> None:
         if self.engine not in ("auto", "pybullet", "mujoco"):
@@ -40,6 +43,8 @@ class PhysicsOptions:
             )
         if self.substeps < 1:
             raise ConfigError(f"{self.substeps} steps do not move anything", "substeps", "use 1 or more")
+        if self.collision not in ("hull", "pieces"):
+            raise ConfigError(f"there is no {self.collision!r}", "collision", "use hull or pieces")
         for name in ("gravity", "damping", "friction"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 
 from artsim.errors import ConfigError
 from artsim.export.robot import LinkJoint, Robot, as_robot
+from artsim.loading.decomposition import decompose
 from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -89,7 +90,8 @@ class Simulation:
     def __init__(self, obj: ArticulatedObject, options: PhysicsOptions | None = None):
         self.obj, self.options = obj, options or PhysicsOptions()
         self.engine = engine_of(self.options)
-        robot = as_robot(add_bodies(obj))
+        pieced = decompose(obj, progress=False) if self.options.collision == "pieces" else obj
+        robot = as_robot(add_bodies(pieced))
         joints = robot.joints
         names = {joint.name: j for j, joint in enumerate(joints)}
         self._measured = [names[joint.name] for joint in robot.obj.tree.joints[1:]]

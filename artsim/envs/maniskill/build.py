@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from artsim.appearance import Coat
 from artsim.envs.maniskill.places import T_world_object
 from artsim.export.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
+from artsim.loading.decomposition import decompose
 from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -53,7 +54,14 @@ class Built:
     inertia: Array
 
 
-def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], number: int, gravity: bool) -> Built:
+def build(
+    scene: ManiSkillScene,
+    obj: ArticulatedObject,
+    coats: Sequence[Coat],
+    number: int,
+    gravity: bool,
+    pieces: bool = False,
+) -> Built:
     """Put an object on the ground of a sub-scene, its base fixed.
 
     Damping, friction and masses are those of :func:`artsim.export.robot.as_robot`, as in :mod:`artsim.physics.world`; a
@@ -69,13 +77,15 @@ def build(scene: ManiSkillScene, obj: ArticulatedObject, coats: Sequence[Coat], 
         Sub-scene.
     gravity : bool
         Whether gravity pulls on the parts.
+    pieces : bool
+        Whether parts of a loaded object collide as convex pieces instead of their hulls.
 
     Raises
     ------
     AssetError
         When a part encloses no solid.
     """
-    robot = as_robot(add_bodies(obj))
+    robot = as_robot(add_bodies(decompose(obj, progress=False) if pieces else obj))
     builder = scene.create_articulation_builder()
     T = T_world_object(obj)
     builder.initial_pose = sapien_pose(T[:3, 3], T[:3, :3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import mani_skill.agents.robots  # noqa: F401  # registers them
 import torch
@@ -48,6 +48,9 @@ class TaskOptions:
     """Share of its range within which a joint is at its goal."""
     gravity: bool = False
     """Whether gravity pulls on the object's parts; without it, lids stay where they are left."""
+    collision: Literal["hull", "pieces"] = "hull"
+    """What of loaded parts collides: their convex hulls, or convex pieces (CoACD, the extra sim; seconds for each
+    hollow piece, once), which leave drawers open."""
     views: ViewOptions = field(
         default_factory=lambda: ViewOptions(width=128, height=128, azimuth=(30.0, 75.0), elevation=(25.0, 55.0))
     )
@@ -60,6 +63,8 @@ class TaskOptions:
             raise ConfigError(f"there is no goal {self.goal!r}", "goal", "use open, close or random")
         if not 0.0 < self.tolerance < LEAST_OPEN:
             raise ConfigError(f"{self.tolerance} is not within 0..{LEAST_OPEN}", "tolerance", "use 0.1")
+        if self.collision not in ("hull", "pieces"):
+            raise ConfigError(f"there is no {self.collision!r}", "collision", "use hull or pieces")
         if self.max_joints < 1:
             raise ConfigError(f"{self.max_joints} is not a count", "max_joints", "use 1 or more")
 

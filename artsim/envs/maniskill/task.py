@@ -175,7 +175,9 @@ class ArticulatedTask(BaseEnv):  # type: ignore[misc]  # ManiSkill has no types
         built = []
         for number, (obj, rng) in enumerate(zip(self.objects, rngs, strict=True)):
             coats = (painted_coats(obj) or draw_coats(obj, rng)) if self.scene.can_render() else ()
-            built.append(build(self.scene, obj, coats, number, self.options.gravity))
+            built.append(
+                build(self.scene, obj, coats, number, self.options.gravity, self.options.collision == "pieces")
+            )
         for each in built:
             self.remove_from_state_dict_registry(each.articulation)
         self.mechanism = Mechanism(self.scene, built, self.truth)

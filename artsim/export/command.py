@@ -1,0 +1,64 @@
+"""The verb ``artsim export``."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from artsim.errors import ConfigError
+from artsim.loading.roots import PackageRoots
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write an object as URDF, MJCF and USD for simulators, such as one of PartNet-Mobility.
+
+    What collides is cut into convex pieces, so that things can be put into drawers. That takes seconds for each hollow
+    piece; the result is kept for the next time.
+
+    Example: artsim export path/to/StorageFurniture/45162 --formats mjcf usd --out out/45162
+    """
+
+    path: tyro.conf.Positional[Path]
+    """URDF, MJCF or USD file, GLB or joint file, or its folder."""
+    out: Path
+    """Folder to write; it must not exist."""
+    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf", "mjcf", "usd")
+    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    collision: Literal["pieces", "hull", "surface"] = "pieces"
+    """What collides: convex pieces of each part (extra sim), one convex hull, or the surface as it is. Parts of MJCF
+    and USD files keep what their file says."""
+    base: Literal["fixed", "free"] = "fixed"
+    """fixed: the root is fixed to the world; free: it falls. Of MJCF and USD: for URDF the simulator is told."""
+    actuators: Literal["none", "motor", "position"] = "none"
+    """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
+    control is where the joint shall be."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+
+    def run(self) -> None:
+        from artsim.export import check_formats, export
+        from artsim.export.loaded import prepare
+        from artsim.export.options import ExportOptions
+        from artsim.loading.urdf import load
+
+        check_formats(self.formats)
+        options = ExportOptions(self.base, self.actuators)
+        if self.out.exists():
+            raise ConfigError("it exists already", self.out, "name a folder that does not, or remove it")
+        obj = prepare(load(self.path, package_roots=self.package_root), self.collision)
+        self.out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f".{self.out.name}.", dir=self.out.parent) as place:
+            made = Path(place) / "made"
+            export(obj, made, self.formats, {"source": {"collision": self.collision}}, options)
+            shutil.move(made, self.out)
+        pieces = sum(len(part.body.pieces) for part in obj.parts if part.body is not None)
+        print(f"{self.out}: {', '.join(self.formats)}; {len(obj)} parts, {pieces} shapes that collide")
+        for repair in obj.repairs:
+            if not repair.note:
+                print(f"  {repair}")
