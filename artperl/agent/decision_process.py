@@ -17,7 +17,7 @@ from artperl.agent.actions import NOTHING, action_mask, apply, expert
 from artperl.core.batch import Batch
 from artperl.core.pose import Posed, Theta, joint_axes, pose_parts
 from artperl.core.shapes import Observed, Shapes, faces_camera
-from artsim.common.compiled import compiled_finite
+from artsim.common.compiled import compiled
 
 Single = NDArray[np.float32]
 
@@ -186,23 +186,26 @@ def nearest_distances(points: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
     return there.to(points.dtype), back.to(points.dtype)
 
 
-@compiled_finite
+@compiled
 def _nearest_squared(points: Single, others: Single) -> tuple[Single, Single]:
-    """Squared distances between points (N, 3) and others (3, M), each from the nearest: (N,) and (M,)."""
+    """Squared distances between points (N, 3) and others (3, M), each from the nearest: (N,) and (M,).
+
+    Bits of numbers that are not negative, taken for whole numbers, are in their order. Least whole numbers are found in
+    wide registers.
+    """
     N, M = len(points), others.shape[1]
     there, back, apart = np.empty(N, dtype=np.float32), np.full(M, np.inf, dtype=np.float32), np.empty(M, np.float32)
+    nearest, bits = there.view(np.int32), apart.view(np.int32)
     for n in range(N):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         for m in range(M):
             dx, dy, dz = others[0, m] - x, others[1, m] - y, others[2, m] - z
             apart[m] = dx * dx + dy * dy + dz * dz
-        least = np.float32(np.inf)
+        least = np.int32(2**31 - 1)
         for m in range(M):
-            if apart[m] < least:
-                least = apart[m]
-        for m in range(M):
+            least = min(least, bits[m])
             back[m] = min(back[m], apart[m])
-        there[n] = least
+        nearest[n] = least
     return there, back
 
 

@@ -120,8 +120,13 @@ def _samples(shard: Path) -> list[str] | list[None]:
     return reader.keys()
 
 
-@lru_cache(maxsize=4)
 def _reader(shard: Path) -> ShardReader:
+    """The reader of a shard as it is now."""
+    return _reader_since(shard, shard.stat().st_mtime_ns if shard.is_file() else 0)
+
+
+@lru_cache(maxsize=4)
+def _reader_since(shard: Path, changed: int) -> ShardReader:
     return ShardReader(shard, "generate or download it again; artsim verify names what else is damaged")
 
 

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
-from artsim.common.compiled import compiled, compiled_finite
+from artsim.common.compiled import compiled
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -63,20 +63,25 @@ def nearest_distance(points: Tensor, surface: Tensor) -> Tensor:
     return torch.from_numpy(np.sqrt(squared)).to(points.dtype)
 
 
-@compiled_finite
+@compiled
 def _nearest_squared(points: Single, surface: Single) -> Single:
-    """(N, P) squared distance of points (N, 3) from the nearest point of each part (P, 3, M)."""
-    found = np.empty((len(points), len(surface)), dtype=np.float32)
+    """(N, P) squared distance of points (N, 3) from the nearest point of each part (P, 3, M).
+
+    Bits of numbers that are not negative, taken for whole numbers, are in their order. Least whole numbers are found in
+    wide registers.
+    """
+    found, apart = np.empty((len(points), len(surface)), dtype=np.float32), np.empty(surface.shape[2], dtype=np.float32)
+    nearest, bits = found.view(np.int32), apart.view(np.int32)
     for n in range(len(points)):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         for k in range(len(surface)):
-            least = np.float32(np.inf)
             for m in range(surface.shape[2]):
                 dx, dy, dz = surface[k, 0, m] - x, surface[k, 1, m] - y, surface[k, 2, m] - z
-                squared = dx * dx + dy * dy + dz * dz
-                if squared < least:
-                    least = squared
-            found[n, k] = least
+                apart[m] = dx * dx + dy * dy + dz * dz
+            least = np.int32(2**31 - 1)
+            for m in range(surface.shape[2]):
+                least = min(least, bits[m])
+            nearest[n, k] = least
     return found
 
 

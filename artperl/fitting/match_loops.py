@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from artperl.fitting.arrays import Array, Indices, Reference, State, Tree, View
 from artperl.fitting.correspondence import BACK_FACE, DISC_RADIUS, OUTLINE_POINTS, TANGENT_WEIGHT
-from artsim.common.compiled import compiled, compiled_finite
+from artsim.common.compiled import compiled
 
 Single = NDArray[np.float32]
+Bits = NDArray[np.int32]
 
+_ZERO, _MOST = np.float32(0.0), 2**31 - 1
 _RUN = 64
 """Distances of which the least is looked for at once, before it is known which of them it is."""
 
@@ -142,78 +144,84 @@ def match(tree: Tree, shape: Reference, view: View, state: State, outline_weight
 @compiled
 def _pose_discs(shape: Reference, posed: Posed, k: int, points: Array, normals: Array) -> None:
     """Points and normals (3, M) of a part's surface in the camera frame."""
-    R, t, scale = posed.rotation[k], posed.translation[k], posed.scale[k]
+    R, scale = posed.rotation[k], posed.scale[k]
+    # Numbers are read before the loop, since the compiler cannot know that it leaves them as they are.
+    a, b, c, d, e, f, g, h, i = R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2]
+    sx, sy, sz = scale[0], scale[1], scale[2]
+    tx, ty, tz = posed.translation[k, 0], posed.translation[k, 1], posed.translation[k, 2]
+    cx = posed.center[k, 0] - sx * shape.box_center[k, 0]
+    cy = posed.center[k, 1] - sy * shape.box_center[k, 1]
+    cz = posed.center[k, 2] - sz * shape.box_center[k, 2]
     own, facing = shape.points[k], shape.normals[k]
-    cx, cy, cz = posed.center[k, 0], posed.center[k, 1], posed.center[k, 2]
-    bx, by, bz = shape.box_center[k, 0], shape.box_center[k, 1], shape.box_center[k, 2]
     for m in range(own.shape[1]):
-        x = cx + scale[0] * (own[0, m] - bx)
-        y = cy + scale[1] * (own[1, m] - by)
-        z = cz + scale[2] * (own[2, m] - bz)
-        u, v, w = facing[0, m] / scale[0], facing[1, m] / scale[1], facing[2, m] / scale[2]
+        x, y, z = cx + sx * own[0, m], cy + sy * own[1, m], cz + sz * own[2, m]
+        points[0, m] = a * x + b * y + c * z + tx
+        points[1, m] = d * x + e * y + f * z + ty
+        points[2, m] = g * x + h * y + i * z + tz
+    for m in range(own.shape[1]):
+        u, v, w = facing[0, m] / sx, facing[1, m] / sy, facing[2, m] / sz
         length = 1.0 / max(np.sqrt(u * u + v * v + w * w), 1e-12)
-        for i in range(3):
-            points[i, m] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z + t[i]
-            normals[i, m] = (R[i, 0] * u + R[i, 1] * v + R[i, 2] * w) * length
+        normals[0, m] = (a * u + b * v + c * w) * length
+        normals[1, m] = (d * u + e * v + f * w) * length
+        normals[2, m] = (g * u + h * v + i * w) * length
 
 
 @compiled
 def _describe_discs(points: Array, normals: Array, middle: Array, unit: float, discs: Single) -> None:
     """Numbers (10, M) whose product with those of a point is its squared distance from a disc, but for a constant."""
-    weight = TANGENT_WEIGHT**2
+    weight, scale = TANGENT_WEIGHT**2, 1.0 / unit
+    mx, my, mz = middle[0], middle[1], middle[2]
     for m in range(points.shape[1]):
         n0, n1, n2 = normals[0, m], normals[1, m], normals[2, m]
-        facing = points[0, m] * n0 + points[1, m] * n1 + points[2, m] * n2 < 0.0  # the camera is at the origin
-        y0, y1, y2 = (
-            (points[0, m] - middle[0]) / unit,
-            (points[1, m] - middle[1]) / unit,
-            (points[2, m] - middle[2]) / unit,
-        )
+        along = points[0, m] * n0 + points[1, m] * n1 + points[2, m] * n2  # below 0 it faces the camera at the origin
+        y0, y1, y2 = (points[0, m] - mx) * scale, (points[1, m] - my) * scale, (points[2, m] - mz) * scale
         height = n0 * y0 + n1 * y1 + n2 * y2
         discs[0, m], discs[1, m], discs[2, m] = n0 * n0, n1 * n1, n2 * n2
         discs[3, m], discs[4, m], discs[5, m] = 2.0 * n0 * n1, 2.0 * n1 * n2, 2.0 * n2 * n0
         discs[6, m] = -2.0 * (height * n0 + weight * y0)
         discs[7, m] = -2.0 * (height * n1 + weight * y1)
         discs[8, m] = -2.0 * (height * n2 + weight * y2)
-        constant = height * height + weight * (y0 * y0 + y1 * y1 + y2 * y2)
-        discs[9, m] = constant if facing else constant + BACK_FACE
+        behind = 0.0 if along < 0.0 else BACK_FACE
+        discs[9, m] = height * height + weight * (y0 * y0 + y1 * y1 + y2 * y2) + behind
 
 
-@compiled_finite
-def _nearest_disc(discs: Single, x: Single, costs: Single) -> int:
-    """Disc of (10, M) with the least cost for a point's numbers (9,)."""
-    M = discs.shape[1]
-    for m in range(M):
-        costs[m] = (
-            discs[0, m] * x[0] + discs[1, m] * x[1] + discs[2, m] * x[2] + discs[3, m] * x[3] + discs[4, m] * x[4]
-            + discs[5, m] * x[5] + discs[6, m] * x[6] + discs[7, m] * x[7] + discs[8, m] * x[8] + discs[9, m]
+@compiled
+def _nearest_disc(discs: Single, x: Single, costs: Single, bits: Bits) -> int:
+    """Disc of (10, M) at the least squared distance of a point with these numbers (10,)."""
+    a, b, c, d, e, f, g, h, i, j = x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9]
+    for m in range(discs.shape[1]):
+        cost = (
+            discs[0, m] * a + discs[1, m] * b + discs[2, m] * c + discs[3, m] * d + discs[4, m] * e
+            + discs[5, m] * f + discs[6, m] * g + discs[7, m] * h + discs[8, m] * i + discs[9, m] + j
         )  # fmt: skip
-    return _least(costs, M)
+        costs[m] = max(cost, _ZERO)
+    return _least(bits, discs.shape[1])
 
 
-@compiled_finite
-def _nearest_ray(rays: Single, x: float, y: float, costs: Single) -> int:
+@compiled
+def _nearest_ray(rays: Single, x: float, y: float, costs: Single, bits: Bits) -> int:
     """Ray of (3, N) that is nearest on the image plane."""
-    u, v = np.float32(-2.0 * x), np.float32(-2.0 * y)
-    N = rays.shape[1]
-    for n in range(N):
-        costs[n] = rays[0, n] * u + rays[1, n] * v + rays[2, n]
-    return _least(costs, N)
+    u, v, own = np.float32(-2.0 * x), np.float32(-2.0 * y), np.float32(x * x + y * y)
+    for n in range(rays.shape[1]):
+        costs[n] = max(rays[0, n] * u + rays[1, n] * v + rays[2, n] + own, _ZERO)
+    return _least(bits, rays.shape[1])
 
 
-@compiled_finite
-def _least(costs: Single, count: int) -> int:
-    """Index of the least of the first costs."""
-    best, run = np.float32(np.inf), 0
+@compiled
+def _least(bits: Bits, count: int) -> int:
+    """Index of the least of the first costs, which are not negative.
+
+    Their bits, taken for whole numbers, are in the same order, and least whole numbers are found in wide registers.
+    """
+    best, run = np.int32(_MOST), 0
     for begin in range(0, count, _RUN):
-        least = np.float32(np.inf)
+        least = np.int32(_MOST)
         for m in range(begin, min(begin + _RUN, count)):
-            if costs[m] < least:
-                least = costs[m]
+            least = min(least, bits[m])
         if least < best:
             best, run = least, begin
     for m in range(run, min(run + _RUN, count)):
-        if costs[m] <= best:
+        if bits[m] <= best:
             return m
     return run
 
@@ -223,15 +231,16 @@ def _match_surface(
     shape: Reference, view: View, posed: Posed, points: Array, normals: Array, discs: Single, rows: Rows
 ) -> None:
     """The first rows: observed points and their discs."""
-    costs, x = np.empty(points.shape[2], dtype=np.float32), np.empty(9, dtype=np.float32)
-    apart = np.empty(3)
+    costs, x, apart = np.empty(points.shape[2], dtype=np.float32), np.empty(10, dtype=np.float32), np.empty(3)
+    bits, weight = costs.view(np.int32), TANGENT_WEIGHT**2
     for n in range(len(view.points)):
         k = view.part[n]
         a = (view.points[n, 0] - view.middle[0]) / view.unit
         b = (view.points[n, 1] - view.middle[1]) / view.unit
         c = (view.points[n, 2] - view.middle[2]) / view.unit
         x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8] = a * a, b * b, c * c, a * b, b * c, c * a, a, b, c
-        m = _nearest_disc(discs[k], x, costs)
+        x[9] = weight * (a * a + b * b + c * c)
+        m = _nearest_disc(discs[k], x, costs, bits)
         offset, square = 0.0, 0.0
         for i in range(3):
             apart[i] = view.points[n, i] - points[k, i, m]
@@ -261,6 +270,7 @@ def _match_outline(shape: Reference, view: View, points: Array, few: int, outlin
     """The last rows: points of the reference that must appear within the outline."""
     N, P = len(view.points), len(points)
     costs, solid = np.empty(view.rays.shape[1], dtype=np.float32), 0
+    bits = costs.view(np.int32)
     for k in range(P):
         solid += shape.spacing[k] < np.inf
     for k in range(P):
@@ -278,7 +288,7 @@ def _match_outline(shape: Reference, view: View, points: Array, few: int, outlin
             if not shape.spacing[k] < np.inf:
                 continue
             rows.weight[row] = outline_weight / (few * solid)
-            nearest = _nearest_ray(view.rays, x, y, costs)
+            nearest = _nearest_ray(view.rays, x, y, costs, bits)
             u, v = x - view.rays[0, nearest], y - view.rays[1, nearest]
             length = np.sqrt(u * u + v * v)
             excess = length - view.gap

@@ -31,8 +31,6 @@ class Compiled(Generic[P, R]):
     ----------
     function : callable
         Loops over NumPy arrays and numbers; it may call other compiled functions of its module.
-    finite : bool
-        Nothing in it is NaN. A least number is then looked for in wide registers, too.
 
     Attributes
     ----------
@@ -40,8 +38,8 @@ class Compiled(Generic[P, R]):
         The function as it is written, for tests.
     """
 
-    def __init__(self, function: Callable[P, R], finite: bool = False):
-        self.python, self._maths = function, _MATHS | {"nnan"} if finite else _MATHS
+    def __init__(self, function: Callable[P, R]):
+        self.python = function
         self.__doc__, self.__name__, self.__module__ = function.__doc__, function.__name__, function.__module__
         self._dispatcher: Any = None
 
@@ -56,7 +54,7 @@ class Compiled(Generic[P, R]):
         if self._dispatcher is None:
             with needs("compiled loops"):
                 import numba
-            how: dict[str, Any] = {"nogil": True, "fastmath": self._maths, "error_model": "numpy"}
+            how: dict[str, Any] = {"nogil": True, "fastmath": _MATHS, "error_model": "numpy"}
             try:
                 self._dispatcher = numba.njit(cache=True, **how)(self.python)
             except RuntimeError:  # no folder can be written to
@@ -71,8 +69,3 @@ class Compiled(Generic[P, R]):
 def compiled(function: Callable[P, R]) -> Compiled[P, R]:
     """Decorate a function to be compiled: see :class:`Compiled`."""
     return Compiled(function)
-
-
-def compiled_finite(function: Callable[P, R]) -> Compiled[P, R]:
-    """Decorate a function to be compiled in which nothing is NaN."""
-    return Compiled(function, finite=True)
