@@ -17,8 +17,10 @@ from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import Trees
+from artperl.fitting.arrays import State, reference_of, tree_of, view_of
 from artperl.fitting.correspondence import Target, match
 from artperl.fitting.levenberg_marquardt import refine, robust_mean
+from artperl.fitting.match_loops import misfits, pose_each
 from artperl.fitting.refine_options import RefineOptions
 
 _STATES = 24
@@ -45,11 +47,24 @@ class _Part(Batch):
     shape: Shapes
     target: Target
 
-    def misfit(self, rotation: Tensor, translation: Tensor, options: RefineOptions) -> Tensor:
-        """(B,) robust distance of its points from the part in B poses ``T_camera_part``."""
+    def misfit(
+        self, rotation: Tensor, translation: Tensor, options: RefineOptions, before: Tensor, keep: int
+    ) -> Tensor:  # fmt: skip
+        """(B,) robust distance of its points from the part in B poses ``T_camera_part``, and what was known before.
+
+        It may be infinite where so many others are lower.
+        """
+        if before.device.type == "cpu":
+            R, t, known = (values.double().contiguous().numpy() for values in (rotation, translation, before))
+            found = misfits(
+                reference_of(self.shape, 0), view_of(self.target, 0), R, t, known, keep, options.outline_weight,
+                options.robust_end,
+            )  # fmt: skip
+            return torch.from_numpy(found).to(before.dtype)
         one = self.map(lambda tensor: tensor.expand(len(rotation), *tensor.shape[1:]))
         placed = replace(Theta.at_rest(one.shape.trees), rotation=rotation, translation=translation)
-        return robust_mean(match(one.shape, one.target, placed, options.outline_weight), options.robust_end)
+        matches = match(one.shape, one.target, placed, options.outline_weight)
+        return before + robust_mean(matches, options.robust_end)
 
 
 def beam(
@@ -83,15 +98,16 @@ def beam(
     parts = {k: _part(shapes, k, cloud, probability[..., k]) for k in solid.nonzero()[:, 0].tolist()}
     joints, turn = _joint_order(trees)
     theta = _roots(parts[0], start, options) if 0 in parts else start
-    cost = _misfit(parts, turn == 0, _pose(shapes, theta), options)
+    cost = torch.zeros_like(theta.translation[:, 0])
+    cost = _misfit(parts, turn == 0, *_poses(shapes, theta), options, cost, width)
     for number, joint in enumerate(joints, start=1):
         states = torch.cat([_grid(trees, joint).expand(len(theta), -1), theta.state[:, joint, None]], dim=1)
         theta, cost = theta.repeat(states.shape[1]), cost.repeat_interleave(states.shape[1])
         state = theta.state.clone()
         state[:, joint] = states.flatten()
         theta = replace(theta, state=state)
-        cost = cost + _misfit(parts, turn == number, _pose(shapes, theta), options)
-        best = cost.argsort()[:width]
+        cost = _misfit(parts, turn == number, *_poses(shapes, theta), options, cost, width)
+        best = cost.argsort(stable=True)[:width]
         theta, cost = theta[best], cost[best]
     return theta[:count]
 
@@ -187,10 +203,28 @@ def _pose(shapes: Shapes, theta: Theta) -> Posed:
     return pose_parts(trees, theta, shapes.box_center)
 
 
-def _misfit(parts: dict[int, _Part], chosen: Tensor, posed: Posed, options: RefineOptions) -> Tensor:
-    """(B,) misfit of the chosen parts together."""
-    total = torch.zeros_like(posed.translation[:, 0, 0])
-    for k, part in parts.items():
-        if chosen[k]:
-            total = total + part.misfit(posed.rotation[:, k], posed.translation[:, k], options)
+def _poses(shapes: Shapes, theta: Theta) -> tuple[Tensor, Tensor]:
+    """Rotations (B, P, 3, 3) and translations (B, P, 3) of the parts of one reference in B states."""
+    if theta.state.device.type != "cpu":
+        posed = _pose(shapes, theta)
+        return posed.rotation, posed.translation
+    states = (getattr(theta, name).double().contiguous().numpy() for name in State._fields)
+    found = pose_each(tree_of(shapes, 0), reference_of(shapes, 0).box_center, *states)
+    rotation, translation = (torch.from_numpy(values).to(theta.state.dtype) for values in found)
+    return rotation, translation
+
+
+def _misfit(
+    parts: dict[int, _Part], chosen: Tensor, rotation: Tensor, translation: Tensor, options: RefineOptions,
+    before: Tensor, keep: int,
+) -> Tensor:  # fmt: skip
+    """(B,) misfit of the chosen parts together, in poses (B, P, 3, 3) and (B, P, 3), and what was known before (B,).
+
+    Infinite for such as are not among the best, of which so many are kept.
+    """
+    total, own = before, [k for k in parts if chosen[k]]
+    for k in own:
+        # Only with the last part it is known which are the best.
+        kept = min(keep, len(before)) if k == own[-1] else len(before)
+        total = parts[k].misfit(rotation[:, k], translation[:, k], options, total, kept)
     return total

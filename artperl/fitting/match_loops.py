@@ -20,6 +20,8 @@ Bits = NDArray[np.int32]
 _ZERO, _MOST = np.float32(0.0), 2**31 - 1
 _RUN = 64
 """Distances of which the least is looked for at once, before it is known which of them it is."""
+_LOOK = 8
+"""Points after which a pose may be given up."""
 
 
 class Posed(NamedTuple):
@@ -98,6 +100,21 @@ def pose(tree: Tree, box_center: Array, state: State) -> Posed:
 
 
 @compiled
+def pose_each(
+    tree: Tree, box_center: Array, rotation: Array, translation: Array, log_scale: Array, state: Array, shift: Array,
+    stretch: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Rotations (B, P, 3, 3) and translations (B, P, 3) of the parts of one object in B states."""
+    B, P = state.shape
+    turned, moved = np.empty((B, P, 3, 3)), np.empty((B, P, 3))
+    for b in range(B):
+        one = State(rotation[b], translation[b], log_scale[b], state[b], shift[b], stretch[b])
+        posed = pose(tree, box_center, one)
+        turned[b], moved[b] = posed.rotation, posed.translation
+    return turned, moved
+
+
+@compiled
 def rotate_about(axis: Array, angle: float, out: Array) -> None:
     """Rodrigues' formula for a unit axis (3,), into (3, 3)."""
     sine, less = np.sin(angle), 1.0 - np.cos(angle)
@@ -135,7 +152,7 @@ def match(tree: Tree, shape: Reference, view: View, state: State, outline_weight
     for k in range(P):
         _pose_discs(shape, posed, k, points[k], normals[k])
         _describe_discs(points[k], normals[k], view.middle, view.unit, discs[k])
-    _match_surface(shape, view, posed, points, normals, discs, rows)
+    _match_surface(shape, view, posed, points, normals, discs, rows, 0, N)
     if few > 0:
         _match_outline(shape, view, points, few, outline_weight, rows)
     return posed, rows
@@ -228,12 +245,13 @@ def _least(bits: Bits, count: int) -> int:
 
 @compiled
 def _match_surface(
-    shape: Reference, view: View, posed: Posed, points: Array, normals: Array, discs: Single, rows: Rows
-) -> None:
-    """The first rows: observed points and their discs."""
+    shape: Reference, view: View, posed: Posed, points: Array, normals: Array, discs: Single, rows: Rows,
+    begin: int, end: int,
+) -> None:  # fmt: skip
+    """The first rows, of some of the observed points and their discs."""
     costs, x, apart = np.empty(points.shape[2], dtype=np.float32), np.empty(10, dtype=np.float32), np.empty(3)
     bits, weight = costs.view(np.int32), TANGENT_WEIGHT**2
-    for n in range(len(view.points)):
+    for n in range(begin, end):
         k = view.part[n]
         a = (view.points[n, 0] - view.middle[0]) / view.unit
         b = (view.points[n, 1] - view.middle[1]) / view.unit
@@ -302,8 +320,72 @@ def _match_outline(shape: Reference, view: View, points: Array, few: int, outlin
 @compiled
 def robust_mean(rows: Rows, width: float) -> float:
     """See :func:`artperl.fitting.levenberg_marquardt.robust_mean`."""
+    return _robust_sum(rows, 0, len(rows.weight), width)
+
+
+@compiled
+def _robust_sum(rows: Rows, begin: int, end: int, width: float) -> float:
     total, wide = 0.0, width * width
-    for r in range(len(rows.weight)):
+    for r in range(begin, end):
         square = rows.residual[r, 0] ** 2 + (TANGENT_WEIGHT * rows.residual[r, 1]) ** 2
         total += rows.weight[r] * wide * square / (wide + square)
+    return total
+
+
+@compiled
+def misfits(
+    shape: Reference, view: View, rotation: Array, translation: Array, before: Array, keep: int, outline_weight: float,
+    width: float,
+) -> Array:  # fmt: skip
+    """Robust distances of a cloud from an object of one part in many poses, and what was known before.
+
+    Sums only grow. So a pose is given up once its sum is beyond those of as many others as are kept.
+
+    Parameters
+    ----------
+    rotation, translation : (B, 3, 3), (B, 3) float
+    before : (B,) float
+    keep : int
+
+    Returns
+    -------
+    (B,) float
+        Infinite for poses that are given up.
+    """
+    M, N = shape.points.shape[2], len(view.points)
+    few = min(OUTLINE_POINTS, M) if outline_weight > 0.0 else 0
+    R = N + few
+    rows = Rows(
+        np.empty((R, 3)), np.empty(R, dtype=np.int64), np.empty((R, 3)), np.empty((R, 3)), np.zeros((R, 3)),
+        np.zeros((R, 2)), np.zeros(R),
+    )  # fmt: skip
+    points, normals, discs = np.empty((1, 3, M)), np.empty((1, 3, M)), np.empty((1, 10, M), dtype=np.float32)
+    scale, reach, least, total = np.ones((1, 3)), np.ones(1), np.full(keep, np.inf), np.full(len(before), np.inf)
+    for b in range(len(before)):
+        worst, own = least[keep - 1], before[b]
+        if own >= worst:
+            continue
+        R1, t1 = rotation[b : b + 1], translation[b : b + 1]
+        posed = Posed(R1, t1, shape.box_center, shape.box_center, scale, reach, R1, t1)
+        _pose_discs(shape, posed, 0, points[0], normals[0])
+        _describe_discs(points[0], normals[0], view.middle, view.unit, discs[0])
+        rows.residual[:], rows.weight[:] = 0.0, 0.0
+        for begin in range(0, N, _LOOK):
+            end = min(begin + _LOOK, N)
+            _match_surface(shape, view, posed, points, normals, discs, rows, begin, end)
+            own += _robust_sum(rows, begin, end, width)
+            if own >= worst:
+                break
+        if own >= worst:
+            continue
+        if few > 0:
+            _match_outline(shape, view, points, few, outline_weight, rows)
+            own += _robust_sum(rows, N, R, width)
+        total[b] = own
+        if own < worst:
+            at = keep - 1
+            while at > 0 and least[at - 1] > own:
+                least[at] = least[at - 1]
+                at -= 1
+            least[at] = own
     return total

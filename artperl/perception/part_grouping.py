@@ -19,6 +19,7 @@ from torch import Tensor
 from artperl.core.labels import label_log_odds
 from artperl.core.part_order import visible_order
 from artperl.perception.network import Perceived, Votes
+from artsim.common.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -129,7 +130,7 @@ def clusters(place: Array, box: Array, fewest: int) -> list[NDArray[np.int64]]:
     -------
     list of (n,) int
     """
-    backed = differences(box[:, None], box[None]) < _NEAR
+    backed = _backed(np.ascontiguousarray(box, dtype=np.float64))
     left, middles = np.ones(len(box), dtype=bool), np.empty((0, 6))
     support = backed.sum(axis=1)
     while left.any():
@@ -149,6 +150,25 @@ def clusters(place: Array, box: Array, fewest: int) -> list[NDArray[np.int64]]:
     apart = differences(box[:, None], middles[None])
     own = np.where(apart.min(1) < 1.0, apart.argmin(1), -1)
     return [np.flatnonzero(own == n) for n in range(len(middles)) if (own == n).sum() >= fewest]
+
+
+@compiled
+def _backed(box: Array) -> NDArray[np.bool_]:
+    """(N, N) votes that back each other: whose :func:`differences` are below :data:`_NEAR`."""
+    N = len(box)
+    backed = np.empty((N, N), dtype=np.bool_)
+    for i in range(N):
+        for j in range(i + 1):
+            near = True
+            for axis in range(3):
+                side, sides = box[i, 3 + axis], box[j, 3 + axis]
+                center = abs(box[i, axis] - box[j, axis]) / (_APART * min(side, sides) + _SLACK)
+                size = abs(side - sides) / (_UNLIKE * max(side, sides) + _SLACK)
+                if not (center < _NEAR and size < _NEAR):
+                    near = False
+                    break
+            backed[i, j] = backed[j, i] = near
+    return backed
 
 
 def overlap(box: Array, other: Array) -> Array:
