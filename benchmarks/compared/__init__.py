@@ -79,7 +79,12 @@ MEASURES: dict[str, Measure] = {
         f"estimates-{category}": Measure(f"estimates of {category}", "estimates:estimates", (category, 1024))
         for category in ("laptop", "eyeglasses", "dishwasher", "scissors", "drawer")
     },
+    **{
+        f"dense-{category}": Measure(f"estimates of {category}, 8,192 points", "estimates:estimates", (category, 8192))
+        for category in ("laptop", "eyeglasses", "dishwasher", "scissors", "drawer")
+    },
     "estimates-512": Measure("estimates of laptops from 512 points", "estimates:estimates", ("laptop", 512)),
     "estimates-any-8": Measure("estimates by `any` of objects of 8 parts", "estimates:any_of_parts", (8,)),
     "environment": Measure("steps of the fitting environment", "environment:steps"),
+    "stable-baselines": Measure("steps that PPO of Stable-Baselines3 learns from", "environment:learnt_from"),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from . import Work
 
@@ -37,5 +38,31 @@ def steps(folder: Path) -> Callable[[], Work]:
         fitting = Fitting(problem.shapes, problem.observed, problem.start, setting)
         reward = torch.stack([fitting.step(action) for action in actions])
         return Work(STEPS * ENVIRONMENTS, facts={"mean_reward": float(reward.mean())})
+
+    return work
+
+
+def learnt_from(folder: Path) -> Callable[[], Work]:
+    """Learning by PPO of Stable-Baselines3, from many environments at once where there are such."""
+    import gymnasium
+    import torch
+    from stable_baselines3 import PPO
+
+    from artperl.training.gym_env import ENV_ID
+
+    torch.set_num_threads(1)
+    envs: Any
+    try:
+        from artperl.training.stable_baselines import StableBaselinesEnvs
+
+        many, envs = ENVIRONMENTS, StableBaselinesEnvs(gymnasium.make_vec(ENV_ID, ENVIRONMENTS))
+    except ImportError:  # the older revision
+        many, envs = 1, gymnasium.make(ENV_ID)
+    model = PPO("MultiInputPolicy", envs, n_steps=1536 // many, batch_size=64, n_epochs=4, device="cpu", seed=0)
+
+    def work() -> Work:
+        before = model.num_timesteps
+        model.learn(1536, reset_num_timesteps=False)
+        return Work(model.num_timesteps - before)
 
     return work
