@@ -78,17 +78,20 @@ class AssetPaths:
             When it would lie outside the allowed folders, or is on the web.
         """
         package, rest = self._split(filename)
-        tried = []
-        for name in dict.fromkeys((rest, unquote(rest))):
-            tried += list(self._candidates(package, name))
-        inside = [candidate for candidate in tried if self._is_inside(candidate.path, package)]
+        names = dict.fromkeys((rest, unquote(rest)))
+        candidates = (candidate for name in names for candidate in self._candidates(package, name))
+        tried: list[_Candidate] = []
+        is_inside = cache(lambda path: self._is_inside(path, package))  # resolving links takes longest, so once each
         for respelt in (False, True):
-            for candidate in inside:
+            for candidate in tried.copy() if respelt else _kept(candidates, tried):
+                if not is_inside(candidate.path):
+                    continue
                 path = _with_case_of_disk(candidate.path) if respelt else candidate.path
-                if path is not None and _is_file(path) and self._is_inside(path, package):
+                if path is not None and _is_file(path) and is_inside(path):
                     self._say(candidate.assumed)
                     self._say(f"{filename!r} is {path.name!r} on disk: read" if respelt else "")
                     return path
+        inside = [candidate for candidate in tried if is_inside(candidate.path)]
         found_outside = next((c.path for c in tried if c not in inside and _is_file(c.path)), None)
         if found_outside is not None or not inside:
             raise AssetError(
@@ -266,6 +269,13 @@ def option(name: str, folder: Path | None) -> str:
     name = name if name.isprintable() and name else "NAME"
     value = f"/path/to/{name}" if folder is None or not str(folder).isprintable() else str(folder)
     return f"--package-root {shlex.quote(f'{name}={value}')}"
+
+
+def _kept(candidates: Iterator[_Candidate], tried: list[_Candidate]) -> Iterator[_Candidate]:
+    """Candidates as they are looked at, written down for a second look."""
+    for candidate in candidates:
+        tried.append(candidate)
+        yield candidate
 
 
 def _is_file(path: Path) -> bool:

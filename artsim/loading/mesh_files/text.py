@@ -86,9 +86,14 @@ class Rows:
     def _starts(self) -> NDArray[np.int32]:
         return np.concatenate([np.zeros(1, np.int32), self._ends[:-1] + 1])
 
+    @cached_property
+    def _first(self) -> NDArray[np.uint8]:
+        """The first letter of each row, or its newline."""
+        return self._bytes[np.minimum(self._starts, self._ends)]
+
     def which(self, word: bytes) -> NDArray[np.bool_]:
         """Which rows begin with a word, alone or before a blank."""
-        rows = np.flatnonzero(self._letter(0) == word[0])
+        rows = np.flatnonzero(self._first == word[0])
         for i, letter in enumerate(word[1:] + b" ", start=1):
             found = self._bytes[np.minimum(self._starts[rows] + i, self._ends[rows])]
             rows = rows[(found == letter) | ((found == ord("\n")) & (i == len(word)))]
@@ -96,13 +101,9 @@ class Rows:
         here[rows] = True
         return here
 
-    def _letter(self, i: int) -> NDArray[np.uint8]:
-        """The i-th letter of each row, or its newline where the row is shorter."""
-        return self._bytes[np.minimum(self._starts + i, self._ends)]
-
     def are_comments(self) -> NDArray[np.bool_]:
         """Which rows begin with #."""
-        return self._letter(0) == ord("#")
+        return self._first == ord("#")
 
     def rest(self, which: NDArray[np.bool_], word: bytes) -> bytes:
         """What follows a word in the rows that begin with it, each with its newline."""
