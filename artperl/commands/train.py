@@ -37,6 +37,9 @@ class Train:
     For a robot of your own, from the estimator for any tree:
     python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000
 
+    On several processors or GPUs, with the same result:
+    torchrun --nproc-per-node 2 train.py --category laptop --out out/laptop
+
     What is not given is as the preset or the recipe has it.
     """
 
@@ -122,7 +125,11 @@ class Train:
         out = self.out or Path("out/train") / f"{name}-{method}{preset}"
         if recipe is None or not is_made(out, recipe):
             try:
-                Training(options, out, self.workers, recipe=recipe).run()
+                training = Training(options, out, self.workers, recipe=recipe)
+                training.run()
+                training.context.ranks.close()
+                if not training.context.ranks.first:
+                    return
             except KeyboardInterrupt:
                 print(f"stopped; the same command goes on from {out}", file=sys.stderr)
                 sys.exit(130)

@@ -40,30 +40,36 @@ MoreRows = Callable[[Source, int, Sample], dict[str, Array]]
 """Of a source, a number and the sample of that number: arrays of equal shapes that a method learns besides."""
 
 
+InTurn = Callable[[Iterator[dict[str, Tensor]]], Iterator[dict[str, Tensor]]]
+"""See :meth:`artperl.training.ranks.Ranks.in_turn`."""
+
+
 class _Rows(IterableDataset[dict[str, Array]]):
     """Rows of fresh objects from sample number ``first`` on, shared out to the loader's workers batch by batch.
 
+    Of several processes that learn together, ``share`` is this one's number, and how many there are.
     Some samples are stretched, of the others some come from the sources of ``noisy`` ones; of all, some are degraded.
     """
 
     def __init__(
         self, samples: Source, noisy: Sequence[Source], num_points: int, batch_size: int, first: int,
-        options: DataOptions, more: MoreRows | None,
+        options: DataOptions, more: MoreRows | None, share: tuple[int, int] = (0, 1),
     ):  # fmt: skip
-        self.more = more
+        self.more, self.share = more, share
         self.samples, self.noisy, self.num_points = samples, noisy, num_points
         self.batch_size, self.first, self.options = batch_size, first, options
 
     def __iter__(self) -> Iterator[dict[str, Array]]:
         info = get_worker_info()
         worker, workers = (info.id, info.num_workers) if info else (0, 1)
-        batch = self.first // self.batch_size + worker
+        rank, ranks = self.share
+        batch = self.first // self.batch_size + rank + ranks * worker
         while True:
             for i in range(batch * self.batch_size, (batch + 1) * self.batch_size):
                 sample = self._sample(i)
                 more = {} if self.more is None else self.more(self.samples, i, sample)
                 yield training_rows(sample, self.num_points, self.samples.num_rows) | more
-            batch += workers
+            batch += ranks * workers
 
     def _sample(self, i: int) -> Sample:
         rng = np.random.default_rng([_STRETCHING, i])
@@ -86,7 +92,7 @@ def ignore_interrupt(worker: int) -> None:
 
 def batches(
     data: DataOptions, num_rows: int, num_points: int = 1024, batch_size: int = 32, first_batch: int = 0,
-    seed: int = 0, workers: int = 1,
+    seed: int = 0, workers: int = 1, share: tuple[int, int] = (0, 1), in_turn: InTurn = iter,
 ) -> Iterator[tuple[Clouds, Truth]]:  # fmt: skip
     """Endless batches of fresh procedural objects, or of a dataset.
 
@@ -105,27 +111,34 @@ def batches(
     seed : int
     workers : int
         Processes that make samples; 0 makes them in this one.
+    share, in_turn
+        See :func:`row_batches`.
     """
-    for rows in row_batches(data, num_rows, num_points, batch_size, first_batch, seed, workers):
+    own = row_batches(data, num_rows, num_points, batch_size, first_batch, seed, workers, None, share, in_turn)
+    for rows in own:
         yield to_batch(rows)
 
 
 def row_batches(
     data: DataOptions, num_rows: int, num_points: int = 1024, batch_size: int = 32, first_batch: int = 0,
-    seed: int = 0, workers: int = 1, more: MoreRows | None = None,
+    seed: int = 0, workers: int = 1, more: MoreRows | None = None, share: tuple[int, int] = (0, 1),
+    in_turn: InTurn = iter,
 ) -> Iterator[dict[str, Tensor]]:  # fmt: skip
-    """Batches as :func:`batches` makes them, as rows for :func:`artperl.data.truth.to_batch`, and more rows."""
+    """Batches as :func:`batches` makes them, as rows for :func:`artperl.data.truth.to_batch`, and more rows.
+
+    Of several processes that learn together, each makes every n-th batch of fresh clouds; ``in_turn`` lets all see all.
+    """
     spare = (data.stretched or data.degraded) and data.dataset is None
     made_points = _SPARE * num_points if spare else num_points
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
     samples = data.source(num_rows, made_points, seed, fresh)
     sensed = [data.source(num_rows, made_points, seed, fresh, sensor) for sensor in SENSORS] if data.noisy else []
-    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data, more)
+    rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data, more, share)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=ignore_interrupt
     )
     window: deque[dict[str, Tensor]] = deque(maxlen=_WINDOW)
-    for n, made in enumerate(loader, begin):
+    for n, made in enumerate(in_turn(iter(loader)), begin):
         window.append({name: values.clone() for name, values in made.items()})  # out of the workers' shared memory
         if n >= first_batch:
             yield _mixed(window, batch_size, np.random.default_rng([seed, n]))

@@ -24,6 +24,7 @@ from artperl.data.batches import ignore_interrupt
 from artperl.evaluation.metrics import true_poses
 from artperl.methods.full import Estimator
 from artperl.training.context import Report
+from artperl.training.ranks import ALONE, Ranks
 from artperl.training.steps import Stop, one_cycle, set_rate
 from artsim.common.progress import track
 from artsim.errors import DatasetError
@@ -68,11 +69,12 @@ class _Examined(Dataset[list[Records]]):
 
 def record(
     estimator: Estimator, samples: Callable[[int], Sample], views: int, file: Path, report: Report, stop: Stop,
-    workers: int, progress: bool,
+    workers: int, progress: bool, ranks: Ranks = ALONE,
 ) -> Records | None:  # fmt: skip
     """Records of the first so many samples, in single precision; those that the file holds are taken from it.
 
-    None when no estimate fits. Each of the workers, processes of one thread, estimates other samples; without any, or
+    None when no estimate fits. Several processes that learn together look at views in turn, and the first keeps the
+    records: the others get none. Each of the workers, processes of one thread, estimates other samples; without any, or
     on a GPU, this process does.
 
     Raises
@@ -80,23 +82,31 @@ def record(
     KeyboardInterrupt
         When a stop is asked for, and what there is has been written down.
     """
-    first, records = load_records(file) if file.exists() else (0, [])
+    first, records = load_records(file) if ranks.first and file.exists() else (0, [])
+    first = ranks.same(first)
     bar = track("boxes", total=views, initial=first, unit="view", smoothing=0.02, shown=progress)
     loader = DataLoader(
-        _Examined(estimator, samples), batch_size=None, sampler=range(first, views),
+        _Examined(estimator, samples), batch_size=None, sampler=range(first + ranks.rank, views, ranks.count),
         num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=ignore_interrupt,
     )  # fmt: skip
-    for n, made in enumerate(loader, first):
-        records += [each.map(torch.clone) for each in made]  # out of the workers' shared memory
+    for n, made in zip(range(first, views), ranks.in_turn(map(_own, loader)), strict=False):
         report("boxes", {"fits": float(len(made))}, n)
         bar.update()
-        if (n + 1) % _SAVE_VIEWS == 0 or n + 1 == views or stop.asked:
-            _save(records, n + 1, file)
+        stop.asked = ranks.add([stop.asked])[0] > 0
+        if ranks.first:
+            records += made
+            if (n + 1) % _SAVE_VIEWS == 0 or n + 1 == views or stop.asked:
+                _save(records, n + 1, file)
         if stop.asked:
             raise KeyboardInterrupt
     bar.close()
     every: Records | None = concatenate(records).to(torch.float32) if records else None
     return every
+
+
+def _own(made: list[Records]) -> list[Records]:
+    """Out of the workers' shared memory."""
+    return [each.map(torch.clone) for each in made]
 
 
 def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, progress: bool) -> Boxes:

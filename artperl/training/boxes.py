@@ -50,9 +50,12 @@ class BoxStage:
         learner = best_without_own_references(best, context)
         records = record(
             learner, _samples(context), options.box_views, context.folder.path / "boxes.safetensors",
-            context.report, context.stop, context.workers, context.progress,
+            context.report, context.stop, context.workers, context.progress, context.ranks,
         )  # fmt: skip
         learnt = None
+        if not context.ranks.first:  # the first process learns from what all have seen
+            state.done[self.name] = context.ranks.same(0)
+            return
         if records is not None:
             rows = best.perception.num_rows
             learnt = learn(records, rows, options.box_width, options.box_steps, options.seed, context.progress)
@@ -63,6 +66,7 @@ class BoxStage:
         else:
             _choose(context, best, learner, learnt.half().float())  # as precise as files are
         context.save()
+        context.ranks.same(state.done[self.name])
 
 
 def best_without_own_references(best: Estimator, context: Context) -> Estimator:

@@ -13,6 +13,7 @@ from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
+from artperl.training.ranks import Ranks
 from artperl.training.report import rounded
 from artperl.training.run_folder import RunFolder
 from artperl.training.state import RunState
@@ -50,6 +51,8 @@ class Context:
         See :func:`artperl.training.recipes.provenance`.
     report : Report
         Hears the figures of every step.
+    ranks : Ranks
+        The processes that learn this run together.
     stop : Stop
         Whether the run is to stop after the present step.
     """
@@ -65,6 +68,7 @@ class Context:
     progress: bool
     provenance: dict[str, Any]
     report: Report
+    ranks: Ranks = field(default_factory=Ranks)
     stop: Stop = field(default_factory=Stop)
 
     def estimator(self) -> Estimator | Stored:
@@ -91,8 +95,9 @@ class Context:
         return {**self.provenance, "options": asdict(self.options), "done": dict(self.state.done), **rounded(figures)}
 
     def save(self) -> None:
-        """Write where the run stands."""
-        self.state.save(self.folder, self.options)
+        """Write where the run stands; of several processes the first one does."""
+        if self.ranks.first:
+            self.state.save(self.folder, self.options)
 
     def stop_if_asked(self) -> None:
         """Write where the run stands and end it, if somebody has asked for that.

@@ -21,13 +21,38 @@ _JOINT_SHARP = 0.2
 """Huber loss of joints turns linear there."""
 
 
-def perception_losses(perceived: Perceived | Votes, truth: Truth) -> dict[str, Tensor]:
+def perception_losses(perceived: Perceived | Votes, truth: Truth, whole: Truth | None = None) -> dict[str, Tensor]:
     """Losses by name; their sum is minimised.
 
     Coordinates are scored by the likelihood of a Laplace distribution of the spread that the network itself expects, so
     that points whose place cannot be told (a lid seen edge-on) do not drown the others. Points that are not of the
     object have no place and no part: only that they are not counts.
+
+    Parameters
+    ----------
+    perceived : Perceived or Votes
+    truth : Truth
+    whole : Truth, optional
+        Of the batch that these clouds are some of: then the losses are their part of the batch's, and those of all
+        parts add up to it.
     """
+    losses = _losses(perceived, truth)
+    if whole is None:
+        return losses
+    share = {
+        "rows": len(truth) / len(whole),
+        "own": float(truth.own.sum() / whole.own.sum()),
+        "parts": float(truth.part_valid.sum() / whole.part_valid.sum()),
+    }
+    means = _MEANS | ({"boxes": "rows"} if isinstance(perceived, Votes) else {})
+    return {name: loss * share[means.get(name, "rows")] for name, loss in losses.items()}
+
+
+_MEANS = {"canonical": "own", "spread": "own", "part": "own", "boxes": "parts"}
+"""What losses are means over, those that are not over clouds."""
+
+
+def _losses(perceived: Perceived | Votes, truth: Truth) -> dict[str, Tensor]:
     distance = (
         functional.huber_loss(perceived.canonical, truth.canonical, reduction="none", delta=_SHARP).sum(-1) / _SHARP
     )

@@ -22,6 +22,7 @@ from artperl.perception.network import Perception
 from artperl.training.context import Context, Report
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
+from artperl.training.ranks import Ranks
 from artperl.training.recipes import Recipe, provenance
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
@@ -65,7 +66,11 @@ class Training:
         self.out, self._report = out, report
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         programme.check(objects)
-        device = _device(options.device)
+        ranks, device = Ranks.started(options.device)
+        if ranks.count > 1 and options.method != "full":
+            raise ConfigError(
+                f"the method {options.method} learns in one process", "torchrun", "start it without torchrun"
+            )
         torch.manual_seed(options.seed)
         networks = programme.networks(options, objects.num_rows)
         start = options.start_from
@@ -82,9 +87,9 @@ class Training:
         }
         self.context = Context(
             options, RunFolder(out), objects, RunState(networks, optimizers), parent, programme.estimator, device,
-            workers, progress, provenance(options, recipe), _no_report,
+            workers, progress and ranks.first, provenance(options, recipe), _no_report, ranks,
         )  # fmt: skip
-        if self.context.folder.begun:
+        if self.context.folder.begun and ranks.first:
             with self.context.folder.held():
                 self.context.state.load(self.context.folder, options)
 
@@ -99,10 +104,20 @@ class Training:
             When the folder cannot be written to, or the disk is full: the same call goes on from what was written.
         DatasetError
             When another process is training here.
+
+        Of several processes, the first one alone writes, tests, and has figures.
         """
         context = self.context
+        if not context.ranks.first:
+            context.ranks.same(None)  # the first one holds the folder, and what it holds is sound
+            context.state.load(context.folder, context.options)
+            with context.stop:
+                for stage in stages_of(context.options):
+                    stage.run(context)
+            return context.ranks.same({})
         with context.folder.held():
             context.state.load(context.folder, context.options)  # another process may have trained here meanwhile
+            context.ranks.same(None)
             with context.folder.curves() as board, context.stop:
 
                 def report(group: str, figures: dict[str, float], step: int) -> None:
@@ -113,7 +128,7 @@ class Training:
                 context.report = report
                 for stage in stages_of(context.options):
                     stage.run(context)
-            return test(context)
+            return context.ranks.same(test(context))
 
 
 def _no_report(group: str, figures: dict[str, float], step: int) -> None:
@@ -142,10 +157,3 @@ def _start_from(parent: Estimator | Stored, networks: dict[str, nn.Module], fold
         state = own.state_dict()
         fits = {key: t for key, t in their.state_dict().items() if alike or t.shape == state[key].shape}
         own.load_state_dict(fits, strict=alike)
-
-
-def _device(name: str) -> torch.device:
-    device = torch.device(name)
-    if device.type == "cuda" and not torch.cuda.is_available():
-        raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
-    return device

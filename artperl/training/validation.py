@@ -60,7 +60,17 @@ def step_taken(context: Context, stage: str, done: int, total: int, validate_eve
 
 
 def validate(context: Context) -> None:
-    """Score the estimator on unseen objects, keep it if it is the best so far, and write where the run stands."""
+    """Score the estimator on unseen objects, keep it if it is the best so far, and write where the run stands.
+
+    Of several processes the first one does, while the others wait.
+    """
+    state, ranks = context.state, context.ranks
+    if ranks.first:
+        _validate(context)
+    state.best, state.history = ranks.same((state.best, state.history))
+
+
+def _validate(context: Context) -> None:
     state, options = context.state, context.options
     estimator = context.estimator()
     assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves

@@ -1,0 +1,127 @@
+"""The processes that learn one run together: those that torchrun started, or this one alone.
+
+All hold the same networks, and see the same batches: each makes its share of the clouds for all, and learns from its
+share of the rows. Gradients are added up, so that a step is that of one process but for the order of sums.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any, TypeVar
+
+import torch
+from torch import distributed, nn
+
+from artsim.errors import ConfigError
+
+T = TypeVar("T")
+
+_PATIENCE = timedelta(hours=6)
+"""The others wait for as long while the first process validates, or learns boxes."""
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """This process among those of a run.
+
+    Attributes
+    ----------
+    rank, count : int
+        Its number, and how many there are. The first alone writes.
+    control : process group or None
+        For what is not gradients: records, clouds.
+    """
+
+    rank: int = 0
+    count: int = 1
+    control: Any = None
+
+    @staticmethod
+    def started(device: str) -> tuple[Ranks, torch.device]:
+        """The processes that torchrun started, and the device of this one; alone without torchrun.
+
+        Raises
+        ------
+        ConfigError
+            When the device is not there.
+        """
+        if device.startswith("cuda") and not torch.cuda.is_available():
+            raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
+        count = int(os.environ.get("WORLD_SIZE", "1"))
+        if count == 1 or "RANK" not in os.environ:
+            return Ranks(), torch.device(device)
+        own = torch.device(device)
+        if own.type == "cuda":
+            own = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
+            torch.cuda.set_device(own)
+        if not distributed.is_initialized():
+            distributed.init_process_group("nccl" if own.type == "cuda" else "gloo", timeout=_PATIENCE)
+        control = distributed.new_group(backend="gloo", timeout=_PATIENCE)
+        return Ranks(distributed.get_rank(), distributed.get_world_size(), control), own
+
+    @property
+    def first(self) -> bool:
+        """Whether this process writes."""
+        return self.rank == 0
+
+    def close(self) -> None:
+        """Leave the others, at the end."""
+        if self.count > 1 and distributed.is_initialized():
+            distributed.destroy_process_group()
+
+    def same(self, value: T, owner: int = 0) -> T:
+        """The value that one of the processes has."""
+        if self.count == 1:
+            return value
+        holder = [value]
+        distributed.broadcast_object_list(holder, src=owner, group=self.control)
+        return holder[0]
+
+    def every(self, value: T) -> list[T]:
+        """The values that the processes have, by their number."""
+        if self.count == 1:
+            return [value]
+        values: list[Any] = [None] * self.count
+        distributed.all_gather_object(values, value, group=self.control)
+        return values
+
+    def rows(self, total: int) -> slice:
+        """The rows of a batch that this process learns from."""
+        return slice(self.rank * total // self.count, (self.rank + 1) * total // self.count)
+
+    def in_turn(self, own: Iterator[T]) -> Iterator[T]:
+        """Items that the processes make in turn, each every ``count``-th, as all of them see them."""
+        if self.count == 1:
+            yield from own
+        else:
+            owner = 0
+            while True:
+                yield self.same(next(own) if owner == self.rank else None, owner)  # type: ignore[misc]
+                owner = (owner + 1) % self.count
+
+    def add_gradients(self, network: nn.Module) -> None:
+        """Let every process have the sum of all gradients."""
+        if self.count == 1:
+            return
+        parameters = [parameter for parameter in network.parameters() if parameter.requires_grad]
+        flat = torch.cat([
+            (torch.zeros_like(p) if p.grad is None else p.grad).flatten().float() for p in parameters
+        ])  # fmt: skip
+        distributed.all_reduce(flat)
+        for parameter, gradient in zip(parameters, flat.split([p.numel() for p in parameters]), strict=True):
+            parameter.grad = gradient.view_as(parameter).to(parameter.dtype)
+
+    def add(self, values: Sequence[float]) -> list[float]:
+        """Sums over all processes."""
+        if self.count == 1:
+            return list(values)
+        total = torch.tensor(values, dtype=torch.float64)
+        distributed.all_reduce(total, group=self.control)
+        return total.tolist()
+
+
+ALONE = Ranks()
+"""One process that learns by itself."""

@@ -1,0 +1,86 @@
+"""Several processes learn what one does, and one that dies costs the steps since the last checkpoint."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from artperl.training.ranks import Ranks
+from tests.conftest import ROOT
+
+pytestmark = pytest.mark.slow
+
+TINY = {
+    "base_objects": 3, "reference_points": 48, "width": 16, "perception_steps": 4, "dense_steps": 2, "batch_size": 6,
+    "num_points": 96, "box_views": 3, "box_steps": 2, "validate_every": 2, "test_objects": 2, "foreign_categories": 1,
+    "validation_views": 1, "test_views": 1, "stretched": 0.5, "mixed_precision": False,
+}  # fmt: skip
+"""Six clouds of unequal parts, so that halves of a batch weigh differently."""
+
+
+def learn(out: Path, processes: int, *more: str, **changes: object) -> subprocess.CompletedProcess[str]:
+    torchrun = ["-m", "torch.distributed.run", "--standalone", f"--nproc-per-node={processes}", "--max-restarts=1"]
+    script = [str(ROOT / "tests/artperl/training/one_of_several.py"), str(out), json.dumps({**TINY, **changes}), *more]
+    paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, *(torchrun if processes > 1 else []), *script]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What one process learns."""
+    out = tmp_path_factory.mktemp("alone") / "run"
+    done = learn(out, 1)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def same_run(one: Path, other: Path) -> None:
+    """The same weights and the same curve, but for the order of sums."""
+    weights, others = load_file(one / "state.safetensors"), load_file(other / "state.safetensors")
+    assert weights.keys() == others.keys()
+    for name, tensor in weights.items():
+        torch.testing.assert_close(tensor, others[name], rtol=1e-3, atol=2e-5, msg=lambda text, n=name: f"{n}: {text}")
+    states = [json.loads((folder / "state.json").read_text()) for folder in (one, other)]
+    assert states[0]["done"] == states[1]["done"]
+    scores = [[entry["score"] for entry in state["history"]] for state in states]
+    np.testing.assert_allclose(scores[0], scores[1], rtol=0.05)
+
+
+def test_two_processes_learn_what_one_does_and_a_dead_one_is_started_again(alone: Path, tmp_path: Path) -> None:
+    done = learn(tmp_path / "run", 2, "die")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "died").exists()
+    same_run(alone, tmp_path / "run")
+    assert json.loads((tmp_path / "1.json").read_text()) == json.loads((tmp_path / "0.json").read_text())
+    assert "laptop" in json.loads((tmp_path / "1.json").read_text())
+    assert not [path for path in (tmp_path / "run").glob(".*") if path.name != ".lock"]
+
+
+def test_a_run_goes_on_with_another_number_of_processes(alone: Path, tmp_path: Path) -> None:
+    """The plan of a run is its steps alone: here two processes end what one has begun."""
+    killed = learn(tmp_path / "run", 1, "die")
+    assert killed.returncode == -9
+    done = learn(tmp_path / "run", 2)
+    assert done.returncode == 0, done.stderr
+    same_run(alone, tmp_path / "run")
+
+
+def test_a_method_that_learns_in_one_process_says_so(tmp_path: Path) -> None:
+    done = learn(tmp_path / "run", 2, method="artperl", box_views=0)
+    assert done.returncode != 0
+    assert "the method artperl learns in one process" in done.stderr
+
+
+def test_rows_of_a_batch_are_shared_out_once() -> None:
+    rows = [list(range(7))[Ranks(rank, 3).rows(7)] for rank in range(3)]
+    assert rows == [[0, 1], [2, 3], [4, 5, 6]]
