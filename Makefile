@@ -5,7 +5,7 @@ PY := $(VENV)/bin/python
 # Two processes of one thread each: four threads on two cores wait for each other.
 PYTEST := OMP_NUM_THREADS=1 $(PY) -m pytest -n 2
 
-.PHONY: help demo check test lint bench audit weights assets system clean
+.PHONY: help demo check test lint bench audit weights gpu assets system clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*##/\1 /p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-8s %s\n' "$$name" "$$text"; done
@@ -52,6 +52,9 @@ weights: $(VENV)/.ready-dev  ## make the shipped estimators again, each from its
 	for recipe in $(RECIPES); do \
 		$(VENV)/bin/artperl train --recipe $$recipe $(if $(PRESET),--preset $(PRESET)) --workers 2 --threads 1 || exit; \
 	done
+
+gpu: $(VENV)/.ready-dev  ## on a machine with a GPU: tests marked gpu, speed; results in out/gpu
+	$(PY) -m benchmarks.gpu
 
 assets: $(VENV)/.ready-dev  ## make the objects in urdf_assets again
 	$(PY) urdf_assets/build.py

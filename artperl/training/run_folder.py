@@ -10,7 +10,9 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 import shlex
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,8 @@ from artsim.errors import DatasetError
 
 _FORMAT = 3
 _MAX_JSON = 64_000_000
+_PATIENCE = 60.0
+"""Seconds that a process that was started again waits for the workers of the one before; they look every five."""
 _SHOWN = 6
 """Differing options that are named."""
 
@@ -62,11 +66,24 @@ class RunFolder:
         DatasetError
             When another run is writing here.
         """
-        with folder_lock(self.path):
+        with contextlib.ExitStack() as stack:
+            self._lock(stack)
             for folder in (self.path, self.best):
                 for part in (*folder.glob(".*.part"), *folder.glob(".*.safetensors"), *folder.glob(".*.npz")):
                     part.unlink(missing_ok=True)
             yield
+
+    def _lock(self, stack: contextlib.ExitStack) -> None:
+        """Lock the folder. Workers of a killed process hold it until they notice, while torchrun starts it again."""
+        last = time.monotonic() + (_PATIENCE if os.environ.get("TORCHELASTIC_RESTART_COUNT", "0") != "0" else 0.0)
+        while True:
+            try:
+                stack.enter_context(folder_lock(self.path))
+                return
+            except DatasetError:
+                if time.monotonic() > last:
+                    raise
+                time.sleep(0.5)
 
     def write(self, state: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> str:
         """Write down where the run stands.
