@@ -13,6 +13,8 @@ Mask = NDArray[np.bool_]
 
 _MAX_CORNERS = 100_000
 """Of the polygons of a mask."""
+_MAX_LETTERS = 400_000
+"""Of compressed run lengths, which Python reads a million of in a second: twenty times those of a ragged mask."""
 _OUTSIDE = 2.0
 """Pixels that a corner may lie outside the image: detectors round."""
 
@@ -51,6 +53,8 @@ def _size(size: object) -> str:
 
 def _uncompress(text: str) -> list[int]:
     """Run lengths of COCO's letters; inverse of :func:`artsim.formats.coco.run_lengths`."""
+    if len(text) > _MAX_LETTERS:
+        raise ValueError(f"its run lengths have {len(text):,} letters, over the limit of {_MAX_LETTERS:,}")
     runs: list[int] = []
     value = shift = 0
     for letter in text.encode("ascii", "replace"):

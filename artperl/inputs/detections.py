@@ -16,7 +16,7 @@ from artsim.errors import ConfigError
 
 ALIASES = {"scissor": "scissors"}
 """Names of categories in other people's files -> ours."""
-_MAX_DETECTIONS = 1_000_000
+_MAX_DETECTIONS = 200_000
 _OUTSIDE = 2.0
 """Pixels that a box may reach outside the image: detectors round."""
 _NAMED = 8

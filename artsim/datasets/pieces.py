@@ -248,8 +248,19 @@ def _take_up(run: Run, document: Mapping[str, Any]) -> None:
 
 
 def _differing(found: Mapping[str, Any], run: Run) -> list[str]:
-    wanted = json.loads(orjson.dumps(run.recipe))
-    return [name for name, value in wanted.items() if found.get(name) != value]
+    """Names of what differs, such as 'scene.count'."""
+    return _differences(json.loads(orjson.dumps(run.recipe)), found, "")
+
+
+def _differences(wanted: Mapping[str, Any], found: Mapping[str, Any], prefix: str) -> list[str]:
+    names: list[str] = []
+    for name, value in wanted.items():
+        there = found.get(name)
+        if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
+            names += _differences(value, there, f"{prefix}{name}.")
+        elif there != value:
+            names.append(prefix + name)
+    return names
 
 
 def _refuse_other(run: Run, found: object) -> None:

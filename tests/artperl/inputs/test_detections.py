@@ -96,6 +96,7 @@ FAULTS: list[tuple[dict[str, object], str]] = [
     ({"segmentation": {"size": [30, 40], "counts": [5, 5]}}, "cover 10 pixels of 1200"),
     ({"segmentation": {"size": [30, 40], "counts": [1200]}}, "mask is empty"),
     ({"segmentation": {"size": [30, 40], "counts": "~~~"}}, "damaged"),
+    ({"segmentation": {"size": [30, 40], "counts": "0" * 500_000}}, "over the limit"),
     ({"segmentation": [[1, 2, 3]]}, "pairs x, y"),
     ({"segmentation": [[1, 2, 300, 4, 5, 6]]}, "outside the image"),
     ({"segmentation": "mask.png"}, "neither run lengths nor polygons"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +21,12 @@ from tests.artsim.formats.conftest import contents
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_workers")]
 
+OTHERS: dict[str, Any] = {"views": 2, "renderer": "raycast", "num_points": 64, "noise": "d435", "misses": True}
 RUN = SceneRun(
     SceneOptions(("stapler", "drawer"), count=(1, 2), diagonal=(0.18, 0.38), crowded=True, distractors=1),
-    SceneCameraOptions(width=160, height=90), views=2, renderer="raycast", num_points=64, noise="d435", misses=True,
-)  # fmt: skip
+    SceneCameraOptions(width=160, height=90),
+    **OTHERS,
+)
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +94,9 @@ def test_damage_is_mended_and_a_stopped_run_goes_on(made: Path, tmp_path: Path) 
 def test_other_options_are_refused_by_name(made: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="different: seed"):
         generate_scenes(RUN, made, 3, seed=1, workers=1, progress=False)
+    closer = SceneRun(RUN.scene, SceneCameraOptions(width=160, height=90, fill=(0.9, 0.95)), **OTHERS)
+    with pytest.raises(DatasetError, match=r"different: camera\.fill\)"):
+        generate_scenes(closer, made, 3, workers=1, progress=False)
     with pytest.raises(DatasetError, match="different: scenes"):
         generate_scenes(RUN, made, 2, workers=1, progress=False)
     with pytest.raises(ConfigError, match="scenes"):
