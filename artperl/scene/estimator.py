@@ -16,6 +16,7 @@ from artperl.estimator import WEIGHTS, load_estimator
 from artperl.inputs.depth_images import points_of_depth
 from artperl.inputs.detections import Detection
 from artperl.methods.protocol import Method
+from artperl.scene.denoise import denoise
 from artsim.errors import ArtsimError, ConfigError
 
 _MOST_POINTS = 8192
@@ -136,7 +137,8 @@ class SceneEstimator:
             )  # fmt: skip
         estimator = self._estimator(category)
         try:
-            points = points_of_depth(depth, K, detection.mask)
+            mask = detection.mask
+            points = points_of_depth(denoise(depth, mask), K, mask)
             if len(points) > _MOST_POINTS:
                 points = points[np.sort(np.random.default_rng(0).permutation(len(points))[:_MOST_POINTS])]
             begun = time.perf_counter()
