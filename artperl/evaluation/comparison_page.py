@@ -181,6 +181,7 @@ body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1.5em auto; max-width: 72e
 table {{ border-collapse: collapse; margin: 0.4em 0 1.2em; display: block; overflow-x: auto; }}
 th, td {{ border-bottom: 1px solid #ddd; padding: 0.25em 0.8em 0.25em 0; text-align: right; white-space: nowrap; }}
 th:first-child, td:first-child {{ text-align: left; }}
+li {{ margin-left: 1.2em; overflow-wrap: anywhere; }}
 h3 {{ margin: 1em 0 0.2em; font-size: 1em; }}
 img {{ max-width: 100%; }} iframe {{ width: 100%; height: 44em; border: 1px solid #ddd; }}
 </style></head><body>

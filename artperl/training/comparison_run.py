@@ -266,6 +266,7 @@ def notes(options: ComparisonOptions) -> list[str]:
         f"Trainings have the preset {options.preset}{train}.",
         "Objects and views are made here. Published figures are of other images, in columns of their own.",
         "Brackets have the 95 % interval of the mean, by a bootstrap over objects.",
+        *(["These trainings are far too short: no figure of them says anything of a method."] if options.train else []),
         "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",
     ]
     if options.benchmark == "artimage":
