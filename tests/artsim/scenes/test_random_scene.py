@@ -284,6 +284,6 @@ def test_the_command_writes_every_view(tmp_path: Path) -> None:
                "--distractors", "1"]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["000002_0", "000002_1"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".lock", "000002_0", "000002_1", "scenes.json"]
     assert Image.open(tmp_path / "000002_1" / "overview.png").size == (192, 128)
     assert "stapler" in done.stdout
