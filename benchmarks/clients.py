@@ -116,6 +116,53 @@ def _loads_back(name: str, material: Material) -> str:
     return f"{len(obj)} parts come back equal"
 
 
+def _joint_file(material: Material) -> str:
+    """A GLB by trimesh, with the joints that PartNet-Mobility would write beside it."""
+    import trimesh
+
+    obj = artsim.make("storage_furniture", 3)
+    T_mesh_rest = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])  # Y up, front to +Z
+    scene = trimesh.Scene()
+    rows: list[dict[str, Any]] = []
+    for k, (part, joint) in enumerate(zip(obj.parts, obj.tree.joints, strict=True)):
+        mesh = trimesh.Trimesh(part.vertices @ T_mesh_rest.T, part.faces, process=False)
+        scene.add_geometry(mesh, node_name=f"{k}_0", geom_name=f"{k}_0")
+        row: dict[str, Any] = {
+            "id": k,
+            "parent": joint.parent,
+            "joint": "slider" if k else "static",
+            "name": part.label,
+        }
+        axis = {"origin": (T_mesh_rest @ joint.origin).tolist(), "direction": (T_mesh_rest @ joint.axis).tolist()}
+        limit = {"a": joint.lower, "b": joint.upper, "noLimit": False}
+        row |= {"parts": [{"id": k, "name": part.label}], "jointData": {"axis": axis, "limit": limit} if k else {}}
+        rows.append(row)
+    folder = material.folder / "glb"
+    folder.mkdir()
+    (folder / "model.glb").write_bytes(scene.export(file_type="glb"))
+    (folder / "mobility_v3.json").write_text(json.dumps({"partnet": [], "mobility": rows}))
+    loaded = artsim.load(folder / "model.glb")
+    np.testing.assert_allclose(loaded.tree.axes, obj.tree.axes, atol=1e-6)
+    np.testing.assert_allclose(loaded.tree.limits, obj.tree.limits, atol=1e-6)
+    np.testing.assert_allclose(loaded.box_size, obj.box_size, atol=1e-6)
+    return f"{len(loaded)} parts of a GLB and its mobility_v3.json come back equal"
+
+
+def _pieces(material: Material) -> str:
+    """A loaded laptop as MJCF, cut into convex pieces."""
+    import mujoco
+
+    from artsim.export import prepare
+
+    export(artsim.make("laptop", 0), material.folder / "laptop")
+    obj = prepare(artsim.load(material.folder / "laptop"), progress=False)
+    export(obj, material.folder / "pieces", ["mjcf"])
+    model = mujoco.MjModel.from_xml_path(str(material.folder / "pieces" / FORMATS["mjcf"]))
+    count = int((model.geom_contype > 0).sum())
+    assert count >= len(obj)
+    return f"{count} convex pieces of {len(obj)} parts"
+
+
 def _gymnasium(material: Material) -> str:
     import gymnasium
     from gymnasium.utils.env_checker import check_env
@@ -241,6 +288,8 @@ CLIENTS: tuple[Client, ...] = (
     ("OBJ and MTL", "trimesh", _trimesh),
     ("MJCF, read back", "mujoco", lambda m: _loads_back("mjcf", m)),
     ("USD, read back", "usd-core", lambda m: _loads_back("usd", m)),
+    ("GLB with joints, read", "trimesh", _joint_file),
+    ("MJCF of a loaded object", "coacd", _pieces),
     ("artsim/Articulated-v0", "gymnasium", _gymnasium),
     ("ArtSimArticulated-v1", "mani_skill", _maniskill),
     ("streams", "torch", _torch),

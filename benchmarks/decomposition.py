@@ -137,7 +137,7 @@ def _report(rows: Sequence[dict[str, Any]]) -> list[str]:
                 f"{100 * total['sweep_passed']:.0f} %",
             )
         )  # fmt: skip
-    return table(lines, left=1)
+    return table(lines, left=1, most=len(lines))
 
 
 # --- boxes in drawers ---

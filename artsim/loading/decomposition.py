@@ -35,6 +35,8 @@ _SEARCH = {"resolution": 500, "mcts_nodes": 10, "mcts_iterations": 10, "mcts_max
 third fewer pieces of the same concavity."""
 _FINER = (1.0, 0.5, 0.25)
 """Factors on the concavity that are tried, until the volume of a closed surface is held."""
+_OF_SIZE = 0.08
+"""Concavity of a closed surface at most, over its longest side."""
 VOLUME = 0.05
 """Share of the volume that a surface encloses, by which pieces may miss it."""
 _MAX_FILE = 1 << 26
@@ -105,10 +107,12 @@ def convex_pieces(
     for own in connected_surfaces(vertices, faces):
         used, index = np.unique(faces[own], return_inverse=True)
         corners, triangles = vertices[used], index.reshape(-1, 3).astype(np.int32)
-        if hollow(corners, triangles) <= options.concavity:
-            pieces.append(convex_hull(corners, THIN))
+        hull, volume = convex_hull(corners, THIN), closed_volume(corners, triangles)
+        holds = volume is None or union_volume([hull]) <= (1.0 + VOLUME) * volume
+        if holds and hollow(corners, triangles) <= options.concavity:
+            pieces.append(hull)
         else:
-            pieces += _cut(corners, triangles, options)
+            pieces += _cut(corners, triangles, volume, options)
     return tuple(pieces)
 
 
@@ -144,15 +148,18 @@ def hollow(vertices: Array, faces: NDArray[np.int32]) -> float:
     return float(distance.max())
 
 
-def _cut(vertices: Array, faces: NDArray[np.int32], options: DecompositionOptions) -> Sequence[Mesh]:
+def _cut(
+    vertices: Array, faces: NDArray[np.int32], volume: float | None, options: DecompositionOptions
+) -> Sequence[Mesh]:
     """Convex pieces by CoACD, out of the cache where they are known."""
     recipe = repr((sorted(_SEARCH.items()), "real metric", options.concavity, options.most_pieces, _version()))
+    recipe += "" if volume is None else repr((_FINER, _OF_SIZE, VOLUME))
     digest = hashlib.sha256(recipe.encode() + vertices.tobytes() + faces.tobytes()).hexdigest()
     file = _cache(options) / f"{digest}.npz"
     known = _read(file)
     if known is not None:
         return known
-    pieces = _searched(vertices, faces, options)
+    pieces = _searched(vertices, faces, volume, options)
     buffer = io.BytesIO()
     arrays: dict[str, Any] = {
         f"{kind}{i}": array for i, piece in enumerate(pieces) for kind, array in zip("vf", piece, strict=True)
@@ -163,15 +170,17 @@ def _cut(vertices: Array, faces: NDArray[np.int32], options: DecompositionOption
     return pieces
 
 
-def _searched(vertices: Array, faces: NDArray[np.int32], options: DecompositionOptions) -> list[Mesh]:
-    """Convex pieces that hold the volume of a closed surface; of thin walls, that takes a finer concavity."""
-    volume = closed_volume(vertices, faces)
+def _searched(
+    vertices: Array, faces: NDArray[np.int32], volume: float | None, options: DecompositionOptions
+) -> list[Mesh]:
+    """Convex pieces that hold the volume of a closed surface: of what is small or thin, by a finer concavity."""
+    if volume is None:
+        return _run_coacd(vertices, faces, options.concavity, options.most_pieces)
+    start = min(options.concavity, _OF_SIZE * float(np.ptp(vertices, axis=0).max()))
     best: list[Mesh] = []
     least = np.inf
-    for finer in _FINER if volume is not None else _FINER[:1]:
-        pieces = _run_coacd(vertices, faces, finer * options.concavity, options.most_pieces)
-        if volume is None:
-            return pieces
+    for finer in _FINER:
+        pieces = _run_coacd(vertices, faces, finer * start, options.most_pieces)
         error = abs(union_volume(pieces) / volume - 1.0)
         if error < least:
             best, least = pieces, error
