@@ -30,6 +30,8 @@ bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 	$(PY) -m benchmarks.agreement
 	$(PY) -m benchmarks.renderers
 	$(PY) -m benchmarks.generation
+	$(PY) -m benchmarks.growth
+	$(PY) -m benchmarks.peers
 	$(PY) -m benchmarks.resume
 	$(PY) -m benchmarks.objects
 	$(PY) -m benchmarks.simulators

@@ -18,7 +18,7 @@ VIEWS = 4
 
 def clouds(folder: Path, noise: str) -> Callable[[], Work]:
     """Clouds with all ground truth of 20 real and 20 procedural objects; of 40 procedural ones without real ones."""
-    return _samples(_objects(40), noise=noise)
+    return _samples(benchmark_objects(40), noise=noise)
 
 
 def many_parts(folder: Path, parts: int) -> Callable[[], Work]:
@@ -28,7 +28,7 @@ def many_parts(folder: Path, parts: int) -> Callable[[], Work]:
 
 def images(folder: Path) -> Callable[[], Work]:
     """Samples with images of 10 objects."""
-    return _samples(_objects(10), images=("depth", "part_mask"))
+    return _samples(benchmark_objects(10), images=("depth", "part_mask"))
 
 
 def _samples(objects: Sequence[Any], **options: Any) -> Callable[[], Work]:
@@ -61,7 +61,7 @@ def digest_of(samples: Sequence[Any]) -> str:
     return digest.hexdigest()
 
 
-def _objects(count: int) -> list[Any]:
+def benchmark_objects(count: int) -> list[Any]:
     """The first half real where there are any, the others of as many families."""
     import artsim
 
