@@ -66,6 +66,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "evaluate": [("laptop", "train"), ("--benchmark artimage", "train")],
         "estimate": [("cloud.npy", "train"), ("--help", "")],
         "calibrate": [("laptop", "train"), ("--help", "")],
+        "detections": [("--help", "")],
     },
 }
 """Command lines of every verb, and the extra that each wants."""
