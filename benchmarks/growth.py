@@ -151,7 +151,7 @@ class Options:
     def __post_init__(self) -> None:
         unknown = set(self.only) - GROWTHS.keys()
         if unknown:
-            raise ConfigError(f"no growth is called {min(unknown)!r}", "only", f"use of {', '.join(GROWTHS)}")
+            raise ConfigError(f"no growth is called {min(unknown)!r}", "only", f"use some of {', '.join(GROWTHS)}")
         if self.repeats < 1:
             raise ConfigError(f"{self.repeats} readings measure nothing", "repeats", "use 1 or more")
 
