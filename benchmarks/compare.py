@@ -47,7 +47,9 @@ class Options:
         if self.rounds < 1:
             raise ConfigError(f"{self.rounds} rounds measure nothing", "rounds", "use 1 or more")
         if not self.measures:
-            raise ConfigError(f"no measure is called {' or '.join(self.only)}", "only", f"use some of {', '.join(MEASURES)}")
+            raise ConfigError(
+                f"no measure is called {' or '.join(self.only)}", "only", f"use some of {', '.join(MEASURES)}"
+            )
 
     @property
     def measures(self) -> list[str]:
