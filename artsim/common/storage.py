@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import os
 import random
+import re
 import secrets
 import shutil
 import time
@@ -78,7 +79,11 @@ def storage_of(place: Place) -> Storage:
         if place.startswith("file://"):
             return FolderStorage(Path(place.removeprefix("file://")))
         return UrlStorage(place) if is_url(place) else FolderStorage(Path(place))
-    return FolderStorage(place) if isinstance(place, Path) else place
+    if isinstance(place, Path):
+        if re.match(r"[a-z0-9]{2,}:/[^/]", str(place)):  # of two slashes, a path keeps one
+            raise ConfigError("this wants a folder, not a URL", place, "copy the dataset to a disk")
+        return FolderStorage(place)
+    return place
 
 
 class FolderStorage:
@@ -234,6 +239,8 @@ class UrlStorage:
                 reason = error
             except Exception as error:  # what botocore and other clients raise is of no common family
                 reason = error
+                if "Credentials" in type(error).__name__:  # botocore's; no later attempt finds any
+                    break
             if attempt + 1 < _ATTEMPTS:
                 pause = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0**attempt)
                 time.sleep(pause * random.uniform(0.5, 1.0))
