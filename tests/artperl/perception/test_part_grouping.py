@@ -12,7 +12,7 @@ from artperl.core.clouds import Clouds
 from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.evaluation.samples import frozen_samples
 from artperl.perception.network import Votes
-from artperl.perception.part_grouping import clusters, differences, group_votes
+from artperl.perception.part_grouping import _backed, clusters, differences, group_votes
 from artsim.observing.sample import Sample
 from tests.artperl.worlds import true_votes
 
@@ -97,3 +97,8 @@ def test_there_is_a_root_even_if_no_point_says_so() -> None:
     found = group_votes(Votes(**{**vars(votes), "level_logits": no_root}))
     assert bool(found.valid[0, 0])
     assert bool((found.joint[0, 0] == 0).all())
+
+
+def test_votes_that_back_each_other_are_those_with_small_differences() -> None:
+    box = np.random.default_rng(0).random((60, 6)) * 0.3
+    np.testing.assert_array_equal(_backed(box), differences(box[:, None], box[None]) < 0.6)
