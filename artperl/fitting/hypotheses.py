@@ -62,8 +62,9 @@ class Context:
     @cached_property
     def start(self) -> tuple[Shapes, Theta]:
         """The references with the perceived boxes, and the states that bring them nearest to the points."""
-        shapes = self.references.shapes
-        return initial_pose.start(self.clouds, self.perceived, shapes, len(shapes))
+        shapes, few = self.references.shapes, slice(self.options.fit_points)
+        clouds = replace(self.clouds, points=self.clouds.points[:, few])
+        return initial_pose.start(clouds, self.perceived.of_points(few), shapes, len(shapes))
 
     @cached_property
     def observed(self) -> Observed:

@@ -53,8 +53,8 @@ class Perceived(Batch):
         last = self.valid_logits.cumsum(1).argmax(1, keepdim=True)
         return torch.arange(self.valid_logits.shape[1], device=last.device) <= last
 
-    def of_points(self, chosen: Tensor) -> Perceived:
-        """Of those points alone that are chosen (N,) bool."""
+    def of_points(self, chosen: Tensor | slice) -> Perceived:
+        """Of those points alone that are chosen: (N,) bool, or a slice."""
         return _of_points(self, chosen, ("part_logits", "canonical", "spread", "own_logits"))
 
     @property
@@ -105,7 +105,7 @@ class Votes(Batch):
 Seen = TypeVar("Seen", Perceived, Votes)
 
 
-def _of_points(seen: Seen, chosen: Tensor, names: tuple[str, ...]) -> Seen:
+def _of_points(seen: Seen, chosen: Tensor | slice, names: tuple[str, ...]) -> Seen:
     return replace(seen, **{name: getattr(seen, name)[:, chosen] for name in names})
 
 
