@@ -59,6 +59,8 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         ],
         "families": [("globe", "")],
         "vary": [("box.urdf --count 1 --out varied", "sim")],
+        "export": [("box.urdf --out exported", "sim"), ("--help", "")],
+        "merge": [("--help", "")],
         "doctor": [("warp", "")],
     },
     "artperl": {
@@ -67,6 +69,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "estimate": [("cloud.npy", "train"), ("--help", "")],
         "calibrate": [("laptop", "train"), ("--help", "")],
         "detections": [("--help", "")],
+        "report": [("--help", "")],
     },
 }
 """Command lines of every verb, and the extra that each wants."""
