@@ -50,8 +50,7 @@ class Ranks:
         """
         if device.startswith("cuda") and not torch.cuda.is_available():
             raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
-        count = int(os.environ.get("WORLD_SIZE", "1"))
-        if count == 1 or "RANK" not in os.environ:
+        if not several_started():
             return Ranks(), torch.device(device)
         own = torch.device(device)
         if own.type == "cuda":
@@ -121,6 +120,11 @@ class Ranks:
         total = torch.tensor(values, dtype=torch.float64)
         distributed.all_reduce(total, group=self.control)
         return total.tolist()
+
+
+def several_started() -> bool:
+    """Whether torchrun has started this process beside others."""
+    return os.environ.get("WORLD_SIZE", "1") != "1" and "RANK" in os.environ
 
 
 ALONE = Ranks()

@@ -22,7 +22,7 @@ from artperl.perception.network import Perception
 from artperl.training.context import Context, Report
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
-from artperl.training.ranks import Ranks
+from artperl.training.ranks import Ranks, several_started
 from artperl.training.recipes import Recipe, provenance
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
@@ -66,11 +66,11 @@ class Training:
         self.out, self._report = out, report
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         programme.check(objects)
-        ranks, device = Ranks.started(options.device)
-        if ranks.count > 1 and options.method != "full":
+        if options.method != "full" and several_started():
             raise ConfigError(
                 f"the method {options.method} learns in one process", "torchrun", "start it without torchrun"
             )
+        ranks, device = Ranks.started(options.device)
         torch.manual_seed(options.seed)
         networks = programme.networks(options, objects.num_rows)
         start = options.start_from

@@ -1,4 +1,7 @@
-"""A process that torchrun starts: ``one_of_several.py OUT OPTIONS [die]``; see ``test_ranks.py``."""
+"""A process that torchrun starts: ``one_of_several.py OUT OPTIONS [die]``; see ``test_ranks.py``.
+
+It dies once with each number of processes.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ if __name__ == "__main__":
 
     def die(group: str, figures: dict[str, float], step: int) -> None:
         """Once, as a process that a machine's owner kills, after the step that follows the first validation."""
-        died = out.parent / "died"
+        died = out.parent / f"died_of_{os.environ.get('WORLD_SIZE', '1')}"
         if sys.argv[3:] and group == "perception" and step == 2 and not died.exists():
             died.write_text(rank)
             os.kill(os.getpid(), signal.SIGKILL)

@@ -13,7 +13,10 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
+from artperl.training.options import PAPER_PRESETS
 from artperl.training.ranks import Ranks
+from artperl.training.run import Training
+from artsim.errors import ConfigError
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.slow
@@ -56,29 +59,24 @@ def same_run(one: Path, other: Path) -> None:
     np.testing.assert_allclose(scores[0], scores[1], rtol=0.05)
 
 
-def test_two_processes_learn_what_one_does_and_a_dead_one_is_started_again(alone: Path, tmp_path: Path) -> None:
+def test_two_processes_end_what_one_has_begun_though_one_of_them_dies(alone: Path, tmp_path: Path) -> None:
+    """What is learnt follows from the number of a step, not from who takes it; a checkpoint is all that is needed."""
+    assert learn(tmp_path / "run", 1, "die").returncode == -9
+    assert json.loads((tmp_path / "run" / "state.json").read_text())["done"] == {"perception": 2}
     done = learn(tmp_path / "run", 2, "die")
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "died").exists()
+    assert (tmp_path / "died_of_2").exists()
     same_run(alone, tmp_path / "run")
     assert json.loads((tmp_path / "1.json").read_text()) == json.loads((tmp_path / "0.json").read_text())
     assert "laptop" in json.loads((tmp_path / "1.json").read_text())
     assert not [path for path in (tmp_path / "run").glob(".*") if path.name != ".lock"]
 
 
-def test_a_run_goes_on_with_another_number_of_processes(alone: Path, tmp_path: Path) -> None:
-    """The plan of a run is its steps alone: here two processes end what one has begun."""
-    killed = learn(tmp_path / "run", 1, "die")
-    assert killed.returncode == -9
-    done = learn(tmp_path / "run", 2)
-    assert done.returncode == 0, done.stderr
-    same_run(alone, tmp_path / "run")
-
-
-def test_a_method_that_learns_in_one_process_says_so(tmp_path: Path) -> None:
-    done = learn(tmp_path / "run", 2, method="artperl", box_views=0)
-    assert done.returncode != 0
-    assert "the method artperl learns in one process" in done.stderr
+def test_a_method_that_learns_in_one_process_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WORLD_SIZE", "2")
+    monkeypatch.setenv("RANK", "0")
+    with pytest.raises(ConfigError, match="the method artperl learns in one process"):
+        Training(PAPER_PRESETS["quick"], tmp_path, progress=False)
 
 
 def test_rows_of_a_batch_are_shared_out_once() -> None:
