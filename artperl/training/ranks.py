@@ -57,7 +57,7 @@ class Ranks:
             own = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
             torch.cuda.set_device(own)
         if not distributed.is_initialized():
-            distributed.init_process_group("nccl" if own.type == "cuda" else "gloo", timeout=_PATIENCE)
+            _join("nccl" if own.type == "cuda" else "gloo")
         control = distributed.new_group(backend="gloo", timeout=_PATIENCE)
         return Ranks(distributed.get_rank(), distributed.get_world_size(), control), own
 
@@ -120,6 +120,18 @@ class Ranks:
         total = torch.tensor(values, dtype=torch.float64)
         distributed.all_reduce(total, group=self.control)
         return total.tolist()
+
+
+def _join(backend: str) -> None:
+    """Meet the other processes.
+
+    torchrun may keep its store when it starts processes again. The addresses of those that died are still in it, so
+    that each start has keys of its own.
+    """
+    store, rank, count = next(distributed.rendezvous("env://", timeout=_PATIENCE))  # type: ignore[attr-defined]
+    start = os.environ.get("TORCHELASTIC_RESTART_COUNT", "0")
+    own = distributed.PrefixStore(f"start {start}", store)  # type: ignore[attr-defined]
+    distributed.init_process_group(backend, store=own, rank=rank, world_size=count, timeout=_PATIENCE)
 
 
 def several_started() -> bool:
