@@ -25,7 +25,7 @@ _DAY = 86_400.0
 
 
 @dataclass(frozen=True)
-class Fleet:
+class Options:
     """What is simulated."""
 
     samples: int = 1_000_000_000
@@ -101,7 +101,7 @@ def measured(samples: int = 2_000) -> tuple[float, float]:
         return (time.process_time() - start) / len(shard), size / len(shard)
 
 
-def simulate(fleet: Fleet) -> Outcome:
+def simulate(fleet: Options) -> Outcome:
     """Run the events until every shard is there."""
     rng = np.random.default_rng(fleet.seed)
     shards = -(-fleet.samples // fleet.shard_size)
@@ -159,7 +159,7 @@ def simulate(fleet: Fleet) -> Outcome:
     )  # fmt: skip
 
 
-def main(fleet: Fleet) -> None:
+def main(fleet: Options) -> None:
     """Measure, simulate every way, and print a table."""
     if not (fleet.sample_seconds and fleet.sample_bytes):
         seconds, size = measured()
@@ -196,4 +196,4 @@ def main(fleet: Fleet) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Fleet, description=__doc__))
+    main(tyro.cli(Options, description=__doc__))

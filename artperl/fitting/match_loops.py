@@ -381,8 +381,8 @@ def misfits(
         if few > 0:
             _match_outline(shape, view, points, few, outline_weight, rows)
             own += _robust_sum(rows, N, R, width)
-        total[b] = own
         if own < worst:
+            total[b] = own
             at = keep - 1
             while at > 0 and least[at - 1] > own:
                 least[at] = least[at - 1]

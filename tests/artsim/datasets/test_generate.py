@@ -358,7 +358,7 @@ def test_options_that_make_no_sense_are_refused_at_once(
 def test_folders_are_searched_for_objects(sources: list[Source], tmp_path: Path) -> None:
     assert [s.name for s in sources] == [f"objects/laptop_{i}/mobility.urdf" for i in range(3)]
     (tmp_path / "empty").mkdir()
-    with pytest.raises(AssetError, match="no URDF, MJCF or USD file below this folder"):
+    with pytest.raises(AssetError, match="no URDF, MJCF, USD or joint file below this folder"):
         find_sources([tmp_path / "empty"])
     with pytest.raises(AssetError, match="no such file"):
         find_sources([tmp_path / "nowhere"])
