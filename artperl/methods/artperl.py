@@ -7,13 +7,12 @@ constraints (4.4). The 9D poses of the parts follow from the joint states (4.1).
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
-from torch import nn
 
 from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
@@ -25,17 +24,10 @@ from artperl.core.estimate import Estimate, estimate_of_fit
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.paper_energy import refine_by_gradient
+from artperl.methods.retrieved import AgentMethod
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import Cloud
-from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.part_names import part_names
-from artperl.retrieval.segmented import SegmentedRetrieval, check_embeddings
-from artperl.retrieval.shape_base import ShapeBase
-from artperl.retrieval.siamese import Siamese
-from artsim.common.json_records import from_json_values
-from artsim.model.objects import MAX_PARTS
-
-_MAX_WIDTH = 2048
 
 
 @dataclass(frozen=True)
@@ -56,56 +48,13 @@ class ArtPERLOptions:
     """The decision process of the agent."""
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Sizes of the networks.
-
-    ``num_rows`` is K, the most parts; the others are the channels of the first layers.
-    """
-
-    num_rows: int
-    segmentation: int = 48
-    siamese: int = 24
-    policy: int = 64
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.num_rows <= MAX_PARTS:
-            raise ValueError(f"num_rows is {self.num_rows}, not 1 to {MAX_PARTS}")
-        if not all(1 <= width <= _MAX_WIDTH for width in (self.segmentation, self.siamese, self.policy)):
-            raise ValueError(f"widths are not within 1 to {_MAX_WIDTH}")
-
-
-def networks_of(sizes: Sizes) -> dict[str, nn.Module]:
-    """New networks of these sizes, by name."""
-    return {
-        "segmentation": Segmentation(sizes.num_rows, sizes.segmentation),
-        "siamese": Siamese(sizes.num_rows, sizes.siamese),
-        "policy": Policy(sizes.policy),
-    }
-
-
-class ArtPERL(SegmentedRetrieval):
-    """The paper's method.
-
-    Parameters
-    ----------
-    segmentation : Segmentation
-    siamese : Siamese
-    policy : Policy
-    base : ShapeBase
-        References with their embeddings by ``siamese``.
-    options : ArtPERLOptions, optional
-    """
+class ArtPERL(AgentMethod):
+    """The paper's method; parameters as of :class:`artperl.methods.retrieved.AgentMethod`."""
 
     name: ClassVar[str] = "artperl"
-
-    def __init__(
-        self, segmentation: Segmentation, siamese: Siamese, policy: Policy, base: ShapeBase,
-        options: ArtPERLOptions | None = None,
-    ):  # fmt: skip
-        super().__init__(segmentation, siamese, base)
-        self.policy = policy.eval()
-        self.options = options or ArtPERLOptions()
+    policy_type, options_type = Policy, ArtPERLOptions
+    policy: Policy
+    options: ArtPERLOptions
 
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.
@@ -150,29 +99,6 @@ class ArtPERL(SegmentedRetrieval):
             fitting.step(expected_action(self.policy(fitting.view())[0]))
             path.append(fitting.theta)
         return path
-
-    def networks(self) -> dict[str, nn.Module]:
-        """The three networks."""
-        return {"segmentation": self.segmentation, "siamese": self.siamese, "policy": self.policy}
-
-    def settings(self) -> dict[str, Any]:
-        """Sizes and options, in JSON's terms."""
-        sizes = Sizes(self.segmentation.num_rows, self.segmentation.width, self.siamese.width, self.policy.width)
-        return {"sizes": asdict(sizes), "options": asdict(self.options)}
-
-    @classmethod
-    def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> ArtPERL:
-        """The method with these settings, its networks untrained."""
-        sizes = from_json_values(Sizes, settings.get("sizes"))
-        options = from_json_values(ArtPERLOptions, settings.get("options"))
-        own: dict[str, Any] = networks_of(sizes)
-        check_embeddings(base, own["siamese"])
-        return cls(**own, base=base, options=options)
-
-    def to(self, device: torch.device | str) -> ArtPERL:
-        """The method on another device."""
-        networks: dict[str, Any] = {name: network.to(device) for name, network in self.networks().items()}
-        return ArtPERL(**networks, base=self.base, options=self.options)
 
     def _report(
         self, row: int, reference: Shapes, observed: Observed, path: list[Theta], labels: NDArray[np.int64],

@@ -6,13 +6,13 @@ that part, step by step, without kinematics; of all steps the one counts whose c
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from torch import Tensor, nn
+from torch import Tensor
 
 from artperl.agent.actions import expected_action
 from artperl.agent.registration import REGISTRATION, PartProblems, RegistrationPolicy, RigidFitting, part_problems
@@ -24,17 +24,10 @@ from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.threads import one_thread
 from artperl.core.trees import KINDS
+from artperl.methods.retrieved import AgentMethod
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import Cloud
-from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.part_names import part_names
-from artperl.retrieval.segmented import SegmentedRetrieval, check_embeddings
-from artperl.retrieval.shape_base import ShapeBase
-from artperl.retrieval.siamese import Siamese
-from artsim.common.json_records import from_json_values
-from artsim.model.objects import MAX_PARTS
-
-_MAX_WIDTH = 2048
 
 
 @dataclass(frozen=True)
@@ -47,42 +40,13 @@ class SporeAgentOptions:
     """View that the reference is turned to before the first step, as for the method artperl."""
 
 
-@dataclass(frozen=True)
-class SporeAgentSizes:
-    """Sizes of the networks: K, and channels of the first layers."""
-
-    num_rows: int
-    segmentation: int = 48
-    siamese: int = 24
-    policy: int = 64
-
-    def __post_init__(self) -> None:
-        widths = self.segmentation, self.siamese, self.policy
-        if not 1 <= self.num_rows <= MAX_PARTS or not all(1 <= width <= _MAX_WIDTH for width in widths):
-            raise ValueError(f"num_rows is {self.num_rows}, widths are {widths}")
-
-
-class SporeAgent(SegmentedRetrieval):
-    """Registration of each part of a retrieved reference.
-
-    Parameters
-    ----------
-    segmentation : Segmentation
-    siamese : Siamese
-    policy : RegistrationPolicy
-    base : ShapeBase
-        References with their embeddings by ``siamese``.
-    options : SporeAgentOptions, optional
-    """
+class SporeAgent(AgentMethod):
+    """Registration of each part of a retrieved reference; parameters as of :class:`AgentMethod`."""
 
     name: ClassVar[str] = "sporeagent"
-
-    def __init__(
-        self, segmentation: Segmentation, siamese: Siamese, policy: RegistrationPolicy, base: ShapeBase,
-        options: SporeAgentOptions | None = None,
-    ):  # fmt: skip
-        super().__init__(segmentation, siamese, base)
-        self.policy, self.options = policy.eval(), options or SporeAgentOptions()
+    policy_type, options_type = RegistrationPolicy, SporeAgentOptions
+    policy: RegistrationPolicy
+    options: SporeAgentOptions
 
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
@@ -138,38 +102,6 @@ class SporeAgent(SegmentedRetrieval):
             own(posed.origin_rest), observed.part[0].cpu().numpy(), float(apart) / (scale * float(reference.diagonal)),
             seen,
         )  # fmt: skip
-
-    def networks(self) -> dict[str, nn.Module]:
-        """The three networks."""
-        return {"segmentation": self.segmentation, "siamese": self.siamese, "policy": self.policy}
-
-    def settings(self) -> dict[str, Any]:
-        """Sizes and options, in JSON's terms."""
-        sizes = SporeAgentSizes(
-            self.segmentation.num_rows, self.segmentation.width, self.siamese.width, self.policy.width
-        )  # fmt: skip
-        return {"sizes": asdict(sizes), "options": asdict(self.options)}
-
-    @classmethod
-    def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> SporeAgent:
-        """The method with these settings, its networks untrained."""
-        networks = sporeagent_networks(from_json_values(SporeAgentSizes, settings.get("sizes")))
-        check_embeddings(base, networks["siamese"])
-        return cls(**networks, base=base, options=from_json_values(SporeAgentOptions, settings.get("options")))
-
-    def to(self, device: torch.device | str) -> SporeAgent:
-        """The method on another device."""
-        networks: dict[str, Any] = {name: network.to(device) for name, network in self.networks().items()}
-        return SporeAgent(**networks, base=self.base, options=self.options)
-
-
-def sporeagent_networks(sizes: SporeAgentSizes) -> dict[str, Any]:
-    """New networks of these sizes, by name."""
-    return {
-        "segmentation": Segmentation(sizes.num_rows, sizes.segmentation),
-        "siamese": Siamese(sizes.num_rows, sizes.siamese),
-        "policy": RegistrationPolicy(sizes.policy),
-    }
 
 
 def posed_apart(reference: Shapes, start: Theta, problems: PartProblems | None, ends: Theta | None) -> Posed:

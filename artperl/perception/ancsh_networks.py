@@ -54,58 +54,59 @@ class JointPoints(Batch):
     heat: Tensor
 
 
-def _head(channels: int, outputs: int) -> nn.Sequential:
-    return nn.Sequential(nn.Linear(channels, _HIDDEN), nn.ReLU(), nn.Linear(_HIDDEN, outputs))
-
-
-class CoordinateNetwork(nn.Module):
-    """Parts and normalised coordinates of points.
+class _PointNetwork(nn.Module):
+    """PointNet++ with a head for points that knows the whole cloud.
 
     Parameters
     ----------
     num_rows : int
         K.
+    outputs : int
     width : int
         Channels of the finest level.
     """
 
-    def __init__(self, num_rows: int, width: int = 48):
+    def __init__(self, num_rows: int, outputs: int, width: int):
         super().__init__()
         self.num_rows, self.width = num_rows, width
         self.backbone = PointNet2(width)
         self.context = nn.Linear(self.backbone.cloud_channels, width)
-        self.head = _head(width, 4 * num_rows + 4)
+        self.head = nn.Sequential(nn.Linear(width, _HIDDEN), nn.ReLU(), nn.Linear(_HIDDEN, outputs))
 
-    def forward(self, points: Tensor) -> Coordinates:
-        """(B, N, 3) points, centred and of unit size, in random order."""
+    def _said(self, points: Tensor) -> Tensor:
+        """(B, N, outputs) in single precision, whatever the backbone's."""
         return self._read(*(values.float() for values in self.backbone(points)))
 
     @exact
-    def _read(self, features: Tensor, cloud: Tensor) -> Coordinates:
-        said, K = self.head(torch.relu(features + self.context(cloud)[:, None])), self.num_rows
+    def _read(self, features: Tensor, cloud: Tensor) -> Tensor:
+        said: Tensor = self.head(torch.relu(features + self.context(cloud)[:, None]))
+        return said
+
+
+class CoordinateNetwork(_PointNetwork):
+    """Parts and normalised coordinates of points, for K = ``num_rows`` parts."""
+
+    def __init__(self, num_rows: int, width: int = 48):
+        super().__init__(num_rows, 4 * num_rows + 4, width)
+
+    def forward(self, points: Tensor) -> Coordinates:
+        """(B, N, 3) points, centred and of unit size, in random order."""
+        said, K = self._said(points), self.num_rows
         return Coordinates(
             part_logits=said[..., :K], npcs=said[..., K : 4 * K].unflatten(-1, (K, 3)).sigmoid(),
             scale=said[..., 4 * K : 4 * K + 1].sigmoid(), shift=said[..., 4 * K + 1 :].tanh(),
         )  # fmt: skip
 
 
-class JointNetwork(nn.Module):
-    """Votes for joints; parameters as of :class:`CoordinateNetwork`."""
+class JointNetwork(_PointNetwork):
+    """Votes for joints, for K = ``num_rows`` parts."""
 
     def __init__(self, num_rows: int, width: int = 48):
-        super().__init__()
-        self.num_rows, self.width = num_rows, width
-        self.backbone = PointNet2(width)
-        self.context = nn.Linear(self.backbone.cloud_channels, width)
-        self.head = _head(width, num_rows + 7)
+        super().__init__(num_rows, num_rows + 7, width)
 
     def forward(self, points: Tensor) -> JointPoints:
         """(B, N, 3) points, centred and of unit size, in random order."""
-        return self._read(*(values.float() for values in self.backbone(points)))
-
-    @exact
-    def _read(self, features: Tensor, cloud: Tensor) -> JointPoints:
-        said, K = self.head(torch.relu(features + self.context(cloud)[:, None])), self.num_rows
+        said, K = self._said(points), self.num_rows
         return JointPoints(
             joint_logits=said[..., :K], axis=said[..., K : K + 3].tanh(), offset=said[..., K + 3 : K + 6].tanh(),
             heat=said[..., K + 6],

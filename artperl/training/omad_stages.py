@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,8 +28,7 @@ from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import KeepStage
 from artperl.training.steps import autocast, one_cycle, set_rate
-from artperl.training.supervised import SAVE_STEPS, count_step, descend
-from artsim.common.progress import track
+from artperl.training.supervised import Taken, descend, take_steps, told
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
@@ -64,32 +64,25 @@ class PriorStage:
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        options, total, shapes = context.options, context.options.prior_steps, context.objects.base.shapes
+        take_steps(context, self.name, "keypoint_prior", context.options.prior_steps, self._learn)
+
+    def _learn(self, context: Context, first: int) -> Iterator[Taken]:
+        options, shapes = context.options, context.objects.base.shapes
         prior, optimizer = context.state.networks["keypoint_prior"], context.state.optimizers["keypoint_prior"]
         assert isinstance(prior, KeypointPrior)
-        first = context.state.done[self.name]
-        if first >= total:
-            return
         if first == 0:  # mirrors and mean joints are read from the references, not learnt
             begun = omad_networks(OMADSizes(context.objects.num_rows, options.width), context.objects.base)
             prior.mirrored.copy_(begun["keypoint_prior"].mirrored)
             prior.joint.copy_(begun["keypoint_prior"].joint)
             with torch.no_grad():
                 prior.mean.add_(shapes.box_center.mean(0)[:, None].to(prior.mean))
-        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
-        prior.train()
-        for step in range(first, total):
+        for step in range(first, options.prior_steps):
             generator = torch.Generator().manual_seed((options.seed << 32) + step)
             rows = torch.randint(len(shapes), (options.batch_size,), generator=generator)
-            set_rate(optimizer, _PRIOR_RATE * one_cycle(step, total))
+            set_rate(optimizer, _PRIOR_RATE * one_cycle(step, options.prior_steps))
             loss, figures = prior_loss(prior, shapes[rows].to(context.device), generator)
             descend(optimizer, prior, loss)
-            context.report(self.name, {"loss": loss.item(), **figures}, step)
-            bar.set_postfix_str(f"loss {loss.item():.4f}")
-            bar.update()
-            count_step(context, self.name, step + 1, SAVE_STEPS)
-        bar.close()
-        prior.eval()
+            yield {"loss": loss.item(), **figures}, f"loss {loss.item():.4f}"
 
 
 @dataclass(frozen=True)
@@ -100,18 +93,16 @@ class CueStage:
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        options, total = context.options, context.options.perception_steps
-        network, optimizer = context.state.networks["cues"], context.state.optimizers["cues"]
-        first, device = context.state.done[self.name], context.device
-        if first >= total:
-            return
+        take_steps(context, self.name, "cues", context.options.perception_steps, self._learn)
+
+    def _learn(self, context: Context, first: int) -> Iterator[Taken]:
+        options, total, device = context.options, context.options.perception_steps, context.device
         method = omad_estimator(context)
+        network, optimizer = context.state.networks["cues"].train(), context.state.optimizers["cues"]
         data = row_batches(
             context.objects.data, context.objects.num_rows, options.num_points, options.batch_size, first, options.seed,
             context.workers, ObjectRows(context.objects.num_rows),
         )  # fmt: skip
-        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
-        network.train()
         for step in range(first, total):
             rows = next(data)
             clouds, truth = to_batch(rows)
@@ -123,12 +114,7 @@ class CueStage:
             targets = cue_targets(method, clouds, rows, device)
             loss, figures = cue_loss(method, cues, truth.to(device), targets)
             descend(optimizer, network, loss)
-            context.report(self.name, {"loss": loss.item(), **figures}, step)
-            bar.set_postfix_str(", ".join(f"{name} {value:.3g}" for name, value in figures.items()))
-            bar.update()
-            count_step(context, self.name, step + 1, SAVE_STEPS)
-        bar.close()
-        network.eval()
+            yield {"loss": loss.item(), **figures}, told(figures)
 
 
 def omad_stages(options: TrainOptions) -> list[Any]:

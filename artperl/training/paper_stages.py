@@ -5,6 +5,7 @@ Each goes on where it stopped: its batches, rates and actions are functions of t
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,28 +24,31 @@ from artperl.core.shapes import Observed, Shapes
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
 from artperl.estimator import save_estimator
-from artperl.methods.artperl import ArtPERL, Sizes, networks_of
+from artperl.methods.artperl import ArtPERL
+from artperl.methods.retrieved import AgentMethod, Sizes
 from artperl.retrieval.segmented import SegmentedRetrieval
 from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
-from artperl.training.supervised import SAVE_STEPS, SupervisedStage, count_step, descend, segmentation_loss
-from artsim.common.progress import track
+from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps
+from artsim.observing.sample import Sample
 
-VIEWS = 4
+_VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
-SAVE_ROLLOUTS = 10
+_SAVE_ROLLOUTS = 10
 """Rollouts after which a run is saved, against a stop that nobody asked for."""
-_ALONE_EVERY, _ALONE = 10, 48
-"""Rollouts between tests of the agent without an expert, and episodes of such a test, always the same ones."""
-CHOICES = 4
+_ALONE_EVERY = 10
+"""Rollouts between tests of the agent without an expert."""
+_ALONE = 48
+"""Views of such a test."""
+_CHOICES = 4
 """Nearest references among which the agent's is drawn: at test time, too, it is seldom the best one."""
 
 
 def paper_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     """New networks of the method, by name."""
-    return networks_of(Sizes(num_rows, segmentation=options.width))
+    return ArtPERL.new_networks(Sizes(num_rows, segmentation=options.width))
 
 
 def paper_estimator(context: Context) -> ArtPERL:
@@ -62,19 +66,19 @@ class RetrievalStage:
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        options, total = context.options, context.options.retrieval_steps
-        network, optimizer = context.state.networks["siamese"], context.state.optimizers["siamese"]
-        first = context.state.done[self.name]
-        if first >= total:
-            return
+        take_steps(context, self.name, "siamese", context.options.retrieval_steps, self._learn)
+
+    def _learn(self, context: Context, first: int) -> Iterator[Taken]:
+        options, base = context.options, context.objects.base.shapes
         segmentation: Any = context.state.networks["segmentation"]
-        siamese: Any = network
-        method, base = SegmentedRetrieval(segmentation, siamese, context.objects.base), context.objects.base.shapes
+        network: Any = context.state.networks["siamese"]
+        method = SegmentedRetrieval(segmentation, network, context.objects.base)
+        network.train()  # the method has it evaluate
         samples = view_source(context, POINTS, options.seed + 1, 1)
-        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
-        network.train()
-        for step in range(first, total):
-            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
+        for step in range(first, options.retrieval_steps):
+            set_rate(
+                context.state.optimizers["siamese"], options.perception_rate * one_cycle(step, options.retrieval_steps)
+            )
             numbers = range(step * options.batch_size, (step + 1) * options.batch_size)
             objects = [samples.object(i).with_diagonal(1.0) for i in numbers]
             own = Shapes.from_objects(objects, base.points.shape[2], base.trees.num_rows).to(context.device)
@@ -82,48 +86,50 @@ class RetrievalStage:
             generator = torch.Generator().manual_seed((options.seed << 32) + step)
             vectors = network(Clouds.of(points).points, method.segment(points))
             loss = contrastive_loss(vectors, network(*canonical_clouds(own, generator)))
-            descend(optimizer, network, loss)
-            context.report(self.name, {"loss": loss.item()}, step)
-            bar.set_postfix_str(f"loss {loss.item():.4f}")
-            bar.update()
-            count_step(context, self.name, step + 1, SAVE_STEPS)
-        bar.close()
-        network.eval()
+            descend(context.state.optimizers["siamese"], network, loss)
+            yield {"loss": loss.item()}, f"loss {loss.item():.4f}"
 
 
 @dataclass(frozen=True)
 class AgentStage:
-    """Algorithm 1 on retrieved references and predicted labels: first cloning alone, then cloning and PPO."""
+    """Algorithm 1 on retrieved references and predicted labels: first cloning alone, then cloning and PPO.
 
+    Attributes
+    ----------
+    estimator : callable
+        The method of a context.
+    episodes : callable
+        Episodes and goals of a rollout, by the method, views, their number, a seed and the number of the rollout.
+    alone : int
+        Views of a test of the agent without an expert, always the same ones.
+    """
+
+    estimator: Callable[[Context], Any]
+    episodes: Callable[[Any, Source, int, int, int], tuple[Any, Theta]]
+    alone: int
     name: str = "agent"
 
     def run(self, context: Context) -> None:
         """Make the rollouts that are left."""
-        options, total = context.options, context.options.agent_rollouts
-        policy, optimizer = context.state.networks["policy"], context.state.optimizers["policy"]
-        first = context.state.done[self.name]
-        if first >= total:
-            return
-        method = paper_estimator(context)
-        samples, unseen = (view_source(context, POINTS, options.seed + seed, VIEWS) for seed in (2, 3))
+        take_steps(context, self.name, "policy", context.options.agent_rollouts, self._learn, _SAVE_ROLLOUTS)
 
-        def episodes(n: int) -> tuple[Fitting, Theta]:
+    def _learn(self, context: Context, first: int) -> Iterator[Taken]:
+        options, total, method = context.options, context.options.agent_rollouts, self.estimator(context)
+        policy, optimizer = method.policy.train(), context.state.optimizers["policy"]
+        samples, unseen = (view_source(context, POINTS, options.seed + seed, _VIEWS) for seed in (2, 3))
+
+        def episodes(n: int) -> tuple[Any, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
-            return fitting_episodes(method, samples, options.episodes, options.seed, n)
+            return self.episodes(method, samples, options.episodes, options.seed, n)
 
-        rounds = algorithm_1(method.policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
-        bar = track(self.name, total=total, initial=first, smoothing=0.1, shown=context.progress)
-        policy.train()
+        rounds = algorithm_1(policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
         for n, figures in enumerate(rounds, first):
-            context.report(self.name, figures, n)
+            line = None
             if n % _ALONE_EVERY == 0 or n + 1 == total:
-                alone = agent_alone(method.policy, *fitting_episodes(method, unseen, _ALONE, options.seed, 0))
+                alone = agent_alone(policy, *self.episodes(method, unseen, self.alone, options.seed, 0))
                 context.report("agent_alone", alone, n)
-                bar.set_postfix_str(f"alone: reward {alone['reward']:.3f}, chamfer {alone['chamfer_end']:.3f}")
-            bar.update()
-            count_step(context, self.name, n + 1, SAVE_ROLLOUTS)
-        bar.close()
-        policy.eval()
+                line = f"alone: reward {alone['reward']:.3f}, {alone['rotation_deg']:.1f} deg"
+            yield figures, line
 
 
 @dataclass(frozen=True)
@@ -141,7 +147,7 @@ class KeepStage:
 def paper_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
-    return [segmentation, RetrievalStage(), AgentStage(), KeepStage()]
+    return [segmentation, RetrievalStage(), AgentStage(paper_estimator, fitting_episodes, _ALONE), KeepStage()]
 
 
 def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n: int) -> tuple[Fitting, Theta]:
@@ -161,19 +167,25 @@ def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n:
     """
     generator = torch.Generator().manual_seed((seed << 32) + n)
     views = [samples[i] for i in range(n * count, (n + 1) * count)]
-    points = _stacked([view.points for view in views]).to(method.device)
-    part = method.segment(points)
-    nearest = method.retrieve(points, part, min(CHOICES, len(method.base)))
-    drawn = torch.randint(nearest.shape[1], (count, 1), generator=generator).to(method.device)
-    reference = method.base.shapes[nearest.gather(1, drawn)[:, 0]]
+    reference, observed = draw_references(method, views, generator)
     trees = reference.trees
     truth = [part_truth(view, trees.num_rows) for view in views]
     _, rotation, center, size, _, _ = (torch.stack(values).to(method.device) for values in zip(*truth, strict=True))
     goal = theta_from_parts(trees, reference.box_center, reference.box_size, rotation, center, size)
     goal = Theta(**{**vars(goal), "state": clamp_state(trees, goal.state)})
-    start = mean_start(reference, points, method.options.start)
-    fitting = Fitting(reference, Observed.of(points, part), start, method.options.fitting)
-    return fitting, goal
+    start = mean_start(reference, observed.points, method.options.start)
+    return Fitting(reference, observed, start, method.options.fitting), goal
+
+
+def draw_references(
+    method: AgentMethod, views: Sequence[Sample], generator: torch.Generator
+) -> tuple[Shapes, Observed]:  # fmt: skip
+    """For each of B views a reference among the nearest, by chance, and the cloud as the method segments it."""
+    points = _stacked([view.points for view in views]).to(method.device)
+    part = method.segment(points)
+    nearest = method.retrieve(points, part, min(_CHOICES, len(method.base)))
+    drawn = torch.randint(nearest.shape[1], (len(views), 1), generator=generator).to(method.device)
+    return method.base.shapes[nearest.gather(1, drawn)[:, 0]], Observed.of(points, part)
 
 
 @torch.no_grad()

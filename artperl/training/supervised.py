@@ -1,8 +1,8 @@
-"""A network that learns from clouds and what is true of them, by any loss."""
+"""Steps of a network's learning: counted, saved, shown; and a stage of them on clouds and what is true, by any loss."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import torch
@@ -17,6 +17,9 @@ from artsim.common.progress import track
 
 Loss = Callable[[nn.Module, Clouds, Truth], tuple[Tensor, dict[str, float]]]
 """Of a network, clouds and their truth: what is to be low, and figures that tell people how it learns."""
+
+Taken = tuple[dict[str, float], str | None]
+"""Of a step that was taken: figures for the curves, and a line for people where there is a new one."""
 
 SAVE_STEPS = 100
 """Steps after which a run is saved, against a stop that nobody asked for."""
@@ -40,29 +43,27 @@ class SupervisedStage:
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        options, total = context.options, context.options.perception_steps
+        take_steps(context, self.name, self.network, context.options.perception_steps, self._learn)
+
+    def _learn(self, context: Context, first: int) -> Iterator[Taken]:
+        options = context.options
         network, optimizer = context.state.networks[self.network], context.state.optimizers[self.network]
-        first = context.state.done[self.name]
-        if first >= total:
-            return
         data = batches(
             context.objects.data, context.objects.num_rows, options.num_points, options.batch_size, first, options.seed,
             context.workers,
         )  # fmt: skip
-        bar = track(self.name, total=total, initial=first, smoothing=0.02, shown=context.progress)
-        network.train()
-        for step in range(first, total):
+        for step in range(first, options.perception_steps):
             clouds, truth = next(data)
-            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
+            set_rate(optimizer, options.perception_rate * one_cycle(step, options.perception_steps))
             with autocast(context.device, options.mixed_precision):
                 loss, figures = self.loss(network, clouds.to(context.device), truth.to(context.device))
             descend(optimizer, network, loss)
-            context.report(self.name, {"loss": loss.item(), **figures}, step)
-            bar.set_postfix_str(", ".join(f"{name} {value:.3g}" for name, value in figures.items()))
-            bar.update()
-            count_step(context, self.name, step + 1, SAVE_STEPS)
-        bar.close()
-        network.eval()
+            yield {"loss": loss.item(), **figures}, told(figures)
+
+
+def told(figures: dict[str, float]) -> str:
+    """Figures in one line for people."""
+    return ", ".join(f"{name} {value:.3g}" for name, value in figures.items())
 
 
 def segmentation_loss(network: nn.Module, clouds: Clouds, truth: Truth) -> tuple[Tensor, dict[str, float]]:
@@ -80,14 +81,40 @@ def descend(optimizer: torch.optim.Optimizer, network: nn.Module, loss: Tensor) 
     optimizer.step()
 
 
-def count_step(context: Context, stage: str, done: int, save_every: int) -> None:
-    """Count a step of a stage, save at intervals, and stop if somebody has asked for it.
+def take_steps(
+    context: Context, stage: str, network: str, total: int, learn: Callable[[Context, int], Iterator[Taken]],
+    save_every: int = SAVE_STEPS,
+) -> None:  # fmt: skip
+    """Take the steps of a stage that are left: report each, save at intervals, and stop if somebody asks for it.
+
+    Parameters
+    ----------
+    context : Context
+    stage, network : str
+        Their names.
+    total : int
+        Steps of the stage.
+    learn : callable
+        Takes steps from a number on, one each time that it is asked for the next.
+    save_every : int
 
     Raises
     ------
     KeyboardInterrupt
     """
-    context.state.done[stage] = done
-    if done % save_every == 0:
-        context.save()
-    context.stop_if_asked()
+    first, own = context.state.done[stage], context.state.networks[network]
+    if first >= total:
+        return
+    bar = track(stage, total=total, initial=first, smoothing=0.02, shown=context.progress)
+    own.train()
+    for step, (figures, line) in enumerate(learn(context, first), first):
+        context.report(stage, figures, step)
+        if line is not None:
+            bar.set_postfix_str(line)
+        bar.update()
+        context.state.done[stage] = step + 1
+        if (step + 1) % save_every == 0:
+            context.save()
+        context.stop_if_asked()
+    bar.close()
+    own.eval()

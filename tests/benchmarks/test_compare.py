@@ -10,6 +10,7 @@ import pytest
 from artsim.errors import ConfigError
 from benchmarks.compare import ROOT, Figure, Options, older_tree
 from benchmarks.compared import MEASURES
+from tests.conftest import absent
 
 
 def answer(seconds: float, digest: str = "") -> dict[str, object]:
@@ -48,8 +49,9 @@ def test_an_unknown_measure_and_an_unknown_revision_are_refused() -> None:
             pass
 
 
-@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a git checkout")
 def test_the_worktree_goes_when_the_work_is_over() -> None:
+    if not (ROOT / ".git").exists():
+        absent("this is not a git checkout")
     with older_tree("HEAD") as (tree, commit):
         assert len(commit) == 40
         assert (tree / "artsim" / "__init__.py").is_file()

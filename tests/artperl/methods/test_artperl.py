@@ -17,7 +17,8 @@ from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.metrics import rotation_error
 from artperl.evaluation.scoring import evaluate
 from artperl.methods import METHODS, method_of
-from artperl.methods.artperl import ArtPERL, ArtPERLOptions, Sizes, networks_of
+from artperl.methods.artperl import ArtPERL, ArtPERLOptions
+from artperl.methods.retrieved import Sizes
 from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese
@@ -47,7 +48,7 @@ class Truth(Segmentation):
 
 def untrained(base: ShapeBase, options: ArtPERLOptions | None = None) -> ArtPERL:
     torch.manual_seed(0)
-    networks = networks_of(SIZES)
+    networks = ArtPERL.new_networks(SIZES)
     siamese = networks["siamese"]
     return ArtPERL(**networks, base=by_siamese(base, siamese.eval()), options=options)  # type: ignore[arg-type]
 

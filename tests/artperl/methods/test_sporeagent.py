@@ -16,7 +16,8 @@ from artperl.core.shapes import Observed
 from artperl.data.fitting_problems import part_truth
 from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.metrics import rotation_error
-from artperl.methods.sporeagent import SporeAgent, SporeAgentSizes, posed_apart, sporeagent_networks
+from artperl.methods.retrieved import Sizes
+from artperl.methods.sporeagent import SporeAgent, posed_apart
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese
 from artperl.training.options import SPOREAGENT_PRESETS
@@ -27,7 +28,7 @@ from tests.artperl.worlds import view
 @pytest.fixture(scope="module")
 def method() -> SporeAgent:
     torch.manual_seed(0)
-    networks = sporeagent_networks(SporeAgentSizes(2, 16, 8, 8))
+    networks = SporeAgent.new_networks(Sizes(2, 16, 8, 8))
     for network in networks.values():
         network.half().float()  # as precise as files are
     base = ShapeBase.of([artsim.make("laptop", seed) for seed in range(4)], 64)

@@ -17,9 +17,9 @@ from artsim.datasets.shards import sample_members
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers import compiled, make_renderer
 from artsim.renderers.raycast import PosedObject, cast_counted, pose, visibility
-from tests.conftest import ASSETS
+from tests.conftest import ASSETS, installed
 
-pytest.importorskip("numba")
+installed("numba")
 
 LOOKS = {
     "clouds": SampleOptions(num_points=300),
