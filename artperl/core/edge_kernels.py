@@ -1,22 +1,20 @@
 """Sums and maxima over the neighbours of points, compiled, with their derivatives.
 
 They do what ``embedding_bag`` of torch does. A maximum takes a tenth of its time on one core, and a sum backwards needs
-no dense matrix. Compilation takes seconds, once on a machine: its result is kept beside this file, or in the user's
-cache where that folder cannot be written.
+no dense matrix.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-_compiled = numba.njit(cache=True, nogil=True)
+from artsim.common.compiled import compiled
 
 
 class Strongest(torch.autograd.Function):
@@ -51,7 +49,7 @@ class Interpolated(torch.autograd.Function):
         return torch.from_numpy(back).to(gradient.dtype), None, None
 
 
-@_compiled
+@compiled
 def maximum(features: NDArray[np.float32], index: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """(M, C) highest of the rows of features (N, C) that indices (M, k) name, and in which row each was found first."""
     count, channels = len(index), features.shape[1]
@@ -70,7 +68,7 @@ def maximum(features: NDArray[np.float32], index: NDArray[np.int64]) -> tuple[ND
     return highest, winner
 
 
-@_compiled
+@compiled
 def maximum_backward(gradient: NDArray[np.float32], winner: NDArray[np.int32], rows: int) -> NDArray[np.float32]:
     """(rows, C) gradient of the features of :func:`maximum` from the gradient (M, C) of its result."""
     back = np.zeros((rows, gradient.shape[1]), np.float32)
@@ -80,7 +78,7 @@ def maximum_backward(gradient: NDArray[np.float32], winner: NDArray[np.int32], r
     return back
 
 
-@_compiled
+@compiled
 def weighted_sum(
     features: NDArray[np.float32], weight: NDArray[np.float32], index: NDArray[np.int64]
 ) -> NDArray[np.float32]:
@@ -94,7 +92,7 @@ def weighted_sum(
     return summed
 
 
-@_compiled
+@compiled
 def weighted_sum_backward(
     gradient: NDArray[np.float32], weight: NDArray[np.float32], index: NDArray[np.int64], rows: int
 ) -> NDArray[np.float32]:

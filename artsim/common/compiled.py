@@ -9,7 +9,10 @@ called, not of others.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import sys
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any, Generic, TypeVar
 
 from typing_extensions import ParamSpec
@@ -22,6 +25,32 @@ R = TypeVar("R")
 _MATHS = {"contract", "reassoc", "nsz"}
 """Liberties that do not touch infinities and NaN: sums in any order, and fused products, so that loops use wide
 registers."""
+
+
+_SAID_AFTER = 1.5
+"""Seconds after which it is said that something is compiled. What is kept on the disk loads in a tenth of that."""
+
+
+@contextlib.contextmanager
+def said_if_slow() -> Iterator[None]:
+    """Say on standard error, once in a process, that loops are being compiled, where that takes a while."""
+    said = threading.Timer(_SAID_AFTER, _say)
+    said.daemon = True
+    said.start()
+    try:
+        yield
+    finally:
+        said.cancel()
+
+
+def _say() -> None:
+    if not _Said.already:
+        _Said.already = True
+        print("artsim compiles its loops for this processor: some seconds, once", file=sys.stderr)
+
+
+class _Said:
+    already = False
 
 
 class Compiled(Generic[P, R]):
@@ -42,11 +71,15 @@ class Compiled(Generic[P, R]):
         self.python = function
         self.__doc__, self.__name__, self.__module__ = function.__doc__, function.__name__, function.__module__
         self._dispatcher: Any = None
+        self._called = False
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        if self._dispatcher is None:
-            self._prepare()
-        result: R = self._dispatcher(*args, **kwargs)
+        if self._called:
+            result: R = self._dispatcher(*args, **kwargs)
+            return result
+        self._called = True
+        with said_if_slow():
+            result = self._prepare()(*args, **kwargs)
         return result
 
     def _prepare(self) -> Any:

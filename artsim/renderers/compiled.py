@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import sys
-import threading
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
+from artsim.common.compiled import said_if_slow
+
 _KERNELS = "artsim.renderers.ray_kernels"
 _PAYS, _PAYS_UNCACHED = 400, 6000
 """Clouds after which kernels pay: each saves about a millisecond. To load them takes 0.4 s, to compile them 6 s."""
-_SAID_AFTER = 1.5
-"""Seconds after which it is said that something is being compiled."""
 
 
 class _Switch:
@@ -50,23 +48,14 @@ def count_cloud() -> None:
 def compile_now() -> bool:
     """Load the kernels, or compile them; False where that is not possible, and NumPy goes on."""
     _Switch.pays = float("inf")  # one attempt
-    said = threading.Timer(_SAID_AFTER, _say)
-    said.daemon = True
-    if not _is_cached():
-        said.start()
     try:
-        loaded = importlib.import_module(_KERNELS)
-        loaded.warm_up()
+        with said_if_slow():
+            loaded = importlib.import_module(_KERNELS)
+            loaded.warm_up()
     except Exception:  # numba is missing, or does not fit this NumPy or this processor: all work without it
         return False
-    finally:
-        said.cancel()
     _Switch.kernels = loaded
     return True
-
-
-def _say() -> None:
-    print("artsim compiles its loops around the rays for this processor: some seconds, once", file=sys.stderr)
 
 
 def _threshold() -> float:

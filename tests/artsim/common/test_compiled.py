@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 
 import pytest
 
-from artsim.common.compiled import compiled
+from artsim.common import compiled as module
+from artsim.common.compiled import compiled, said_if_slow
 
 
 @compiled
@@ -37,3 +39,15 @@ def test_compiled_functions_call_each_other_and_give_what_python_gives() -> None
 def test_numba_comes_with_the_first_call_alone() -> None:
     code = "import sys, artsim.common.compiled as c; c.compiled(len); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_what_takes_long_is_said_once(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_SAID_AFTER", 0.01)
+    monkeypatch.setattr(module._Said, "already", False)
+    with said_if_slow():
+        pass
+    assert capsys.readouterr().err == ""
+    for _ in range(2):
+        with said_if_slow():
+            time.sleep(0.2)
+    assert capsys.readouterr().err.count("compiles its loops") == 1
