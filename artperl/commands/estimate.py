@@ -17,6 +17,7 @@ import tyro
 
 from artperl.commands.estimate_record import arrays_of, record_of
 from artperl.commands.resumed_lines import line_name
+from artperl.methods import StoredMethod
 from artsim.common.files import atomic_file, write_atomic
 from artsim.common.progress import track
 from artsim.errors import ConfigError
@@ -112,8 +113,9 @@ class Estimate:
     seen_from: tuple[float, float] | None = None
     """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
-    method: Literal["full", "artperl"] = "full"
-    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed."""
+    method: StoredMethod = "full"
+    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; or a
+    baseline that you trained."""
     workers: int = 1
     """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""
 

@@ -30,8 +30,9 @@ class Evaluate:
     """Folder of the estimator, or the name of one that comes with the package. For a benchmark and the
     ablation, folder of the estimators by category; by default those that come with the package."""
     method: str = "full"
-    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; or one
-    that you add (CONTRIBUTING.md). A benchmark and the ablation are of the method full."""
+    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; a
+    baseline that you trained (ancsh, omad, sporeagent); or one that you add (CONTRIBUTING.md). A benchmark and the
+    ablation are of the method full."""
     benchmark: Literal["artimage", "robustness", "reartmix"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row. robustness: sensors, occluders,
     bad masks and few points, at least 100 views in each row; with --json, a run that was stopped goes on. reartmix:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from artperl.methods import StoredMethod
 from artsim.common.progress import say
 
 
@@ -33,7 +34,7 @@ class Report:
     """One category, trainings of seconds, few views: to see the report. Its figures say nothing of the methods."""
     category: tuple[str, ...] = ()
     """Categories of the benchmark; by default all."""
-    methods: tuple[Literal["full", "artperl", "ancsh", "omad", "sporeagent"], ...] = ()
+    methods: tuple[StoredMethod, ...] = ()
     """By default all of the benchmark."""
     preset: Literal["quick", "full"] = "full"
     """Of the trainings: quick ones take some minutes each, full ones an hour and more."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from artperl.methods import StoredMethod
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.model.draws import StateMode, ViewPreset
@@ -58,7 +59,7 @@ class Train:
     """Processor threads of the network; by default torch's choice."""
 
     # From here on: fields of TrainOptions under their own names, then those of its parts.
-    method: Literal["full", "artperl", "ancsh", "omad", "sporeagent"] | None = None
+    method: StoredMethod | None = None
     """full: the method that comes with trained weights; artperl: section 4 of the paper as printed; the others: the
     baselines that the paper compares with."""
     categories: Annotated[tuple[str, ...] | None, tyro.conf.arg(name="category")] = None

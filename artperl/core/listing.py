@@ -27,10 +27,11 @@ def full_text(estimate: Estimate) -> str:
 
 def summary(estimate: Estimate) -> str:
     """One line: how sure it is, how well it fits, and by which reference."""
+    reference = f"reference {estimate.reference}, " if estimate.reference else ""  # some methods have none
     other = f"{100 * estimate.foreign:.0f} % of the points left out, " if estimate.foreign >= 0.005 else ""
     return (
         f"confidence {100 * estimate.confidence:.0f} %, residual {100 * estimate.residual:.2f} % of the diagonal, "
-        f"{other}reference {estimate.reference}, {sum(estimate.milliseconds.values()):.0f} ms"
+        f"{other}{reference}{sum(estimate.milliseconds.values()):.0f} ms"
     )
 
 

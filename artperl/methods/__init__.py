@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 from artsim.errors import ConfigError
 
@@ -22,7 +22,8 @@ METHODS = {
 }
 """Module and class of each method: full, which comes with trained weights; artperl, section 4 of the paper; and the
 baselines that the paper compares with."""
-STORED_METHODS = ("full", "artperl", "ancsh", "omad", "sporeagent")
+StoredMethod = Literal["full", "artperl", "ancsh", "omad", "sporeagent"]
+STORED_METHODS: tuple[str, ...] = get_args(StoredMethod)
 """Those that are trained and written down; others make themselves for a category."""
 
 

@@ -22,9 +22,9 @@ from artperl.evaluation.comparison_page import html_page, markdown
 from artperl.evaluation.pictures import curves, overlays
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, samples_of
 from artperl.evaluation.scoring import evaluate, object_symmetries
+from artperl.methods import StoredMethod
 from artperl.methods.protocol import Method
 from artperl.training.options import PRESETS, TrainOptions, preset_of
-from artperl.training.options import Method as MethodName
 from artperl.training.run import Training
 from artperl.viewer import page
 from artsim.common.files import read_json, write_atomic
@@ -38,7 +38,7 @@ from artsim.observing.sample import Sample
 Benchmark = Literal["artimage", "robotarm"]
 Preset = Literal["quick", "full"]
 
-METHODS: dict[Benchmark, tuple[MethodName, ...]] = {
+METHODS: dict[Benchmark, tuple[StoredMethod, ...]] = {
     "artimage": ("full", "artperl", "ancsh", "omad", "sporeagent"),
     "robotarm": ("full", "artperl", "ancsh"),
 }
@@ -66,7 +66,7 @@ class ComparisonOptions:
     benchmark: Benchmark = "artimage"
     categories: tuple[str, ...] = ()
     """Of ArtImage; by default all. The benchmark robotarm has one."""
-    methods: tuple[MethodName, ...] = ()
+    methods: tuple[StoredMethod, ...] = ()
     """By default those of the paper's table, and full."""
     preset: Preset = "full"
     """Of the trainings."""
@@ -99,7 +99,7 @@ class ComparisonOptions:
         return self.categories or (tuple(ARTIMAGE) if self.benchmark == "artimage" else (ARM,))
 
     @property
-    def of_methods(self) -> tuple[MethodName, ...]:
+    def of_methods(self) -> tuple[StoredMethod, ...]:
         """Methods, all if none is named."""
         return self.methods or METHODS[self.benchmark]
 
@@ -184,7 +184,7 @@ def _told(record: dict[str, Any]) -> str:
     return f"rotation {turns} deg, {record['seconds']:.2f} s"
 
 
-def _asked(options: ComparisonOptions, method: MethodName) -> dict[str, Any]:
+def _asked(options: ComparisonOptions, method: StoredMethod) -> dict[str, Any]:
     """What a row depends on, in JSON's terms."""
     own = asdict(options)
     for name in ("categories", "methods"):
@@ -203,7 +203,7 @@ def _kept_row(path: Path, asked: dict[str, Any]) -> dict[str, Any] | None:
     return row
 
 
-def training_options(options: ComparisonOptions, category: str, method: MethodName, out: Path) -> TrainOptions:
+def training_options(options: ComparisonOptions, category: str, method: StoredMethod, out: Path) -> TrainOptions:
     """What a method learns from, for a category of a comparison."""
     if options.benchmark == "artimage":
         own = replace(preset_of(method, options.preset), categories=(category,))
@@ -223,7 +223,7 @@ def training_options(options: ComparisonOptions, category: str, method: MethodNa
 
 
 def trained(
-    options: ComparisonOptions, category: str, method: MethodName, out: Path, workers: int, progress: bool,
+    options: ComparisonOptions, category: str, method: StoredMethod, out: Path, workers: int, progress: bool,
     say: Callable[[str], None],
 ) -> Method:  # fmt: skip
     """A method for a category: one that comes with the package, or one that is trained here, or was before."""

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from artperl.agent.ppo import CLONING, JOINT, Phase, PPOOptions
 from artperl.data.categories import Parts
+from artperl.methods import StoredMethod
 from artsim.common.json_records import from_json_values
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 
 T = TypeVar("T")
-Method = Literal["full", "artperl", "ancsh", "omad", "sporeagent"]
 _WITH_AGENT = ("artperl", "sporeagent")
 """Methods that retrieve a reference by a network and fit it by an agent."""
 _MOST = 1_000_000_000
@@ -42,7 +42,7 @@ class TrainOptions:
         When a value is impossible, or two values contradict each other.
     """
 
-    method: Method = "full"
+    method: StoredMethod = "full"
     """full: the estimator that is shipped; artperl: the method of the paper as printed; others: its baselines."""
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
@@ -237,7 +237,7 @@ SPOREAGENT_PRESETS = {
 }
 """Presets of the method sporeagent: stages as long as those of artperl."""
 
-METHOD_PRESETS: dict[Method, dict[str, TrainOptions]] = {
+METHOD_PRESETS: dict[StoredMethod, dict[str, TrainOptions]] = {
     "full": PRESETS,
     "artperl": PAPER_PRESETS,
     "ancsh": ANCSH_PRESETS,
@@ -247,7 +247,7 @@ METHOD_PRESETS: dict[Method, dict[str, TrainOptions]] = {
 """Presets of each method."""
 
 
-def preset_of(method: Method, name: str) -> TrainOptions:
+def preset_of(method: StoredMethod, name: str) -> TrainOptions:
     """A preset of a method.
 
     Raises
