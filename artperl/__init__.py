@@ -42,13 +42,17 @@ def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Me
     return load(name, method=method, **changes)
 
 
-def load_scene_estimator(estimators: Mapping[str, str | Path] | None = None, **changes: Any) -> SceneEstimator:
-    """An estimator of all objects in an image: ``load_scene_estimator()(rgb, depth, K, detections)``.
+def load_scene_estimator(
+    estimators: Mapping[str, str | Path] | None = None, detector: str | Path = "tabletop", **changes: Any
+) -> SceneEstimator:
+    """An estimator of all objects in an image: ``load_scene_estimator()(rgb, depth, K)``.
 
     Parameters
     ----------
     estimators : mapping, optional
         Name or folder of the estimator of each category; by default those that come with the package, by their names.
+    detector : str or Path
+        Name or folder of the detector, used where no detections are given.
     **changes
         Of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
 
@@ -60,7 +64,7 @@ def load_scene_estimator(estimators: Mapping[str, str | Path] | None = None, **c
     with needs("artperl"):
         from artperl.scene.estimator import SceneEstimator  # torch takes seconds to import
 
-    return SceneEstimator(estimators, **changes)
+    return SceneEstimator(estimators, detector, **changes)
 
 
 def __getattr__(name: str) -> Any:

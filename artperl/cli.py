@@ -1,4 +1,4 @@
-"""The program ``artperl``: train, evaluate, estimate, report, calibrate, detections."""
+"""The program ``artperl``: train, evaluate, estimate, report, calibrate, detections, train-detector."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
 from artperl.commands.report import Report
 from artperl.commands.train import Train
+from artperl.commands.train_detector import TrainDetector
 from artsim.common.program import run_program
 
 Verb = (
@@ -21,6 +22,7 @@ Verb = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
     | Annotated[MakeDetections, tyro.conf.subcommand("detections")]
+    | Annotated[TrainDetector, tyro.conf.subcommand("train-detector")]
 )
 
 

@@ -11,22 +11,27 @@ import tyro
 
 from artperl.evaluation.realistic_detections import Flaws
 from artsim.common.files import write_atomic
+from artsim.errors import ConfigError
 
 
 @dataclass(frozen=True)
 class MakeDetections:
-    """Make detections of scenes as a detector of today would, from their ground truth: COCO's results, with masks.
+    """Detect the objects of scenes: COCO's results, with masks. By default, detections are made from the ground truth.
 
     Borders of masks are off, pieces are missing or too much, objects are missed, found twice, confused, or made up. The
     same seed makes the same file. Flaws of 0 make perfect detections.
 
-    Example: artperl detections out/scenes --out out/detections.json --seed 0
+    From the ground truth: artperl detections out/scenes --out out/detections.json --seed 0
+
+    By a detector, with COCO's average precision: artperl detections out/scenes --out out/found.json --detector tabletop
     """
 
     scenes: tyro.conf.Positional[Path]
     """Folder that artsim scene wrote."""
     out: Path
     """File to write, .json."""
+    detector: str | None = None
+    """tabletop, which comes with the package, or a folder that artperl train-detector wrote."""
     seed: int = 0
     """Of all chance."""
     flaws: Annotated[Flaws, tyro.conf.arg(name="")] = field(default_factory=Flaws)
@@ -37,8 +42,19 @@ class MakeDetections:
         from artsim.scenes import open_scenes
 
         scenes = open_scenes(self.scenes)
-        found = realistic_detections(scenes, self.flaws, self.seed)
+        if self.detector is None:
+            found = realistic_detections(scenes, self.flaws, self.seed)
+        else:
+            from artperl.detection.detector import load_detector
+            from artperl.evaluation.mask_precision import detect, precision_lines
+
+            if (self.flaws, self.seed) != (Flaws(), 0):
+                raise ConfigError("a detector has its own flaws, and no chance", "flaws, seed", "leave them out")
+            found = detect(scenes, load_detector(self.detector))
         write_atomic(self.out, json_bytes(found))
+        if self.detector is not None:
+            for line in precision_lines(scenes, found):
+                print(line)
         counts = ", ".join(f"{n} {name}" for name, n in sorted(Counter(d["category"] for d in found).items()))
         there = sum(obj.visible_fraction > 0 for entry in scenes.entries for obj in entry.objects)
         print(f"wrote {self.out}: {len(found)} detections ({counts}) of {there} objects in {len(scenes)} images")

@@ -37,8 +37,7 @@ class Estimate:
 
     From a depth image: artperl estimate depth.png --mask mask.png --intrinsics camera.json --category laptop
 
-    All objects of an image, found by a detector: artperl estimate image.png depth.png --intrinsics camera.json
-    --detections results.json --picture boxes.png
+    All objects of an image: artperl estimate image.png depth.png --intrinsics camera.json --picture boxes.png
 
     From a folder, or several files, one line of JSON each: artperl estimate FOLDER --category laptop --out poses.jsonl
 
@@ -101,13 +100,17 @@ class Estimate:
     """Where the intrinsics have the centre of the first pixel. By default as their format has it."""
     image_id: str | None = None
     """Which image of a scene_camera.json; by default that in the depth image's name."""
+    detector: str | None = None
+    """Finds the objects of an image: name the image in colour and the depth image, and no category. tabletop, which
+    comes with the package, or a folder that artperl train-detector wrote. The default where the first of two files is a
+    picture in colour."""
     detections: Path | None = None
-    """Objects that a detector has found in an image: name the image in colour and the depth image, and no category."""
+    """Instead of a detector, the objects that another one has found."""
     estimators: tuple[str, ...] = ()
-    """Of an image with detections: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one for
-    each category. By default those that come with the package, by their names."""
+    """Of an image of several objects: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one
+    for each category. By default those that come with the package, by their names."""
     picture: Path | None = None
-    """Of an image with detections: write the image with boxes and joint axes drawn over it here, as PNG."""
+    """Of an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
     skip_bad: bool = False
     """Leave out detections that cannot be used, and list them, instead of refusing the file."""
     seen_from: tuple[float, float] | None = None
@@ -120,17 +123,16 @@ class Estimate:
     """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""
 
     def run(self) -> None:
+        from artperl.commands.estimate_scene import estimate_scene, is_image_pair
         from artperl.estimator import load_estimator
 
-        if self.detections is not None:
-            from artperl.commands.estimate_scene import estimate_scene
-
+        if self.detections is not None or self.detector is not None or is_image_pair(self.clouds):
             estimate_scene(self)
             return
         if self.picture is not None or self.estimators or self.skip_bad:
             raise ConfigError(
-                "these are of an image with detections", "picture, estimators, skip_bad",
-                "add --detections results.json",
+                "these are of an image of several objects", "picture, estimators, skip_bad",
+                "name the image in colour, then the depth image, and add --intrinsics camera.json",
             )  # fmt: skip
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"
         self._check(several)

@@ -1,4 +1,4 @@
-"""``artperl estimate`` of an image with detections: all objects, all parts."""
+"""``artperl estimate`` of an image of several objects: all objects, all parts."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from artsim.common.files import write_atomic
 from artsim.errors import ConfigError
+
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
 
 if TYPE_CHECKING:
     from artperl.commands.estimate import Estimate
@@ -46,6 +49,17 @@ def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:
     return found
 
 
+def is_image_pair(files: Sequence[Path]) -> bool:
+    """Whether these are two files, the first a picture in colour, which no depth image is."""
+    if len(files) != 2 or files[0].suffix.lower() not in _PICTURES or not files[0].is_file():
+        return False
+    try:
+        with Image.open(files[0]) as image:
+            return image.mode in ("RGB", "RGBA")
+    except (OSError, ValueError, Image.DecompressionBombError):
+        return False  # what is wrong with it is told where it is read
+
+
 def estimate_scene(options: Estimate) -> None:
     """Estimate, print, and write what is asked for.
 
@@ -55,6 +69,7 @@ def estimate_scene(options: Estimate) -> None:
         When a file cannot be used, or an option does not fit.
     """
     from artperl.commands.estimate import STDOUT
+    from artperl.inputs.detections import Detections
     from artperl.inputs.images import read_picture
     from artperl.inputs.reading import read_depth_image
     from artperl.scene.drawing import draw_scene
@@ -64,14 +79,16 @@ def estimate_scene(options: Estimate) -> None:
     image, depth_file = options.clouds
     depth = read_depth_image(depth_file, options.input_options())
     rgb = _colour(read_picture(image, "image").values, image)
-    detections = _read_detections(options, image, (depth.values.shape[1], depth.values.shape[0]))
+    told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
+    estimator = SceneEstimator(named_estimators(options.estimators), options.detector or "tabletop", **told)
+    size = (depth.values.shape[1], depth.values.shape[0])
+    given = None if options.detections is None else _read_detections(options, image, size)
+    detections = given or Detections((), (), (f"objects are found by {estimator.detector}",))
     for text in (*depth.notes, *detections.notes):
         print(f"note: {text}", file=sys.stderr)
     for text in (*depth.warnings, *(f"left out: {text}" for text in detections.skipped)):
         print(f"warning: {text}", file=sys.stderr)
-    told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    estimator = SceneEstimator(named_estimators(options.estimators), **told)
-    result = estimator(rgb, depth.values, depth.K, detections.all)
+    result = estimator(rgb, depth.values, depth.K, None if given is None else given.all)
     if options.picture is not None:
         write_atomic(options.picture, draw_scene(rgb, depth.K, result))
     record = scene_record(result, detections)
@@ -92,16 +109,18 @@ def _check(options: Estimate) -> None:
         raise ConfigError(
             f"{len(options.clouds)} files are named", "estimate",
             "name the image in colour, then the depth image: artperl estimate image.png depth.png --intrinsics"
-            " camera.json --detections results.json",
+            " camera.json",
         )  # fmt: skip
     if options.intrinsics is None:
         raise ConfigError("a depth image needs intrinsics", "intrinsics", "add --intrinsics camera.json")
     if options.out is not None and str(options.out) != "-" and options.out.suffix != ".json":
         raise ConfigError(f"{options.out} is no .json file", "out", "name one, or - for standard output")
+    if options.detections is not None and options.detector is not None:
+        raise ConfigError("objects are found once", "detector, detections", "leave one of them out")
     given = [name for name in ("mask", "mask_id", "view") if getattr(options, name) is not None]
     if given or options.method != "full" or options.camera != "opencv":
         names = ", ".join([*given, *(["method"] if options.method != "full" else [])]) or "camera"
-        raise ConfigError("these do not go with detections", names, "leave them out")
+        raise ConfigError("these do not go with several objects", names, "leave them out")
 
 
 def _colour(values: NDArray[Any], path: Path) -> NDArray[np.uint8]:

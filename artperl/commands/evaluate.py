@@ -51,8 +51,11 @@ class Evaluate:
     """For the benchmark artimage: folder of the original ArtImage, whose test split is read instead of views that are
     made here. Any --method then; without --views, all frames. For reartmix: folder that artsim scene wrote, or that has
     the layout of ReArtMix; by default --views scenes, 50, are made in out/reartmix."""
+    detector: str | None = None
+    """For reartmix: what finds the objects: tabletop, which comes with the package, or a folder that artperl
+    train-detector wrote. By default detections are realistic ones, made from the truth."""
     detections: Path | None = None
-    """For reartmix: COCO's results, with image_id as artperl detections writes it. By default realistic ones."""
+    """For reartmix: COCO's results instead, with image_id as artperl detections writes it."""
     skip_bad: bool = False
     """For reartmix: leave out detections that cannot be used, and list them, instead of refusing the file."""
     estimators: tuple[str, ...] = ()
@@ -94,9 +97,9 @@ class Evaluate:
 
             evaluate_reartmix(self)
             return
-        if self.detections is not None or self.estimators or self.skip_bad:
+        if self.detections is not None or self.detector is not None or self.estimators or self.skip_bad:
             raise ConfigError(
-                "these are of a benchmark", "detections, estimators, skip_bad", "add --benchmark reartmix"
+                "these are of a benchmark", "detections, detector, estimators, skip_bad", "add --benchmark reartmix"
             )
         if self.root is not None and (self.benchmark != "artimage" or self.ablation or self.rows):
             raise ConfigError("the original images are those of a benchmark", "root", "use --benchmark artimage alone")

@@ -46,14 +46,16 @@ def evaluate_reartmix(options: Evaluate) -> None:
         root = _FOLDER
         generate_scenes(SCENES, root, options.views or _SCENES, SEEDS, 10, cores())
     images = open_images(root)
-    if options.detections is None:
-        detections = images.own_detections(0)
-    else:
+    if options.detector is not None and options.detections is not None:
+        raise ConfigError("objects are found once", "detector, detections", "leave one of them out")
+    detections = None if options.detector is not None else images.own_detections(0)
+    if options.detections is not None:
         detections = read_detections(options.detections, images.sizes, images.names(), options.skip_bad)
-    for text in detections.skipped:
+    for text in () if detections is None else detections.skipped:
         say(f"left out: {text}")
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    estimator = SceneEstimator({"drawer": "any", **named_estimators(options.estimators)}, **told)
+    named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
+    estimator = SceneEstimator(named, options.detector or "tabletop", **told)
     figures = run_reartmix(images, detections, estimator, True, say)
     if options.json is not None:
         write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())

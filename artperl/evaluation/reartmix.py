@@ -62,7 +62,7 @@ class SceneImages:
                 for told, sample in zip(record.entry.objects, record.samples, strict=True)
                 if sample is not None
             ]
-            yield i, AnnotatedImage(record.entry.key, record.depth, record.camera.K, tuple(objects))
+            yield i, AnnotatedImage(record.entry.key, record.depth, record.camera.K, tuple(objects), record.rgb)
 
     def __len__(self) -> int:
         return len(self.scenes)
@@ -96,12 +96,22 @@ def open_images(root: Path) -> SceneImages | ReArtMixFolder:
 
 def run_reartmix(
     images: SceneImages | ReArtMixFolder,
-    detections: Detections,
+    detections: Detections | None,
     estimator: SceneEstimator,
     progress: bool = True,
     say: Callable[[str], None] = print,
 ) -> dict[str, Any]:
     """Estimate every detected object of every image, score, and print the table.
+
+    Parameters
+    ----------
+    images : SceneImages or ReArtMixFolder
+    detections : Detections or None
+        None: what the estimator's own detector finds.
+    estimator : SceneEstimator
+    progress : bool
+    say : callable
+        Gets each line.
 
     Returns
     -------
@@ -111,9 +121,11 @@ def run_reartmix(
         ``seconds_per_image``, ``notes``.
     """
     found, true, seconds, failures = list[PosedObject](), list[PosedObject](), list[float](), list[str]()
+    detected = 0
     for key, image in track("images", images, total=len(images), unit="image", shown=progress):
         true += image.objects
-        result = estimator(None, image.depth, image.K, detections.of(key))
+        result = estimator(image.rgb, image.depth, image.K, None if detections is None else detections.of(key))
+        detected += len(result.objects)
         seconds.append(sum(result.milliseconds.values()) / 1e3)
         for obj in result.objects:
             if obj.estimate is None:
@@ -122,11 +134,12 @@ def run_reartmix(
             boxes = obj.estimate.rotation, obj.estimate.translation, obj.estimate.size
             found.append(PosedObject(str(key), obj.detection.category, *boxes, obj.score))
     table = ap_table(found, true)
+    notes = [f"objects are found by {estimator.detector}"] if detections is None else list(detections.notes)
     have = [name for name in table if name in estimator.categories]
     figures: dict[str, Any] = {
         "categories": table, "mean": _mean(table, list(table)), "mean_with_estimator": _mean(table, have),
-        "images": len(images), "detections": len(detections.all), "failures": len(failures),
-        "seconds_per_image": float(np.median(seconds)) if seconds else 0.0, "notes": list(detections.notes),
+        "images": len(images), "detections": detected, "failures": len(failures),
+        "seconds_per_image": float(np.median(seconds)) if seconds else 0.0, "notes": notes,
     }  # fmt: skip
     lacking = [name for name in table if name not in have]
     if lacking:

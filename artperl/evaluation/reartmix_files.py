@@ -48,12 +48,13 @@ def is_reartmix(folder: Path) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class AnnotatedImage:
-    """An image of the folder: its depth in metres, its camera, its true objects."""
+    """An image of the folder: its depth in metres, its camera, its true objects, its colours where known."""
 
     key: str
     depth: NDArray[Any]
     K: Array
     objects: tuple[PosedObject, ...]
+    rgb: NDArray[np.uint8] | None = None
 
 
 class ReArtMixFolder:

@@ -1,4 +1,4 @@
-"""From an image with depth to the parts of every object: each detection's cloud, its category's estimator."""
+"""From an image with depth to the parts of every object: its detections, their clouds, their categories' estimators."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from artperl.inputs.detections import Detection
 from artperl.methods.protocol import Method
 from artperl.scene.denoise import denoise
 from artsim.errors import ArtsimError, ConfigError
+
+if TYPE_CHECKING:
+    from artperl.detection.detector import Detector
 
 _MOST_POINTS = 8192
 """Of an object's cloud: what estimators are tested with. More cost time and bring nothing."""
@@ -81,23 +84,38 @@ class SceneEstimator:
     ----------
     estimators : mapping, optional
         Name or folder of the estimator of each category; by default those that come with the package, by their names.
+    detector : str or Path
+        Name or folder of the detector, loaded when an image comes without detections.
     **changes
         Of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
     """
 
-    def __init__(self, estimators: Mapping[str, str | Path] | None = None, **changes: Any):
+    def __init__(
+        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = "tabletop", **changes: Any
+    ):
         shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
         shipped.pop("any", None)  # of no category
         self.estimators: dict[str, str | Path] = {**shipped, **(estimators or {})}
         self._changes, self._loaded = changes, dict[str, Method]()
+        self._detector_name = detector
+        self._detector: Detector | None = None
 
     @property
     def categories(self) -> tuple[str, ...]:
         """Categories that there is an estimator for."""
         return tuple(sorted(self.estimators))
 
+    @property
+    def detector(self) -> Detector:
+        """What finds the objects."""
+        from artperl.detection.detector import load_detector  # transformers takes seconds to import
+
+        if self._detector is None:
+            self._detector = load_detector(self._detector_name)
+        return self._detector
+
     def __call__(
-        self, rgb: ArrayLike | None, depth: ArrayLike, K: ArrayLike, detections: Sequence[Detection]
+        self, rgb: ArrayLike | None, depth: ArrayLike, K: ArrayLike, detections: Sequence[Detection] | None = None
     ) -> SceneEstimate:
         """Estimate all objects of an image.
 
@@ -106,12 +124,13 @@ class SceneEstimator:
         Parameters
         ----------
         rgb : (H, W, 3) uint8 or None
-            Not needed by the estimators; it has to be of the depth image's size.
+            Of the depth image's size. The detector uses it where it is there; the estimators do not.
         depth : (H, W) float
             Metres along the camera's axis; 0, or not finite, where nothing was measured.
         K : (3, 3) float
             Intrinsic matrix in pixels; the centre of the first pixel is at (0.5, 0.5).
-        detections : sequence of Detection
+        detections : sequence of Detection, optional
+            By default what the detector finds.
 
         Raises
         ------
@@ -121,11 +140,17 @@ class SceneEstimator:
         """
         depth = np.asarray(depth, dtype=np.float64)
         check_images(rgb, depth)
-        K, begun = np.asarray(K, dtype=np.float64), time.perf_counter()
+        K, begun, times = np.asarray(K, dtype=np.float64), time.perf_counter(), dict[str, float]()
+        if detections is None:
+            picture = None if rgb is None else np.asarray(rgb, dtype=np.uint8)
+            find, begun = self.detector, time.perf_counter()
+            detections = find(picture, depth, K)
+            times["detector"] = 1e3 * (time.perf_counter() - begun)
+            begun = time.perf_counter()
         objects = tuple(self._object(depth, K, detection) for detection in detections)
         whole = 1e3 * (time.perf_counter() - begun)
         estimating = sum(obj.milliseconds for obj in objects)
-        return SceneEstimate(objects, {"clouds": whole - estimating, "estimates": estimating})
+        return SceneEstimate(objects, {**times, "clouds": whole - estimating, "estimates": estimating})
 
     def _object(self, depth: NDArray[np.float64], K: NDArray[np.float64], detection: Detection) -> SceneObject:
         category = detection.category

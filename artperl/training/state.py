@@ -6,14 +6,16 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch import Tensor, nn
 
-from artperl.training.options import TrainOptions
 from artperl.training.run_folder import RunFolder, differences
 from artsim.errors import DatasetError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass
@@ -45,7 +47,7 @@ class RunState:
         """Steps of all stages together."""
         return sum(self.done.values())
 
-    def save(self, folder: RunFolder, options: TrainOptions) -> None:
+    def save(self, folder: RunFolder, options: DataclassInstance) -> None:
         """Write the state; a process that is killed meanwhile leaves the state before or after.
 
         Raises
@@ -61,7 +63,7 @@ class RunState:
         state = {"options": asdict(options), "done": self.done, "best": self.best, "history": self.history}
         self._digest = folder.write(state, tensors)
 
-    def load(self, folder: RunFolder, options: TrainOptions) -> None:
+    def load(self, folder: RunFolder, options: DataclassInstance) -> None:
         """Take up the state that a folder holds, if there is one; only while the folder is held.
 
         Raises

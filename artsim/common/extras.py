@@ -40,6 +40,8 @@ MODULES = {
     "tensorboard": ("tensorboard", "train"),
     "safetensors": ("safetensors", "train"),
     "yaml": ("PyYAML", "train"),
+    "transformers": ("transformers", "detect"),
+    "pycocotools": ("pycocotools", "detect"),
     "hypothesis": ("hypothesis", "dev"),
     "pytest": ("pytest", "dev"),
     "stable_baselines3": ("stable-baselines3", "dev"),

@@ -24,6 +24,8 @@ FORMAT = 1
 DESCRIPTION = "scenes.json"
 _MAX_VIEWS = 1_000_000
 _MAX_FILE = 1 << 28
+_MOST_OPEN = 200
+"""Shards whose index is kept, each with a file handle: what shuffled reading of some thousand scenes takes."""
 _KEY, _FILE = re.compile(r"[0-9]{6,12}_[0-9]{1,6}"), re.compile(r"[0-9]{6,12}_[0-9]{1,6}|scenes-[0-9]{6,12}\.tar")
 _AGAIN = "run the same artsim scene command again: it makes again what is damaged"
 
@@ -202,9 +204,9 @@ class SceneDataset:
 
     def _reader(self, file: str) -> ShardReader:
         if file not in self._readers:
-            for reader in self._readers.values():  # views are read one after the other
-                reader.close()
-            self._readers = {file: ShardReader(self.folder / file, _AGAIN)}
+            if len(self._readers) >= _MOST_OPEN:
+                self._readers.pop(next(iter(self._readers))).close()
+            self._readers[file] = ShardReader(self.folder / file, _AGAIN)
         return self._readers[file]
 
 

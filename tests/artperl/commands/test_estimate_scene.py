@@ -74,7 +74,7 @@ def test_what_does_not_fit_is_refused_with_its_mend(
         command(folder, intrinsics=None).run()
     with pytest.raises(ConfigError, match=r"gone\.png"):
         command(folder, clouds=(tmp_path / "gone.png", view / "depth.npy")).run()
-    with pytest.raises(ConfigError, match="do not go with detections"):
+    with pytest.raises(ConfigError, match="do not go with several objects"):
         command(folder, mask=view / "instance_ids.png").run()
     with pytest.raises(ConfigError, match="no image '9'"):
         command(folder, image_id="9").run()

@@ -1,0 +1,1 @@
+"""Finding the objects of an image: which categories, which pixels."""

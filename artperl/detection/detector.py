@@ -1,0 +1,168 @@
+"""A trained detector: an image with depth in, detections out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from artsim.common.extras import needs
+
+with needs("the detector"):
+    import torch
+    from torch.nn import functional
+
+from artperl.core.tensor_files import read_tensors, write_tensors
+from artperl.detection.grouping import assign, find_middles
+from artperl.detection.images import cell_pixels, fill, look_at
+from artperl.detection.network import OFFSET, DetectorNetwork, DetectorSize
+from artperl.inputs.detections import Detection
+from artsim.common.files import read_json, write_atomic
+from artsim.common.json_records import from_json_values
+from artsim.errors import DatasetError
+from artsim.formats.coco import mask_record
+
+WEIGHTS = Path(__file__).parents[1] / "weights"
+"""Folder of what comes with the package."""
+SHIPPED = "tabletop"
+"""Name of the detector that comes with the package: of small things on tables."""
+_SETTINGS, _TENSORS, _FORMAT = "detector.json", "weights.safetensors", 1
+_AGAIN = "train it again: artperl train-detector"
+_LEAST_SHARE = 2e-4
+"""Of the image's pixels that the smallest object has: fewer are borders of others."""
+
+
+class Detector:
+    """Finds objects in an image with depth.
+
+    Parameters
+    ----------
+    network : DetectorNetwork
+    about : mapping, optional
+        How it was trained, in JSON's terms.
+    """
+
+    def __init__(self, network: DetectorNetwork, about: Mapping[str, Any] | None = None):
+        self.network, self.about = network.eval(), dict(about or {})
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Categories that it finds."""
+        return self.network.size.categories
+
+    def __repr__(self) -> str:
+        return f"<Detector of {', '.join(self.categories)}>"
+
+    @torch.no_grad()
+    def __call__(
+        self, rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, image: int | str = 0
+    ) -> list[Detection]:
+        """Objects of an image, the surest first, with masks that do not overlap.
+
+        Parameters
+        ----------
+        rgb : (H, W, 3) uint8 or None
+        depth : (H, W) float
+            Metres along the camera's axis; 0, or not finite, where nothing was measured.
+        K : (3, 3) float
+            Intrinsic matrix in pixels; the centre of the first pixel is at (0.5, 0.5).
+        image : int or str
+            Identity that the detections get.
+        """
+        depth, K = np.asarray(depth, dtype=np.float32), np.asarray(K, dtype=np.float64)
+        look = look_at(rgb, depth, K)
+        logits, told = self.network(torch.from_numpy(look.channels)[None])
+        shares = logits.softmax(1)
+        points = look.points[np.ix_(*(cell_pixels(n) for n in look.points.shape[:2]))] / look.unit
+        there = (shares[0].argmax(0) > 0).numpy()
+        offset, size = told[0, :3].numpy()[:, there].T, told[0, 3].exp().numpy()[there]
+        middles = find_middles(points[there] + OFFSET * offset, size, 1.0 - shares[0, 0].numpy()[there])
+        if len(middles) == 0:
+            return []
+        # The same at the full resolution: edges of depth make edges of masks.
+        whole = depth.shape
+        shares, told = (
+            functional.interpolate(x, size=whole, mode="bilinear", align_corners=False)[0] for x in (shares, told)
+        )
+        of = (shares.argmax(0) > 0).numpy()
+        pixels = _points(depth, K)[of] / look.unit
+        votes, size = pixels + OFFSET * told[:3].numpy()[:, of].T, told[3].exp().numpy()[of]
+        owner = assign(votes, size, middles)
+        found, likely = list[Detection](), shares.numpy()[:, of]
+        for number in range(len(middles)):
+            own = owner == number
+            if own.sum() < _LEAST_SHARE * of.size:
+                continue
+            mean = likely[:, own].mean(axis=1)
+            category = int(mean[1:].argmax())
+            mask = np.zeros(whole, dtype=bool)
+            mask[of] = own
+            told_of, score = mask_record(mask), float(np.clip(mean[1 + category], 0.0, 1.0))
+            box = (
+                float(told_of["bbox"][0]),
+                float(told_of["bbox"][1]),
+                float(told_of["bbox"][2]),
+                float(told_of["bbox"][3]),
+            )
+            size_ = (whole[1], whole[0])
+            found.append(Detection(image, self.categories[category], score, told_of["segmentation"], box, size_))
+        return sorted(found, key=lambda d: -d.score)
+
+
+def _points(depth: NDArray[np.float32], K: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(H, W, 3) of all pixels, those without depth as far away as the nearest that has one."""
+    filled = fill(depth, np.isfinite(depth) & (depth > 0))
+    v, u = np.mgrid[: depth.shape[0], : depth.shape[1]] + 0.5
+    y = (v - K[1, 2]) / K[1, 1]
+    x = (u - K[0, 2] - K[0, 1] * y) / K[0, 0]
+    return np.stack([x * filled, y * filled, filled], axis=-1).astype(np.float32)
+
+
+def save_detector(detector: Detector, folder: Path, about: Mapping[str, Any]) -> None:
+    """Write a detector: weights in half precision, sizes and how it was made in JSON."""
+    folder.mkdir(parents=True, exist_ok=True)
+    state = detector.network.state_dict()
+    # Counters of batches are whole numbers, and not needed.
+    write_tensors({name: t.half() for name, t in state.items() if t.is_floating_point()}, folder / _TENSORS)
+    told = {"format": _FORMAT, "size": asdict(detector.network.size), "about": dict(about)}
+    write_atomic(folder / _SETTINGS, (json.dumps(told, indent=1) + "\n").encode())
+
+
+def load_detector(name: str | Path = SHIPPED) -> Detector:
+    """A detector by its folder, or the one that comes with the package by its name.
+
+    Raises
+    ------
+    DatasetError
+        When there is none, or its files are damaged.
+    ConfigError
+        When transformers is not installed.
+    """
+    folder = WEIGHTS / name if str(name) == SHIPPED else Path(name)
+    folder = folder / "best" if not (folder / _SETTINGS).exists() and (folder / "best").is_dir() else folder
+    if not (folder / _SETTINGS).exists():
+        raise DatasetError(
+            "there is no detector here", folder, f"use {SHIPPED}, or a folder that artperl train-detector wrote"
+        )
+    settings = read_json(folder / _SETTINGS, "the detector's settings", DatasetError)
+    try:
+        if settings.get("format") != _FORMAT:
+            raise ValueError(f"format {settings.get('format')!r:.20} is not {_FORMAT}")
+        size = from_json_values(DetectorSize, settings["size"])
+        if not (1 <= len(size.categories) <= 1000 and 1 <= size.width <= 512 and 1 <= size.blocks <= 16):
+            raise ValueError(f"its size {size} is out of range")
+    except (ValueError, KeyError, AttributeError, TypeError) as error:
+        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
+    tensors, _ = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
+    with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
+        shapes = {k: t.shape for k, t in DetectorNetwork(size).state_dict().items() if t.is_floating_point()}
+    if shapes != {k: t.shape for k, t in tensors.items()}:
+        raise DatasetError("the weights are not of a detector of this size", folder, _AGAIN)
+    network = DetectorNetwork(size)
+    network.load_state_dict(tensors, strict=False)
+    return Detector(network, settings.get("about"))
