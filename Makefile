@@ -48,10 +48,10 @@ bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 audit: $(VENV)/.ready-dev  ## test 10,000 procedural objects, and those in ARTSIM_PARTNET_DIR, for simulators
 	$(PY) -m benchmarks.audit
 
-# Stop it at any moment: the same command goes on. To try one: make weights RECIPES=laptop PRESET=quick
-RECIPES ?= $(basename $(notdir $(wildcard artperl/recipes/*.json)))
+# Stop it at any moment: the same command goes on. To try one: make weights CATEGORY=laptop PRESET=quick
+CATEGORY ?= $(basename $(notdir $(wildcard artperl/recipes/*.json)))
 weights: $(VENV)/.ready-dev  ## make the shipped estimators again, each from its recipe
-	for recipe in $(RECIPES); do \
+	for recipe in $(CATEGORY); do \
 		$(VENV)/bin/artperl train --recipe $$recipe $(if $(PRESET),--preset $(PRESET)) --workers 2 --threads 1 || exit; \
 	done
 

@@ -1,4 +1,7 @@
-"""Samples by number: of fresh procedural objects, of a dataset, or of given objects."""
+"""Samples by number: of fresh procedural objects, of a dataset, or of given objects.
+
+Of an object that looks the same turned round, the truth that faces the camera is told: see :mod:`artperl.data.facing`.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ import numpy as np
 
 from artperl.core.part_order import reorder_sample, visible_order
 from artperl.data.categories import Parts, has_parts, order_parts
+from artperl.data.facing import Facing
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.datasets.sample_options import SensorName
@@ -55,13 +59,15 @@ class Samples:
     ):
         self.stream = FamilyStream(categories, options, seed, views_per_object)
         self.num_rows, self.parts, self.given = num_rows, parts, given
+        self._facing = Facing()
         self._keep()
 
     def __getitem__(self, i: int) -> Sample:
         n, view = divmod(i, self.stream.views_per_object)
         index = i if self._is_given(n) else self._right(n) * self.stream.views_per_object + view
         renderer = shared_renderer(self.stream.options.renderer)
-        return draw_sample(self.object(i), self.stream.options, self.stream.seed, index, renderer)
+        obj = self.object(i)
+        return self._facing(draw_sample(obj, self.stream.options, self.stream.seed, index, renderer), lambda: obj)
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
@@ -134,6 +140,7 @@ class Recorded:
         self.dataset, self.seed, self.num_rows = open_dataset(folder, "train"), seed, num_rows
         self.categories, self.parts = tuple(categories), parts
         self._usable: list[int] = []
+        self._facing = Facing()
         wanted: dict[str, bool] = {}
         for place in range(len(self.dataset)):
             key = self.dataset.object_key(place)
@@ -158,13 +165,16 @@ class Recorded:
         if turn != self._turn:
             self._turn, self._order = turn, np.random.default_rng([self.seed, turn]).permutation(self._usable)
         sample = self.dataset[int(self._order[place])]
-        if self.parts != "any":
-            return sample
-        return reorder_sample(sample, visible_order(sample.joint_parent, sample.box_center, sample.box_size))
+        if self.parts == "any":
+            sample = reorder_sample(sample, visible_order(sample.joint_parent, sample.box_center, sample.box_size))
+        return self._facing(sample, lambda: self._object_of(sample))
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
-        return order_parts(self.dataset.object_of(self[i]), self.parts)
+        return self._object_of(self[i])
+
+    def _object_of(self, sample: Sample) -> ArticulatedObject:
+        return order_parts(self.dataset.object_of(sample), self.parts)
 
     def _is_right(self, sample: Sample) -> bool:
         few_enough = len(sample.joint_type) <= self.num_rows
@@ -193,9 +203,12 @@ class Given:
     ):  # fmt: skip
         self.objects, self.options, self.seed = objects, options, seed
         self.views_per_object, self.num_rows = views_per_object, num_rows
+        self._facing = Facing()
 
     def __getitem__(self, i: int) -> Sample:
-        return draw_sample(self.object(i), self.options, self.seed, i, shared_renderer(self.options.renderer))
+        obj = self.object(i)
+        sample = draw_sample(obj, self.options, self.seed, i, shared_renderer(self.options.renderer))
+        return self._facing(sample, lambda: obj)
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""

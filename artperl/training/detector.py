@@ -21,6 +21,7 @@ from artperl.data.scene_cells import Cells, SceneCells
 from artperl.detection.detector import Detector, save_detector
 from artperl.detection.images import WIDTH
 from artperl.detection.network import OFFSET, DetectorNetwork, DetectorSize
+from artperl.training.recipes import commit
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
 from artperl.training.state import RunState
@@ -130,7 +131,8 @@ def train_detector(options: DetectorOptions, out: Path, workers: int = 1, progre
         bar.close()
         state.save(folder, options)
         detector = Detector(network.cpu())
-        save_detector(detector, folder.best, {"options": json.loads(json.dumps(asdict(options)))})
+        about = {"commit": commit(), "options": json.loads(json.dumps(asdict(options)))}
+        save_detector(detector, folder.best, about)
     return detector
 
 

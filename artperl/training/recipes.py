@@ -88,7 +88,7 @@ def provenance(options: TrainOptions, recipe: Recipe | None) -> dict[str, Any]:
     parents = [] if options.start_from is None else [folder_of(options.start_from)]
     return {
         "recipe": None if recipe is None else {"name": recipe.name, "sha256": recipe.sha256},
-        "commit": _commit(),
+        "commit": commit(),
         "parents": [{"name": folder.name, "sha256": weights_sha256(folder)} for folder in parents],
     }
 
@@ -103,7 +103,7 @@ def is_made(out: Path, recipe: Recipe) -> bool:
     return "test" in about and isinstance(found, dict) and found.get("sha256") == recipe.sha256
 
 
-def _commit() -> str:
+def commit() -> str:
     """The commit of the clone that this package is in, with + for changed files; outside a clone its version."""
     clone = WEIGHTS.parents[1]
     if (clone / ".git").exists():

@@ -68,7 +68,7 @@ def symmetries(obj: ArticulatedObject, tolerance: float = TOLERANCE) -> tuple[Sy
 
 
 def equivalent_sample(sample: Sample, symmetry: Symmetry) -> Sample:
-    """The same view with the truth written in the other of two equal ways: poses, boxes, joints, and part ids.
+    """The same view with the truth written in the other of two equal ways: poses, boxes, joints, part ids and NPCS.
 
     Part k of the new truth is part ``parts[k]`` of the old one, and its rest frame is turned by the symmetry.
     """
@@ -88,6 +88,7 @@ def equivalent_sample(sample: Sample, symmetry: Symmetry) -> Sample:
         joint_origin_camera=sample.joint_origin_camera[edge],
         joint_state=state,
         part=number[sample.part].astype(np.uint8),
+        npcs=((sample.npcs - 0.5) @ rotation.astype(np.float32) + np.float32(0.5)).astype(np.float32),
     )
 
 
