@@ -40,6 +40,8 @@ class PosedObject:
         Of a found object.
     counted : bool
         Of a true object: whether it is to be found. Who finds another one neither wins nor loses.
+    equals : tuple of PosedObject
+        Of a true object: the same one as it looks the same, its parts renumbered. Each of them is as true.
     """
 
     image: str
@@ -49,6 +51,7 @@ class PosedObject:
     size: Array
     score: float = 1.0
     counted: bool = True
+    equals: tuple[PosedObject, ...] = ()
 
 
 Criterion = Callable[[PosedObject, PosedObject], Right]
@@ -129,7 +132,8 @@ def match(found: Sequence[PosedObject], true: Sequence[PosedObject], criterion: 
     for obj in sorted(found, key=lambda o: -o.score):  # stable: of equal ones the first given
         best, taken, rank = np.zeros(len(obj.center), dtype=bool), None, (0, 0.0)
         for other in free.get(obj.image, []):
-            parts = pair_parts(criterion(obj, other))
+            ways = [pair_parts(criterion(obj, true)) for true in (other, *other.equals)]
+            parts = max(ways, key=lambda way: int(way.sum()))
             order = (int(parts.sum()), -float(np.linalg.norm(obj.center[0] - other.center[0])))
             if order[0] > 0 and (taken is None or order > rank):
                 best, taken, rank = parts, other, order

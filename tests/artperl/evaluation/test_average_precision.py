@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -66,6 +67,15 @@ def test_roots_are_compared_with_roots_and_others_in_the_best_order() -> None:
     right = np.array([[False, True, True], [True, False, True], [True, True, False]])
     assert pair_parts(right).tolist() == [False, True, True]
     assert pair_parts(np.array([[True], [True]])).tolist() == [True, False]
+
+
+def test_an_object_that_looks_the_same_is_right_in_each_way() -> None:
+    true = posed("a", [0, 0], [0.0, 0.5])
+    swapped = posed("a", [0, 0], [0.5, 0.0])
+    rule = within_metres(0.05)
+    assert average_precision([swapped], [true], rule) == 0.0
+    assert average_precision([swapped], [replace(true, equals=(swapped,))], rule) == 1.0
+    assert average_precision([true], [replace(true, equals=(swapped,))], rule) == 1.0
 
 
 def test_the_table_has_every_category_that_is_there() -> None:
