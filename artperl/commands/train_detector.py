@@ -33,15 +33,15 @@ class TrainDetector:
     """Folder of the run."""
     share: float = 1.0
     """Share of the scenes that are made, for a trial."""
-    steps: int = 3000
+    steps: int = 6000
     """Batches that the network learns from."""
-    batch_size: int = 4
-    """Images of a batch."""
+    batch_size: int = 8
+    """Windows of a batch, a quarter of an image each."""
     width: int = 32
     """Channels of the network's finest level."""
     blocks: int = 2
     """Residual blocks of each of its four levels."""
-    rate: float = 1e-3
+    rate: float = 2e-3
     """Highest learning rate."""
     seed: int = 0
     device: Literal["cpu", "cuda"] = "cpu"

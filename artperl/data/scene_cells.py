@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from artperl.detection.images import cell_pixels, look_at
+from artperl.detection.images import CELL, cell_pixels, look_at
 from artperl.detection.network import OFFSET
 from artsim.observing.sample import Sample
 from artsim.scenes import SceneDataset, SceneRecord
@@ -23,6 +23,10 @@ _ZOOM = (0.75, 1.5)
 """Shares of the focal length that crops and borders change it to: other cameras, other distances."""
 _COLOURLESS = 0.4
 """Share of images in colour that lose it: a detector has to do without where there is none."""
+_WINDOWS = 2
+"""On each image: to make one takes as long as to learn from two windows."""
+_WINDOW_CELLS = (48, 80)
+"""Rows and columns of cells of a window, a quarter of an image of 640 x 360."""
 _GAIN = 0.3
 """By which brightness and each colour change: other lamps, other cameras."""
 _USUAL, _OF_USUAL, _WEIGHTS = 200.0, 3.0, (1.0, 8.0)
@@ -55,7 +59,10 @@ class Cells:
 
 
 class SceneCells(Dataset[Cells]):
-    """Batches of fresh looks at the views of scenes; batch i is the same whenever it is asked for.
+    """Batches of windows on fresh looks at the views of scenes; batch i is the same whenever it is asked for.
+
+    A window has an object near its middle: most of a whole image is wall and table, which is soon learnt. What the
+    network sees in a window is what it sees there in the whole image.
 
     Parameters
     ----------
@@ -77,14 +84,16 @@ class SceneCells(Dataset[Cells]):
     def __getitem__(self, batch: int) -> Cells:
         sets = self._sets = self._sets or [SceneDataset(folder) for folder in self.folders]  # in each process its own
         places = [(which, view) for which, scenes in enumerate(sets) for view in range(len(scenes))]
-        looks = []
-        for number in range(batch * self.batch_size, (batch + 1) * self.batch_size):
+        windows, images = list[tuple[Any, ...]](), -(-self.batch_size // _WINDOWS)
+        for number in range(batch * images, (batch + 1) * images):
             epoch, turn = divmod(number, len(places))
             order = np.random.default_rng([self.seed, 0, epoch]).permutation(len(places))
             which, view = places[order[turn]]
             rng = np.random.default_rng([self.seed, 1, number])
-            looks.append(_look(sets[which][view], self.categories, self.width, rng))
-        return Cells(*(torch.from_numpy(np.stack(values)) for values in zip(*looks, strict=True)))
+            look = _look(sets[which][view], self.categories, self.width, rng)
+            windows += [_window(look, rng) for _ in range(_WINDOWS)]
+        fields = zip(*windows[: self.batch_size], strict=True)
+        return Cells(*(torch.from_numpy(np.stack(values)) for values in fields))
 
 
 def _look(record: SceneRecord, categories: Sequence[str], width: int, rng: np.random.Generator) -> tuple[Any, ...]:
@@ -132,6 +141,21 @@ def _truth(
         size[own] = np.log(np.linalg.norm(np.ptp(corners, axis=0)) / unit)
         weight[own] = np.clip(_OF_USUAL * np.sqrt(_USUAL / own.sum()), *_WEIGHTS)
     return category, np.moveaxis(offset, -1, 0), size, weight
+
+
+def _window(look: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
+    """A part of the fields of :class:`Cells` of one image, about some cell of some object."""
+    channels, category = look[:2]
+    rows, columns = category.shape
+    high, wide = (min(n, most) for n, most in zip((rows, columns), _WINDOW_CELLS, strict=True))
+    there = np.flatnonzero(category)
+    middle = divmod(int(rng.choice(there)) if len(there) else int(rng.integers(category.size)), columns)
+    top, left = (
+        int(np.clip(at + rng.integers(-size // 3, size // 3 + 1) - size // 2, 0, whole - size))
+        for at, size, whole in zip(middle, (high, wide), (rows, columns), strict=True)
+    )
+    pixels = channels[:, CELL * top : CELL * (top + high), CELL * left : CELL * (left + wide)]
+    return pixels, *(field[..., top : top + high, left : left + wide] for field in look[1:])
 
 
 def _corners(sample: Sample) -> NDArray[np.float64]:

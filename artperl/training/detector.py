@@ -48,15 +48,16 @@ class DetectorOptions:
     scenes: tuple[str, ...]
     """Folders that artsim scene wrote."""
     categories: tuple[str, ...]
-    steps: int = 3000
-    batch_size: int = 4
+    steps: int = 6000
+    batch_size: int = 8
+    """Windows of a batch."""
     width: int = 32
     """Channels of the network's finest level."""
     blocks: int = 2
     """Residual blocks of each of its four levels."""
     columns: int = WIDTH
     """Of the images that it looks at."""
-    rate: float = 1e-3
+    rate: float = 2e-3
     """Highest learning rate."""
     seed: int = 0
     device: str = "cpu"
