@@ -48,7 +48,7 @@ class DetectorOptions:
     scenes: tuple[str, ...]
     """Folders that artsim scene wrote."""
     categories: tuple[str, ...]
-    steps: int = 6000
+    steps: int = 4500
     batch_size: int = 8
     """Windows of a batch."""
     width: int = 32

@@ -56,6 +56,7 @@ def truthful(folder: Path, view: int, monkeypatch: pytest.MonkeyPatch) -> Detect
     import artperl.data.scene_cells as module
 
     monkeypatch.setattr(module, "_ZOOM", (1.0, 1.0))
+    monkeypatch.setattr(module, "_WINDOW_CELLS", (90, 160))
     categories = SceneDataset(folder).categories
     for seed in range(64):  # one of which does not mirror it
         data = SceneCells([folder], categories, 1, seed, 640)
@@ -105,8 +106,22 @@ def test_batches_depend_on_their_number_alone(folder: Path) -> None:
     assert not torch.equal(first[5].channels, first[6].channels)
 
 
+def test_a_window_shows_what_the_whole_image_shows_there(folder: Path) -> None:
+    categories = SceneDataset(folder).categories
+    whole, windows = SceneCells([folder], categories, 1, 2, 640), SceneCells([folder], categories, 4, 2, 640)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("artperl.data.scene_cells._WINDOW_CELLS", (90, 160))
+        image = whole[0]
+    window = windows[0]
+    assert window.channels.shape == (4, 8, 192, 320)
+    assert (window.category.flatten(1) > 0).any(dim=1).all()
+    places = image.category.unfold(1, 48, 1).unfold(2, 80, 1)
+    ((row, column),) = (places[0] == window.category[0]).flatten(2).all(dim=2).nonzero()[:1].tolist()
+    assert torch.equal(image.channels[0, :, 4 * row : 4 * row + 192, 4 * column : 4 * column + 320], window.channels[0])
+
+
 def test_a_stopped_training_goes_on_with_the_same_result(folder: Path, tmp_path: Path) -> None:
-    options = scene_options([folder], steps=4, batch_size=1, width=8, blocks=1, columns=160)
+    options = scene_options([folder], steps=4, batch_size=2, width=8, blocks=1, columns=160)
     whole = train_detector(options, tmp_path / "whole", 0, progress=False)
 
     import artperl.training.detector as module
@@ -128,7 +143,7 @@ def test_a_stopped_training_goes_on_with_the_same_result(folder: Path, tmp_path:
     record = SceneDataset(folder)[0]
     assert isinstance(read(record.rgb, record.depth, record.camera.K), list)
     with pytest.raises(DatasetError, match="steps"):
-        train_detector(scene_options([folder], steps=5, batch_size=1, width=8, blocks=1, columns=160),
+        train_detector(scene_options([folder], steps=5, batch_size=2, width=8, blocks=1, columns=160),
                        tmp_path / "whole", 0, progress=False)  # fmt: skip
 
 
