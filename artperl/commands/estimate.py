@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import tee
 from pathlib import Path
@@ -42,7 +42,7 @@ class Estimate:
     From a folder, or several files, one line of JSON each: artperl estimate FOLDER --category laptop --out poses.jsonl
 
     From a dataset or its shards, in four processes: artperl estimate DATASET --category laptop --out poses.jsonl
-    --workers 4. A line names the shard and the sample.
+    --workers 4, or on a cluster, --ray auto. A line names the shard and the sample.
 
     Clouds: .npy and .npz (N, 3), (N, 4 or more) of which the first three columns count, (H, W, 3), or records with
     x, y, z; .ply; .pcd; .xyz .txt .csv .pts .asc with any separator; vertices of .obj .stl .off. Camera frame (x right,
@@ -121,6 +121,9 @@ class Estimate:
     baseline that you trained."""
     workers: int = 1
     """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""
+    ray: str | None = None
+    """Instead of processes here, those of a Ray cluster: auto for the one that this machine belongs to, local to start
+    one here, or HOST:PORT of its head. Every node must see the files, under the same names. Extra: ray."""
 
     def run(self) -> None:
         from artperl.commands.estimate_scene import estimate_scene, is_image_pair
@@ -137,7 +140,7 @@ class Estimate:
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"
         self._check(several)
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
-        load = partial(load_estimator, estimator_folder(self.category), method=self.method, **told)
+        load = partial(load_estimator, estimator_folder(self.category).absolute(), method=self.method, **told)
         if several:
             self._estimate_all(load)
         else:
@@ -150,8 +153,10 @@ class Estimate:
                 f"{self.out} is no {' or '.join(kinds)} file", "out",
                 f"name one for {'several files' if several else 'one file'}, or - for JSON",
             )  # fmt: skip
-        if not several and self.workers != 1:
-            raise ConfigError("one cloud takes one process", "workers", "leave it out")
+        if not several and (self.workers != 1 or self.ray is not None):
+            raise ConfigError("one cloud takes one process", "workers, ray", "leave them out")
+        if self.workers != 1 and self.ray is not None:
+            raise ConfigError("a cluster has its own processes", "workers, ray", "leave one of them out")
         if several and self.view is not None:
             raise ConfigError("a page shows one object", "view", "give one file, or leave it out")
 
@@ -192,6 +197,7 @@ class Estimate:
     def _estimate_all(self, load: Callable[[], Method]) -> None:
         """A line of JSON for each cloud, written as soon as it is known, so that Ctrl-C loses nothing."""
         from artperl.commands.estimate_many import Clouds, Estimating
+        from artperl.commands.on_ray import each_on_ray
         from artperl.commands.resumed_lines import Lines
         from artperl.core.processes import each
 
@@ -203,7 +209,11 @@ class Estimate:
             if done:
                 print(f"note: {len(done)} lines are in {self.out} already", file=sys.stderr)
             asked, told = tee(entry for entry in clouds if line_name(entry.file, entry.sample) not in done)
-            records = each(Estimating(load, options), asked, self.workers)
+            if self.ray is None:
+                records = each(Estimating(load, options), asked, self.workers)
+            else:  # processes of nodes run in folders of their own
+                there = (replace(entry, file=entry.file.absolute()) for entry in asked)
+                records = each_on_ray(Estimating(load, options.absolute()), there, self.ray)
             with closing(records), track("estimate", total=total, initial=len(done), unit="cloud") as progress:
                 for entry, record in zip(told, records, strict=True):
                     failed += "error" in record

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -58,6 +58,11 @@ class InputOptions:
     depth_kind: DepthKind = "z"
     pixel_center: PixelCenter | None = None
     image_id: str | None = None
+
+    def absolute(self) -> InputOptions:
+        """The same for a process that runs in another folder."""
+        intrinsics, mask = (None if path is None else path.absolute() for path in (self.intrinsics, self.mask))
+        return replace(self, intrinsics=intrinsics, mask=mask)
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ class RayPool:
         self._ray, self.storage = ray, storage_of(place)
         self._own = not ray.is_initialized()
         if self._own:
-            _connect(ray, address)
+            connect(ray, address)
         self._run = uuid.uuid4().hex
         self._pending: dict[Any, tuple[Any, tuple[Any, ...], int]] = {}
         self._processors, self._looked = 1, -_LOOK
@@ -140,7 +140,14 @@ class RayPool:
             self._ray.shutdown()
 
 
-def _connect(ray: Any, address: str) -> None:
+def connect(ray: Any, address: str) -> None:
+    """Join a Ray cluster, or start one on this machine; see :class:`RayPool`.
+
+    Raises
+    ------
+    ConfigError
+        When there is none.
+    """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing here calls home
     # Its next version leaves such variables alone of itself; the warning that it will is not for our users.
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
