@@ -34,7 +34,7 @@ class Calibrate:
     """Views of each object."""
 
     def run(self) -> None:
-        from artperl.data.categories import ARTIMAGE, Parts
+        from artperl.data.categories import JOINTS, Parts
         from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings, save_estimator
         from artperl.evaluation.calibration import calibrated
         from artperl.evaluation.samples import (
@@ -61,7 +61,7 @@ class Calibrate:
         if unknown:
             raise ConfigError(f"unknown category {unknown[0]!r}", "category", f"use {', '.join(sorted(FAMILIES))}")
         votes = estimator.perception.votes
-        parts: Parts = "any" if votes or not set(categories) <= set(ARTIMAGE) else "artimage"
+        parts: Parts = "any" if votes or not set(categories) <= set(JOINTS) else "artimage"
         samples = frozen_samples(
             categories, self.objects, self.views, mixed, VALIDATION_SEEDS, parts, estimator.perception.num_rows
         )

@@ -61,6 +61,8 @@ class Evaluate:
     estimators: tuple[str, ...] = ()
     """For reartmix: CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category. By default
     those that come with the package, by their names, and any for drawers, whose number varies."""
+    picture: Path | None = None
+    """For reartmix: write the first 12 images with the estimates over them here, as PNG."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
     """For the rows of real objects: unpacked PartNet-Mobility; by default what ARTSIM_PARTNET_DIR names."""
     category: tuple[str, ...] = ()
@@ -97,10 +99,10 @@ class Evaluate:
 
             evaluate_reartmix(self)
             return
-        if self.detections is not None or self.detector is not None or self.estimators or self.skip_bad:
-            raise ConfigError(
-                "these are of a benchmark", "detections, detector, estimators, skip_bad", "add --benchmark reartmix"
-            )
+        names = ("detections", "detector", "estimators", "skip_bad", "picture")
+        given = [name for name in names if getattr(self, name)]
+        if given:
+            raise ConfigError("these are of a benchmark", ", ".join(given), "add --benchmark reartmix")
         if self.root is not None and (self.benchmark != "artimage" or self.ablation or self.rows):
             raise ConfigError("the original images are those of a benchmark", "root", "use --benchmark artimage alone")
         if self.method != "full" and self.root is None and (self.ablation or self.benchmark):

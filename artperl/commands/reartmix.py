@@ -56,6 +56,6 @@ def evaluate_reartmix(options: Evaluate) -> None:
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
     named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
     estimator = SceneEstimator(named, options.detector or "tabletop", **told)
-    figures = run_reartmix(images, detections, estimator, True, say)
+    figures = run_reartmix(images, detections, estimator, True, say, options.picture)
     if options.json is not None:
         write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())

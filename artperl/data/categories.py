@@ -1,7 +1,8 @@
 """Which objects of a category an estimator is for.
 
 Procedural families vary the parts, too: a `drawer` has one to seven drawers, a `dishwasher` may have racks and buttons.
-ArtImage, which the paper reports, has a fixed kinematic structure in each category (Xue et al. 2021).
+ArtImage and ReArtMix, which the paper reports, have a fixed kinematic structure in each category (Xue et al. 2021, Liu et
+al. 2022).
 """
 
 from __future__ import annotations
@@ -27,9 +28,17 @@ ARTIMAGE: dict[str, tuple[str, ...]] = {
 }
 """Joints of the moving parts of each category of ArtImage."""
 
+JOINTS: dict[str, tuple[str, ...]] = {
+    **ARTIMAGE,
+    "box": ("revolute",),
+    "stapler": ("revolute",),
+    "cutter": ("prismatic",),
+}
+"""The same of ArtImage and of ReArtMix (Liu et al. 2022). Drawers of ReArtMix have one sliding part, or three."""
+
 Parts = Literal["artimage", "any"]
-"""artimage: objects with the joints that their category has in ArtImage (any, for other categories), whose drawers open
-to the front; any: all, with their parts in the order in which they are seen."""
+"""artimage: objects with the joints that their category has in :data:`JOINTS` (any, for other categories), whose drawers
+open to the front; any: all, with their parts in the order in which they are seen."""
 
 _ATTEMPTS = 200
 _BACKWARDS = 0.5
@@ -47,9 +56,10 @@ def has_parts(category: str, joint_types: Sequence[str], joint_axes: ArrayLike, 
         Rest frame.
     parts : Parts
     """
-    if parts == "any" or category not in ARTIMAGE:
+    if parts == "any" or category not in JOINTS:
         return True
-    return tuple(joint_types[1:]) == ARTIMAGE[category] and not opens_to_the_back(joint_types, joint_axes)
+    backwards = category == "drawer" and opens_to_the_back(joint_types, joint_axes)
+    return tuple(joint_types[1:]) == JOINTS[category] and not backwards
 
 
 def opens_to_the_back(joint_types: Sequence[str], joint_axes: ArrayLike) -> bool:

@@ -19,9 +19,12 @@ from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.realistic_detections import realistic_detections
 from artperl.evaluation.reartmix_files import AnnotatedImage, ReArtMixFolder, is_reartmix
 from artperl.inputs.detections import Detection, Detections
+from artperl.scene.drawing import draw_scene, scene_gallery
 from artperl.scene.estimator import SceneEstimator
+from artsim.common.files import write_atomic
 from artsim.common.progress import track
 from artsim.families import FAMILIES, make
+from artsim.formats.images import grey_depth
 from artsim.observing.sample import Sample
 from artsim.observing.symmetry import Symmetry, equivalent_sample, symmetries
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun
@@ -34,6 +37,8 @@ PUBLISHED = {"5_degrees": 48.9, "5_cm": 77.4, "iou_50": 57.8}
 """Mean average precision of ArtPERL on the original images, per cent (its section 5.3); box has 82.3 at 5 degrees."""
 SEEDS = 1_000_000
 """First scene: objects of far smaller seeds are learnt from."""
+_SHOWN = 12
+"""Images of a gallery."""
 _VISIBLE = 0.1
 """Share of an object that must be seen for it to count, as in BOP."""
 
@@ -126,6 +131,7 @@ def run_reartmix(
     estimator: SceneEstimator,
     progress: bool = True,
     say: Callable[[str], None] = print,
+    gallery: Path | None = None,
 ) -> dict[str, Any]:
     """Estimate every detected object of every image, score, and print the table.
 
@@ -138,21 +144,27 @@ def run_reartmix(
     progress : bool
     say : callable
         Gets each line.
+    gallery : Path, optional
+        PNG to write, of the first images with the estimates over them; over depth where there is no colour.
 
     Returns
     -------
     dict
         ``categories`` (see :func:`artperl.evaluation.average_precision.ap_table`), ``mean`` over all categories,
         ``mean_with_estimator`` over those that there is an estimator for, ``strict`` and ``mean_strict`` where poses
-        that look the same count as wrong, ``images``, ``detections``, ``failures``, ``seconds_per_image``, ``notes``.
+        that look the same count as wrong, ``images``, ``detections``, ``failures``, ``seconds`` (median of an image
+        by stage), ``notes``.
     """
-    found, true, seconds, failures = list[PosedObject](), list[PosedObject](), list[float](), list[str]()
-    detected = 0
+    found, true, failures, pictures = list[PosedObject](), list[PosedObject](), list[str](), list[bytes]()
+    detected, times = 0, dict[str, list[float]]()
     for key, image in track("images", images, total=len(images), unit="image", shown=progress):
         true += image.objects
         result = estimator(image.rgb, image.depth, image.K, None if detections is None else detections.of(key))
         detected += len(result.objects)
-        seconds.append(sum(result.milliseconds.values()) / 1e3)
+        for stage, own in {**result.milliseconds, "all": sum(result.milliseconds.values())}.items():
+            times.setdefault(stage, []).append(own / 1e3)
+        if gallery is not None and len(pictures) < _SHOWN:
+            pictures.append(draw_scene(_background(image), image.K, result))
         for obj in result.objects:
             if obj.estimate is None:
                 failures.append(obj.detection.category)
@@ -165,17 +177,25 @@ def run_reartmix(
     figures: dict[str, Any] = {
         "categories": table, "mean": _mean(table, list(table)), "mean_with_estimator": _mean(table, have),
         "strict": strict, "mean_strict": _mean(strict, list(strict)),
-
         "images": len(images), "detections": detected, "failures": len(failures),
-        "seconds_per_image": float(np.median(seconds)) if seconds else 0.0, "notes": notes,
+        "seconds": {stage: float(np.median(own)) for stage, own in times.items()}, "notes": notes,
     }  # fmt: skip
     lacking = [name for name in table if name not in have]
     if lacking:
         text = f"no estimator for {', '.join(lacking)}: none of their parts can be found."
         figures["notes"].append(f"{text} Fix: --estimators {lacking[0]}=FOLDER")
+    if gallery is not None:
+        write_atomic(gallery, scene_gallery(pictures))
     for line in _lines(figures):
         say(line)
     return figures
+
+
+def _background(image: AnnotatedImage) -> NDArray[np.uint8]:
+    """(H, W, 3) its colours, or its depth in grey."""
+    if image.rgb is not None:
+        return image.rgb
+    return np.repeat(grey_depth(image.depth.astype(np.float32))[..., None], 3, axis=2)
 
 
 def _mean(table: Mapping[str, Any], names: Sequence[str]) -> dict[str, float]:
@@ -196,7 +216,8 @@ def _lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield f"{'published, mean':<22}{published}   (the original images; box 82.3 at 5 deg)"
     yield (
         f"{figures['images']} images, {figures['detections']} detections, {figures['failures']} without an estimate, "
-        f"{figures['seconds_per_image']:.2f} s an image (median)"
+        + ", ".join(f"{stage} {own:.2f} s" for stage, own in figures["seconds"].items())
+        + " an image (median)"
     )
     for note in figures["notes"]:
         yield f"note: {note}"

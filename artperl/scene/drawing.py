@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,28 @@ _REACH = 0.18
 """Half of an axis, over the diagonal of all sizes."""
 _SIGNS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) - 0.5
 _EDGES = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
+
+
+def scene_gallery(pictures: Sequence[bytes], columns: int = 3, width: int = 640) -> bytes:
+    """PNG of several pictures side by side.
+
+    Parameters
+    ----------
+    pictures : sequence of bytes
+        Of :func:`draw_scene`, all of one size.
+    columns : int
+    width : int
+        Pixels of each.
+    """
+    images = [Image.open(io.BytesIO(picture)) for picture in pictures]
+    height = round(width * images[0].height / images[0].width)
+    sheet = Image.new("RGB", (columns * width, -(-len(images) // columns) * height), (255, 255, 255))
+    for number, image in enumerate(images):
+        row, column = divmod(number, columns)
+        sheet.paste(image.resize((width, height), Image.Resampling.LANCZOS), (column * width, row * height))
+    buffer = io.BytesIO()
+    sheet.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
 
 
 def draw_scene(rgb: NDArray[np.uint8], K: NDArray[np.float64], scene: SceneEstimate) -> bytes:
