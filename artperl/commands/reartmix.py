@@ -29,7 +29,7 @@ def evaluate_reartmix(options: Evaluate) -> None:
         When the folder holds no images.
     """
     from artperl.commands.estimate_scene import named_estimators
-    from artperl.evaluation.reartmix import SCENES, SEEDS, open_images, run_reartmix
+    from artperl.evaluation.reartmix import SEEDS, open_images, reartmix_scenes, run_reartmix
     from artperl.inputs.detections import read_detections
     from artperl.scene.estimator import SceneEstimator
     from artsim.scenes import generate_scenes
@@ -44,7 +44,7 @@ def evaluate_reartmix(options: Evaluate) -> None:
     root = options.root
     if root is None:
         root = _FOLDER
-        generate_scenes(SCENES, root, options.views or _SCENES, SEEDS, 10, cores())
+        generate_scenes(reartmix_scenes(), root, options.views or _SCENES, SEEDS, 10, cores())
     images = open_images(root)
     if options.detector is not None and options.detections is not None:
         raise ConfigError("objects are found once", "detector, detections", "leave one of them out")

@@ -33,7 +33,7 @@ class TrainDetector:
     """Folder of the run."""
     share: float = 1.0
     """Share of the scenes that are made, for a trial."""
-    steps: int = 4500
+    steps: int = 4000
     """Batches that the network learns from."""
     batch_size: int = 8
     """Windows of a batch, a quarter of an image each."""

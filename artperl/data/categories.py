@@ -1,8 +1,8 @@
 """Which objects of a category an estimator is for.
 
 Procedural families vary the parts, too: a `drawer` has one to seven drawers, a `dishwasher` may have racks and buttons.
-ArtImage and ReArtMix, which the paper reports, have a fixed kinematic structure in each category (Xue et al. 2021, Liu et
-al. 2022).
+ArtImage and ReArtMix, which the paper reports, have a fixed kinematic structure in each category (Xue et al. 2021, Liu
+et al. 2022).
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ JOINTS: dict[str, tuple[str, ...]] = {
 """The same of ArtImage and of ReArtMix (Liu et al. 2022). Drawers of ReArtMix have one sliding part, or three."""
 
 Parts = Literal["artimage", "any"]
-"""artimage: objects with the joints that their category has in :data:`JOINTS` (any, for other categories), whose drawers
-open to the front; any: all, with their parts in the order in which they are seen."""
+"""artimage: objects with the joints that their category has in :data:`JOINTS` (any, for other categories), whose
+drawers open to the front; any: all, with their parts in the order in which they are seen."""
 
 _ATTEMPTS = 200
 _BACKWARDS = 0.5

@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from artperl.data.categories import JOINTS
 from artperl.evaluation.average_precision import CRITERIA, PosedObject, ap_table
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.realistic_detections import realistic_detections
@@ -25,6 +27,8 @@ from artsim.common.files import write_atomic
 from artsim.common.progress import track
 from artsim.families import FAMILIES, make
 from artsim.formats.images import grey_depth
+from artsim.model.draws import StateOptions
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.observing.symmetry import Symmetry, equivalent_sample, symmetries
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun
@@ -32,7 +36,6 @@ from artsim.scenes.dataset import ViewObject
 
 Array = NDArray[np.float64]
 
-CATEGORIES = ("box", "stapler", "cutter", "scissors", "drawer")
 PUBLISHED = {"5_degrees": 48.9, "5_cm": 77.4, "iou_50": 57.8}
 """Mean average precision of ArtPERL on the original images, per cent (its section 5.3); box has 82.3 at 5 degrees."""
 SEEDS = 1_000_000
@@ -42,12 +45,28 @@ _SHOWN = 12
 _VISIBLE = 0.1
 """Share of an object that must be seen for it to count, as in BOP."""
 
-SCENES = SceneRun(
-    SceneOptions(CATEGORIES, count=(3, 6), diagonal=(0.18, 0.38), crowded=True, distractors=4),
-    SceneCameraOptions(fov=(43.0, 43.0)),
-    renderer="raycast", noise="d435", misses=True, num_points=64,
-)  # fmt: skip
-"""Regenerated ReArtMix: its categories, sizes (diagonals of 0.18 to 0.38 m), image size and focal length."""
+OBJECTS = (("box", 1, 8), ("stapler", 1, 7), ("cutter", 1, 9), ("scissors", 1, 9), ("drawer", 1, 10), ("drawer", 3, 5))
+"""Categories of ReArt-48, joints of their objects, and how many there are (Liu et al. 2022)."""
+
+
+def reart_objects() -> tuple[ArticulatedObject, ...]:
+    """48 procedural objects with the joints that those of ReArt-48 have; no run learns from them."""
+    found = list[ArticulatedObject]()
+    for category, joints, number in OBJECTS:
+        made = (make(category, seed) for seed in count(SEEDS))
+        wanted = (JOINTS[category][:1] * joints,) if category == "drawer" else (JOINTS[category],)
+        found += islice((obj for obj in made if obj.tree.types[1:] in wanted), number)
+    return tuple(found)
+
+
+def reartmix_scenes() -> SceneRun:
+    """Regenerated ReArtMix: its categories, joints, sizes (diagonals of 0.18 to 0.38 m), image size, focal length."""
+    objects = SceneOptions(
+        (), obj=reart_objects(), count=(3, 6), diagonal=(0.18, 0.38), crowded=True, distractors=4,
+        states=StateOptions(),
+    )  # fmt: skip
+    camera = SceneCameraOptions(fov=(43.0, 43.0))
+    return SceneRun(objects, camera, renderer="raycast", noise="d435", misses=True, num_points=64)
 
 
 class SceneImages:
