@@ -71,8 +71,8 @@ class Train:
     package_roots: Annotated[PackageRoots, tyro.conf.arg(name="package-root")] = field(default_factory=dict)
     """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
     parts: Literal["artimage", "any"] | None = None
-    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
-    objects of the families."""
+    """artimage: objects with the parts that their category has in ArtImage or ReArtMix, such as body and three drawers;
+    any: all objects of the families."""
     seed: int | None = None
     perception_steps: int | None = None
     """Batches that perception learns from."""

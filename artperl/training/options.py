@@ -47,8 +47,8 @@ class TrainOptions:
     categories: tuple[str, ...] = ("laptop",)
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
-    """artimage: objects with the parts that their category has in ArtImage, such as body and three drawers; any: all
-    objects of the families."""
+    """artimage: objects with the parts that their category has in ArtImage or ReArtMix, such as body and three drawers;
+    any: all objects of the families."""
     max_parts: int | None = None
     """The most parts that an object may have."""
     files: tuple[str, ...] = ()
