@@ -7,8 +7,8 @@ import pytest
 
 from artperl import load_scene_estimator
 from artperl.inputs.detections import Detection
-from artperl.scene.drawing import draw_scene
-from artperl.scene.estimator import check_images
+from artperl.scene.drawing import draw_scene, scene_gallery
+from artperl.scene.estimator import SceneEstimate, check_images
 from artsim import Camera, make, render
 from artsim.common.files import open_image
 from artsim.errors import ConfigError
@@ -51,6 +51,16 @@ def test_one_object_is_posed_and_the_others_say_why_they_are_not() -> None:
     assert 500 < changed.sum() < 0.5 * changed.size
     near = (columns > left - 60) & (columns < left + width + 60) & (rows > top - 60) & (rows < top + height + 60)
     assert near.mean() > 0.9
+
+
+def test_a_gallery_has_every_picture_in_its_place() -> None:
+    shades = (40, 90, 140, 190)
+    pictures = [draw_scene(np.full((60, 80, 3), shade, np.uint8), CAMERA.K, SceneEstimate(())) for shade in shades]
+    sheet = np.asarray(open_image(scene_gallery(pictures, columns=3, width=40)))
+    assert sheet.shape == (60, 120, 3)
+    assert [int(sheet[15, x, 0]) for x in (20, 60, 100)] == list(shades[:3])
+    assert sheet[45, 20, 0] == shades[3]
+    assert (sheet[45, 60:] == 255).all()
 
 
 def test_depth_in_another_unit_and_images_of_two_sizes_are_refused() -> None:
