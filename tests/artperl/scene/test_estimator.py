@@ -56,7 +56,7 @@ def test_one_object_is_posed_and_the_others_say_why_they_are_not() -> None:
 def test_a_gallery_has_every_picture_in_its_place() -> None:
     shades = (40, 90, 140, 190)
     pictures = [draw_scene(np.full((60, 80, 3), shade, np.uint8), CAMERA.K, SceneEstimate(())) for shade in shades]
-    sheet = np.asarray(open_image(scene_gallery(pictures, columns=3, width=40)))
+    sheet = np.asarray(open_image(scene_gallery(pictures, columns=3, width=40)).convert("RGB"))
     assert sheet.shape == (60, 120, 3)
     assert [int(sheet[15, x, 0]) for x in (20, 60, 100)] == list(shades[:3])
     assert sheet[45, 20, 0] == shades[3]
