@@ -18,7 +18,7 @@ from artsim.scenes import SceneCameraOptions, SceneOptions, SceneRun, generate_s
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
 
 RUN = SceneRun(
-    SceneOptions(("laptop", "stapler"), distractors=0), SceneCameraOptions(width=320, height=180), renderer="raycast",
+    SceneOptions(("laptop", "lighter"), distractors=0), SceneCameraOptions(width=320, height=180), renderer="raycast",
     num_points=64,
 )  # fmt: skip
 
@@ -49,8 +49,8 @@ def test_all_objects_are_written_with_a_picture(
     told = json.loads((folder / "detections.json").read_text())
     assert [obj["category"] for obj in record["objects"]] == [d["category"] for d in told]
     for obj in record["objects"]:
-        if obj["category"] == "stapler":
-            assert "--estimators stapler=" in obj["error"]
+        if obj["category"] == "lighter":
+            assert "--estimators lighter=" in obj["error"]
         else:
             assert np.shape(obj["T_camera_part"])[1:] == (4, 4)
     assert Image.open(tmp_path / "out.png").size == (320, 180)
@@ -88,7 +88,7 @@ def test_what_does_not_fit_is_refused_with_its_mend(
     out, err = capsys.readouterr()
     assert "left out: detection" in err
     assert len(json.loads(out)["skipped"]) == 1
-    with pytest.raises(ConfigError, match="add --detections"):
+    with pytest.raises(ConfigError, match="add --intrinsics"):
         Estimate((view / "depth.npy",), picture=tmp_path / "x.png").run()
 
 
