@@ -9,6 +9,7 @@ from typing import Literal
 
 import tyro
 
+from artsim.common.extras import needs
 from artsim.common.program import cores
 
 
@@ -52,9 +53,10 @@ class TrainDetector:
     """Processor threads of the network; by default torch's choice."""
 
     def run(self) -> None:
-        import torch
+        with needs("train-detector", extra="detect"):
+            import torch
 
-        from artperl.training.detector import scene_options, train_detector
+            from artperl.training.detector import scene_options, train_detector
         from artperl.training.detector_scenes import make_detector_scenes
 
         if self.threads is not None:

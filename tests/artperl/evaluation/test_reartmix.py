@@ -120,7 +120,9 @@ def test_the_benchmark_finds_scissors_and_says_what_has_no_estimator(scenes: Sce
     perfect = realistic_detections(scenes, Flaws(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     (tmp_path / "detections.json").write_text(json.dumps(perfect))
     detections = read_detections(tmp_path / "detections.json", images.sizes, images.names())
-    figures = run_reartmix(images, detections, SceneEstimator(), False, lines.append)
+    estimator = SceneEstimator()
+    del estimator.estimators["stapler"]
+    figures = run_reartmix(images, detections, estimator, False, lines.append)
     assert figures["categories"]["stapler"]["iou_50"] == 0.0
     assert figures["categories"]["scissors"]["5_cm"] > 0.0
     assert figures["mean"]["5_cm"] == pytest.approx(figures["mean_with_estimator"]["5_cm"] / 2)

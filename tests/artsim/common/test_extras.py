@@ -69,6 +69,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "estimate": [("cloud.npy", "train"), ("--help", "")],
         "calibrate": [("laptop", "train"), ("--help", "")],
         "detections": [("--help", "")],
+        "train-detector": [("--out detector", "detect")],
         "report": [("--help", "")],
     },
 }
