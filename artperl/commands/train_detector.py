@@ -11,6 +11,7 @@ import tyro
 
 from artsim.common.extras import needs
 from artsim.common.program import cores
+from artsim.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ class TrainDetector:
     """Processor threads of the network; by default torch's choice."""
 
     def run(self) -> None:
+        if not 0.0 < self.share <= 1.0:
+            raise ConfigError(f"{self.share} is no share", "share", "use a number above 0, up to 1")
         with needs("train-detector", extra="detect"):
             import torch
 

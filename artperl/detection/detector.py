@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,12 @@ from artsim.common.extras import needs
 
 with needs("the detector"):
     import torch
+    from torch import Tensor
     from torch.nn import functional
 
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artperl.detection.grouping import assign, find_middles
-from artperl.detection.images import cell_pixels, fill, look_at
+from artperl.detection.images import Look, cell_pixels, fill, look_at
 from artperl.detection.network import OFFSET, DetectorNetwork, DetectorSize
 from artperl.inputs.detections import Detection
 from artsim.common.files import read_json, write_atomic
@@ -62,7 +63,7 @@ class Detector:
     def __call__(
         self, rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, image: int | str = 0
     ) -> list[Detection]:
-        """Objects of an image, the surest first, with masks that do not overlap.
+        """Objects of an image, the surest first, with masks that do not overlap; none where nothing was measured.
 
         Parameters
         ----------
@@ -75,43 +76,68 @@ class Detector:
             Identity that the detections get.
         """
         depth, K = np.asarray(depth, dtype=np.float32), np.asarray(K, dtype=np.float64)
+        if not (np.isfinite(depth) & (depth > 0)).any():
+            return []
         look = look_at(rgb, depth, K)
         logits, told = self.network(torch.from_numpy(look.channels)[None])
-        shares = logits.softmax(1)
-        points = look.points[np.ix_(*(cell_pixels(n) for n in look.points.shape[:2]))] / look.unit
-        there = (shares[0].argmax(0) > 0).numpy()
-        offset, size = told[0, :3].numpy()[:, there].T, told[0, 3].exp().numpy()[there]
-        middles = find_middles(points[there] + OFFSET * offset, size, 1.0 - shares[0, 0].numpy()[there])
+        cells = _Answer.of(logits.softmax(1)[0], told[0], look.points[_cells(look)] / look.unit)
+        middles = find_middles(cells.votes, cells.sizes, cells.shares[1:].sum(axis=0))
         if len(middles) == 0:
             return []
         # The same at the full resolution: edges of depth make edges of masks.
-        whole = depth.shape
-        shares, told = (
-            functional.interpolate(x, size=whole, mode="bilinear", align_corners=False)[0] for x in (shares, told)
-        )
-        of = (shares.argmax(0) > 0).numpy()
-        pixels = _points(depth, K)[of] / look.unit
-        votes, size = pixels + OFFSET * told[:3].numpy()[:, of].T, told[3].exp().numpy()[of]
-        owner = assign(votes, size, middles)
-        found, likely = list[Detection](), shares.numpy()[:, of]
-        for number in range(len(middles)):
-            own = owner == number
-            if own.sum() < _LEAST_SHARE * of.size:
-                continue
-            mean = likely[:, own].mean(axis=1)
-            category = int(mean[1:].argmax())
-            mask = np.zeros(whole, dtype=bool)
-            mask[of] = own
-            told_of, score = mask_record(mask), float(np.clip(mean[1 + category], 0.0, 1.0))
-            box = (
-                float(told_of["bbox"][0]),
-                float(told_of["bbox"][1]),
-                float(told_of["bbox"][2]),
-                float(told_of["bbox"][3]),
-            )
-            size_ = (whole[1], whole[0])
-            found.append(Detection(image, self.categories[category], score, told_of["segmentation"], box, size_))
+        full = [functional.interpolate(x, size=depth.shape, mode="bilinear", align_corners=False)[0]
+                for x in (logits.softmax(1), told)]  # fmt: skip
+        pixels = _Answer.of(full[0], full[1], _points(depth, K) / look.unit)
+        owner = assign(pixels.votes, pixels.sizes, middles)
+        found = [self._detection(pixels, owner == n, image) for n in range(len(middles))
+                 if (owner == n).sum() >= _LEAST_SHARE * depth.size]  # fmt: skip
         return sorted(found, key=lambda d: -d.score)
+
+    def _detection(self, pixels: _Answer, own: NDArray[np.bool_], image: int | str) -> Detection:
+        """The object that some of the pixels with an object show: its category is what they say in the mean."""
+        mean = pixels.shares[:, own].mean(axis=1)
+        category = int(mean[1:].argmax())
+        mask = np.zeros_like(pixels.there)
+        mask[pixels.there] = own
+        record, size = mask_record(mask), (mask.shape[1], mask.shape[0])
+        left, top, wide, high = (float(v) for v in record["bbox"])
+        score = float(np.clip(mean[1 + category], 0.0, 1.0))
+        place = record["segmentation"], (left, top, wide, high), size
+        return Detection(image, self.categories[category], score, *place)
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """What the network says of those n cells or pixels of an image that it takes for objects.
+
+    Attributes
+    ----------
+    there : (H, W) bool
+        Which those are.
+    shares : (1 + C, n) float32
+        Probability of each category, none first.
+    votes : (n, 3) float32
+        For the middle of the object, in the unit of the look.
+    sizes : (n,) float32
+        Diagonal of the object.
+    """
+
+    there: NDArray[np.bool_]
+    shares: NDArray[np.float32]
+    votes: NDArray[np.float32]
+    sizes: NDArray[np.float32]
+
+    @staticmethod
+    def of(shares: Tensor, told: Tensor, points: NDArray[np.float32]) -> _Answer:
+        """Of probabilities (1 + C, H, W), votes (4, H, W), and the points (H, W, 3) that cast them."""
+        there = (shares.argmax(0) > 0).numpy()
+        own = told.numpy()[:, there]
+        return _Answer(there, shares.numpy()[:, there], points[there] + OFFSET * own[:3].T, np.exp(own[3]))
+
+
+def _cells(look: Look) -> tuple[NDArray[np.int64], ...]:
+    """Index of the pixels in the middles of the cells."""
+    return np.ix_(*(cell_pixels(n) for n in look.points.shape[:2]))
 
 
 def _points(depth: NDArray[np.float32], K: NDArray[np.float64]) -> NDArray[np.float32]:
