@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from artperl.detection import SHIPPED
 from artsim.common.extras import needs
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Me
 
 
 def load_scene_estimator(
-    estimators: Mapping[str, str | Path] | None = None, detector: str | Path = "tabletop", **changes: Any
+    estimators: Mapping[str, str | Path] | None = None, detector: str | Path = SHIPPED, **changes: Any
 ) -> SceneEstimator:
     """An estimator of all objects in an image: ``load_scene_estimator()(rgb, depth, K)``.
 

@@ -9,8 +9,8 @@ from importlib.metadata import version
 from typing import Any, TypeVar
 
 from artsim.common.extras import needs
-from artsim.datasets.ray_pool import connect
-from artsim.errors import ArtsimError, ConfigError
+from artsim.datasets.ray_pool import connect, version_difference
+from artsim.errors import ArtsimError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -55,7 +55,7 @@ def each_on_ray(
     try:
         function = ray.put(prepare)
         work = ray.remote(num_cpus=1, max_retries=_ATTEMPTS - 1)(_work)
-        run, here = uuid.uuid4().hex, version("artsim")
+        run, here = uuid.uuid4().hex, {"artsim": version("artsim")}
 
         def result() -> Result:
             try:
@@ -83,16 +83,14 @@ def each_on_ray(
             ray.shutdown()
 
 
-def _work(run: str, wanted: str, prepare: Callable[[], Callable[[Any], Any]], task: Any) -> tuple[str, Any]:
+def _work(run: str, wanted: dict[str, str], prepare: Callable[[], Callable[[Any], Any]], task: Any) -> tuple[str, Any]:
     """Do a task in a process of a node: its result, or the error that the driver is to raise."""
     global _here
     try:
         if _here is None or _here[0] != run:
-            if version("artsim") != wanted:
-                raise ConfigError(
-                    f"a node has artsim {version('artsim')}, the driver {wanted}", "--ray",
-                    f"install the same on every node: pip install artsim=={wanted}",
-                )  # fmt: skip
+            difference = version_difference(wanted)
+            if difference is not None:
+                return "failed", difference
             _here = run, prepare()
         return "done", _here[1](task)
     except ArtsimError as error:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from artperl.detection import SHIPPED
 from artsim.common.files import write_atomic
 from artsim.common.program import cores
 from artsim.common.progress import say
@@ -55,7 +56,7 @@ def evaluate_reartmix(options: Evaluate) -> None:
         say(f"left out: {text}")
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
     named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
-    estimator = SceneEstimator(named, options.detector or "tabletop", **told)
+    estimator = SceneEstimator(named, options.detector or SHIPPED, **told)
     figures = run_reartmix(images, detections, estimator, True, say, options.picture)
     if options.json is not None:
         write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())

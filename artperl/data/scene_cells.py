@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from torch.utils.data import Dataset
 
 from artperl.detection.images import CELL, cell_pixels, look_at
 from artperl.detection.network import OFFSET
-from artsim.observing.sample import Sample
+from artsim.drawing.annotation import box_corners
 from artsim.scenes import SceneDataset, SceneRecord
 
 _ZOOM = (0.75, 1.5)
@@ -134,7 +133,7 @@ def _truth(
         own = ids == i
         if told.category not in categories or sample is None or not own.any():
             continue
-        corners = _corners(sample)
+        corners = np.concatenate([box_corners(sample, k) for k in range(len(sample.box_size))])
         middle = corners.mean(axis=0) * (-1.0 if mirrored else 1.0, 1.0, 1.0)
         category[own] = 1 + categories.index(told.category)
         offset[own] = (middle - points[own]) / (OFFSET * unit)
@@ -156,14 +155,6 @@ def _window(look: tuple[Any, ...], rng: np.random.Generator) -> tuple[Any, ...]:
     )
     pixels = channels[:, CELL * top : CELL * (top + high), CELL * left : CELL * (left + wide)]
     return pixels, *(field[..., top : top + high, left : left + wide] for field in look[1:])
-
-
-def _corners(sample: Sample) -> NDArray[np.float64]:
-    """(8 K, 3) corners of the boxes of all parts, camera frame."""
-    signs = np.array(list(product((-0.5, 0.5), repeat=3)))
-    corners = sample.box_center[:, None] + signs * sample.box_size[:, None]
-    T = sample.T_camera_part
-    return np.asarray(np.einsum("kij,kcj->kci", T[:, :3, :3], corners) + T[:, None, :3, 3]).reshape(-1, 3)
 
 
 def _lit(rgb: NDArray[np.uint8], gain: NDArray[np.float64]) -> NDArray[np.uint8]:

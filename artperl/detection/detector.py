@@ -19,6 +19,7 @@ with needs("the detector"):
     from torch.nn import functional
 
 from artperl.core.tensor_files import read_tensors, write_tensors
+from artperl.detection import SHIPPED
 from artperl.detection.grouping import assign, find_middles
 from artperl.detection.images import Look, cell_pixels, fill, look_at
 from artperl.detection.network import OFFSET, DetectorNetwork, DetectorSize
@@ -27,11 +28,10 @@ from artsim.common.files import read_json, write_atomic
 from artsim.common.json_records import from_json_values
 from artsim.errors import DatasetError
 from artsim.formats.coco import mask_record
+from artsim.model.camera import Camera
 
 WEIGHTS = Path(__file__).parents[1] / "weights"
 """Folder of what comes with the package."""
-SHIPPED = "tabletop"
-"""Name of the detector that comes with the package: of small things on tables."""
 _SETTINGS, _TENSORS, _FORMAT = "detector.json", "weights.safetensors", 1
 _AGAIN = "train it again: artperl train-detector"
 _LEAST_SHARE = 2e-4
@@ -80,13 +80,14 @@ class Detector:
             return []
         look = look_at(rgb, depth, K)
         logits, told = self.network(torch.from_numpy(look.channels)[None])
-        cells = _Answer.of(logits.softmax(1)[0], told[0], look.points[_cells(look)] / look.unit)
+        shares = logits.softmax(1)
+        cells = _Answer.of(shares[0], told[0], look.points[_cells(look)] / look.unit)
         middles = find_middles(cells.votes, cells.sizes, cells.shares[1:].sum(axis=0))
         if len(middles) == 0:
             return []
         # The same at the full resolution: edges of depth make edges of masks.
         full = [functional.interpolate(x, size=depth.shape, mode="bilinear", align_corners=False)[0]
-                for x in (logits.softmax(1), told)]  # fmt: skip
+                for x in (shares, told)]  # fmt: skip
         pixels = _Answer.of(full[0], full[1], _points(depth, K) / look.unit)
         owner = assign(pixels.votes, pixels.sizes, middles)
         found = [self._detection(pixels, owner == n, image) for n in range(len(middles))
@@ -143,10 +144,8 @@ def _cells(look: Look) -> tuple[NDArray[np.int64], ...]:
 def _points(depth: NDArray[np.float32], K: NDArray[np.float64]) -> NDArray[np.float32]:
     """(H, W, 3) of all pixels, those without depth as far away as the nearest that has one."""
     filled = fill(depth, np.isfinite(depth) & (depth > 0))
-    v, u = np.mgrid[: depth.shape[0], : depth.shape[1]] + 0.5
-    y = (v - K[1, 2]) / K[1, 1]
-    x = (u - K[0, 2] - K[0, 1] * y) / K[0, 0]
-    return np.stack([x * filled, y * filled, filled], axis=-1).astype(np.float32)
+    camera = Camera(K, depth.shape[1], depth.shape[0], np.eye(4))
+    return camera.unproject(np.arange(depth.size), filled.ravel()).reshape(*depth.shape, 3).astype(np.float32)
 
 
 def save_detector(detector: Detector, folder: Path, about: Mapping[str, Any]) -> None:

@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
+from artsim.model.camera import Camera
+
 Array = NDArray[np.float32]
 
 CHANNELS = 8
@@ -74,7 +76,8 @@ def look_at(rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, width
     measured = np.isfinite(small) & (small > 0)
     filled = fill(small, measured)
     unit = float(np.median(filled))
-    rays = _rays(K, (pick[0] + 0.5, pick[1] + 0.5))
+    pixels = pick[0][:, None] * columns + pick[1]
+    rays = Camera(K, columns, rows, np.eye(4)).directions(pixels.ravel()).reshape(*shape, 3).astype(np.float32)
     inverse = unit / filled - 1.0
     channels = np.zeros((CHANNELS, *shape), dtype=np.float32)
     if rgb is not None:
@@ -83,9 +86,8 @@ def look_at(rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, width
     channels[3] = np.clip(inverse, -1.0, 3.0)
     channels[4] = np.clip(_ABOVE * (inverse - plane_of(inverse, measured)), -3.0, 3.0)
     channels[5] = measured
-    channels[6:] = np.moveaxis(rays, -1, 0)
-    points = np.concatenate([rays * filled[..., None], filled[..., None]], axis=-1)
-    return Look(channels, points, unit)
+    channels[6:] = np.moveaxis(rays[..., :2], -1, 0)
+    return Look(channels, rays * filled[..., None], unit)
 
 
 def cell_pixels(size: int) -> NDArray[np.int64]:
@@ -99,14 +101,6 @@ def fill(depth: Array, measured: NDArray[np.bool_]) -> Array:
         return depth if measured.any() else np.ones_like(depth)
     near = distance_transform_edt(~measured, return_distances=False, return_indices=True)
     return np.asarray(depth[tuple(near)])
-
-
-def _rays(K: NDArray[np.float64], at: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Array:
-    """(H, W, 2) x / z and y / z of the points that are seen at rows and columns."""
-    v, u = np.meshgrid(at[0], at[1], indexing="ij")
-    y = (v - K[1, 2]) / K[1, 1]
-    x = (u - K[0, 2] - K[0, 1] * y) / K[0, 0]
-    return np.stack([x, y], axis=-1).astype(np.float32)
 
 
 def plane_of(inverse: Array, measured: NDArray[np.bool_]) -> Array:

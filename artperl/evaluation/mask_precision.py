@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from artperl.detection.detector import Detector
+from artperl.evaluation.realistic_detections import LEAST_VISIBLE
 from artsim.common.extras import needs
 from artsim.common.progress import track
 from artsim.formats.coco import mask_record
 from artsim.scenes import SceneDataset, SceneRecord
 
-_VISIBLE = 0.1
-"""Share of an object that must be seen for it to count, as in BOP; others are crowds to COCO: neither won nor lost."""
 _THRESHOLDS = {"AP": None, "AP50": 0.5, "AP75": 0.75}
 """Names of COCO's figures and their IoU; None: the mean over 0.5 to 0.95."""
 
@@ -94,7 +93,7 @@ def _truth(scenes: SceneDataset, numbers: Mapping[str, int]) -> Iterator[dict[st
             if not mask.any():
                 continue
             identity += 1
-            ignored = int(told.visible_fraction < _VISIBLE)
+            ignored = int(told.visible_fraction < LEAST_VISIBLE)  # a crowd to COCO: neither won nor lost
             own = {"id": identity, "image_id": image, "category_id": numbers[told.category]}
             yield {**own, **mask_record(mask), "iscrowd": ignored, "ignore": ignored}
 

@@ -22,8 +22,8 @@ _SMOOTH = 6.0
 """Pixels over which a border's error changes: networks predict masks at a quarter of the resolution or less."""
 _LEAST = 64
 """Pixels of the smallest mask that is reported."""
-_HIDDEN = 0.1
-"""Objects of which less is visible are never found, as BOP does not ask for them."""
+LEAST_VISIBLE = 0.1
+"""Share of an object that must be seen for it to be found, and to count: BOP does not ask for others."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _of_view(
         truth = ids == i
         hidden = 1.0 - obj.visible_fraction
         missed = rng.random() < flaws.missed + 0.5 * hidden * hidden
-        if obj.visible_fraction < _HIDDEN or missed:
+        if obj.visible_fraction < LEAST_VISIBLE or missed:
             continue
         for again in range(1 + (rng.random() < flaws.twice)):
             mask = imperfect(truth, flaws, rng)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from artperl.data.categories import JOINTS
 from artperl.evaluation.average_precision import CRITERIA, PosedObject, ap_table
 from artperl.evaluation.metrics import true_poses
-from artperl.evaluation.realistic_detections import realistic_detections
+from artperl.evaluation.realistic_detections import LEAST_VISIBLE, realistic_detections
 from artperl.evaluation.reartmix_files import AnnotatedImage, ReArtMixFolder, is_reartmix
 from artperl.inputs.detections import Detection, Detections
 from artperl.scene.drawing import draw_scene, scene_gallery
@@ -42,8 +42,6 @@ SEEDS = 1_000_000
 """First scene: objects of far smaller seeds are learnt from."""
 _SHOWN = 12
 """Images of a gallery."""
-_VISIBLE = 0.1
-"""Share of an object that must be seen for it to count, as in BOP."""
 
 OBJECTS = (("box", 1, 8), ("stapler", 1, 7), ("cutter", 1, 9), ("scissors", 1, 9), ("drawer", 1, 10), ("drawer", 3, 5))
 """Categories of ReArt-48, joints of their objects, and how many there are (Liu et al. 2022)."""
@@ -88,7 +86,7 @@ class SceneImages:
             objects = [
                 replace(
                     posed(sample, str(i)),
-                    counted=told.visible_fraction >= _VISIBLE,
+                    counted=told.visible_fraction >= LEAST_VISIBLE,
                     equals=equals_of(told, sample, str(i)),
                 )
                 for told, sample in zip(record.entry.objects, record.samples, strict=True)

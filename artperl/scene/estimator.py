@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artperl.core.estimate import Estimate
+from artperl.detection import SHIPPED
 from artperl.estimator import WEIGHTS, load_estimator
 from artperl.inputs.depth_images import points_of_depth
 from artperl.inputs.detections import Detection
@@ -91,7 +92,7 @@ class SceneEstimator:
     """
 
     def __init__(
-        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = "tabletop", **changes: Any
+        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = SHIPPED, **changes: Any
     ):
         shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
         shipped.pop("any", None)  # of no category

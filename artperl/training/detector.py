@@ -26,11 +26,11 @@ from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
 from artperl.training.state import RunState
 from artperl.training.steps import Stop, autocast, one_cycle, set_rate
+from artperl.training.supervised import SAVE_STEPS, descend
 from artsim.common.progress import track
 from artsim.errors import ConfigError
 from artsim.scenes import SceneDataset
 
-_SAVE_STEPS = 50
 _DECAY = 1e-2
 _NETWORK = "detector"
 _MIDDLE = 5.0
@@ -127,7 +127,7 @@ def train_detector(options: DetectorOptions, out: Path, workers: int = 1, progre
             bar.set_postfix_str(f"cells {100 * figures['right']:.0f} %, middles off {100 * figures['off']:.1f} %")
             bar.update()
             state.done[_NETWORK] = step + 1
-            if (step + 1) % _SAVE_STEPS == 0 or stop.asked:
+            if (step + 1) % SAVE_STEPS == 0 or stop.asked:
                 state.save(folder, options)
             if stop.asked:
                 raise KeyboardInterrupt
@@ -148,10 +148,7 @@ def _learn(
         logits, told = network(cells.channels.contiguous(memory_format=torch.channels_last))
     losses, figures = detector_losses(logits, told, cells)
     loss = torch.stack(list(losses.values())).sum()
-    optimizer.zero_grad()
-    loss.backward()
-    torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-    optimizer.step()
+    descend(optimizer, network, loss)
     return {name: value.item() for name, value in losses.items()} | figures
 
 

@@ -258,7 +258,7 @@ def _do(
     run, storage, hub, versions = about
     counts: list[int] = []
     if _here is None or _here[0] != run:
-        difference = _difference(versions)
+        difference = version_difference(versions)
         if difference is not None:
             return "failed", difference, 0
         _here = run, Worker(storage, counts.append, bool)
@@ -270,7 +270,7 @@ def _do(
     return kind, value, sum(counts)
 
 
-def _difference(versions: dict[str, str]) -> ArtsimError | None:
+def version_difference(versions: dict[str, str]) -> ArtsimError | None:
     """The error of a node that has other versions than the driver: its bytes could be others."""
     for name, wanted in versions.items():
         if version(name) != wanted:
