@@ -12,7 +12,9 @@ from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch,
 from artsim.datasets.padding import PaddedStream
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ConfigError
+from artsim.families import assembly_of
 from artsim.loading.sources import family_sources
+from artsim.making.assembly import Assembly
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
@@ -97,6 +99,16 @@ class FamilyStream:
         """Object number ``n``, which samples ``n * views_per_object`` and on show."""
         return self._object(n)
 
+    def assembly(self, n: int) -> Assembly:
+        """Parts and joints of object number ``n``, in less than half of the time that the object takes.
+
+        Raises
+        ------
+        AssetError
+            When a solid is empty.
+        """
+        return assembly_of(*self._named(n))
+
     def __iter__(self) -> Iterator[Sample]:
         share, shares = share_of(self._rank or process_rank())
         n = self.start + share * self.step
@@ -106,9 +118,13 @@ class FamilyStream:
             n += shares * self.step
 
     def _make(self, n: int) -> ArticulatedObject:
-        seed = int(np.random.default_rng([self.seed, n]).integers(*STREAM_SEEDS))
-        (source,) = family_sources([self.categories[n % len(self.categories)]], 1, seed)
+        category, seed = self._named(n)
+        (source,) = family_sources([category], 1, seed)
         return source.load()
+
+    def _named(self, n: int) -> tuple[str, int]:
+        seed = int(np.random.default_rng([self.seed, n]).integers(*STREAM_SEEDS))
+        return self.categories[n % len(self.categories)], seed
 
     def __getstate__(self) -> dict[str, Any]:
         rank = self._rank or process_rank()  # of the process that hands it to workers, which have no group

@@ -9,6 +9,7 @@ slice that has its file is not run again. The last line is one JSON object.
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -31,21 +32,37 @@ _TRAIN = (
     "start, seen = time.perf_counter(), []\n"
     "def report(group, figures, step):\n"
     "    if group == 'perception': seen.append(time.perf_counter())\n"
-    "options = changed(PRESETS['gpu'], {'device': 'DEVICE', 'perception_steps': 300, 'dense_steps': 0,\n"
-    "                                   'box_views': 0, 'validate_every': 300, 'test_objects': 4,\n"
-    "                                   'foreign_categories': 1})\n"
+    "options = changed(PRESETS['full'], {'perception_steps': 300, 'dense_steps': 0, 'box_views': 0,\n"
+    "                                    'validate_every': 300, 'test_objects': 4, 'foreign_categories': 1})\n"
     "with TemporaryDirectory() as out:\n"
-    "    figures = Training(options, Path(out), 8, progress=False, report=report).run()\n"
-    "print(json.dumps({'steps_per_s': 200 / (seen[299] - seen[99]), 'device': 'DEVICE'}))\n"
+    "    figures = Training(options, Path(out), WORKERS, progress=False, report=report, device='DEVICE').run()\n"
+    "print(json.dumps({'steps_per_s': 200 / (seen[299] - seen[99]), 'device': 'DEVICE', 'workers': WORKERS}))\n"
+)
+
+_WORKERS = str(max(1, (os.cpu_count() or 1) - 1))
+_ESTIMATE = (
+    "import json, time\n"
+    "import artperl, artsim\n"
+    "from artsim.datasets.sample_options import SampleOptions, draw_sample\n"
+    "from artsim.renderers import make_renderer\n"
+    "laptop, renderer = artsim.make('laptop', 2_000_001), make_renderer('raycast')\n"
+    "clouds = [draw_sample(laptop, SampleOptions(), 0, i, renderer).points for i in range(24)]\n"
+    "def seconds(device):\n"
+    "    estimate = artperl.load_estimator('laptop', device=device)\n"
+    "    for cloud in clouds[:4]: estimate(cloud)\n"
+    "    start = time.perf_counter()\n"
+    "    for cloud in clouds[4:]: estimate(cloud)\n"
+    "    return (time.perf_counter() - start) / 20\n"
+    "print(json.dumps({'s_per_estimate': {device: seconds(device) for device in ('cpu', 'cuda')}}))\n"
 )
 
 SLICES: dict[str, list[str]] = {
     "tests": ["-m", "pytest", "-q", "-m", "gpu"],
     "doctor": ["-c", "import sys; sys.argv[1:] = ['doctor']; from artsim.cli import main; main()"],
     "renderers": ["-m", "benchmarks.renderers"],
-    "estimation": ["-m", "benchmarks.inference", "--instances", "20"],
-    "training_gpu": ["-c", _TRAIN.replace("DEVICE", "cuda")],
-    "training_cpu": ["-c", _TRAIN.replace("DEVICE", "cpu")],
+    "estimation": ["-c", _ESTIMATE],
+    "training_gpu": ["-c", _TRAIN.replace("DEVICE", "cuda").replace("WORKERS", _WORKERS)],
+    "training_cpu": ["-c", _TRAIN.replace("DEVICE", "cpu").replace("WORKERS", _WORKERS)],
 }
 """What is run, by name."""
 

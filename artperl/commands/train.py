@@ -44,9 +44,9 @@ class Train:
     What is not given is as the preset or the recipe has it.
     """
 
-    preset: Literal["quick", "full", "gpu", "joint"] | None = None
-    """quick: under five minutes on two cores, to see it learn; full: within the hour; gpu: longer, on a GPU, never
-    measured; joint: one estimator for many categories, with any parts. By default the recipe's, else quick."""
+    preset: Literal["quick", "full", "joint"] | None = None
+    """quick: under five minutes on two cores, to see it learn; full: within the hour; joint: one estimator for many
+    categories, with any parts. By default the recipe's, else quick."""
     recipe: str | None = None
     """A recipe that comes with the package, by the name of its estimator, or a JSON file. With a preset, the run is as
     long as that preset's. A finished run is left as it is."""
@@ -57,6 +57,8 @@ class Train:
     depend on it."""
     threads: int | None = None
     """Processor threads of the network; by default torch's choice."""
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where the networks learn. A run may go on elsewhere than where it was begun."""
 
     # From here on: fields of TrainOptions under their own names, then those of its parts.
     method: StoredMethod | None = None
@@ -100,8 +102,6 @@ class Train:
     """Learn from the train split of a dataset that generate.py wrote, instead of from fresh objects."""
     start_from: Path | None = None
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
-    device: Literal["cpu", "cuda"] | None = None
-    """Where the networks learn."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] | None = None
     """Depth sensor of the clouds."""
     states: StateMode | None = None
@@ -126,7 +126,7 @@ class Train:
         out = self.out or Path("out/train") / f"{name}-{method}{preset}"
         if recipe is None or not is_made(out, recipe):
             try:
-                training = Training(options, out, self.workers, recipe=recipe)
+                training = Training(options, out, self.workers, recipe=recipe, device=self.device)
                 training.run()
                 training.context.ranks.close()
                 if not training.context.ranks.first:
@@ -156,11 +156,11 @@ class Train:
         if any(seen.values()):
             changes["sample"] = {name: value for name, value in seen.items() if value is not None}
         if recipe is not None:
-            if changes.keys() - {"device"}:
+            if changes:
                 raise ConfigError(
                     f"the recipe says that itself: {', '.join(changes)}", "recipe", "give no other options with it"
                 )
-            return changed(recipe.train_options(self.preset), changes)
+            return recipe.train_options(self.preset)
         preset = preset_of(self.method or "full", self.preset or "quick")
         if self.files:
             if self.categories or self.real or self.parts == "artimage":

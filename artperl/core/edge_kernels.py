@@ -33,6 +33,25 @@ class Strongest(torch.autograd.Function):
         return torch.from_numpy(back).to(gradient.dtype), None
 
 
+class StrongestByGathering(torch.autograd.Function):
+    """What :class:`Strongest` says, on any device, with room for a row of each neighbour: for a GPU.
+
+    torch's ``embedding_bag`` has no derivative of a maximum in bfloat16 there.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, features: Tensor, index: Tensor) -> Tensor:
+        highest, place = features[index].max(1)
+        ctx.winner, ctx.rows = index.gather(1, place), len(features)
+        return highest
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        back = gradient.new_zeros(ctx.rows, gradient.shape[1], dtype=torch.float32)
+        return back.scatter_add_(0, ctx.winner, gradient.float()).to(gradient.dtype), None
+
+
 class Interpolated(torch.autograd.Function):
     """(M, C) sums, with constant weights (M, k), of the rows of features (N, C) that indices (M, k) name."""
 

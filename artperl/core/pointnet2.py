@@ -19,10 +19,9 @@ from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 from typing_extensions import ParamSpec
 
-from artperl.core.edge_kernels import Interpolated, Strongest
+from artperl.core.edge_kernels import Interpolated, Strongest, StrongestByGathering
 from artperl.core.neighbours import nearest_points
 
 P = ParamSpec("P")
@@ -87,9 +86,8 @@ class Neighbourhoods:
 def strongest(features: Tensor, index: Tensor) -> Tensor:
     """(B, M, C) maxima of the rows of features (B, N, C) that indices (B, M, k) name."""
     every, flat = _flat(features, index)
-    best: Tensor = (
-        functional.embedding_bag(flat, every, mode="max") if features.is_cuda else Strongest.apply(every, flat)  # type: ignore[no-untyped-call]
-    )
+    kernel = StrongestByGathering if features.is_cuda else Strongest
+    best: Tensor = kernel.apply(every, flat)  # type: ignore[no-untyped-call]
     return best.reshape(*index.shape[:2], -1)
 
 

@@ -132,7 +132,7 @@ def row_batches(
     made_points = _SPARE * num_points if spare else num_points
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
     samples = data.source(num_rows, made_points, seed, fresh)
-    sensed = [data.source(num_rows, made_points, seed, fresh, sensor) for sensor in SENSORS] if data.noisy else []
+    sensed = [samples.seen_by(sensor) for sensor in SENSORS] if data.noisy else []
     rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data, more, share)
     loader = DataLoader(
         rows, fresh, num_workers=workers, prefetch_factor=4 if workers else None, worker_init_fn=ignore_interrupt

@@ -6,10 +6,11 @@ Of an object that looks the same turned round, the truth that faces the camera i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class Samples:
         parts: Parts = "artimage",
         given: Sequence[ArticulatedObject] = (),
     ):
-        self.stream = FamilyStream(categories, options, seed, views_per_object)
+        self.stream, self.options = FamilyStream(categories, options, seed, views_per_object), options
         self.num_rows, self.parts, self.given = num_rows, parts, given
         self._facing = Facing()
         self._keep()
@@ -65,13 +66,16 @@ class Samples:
     def __getitem__(self, i: int) -> Sample:
         n, view = divmod(i, self.stream.views_per_object)
         index = i if self._is_given(n) else self._right(n) * self.stream.views_per_object + view
-        renderer = shared_renderer(self.stream.options.renderer)
-        obj = self.object(i)
-        return self._facing(draw_sample(obj, self.stream.options, self.stream.seed, index, renderer), lambda: obj)
+        obj, renderer = self.object(i), shared_renderer(self.options.renderer)
+        return self._facing(draw_sample(obj, self.options, self.stream.seed, index, renderer), lambda: obj)
 
     def object(self, i: int) -> ArticulatedObject:
         """The object that sample ``i`` shows."""
         return self._object(i // self.stream.views_per_object)
+
+    def seen_by(self, sensor: SensorName) -> Samples:
+        """The same objects, states and views as a depth sensor sees them; each object is made once for both."""
+        return _with_noise(self, sensor)
 
     def _is_given(self, n: int) -> bool:
         return bool(self.given) and n % 2 == 1
@@ -86,12 +90,15 @@ class Samples:
         category = self.stream.categories[n % len(self.stream.categories)]
         elsewhere = len(self.stream.categories) << 32  # of the same category, and no run gets there
         for attempt in range(_ATTEMPTS):
+            number = n + attempt * elsewhere
             try:
-                tree = self.stream.object(n + attempt * elsewhere).tree
+                planned = self.stream.assembly(number)
+                types = planned.joint_types
+                if len(types) <= self.num_rows and has_parts(category, types, planned.joint_axes, self.parts):
+                    self.stream.object(number)
+                    return number
             except AssetError:
                 continue
-            if len(tree) <= self.num_rows and has_parts(category, tree.types, tree.axes, self.parts):
-                return n + attempt * elsewhere
         raise ConfigError(
             f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts, or other ones, or cannot be made",
             ", ".join(self.stream.categories),
@@ -173,6 +180,10 @@ class Recorded:
         """The object that sample ``i`` shows."""
         return self._object_of(self[i])
 
+    def seen_by(self, sensor: SensorName) -> NoReturn:
+        """Not possible: clouds of a dataset are as they were seen."""
+        raise ConfigError("clouds of a dataset get no other noise", "noisy", "generate a dataset with noise")
+
     def _object_of(self, sample: Sample) -> ArticulatedObject:
         return order_parts(self.dataset.object_of(sample), self.parts)
 
@@ -215,6 +226,20 @@ class Given:
         number = i // self.views_per_object
         return self.objects[int(np.random.default_rng([self.seed, number]).integers(len(self.objects)))]
 
+    def seen_by(self, sensor: SensorName) -> Given:
+        """The same objects, states and views as a depth sensor sees them."""
+        return _with_noise(self, sensor)
+
+
+S = TypeVar("S", Samples, Given)
+
+
+def _with_noise(source: S, sensor: SensorName) -> S:
+    """A copy that shares what was looked up."""
+    other = copy(source)
+    other.options = replace(source.options, noise=sensor)
+    return other
+
 
 Source = Samples | Recorded | Given
 
@@ -252,9 +277,7 @@ class DataOptions:
     noisy: float = 0.0
     degraded: float = 0.0
 
-    def source(
-        self, num_rows: int, num_points: int, seed: int, views_per_object: int, noise: SensorName | None = None
-    ) -> Source:
+    def source(self, num_rows: int, num_points: int, seed: int, views_per_object: int) -> Source:
         """Samples by number.
 
         Parameters
@@ -266,8 +289,6 @@ class DataOptions:
         seed : int
         views_per_object : int
             Samples in a row of the same object.
-        noise : str, optional
-            Depth sensor; by default that of :attr:`sample`.
 
         Raises
         ------
@@ -276,7 +297,7 @@ class DataOptions:
         """
         if self.dataset is not None:
             return Recorded(self.dataset, self.categories, seed, num_rows, num_points, self.parts)
-        sample = replace(self.sample, num_points=num_points, noise=self.sample.noise if noise is None else noise)
+        sample = replace(self.sample, num_points=num_points)
         if not self.categories:
             return Given(self.given, sample, seed, views_per_object, num_rows)
         return Samples(self.categories, sample, seed, views_per_object, num_rows, self.parts, self.given)

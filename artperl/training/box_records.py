@@ -74,8 +74,8 @@ def record(
     """Records of the first so many samples, in single precision; those that the file holds are taken from it.
 
     None when no estimate fits. Several processes that learn together look at views in turn, and the first keeps the
-    records: the others get none. Each of the workers, processes of one thread, estimates other samples; without any, or
-    on a GPU, this process does.
+    records: the others get none. Each of the workers, processes of one thread, estimates other samples; without any,
+    this process does.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def record(
     bar = track("boxes", total=views, initial=first, unit="view", smoothing=0.02, shown=progress)
     loader = DataLoader(
         _Examined(estimator, samples), batch_size=None, sampler=range(first + ranks.rank, views, ranks.count),
-        num_workers=workers if estimator.perception.device.type == "cpu" else 0, worker_init_fn=ignore_interrupt,
+        num_workers=workers, worker_init_fn=ignore_interrupt,
     )  # fmt: skip
     for n, made in zip(range(first, views), ranks.in_turn(map(_own, loader)), strict=False):
         report("boxes", {"fits": float(len(made))}, n)

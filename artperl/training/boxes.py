@@ -45,7 +45,7 @@ class BoxStage:
         options, state = context.options, context.state
         if state.done[self.name] >= options.box_views:
             return
-        best = context.best(context.device)
+        best = context.best()
         assert isinstance(best, Estimator)
         learner = best_without_own_references(best, context)
         records = record(
@@ -58,7 +58,8 @@ class BoxStage:
             return
         if records is not None:
             rows = best.perception.num_rows
-            learnt = learn(records, rows, options.box_width, options.box_steps, options.seed, context.progress)
+            records = records.to(context.device)
+            learnt = learn(records, rows, options.box_width, options.box_steps, options.seed, context.progress).cpu()
         context.stop_if_asked()
         state.done[self.name] = options.box_views
         if learnt is None:
@@ -86,7 +87,7 @@ def _samples(context: Context) -> Callable[[int], Sample]:
     clean = objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS)
     noisy: list[Source] = []
     if _sees_noise(context):
-        noisy = [objects.data.source(objects.num_rows, num_points, options.seed + 2, _VIEWS, name) for name in SENSORS]
+        noisy = [clean.seen_by(sensor) for sensor in SENSORS]
     return partial(_mostly_clean, clean, noisy, options.degraded > 0.0)
 
 

@@ -63,8 +63,6 @@ class TrainOptions:
     start_from: str | None = None
     """Folder of an estimator whose networks are learnt on; by default they begin at random."""
     seed: int = 0
-    device: str = "cpu"
-    """Where the networks learn: cpu, cuda."""
     base_objects: int = 64
     """Reference objects of each category."""
     reference_points: int = 192
@@ -191,16 +189,13 @@ PRESETS = {
         box_views=0, validate_every=250, test_objects=20, validation_views=2,
     ),
     "full": TrainOptions(),
-    "gpu": TrainOptions(
-        device="cuda", width=64, perception_steps=20000, dense_steps=5000, batch_size=64,
-    ),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, reference_points=64, width=40, perception_steps=9000,
         dense_steps=0, denser=1, box_views=0, box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
 }  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; gpu: the
-same on a GPU, never measured; joint: one estimator for many categories, with any parts."""
+"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; joint:
+one estimator for many categories, with any parts."""
 
 PAPER_PRESETS = {
     "quick": TrainOptions(

@@ -52,6 +52,9 @@ class Training:
         Hears the figures of every step, as the curves do.
     recipe : Recipe, optional
         The recipe that the options are of.
+    device : str
+        Where the networks learn: "cpu", "cuda". Estimates are made on the processor, which is faster at them. A run may
+        go on elsewhere than where it was begun; its result is the same up to the rounding of the devices.
 
     Raises
     ------
@@ -61,7 +64,7 @@ class Training:
 
     def __init__(
         self, options: TrainOptions, out: Path, workers: int = 1, progress: bool = True, report: Report | None = None,
-        recipe: Recipe | None = None,
+        recipe: Recipe | None = None, device: str = "cpu",
     ):  # fmt: skip
         self.out, self._report = out, report
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
@@ -70,23 +73,23 @@ class Training:
             raise ConfigError(
                 f"the method {options.method} learns in one process", "torchrun", "start it without torchrun"
             )
-        ranks, device = Ranks.started(options.device)
+        ranks, own = Ranks.started(device)
         torch.manual_seed(options.seed)
         networks = programme.networks(options, objects.num_rows)
         start = options.start_from
         method: str = options.method
-        parent = None if start is None else cast("Estimator | Stored", load_estimator(start, device, method=method))
+        parent = None if start is None else cast("Estimator | Stored", load_estimator(start, own, method=method))
         if parent is not None:
             _start_from(parent, networks, str(start))
         optimizers: dict[str, torch.optim.Optimizer] = {
             name: torch.optim.AdamW(
-                network.to(device).parameters(),
+                network.to(own).parameters(),
                 weight_decay=_PERCEPTION_DECAY if name == "perception" else _WEIGHT_DECAY,
             )
             for name, network in networks.items()
         }
         self.context = Context(
-            options, RunFolder(out), objects, RunState(networks, optimizers), parent, programme.estimator, device,
+            options, RunFolder(out), objects, RunState(networks, optimizers), parent, programme.estimator, own,
             workers, progress and ranks.first, provenance(options, recipe), _no_report, ranks,
         )  # fmt: skip
         if self.context.folder.begun and ranks.first:

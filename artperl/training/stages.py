@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -90,8 +91,10 @@ def _full_stages(options: TrainOptions) -> list[Stage]:
 
 
 def _full_estimator(context: Context) -> Estimator:
-    """With the parent's boxes, if parts are found as the parent finds them."""
+    """With the parent's boxes, if parts are found as the parent finds them; on the processor."""
     perception, parent, options = context.state.networks["perception"], context.parent, context.options
+    if context.device.type != "cpu":
+        perception = deepcopy(perception).cpu()
     assert isinstance(parent, Estimator | None)
     assert isinstance(perception, Perception)
     alike = parent is not None and parent.perception.votes == perception.votes

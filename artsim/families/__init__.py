@@ -207,6 +207,11 @@ def make_constrained(category: str, seed: int, constraints: Constraints) -> Arti
     raise constraints.refusal(category, drawn)
 
 
+def assembly_of(category: str, seed: int) -> Assembly:
+    """Parts and joints of the object of a seed before its solids are united, which takes most of the time."""
+    return FAMILIES[category](_generator(category, seed, 0))
+
+
 def source_name(category: str, seed: int, constraints: Constraints) -> str:
     """What names an object among all procedural ones: ``laptop:3``, ``drawer[drawer=2..4]:3``."""
     return f"{category}[{constraints}]:{seed}" if constraints else f"{category}:{seed}"

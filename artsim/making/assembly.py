@@ -10,7 +10,7 @@ import numpy as np
 from artsim.common.products import apply, unit
 from artsim.errors import AssetError, KinematicsError
 from artsim.making.solids import Solid, Vector, rotation_about
-from artsim.model.kinematics import Joint, KinematicTree, Mimic
+from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 
 
@@ -114,6 +114,16 @@ class Assembly:
         self._densities.append(density)
         self._joints.append(joint)
         return name
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        """Types of the joints, the root's first, as :class:`~artsim.model.kinematics.Joint` names them."""
+        return tuple("free" if joint is None else joint.type for joint in self._joints)
+
+    @property
+    def joint_axes(self) -> Array:
+        """(K, 3) unit axes, in the assembly's frame; zeros for the root."""
+        return np.array([np.zeros(3) if joint is None else unit(joint.axis) for joint in self._joints])
 
     def open_at_rest(self, name: str, angle: float) -> None:
         """Let a part that is there rest turned about its hinge; what hangs on it turns with it.

@@ -55,16 +55,19 @@ def symmetries(obj: ArticulatedObject, tolerance: float = TOLERANCE) -> tuple[Sy
         Largest chamfer distance of a part's surface from that of its counterpart, in diagonals.
     """
     obj = obj.with_diagonal(1.0)
+    possible = [
+        Symmetry(rotation, parts)
+        for rotation in _cube_rotations()[1:]
+        if (parts := _counterparts(obj, rotation)) is not None and _same_joints(obj, rotation, parts)
+    ]
+    if not possible:  # of most objects, whose surfaces take long
+        return ()
     clouds = [_surface(obj, k) for k in range(len(obj))]
     trees = [cKDTree(cloud) if len(cloud) else None for cloud in clouds]
-    found = []
-    for rotation in _cube_rotations()[1:]:
-        parts = _counterparts(obj, rotation)
-        if parts is None or not _same_joints(obj, rotation, parts):
-            continue
-        if all(_apart(clouds[k] @ rotation.T, trees[j], clouds[j]) <= tolerance for k, j in enumerate(parts)):
-            found.append(Symmetry(rotation, parts))
-    return tuple(found)
+    return tuple(
+        own for own in possible
+        if all(_apart(clouds[k] @ own.rotation.T, trees[j], clouds[j]) <= tolerance for k, j in enumerate(own.parts))
+    )  # fmt: skip
 
 
 def equivalent_sample(sample: Sample, symmetry: Symmetry) -> Sample:

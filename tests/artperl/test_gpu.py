@@ -42,10 +42,17 @@ def test_a_run_learns_there_and_goes_on_on_the_processor(tmp_path: Path) -> None
         "batch_size": 4, "num_points": 96, "box_views": 0, "validate_every": 3, "test_objects": 2,
         "foreign_categories": 1, "validation_views": 1, "test_views": 1,
     }  # fmt: skip
-    figures = Training(changed(PRESETS["gpu"], tiny), tmp_path / "gpu", 0, progress=False).run()
+    options = changed(PRESETS["full"], tiny)
+
+    def stop(group: str, figures: dict[str, float], step: int) -> None:
+        begun.context.stop.asked = step == 1
+
+    begun = Training(options, tmp_path, 0, progress=False, report=stop, device="cuda")
+    with pytest.raises(KeyboardInterrupt):
+        begun.run()
+    assert begun.context.state.done["perception"] == 2
+    figures = Training(options, tmp_path, 0, progress=False).run()
     assert figures["laptop"]["instances"] == 2
-    start = {**tiny, "device": "cpu", "start_from": str(tmp_path / "gpu" / "best")}
-    assert Training(changed(PRESETS["gpu"], start), tmp_path / "cpu", 0, progress=False).run()
 
 
 def test_warp_draws_what_rays_see() -> None:

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from artsim.families import FAMILIES
 from artsim.stream import FamilyStream
 from tests.conftest import in_another_process
 
@@ -21,3 +22,11 @@ def test_a_stream_never_ends_and_repeats_itself_exactly() -> None:
     np.testing.assert_array_equal(odd[0].points, first[2].points)
     twice = FamilyStream(["laptop", "drawer", "drawer"], views_per_object=1)
     assert [twice.object(n).category for n in range(6)] == ["laptop", "drawer", "drawer"] * 2
+
+
+def test_the_plan_of_an_object_has_the_joints_that_the_object_has() -> None:
+    stream = FamilyStream(sorted(FAMILIES))
+    for n in range(len(FAMILIES)):
+        planned, tree = stream.assembly(n), stream.object(n).tree
+        assert planned.joint_types == tree.types
+        np.testing.assert_array_equal(planned.joint_axes[1:], tree.axes[1:])

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch.nn import functional
 
-from artperl.core.edge_kernels import Interpolated, Strongest
+from artperl.core.edge_kernels import Interpolated, Strongest, StrongestByGathering
 
 
 def _drawn(seed: int, rows: int, queries: int, neighbours: int, channels: int):
@@ -28,10 +28,10 @@ def _gradient(result: torch.Tensor, features: torch.Tensor, upstream: torch.Tens
 SIZES = st.tuples(st.integers(0, 2**31), st.integers(1, 40), st.integers(1, 50), st.integers(1, 9), st.integers(1, 20))
 
 
-@given(SIZES)
-def test_a_maximum_is_that_of_embedding_bag(sizes):
+@given(SIZES, st.sampled_from([Strongest, StrongestByGathering]))
+def test_a_maximum_is_that_of_embedding_bag(sizes, kernel):
     features, index, _, upstream = _drawn(*sizes)
-    ours, theirs = Strongest.apply(features, index), functional.embedding_bag(index, features, mode="max")
+    ours, theirs = kernel.apply(features, index), functional.embedding_bag(index, features, mode="max")
     assert torch.equal(ours, theirs)
     torch.testing.assert_close(_gradient(ours, features, upstream), _gradient(theirs, features, upstream))
 
@@ -49,7 +49,8 @@ def test_a_weighted_sum_is_that_of_embedding_bag(sizes):
 def test_results_and_gradients_keep_the_precision_of_the_features(dtype):
     features, index, weight, upstream = _drawn(0, 7, 5, 3, 4)
     features = features.detach().to(dtype).requires_grad_()
-    for result in (Strongest.apply(features, index), Interpolated.apply(features, weight, index)):
+    kernels = Strongest.apply(features, index), StrongestByGathering.apply(features, index)
+    for result in (*kernels, Interpolated.apply(features, weight, index)):
         assert result.dtype == dtype
         assert _gradient(result, features, upstream.to(dtype)).dtype == dtype
 

@@ -59,6 +59,17 @@ def test_objects_with_too_many_parts_give_way_to_others() -> None:
     assert samples[2].object_id == samples[2].object_id
 
 
+def test_a_sensor_sees_the_same_objects_which_are_made_once() -> None:
+    clean = Samples(["eyeglasses"], SampleOptions(num_points=64), 0, 2, 3)
+    noisy = clean.seen_by("d435")
+    alone = Samples(["eyeglasses"], SampleOptions(num_points=64, noise="d435"), 0, 2, 3)
+    for i in range(4):
+        assert noisy.object(i) is clean.object(i)
+        np.testing.assert_array_equal(noisy[i].points, alone[i].points)
+        np.testing.assert_array_equal(noisy[i].T_camera_part, clean[i].T_camera_part)
+        assert not np.array_equal(noisy[i].points, clean[i].points)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("category", sorted(ARTIMAGE))
 def test_objects_have_the_parts_of_artimage(category: str) -> None:
