@@ -56,6 +56,7 @@ def test_a_run_learns_there_and_goes_on_on_the_processor(tmp_path: Path) -> None
 
 
 def test_warp_draws_what_rays_see() -> None:
+    installed("warp")
     warp, rays = make_renderer("warp"), make_renderer("raycast")
     drawer, rng = artsim.make("drawer", 0), np.random.default_rng(0)
     q = artsim.sample_state(drawer, artsim.StateOptions(), rng)
