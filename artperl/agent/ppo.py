@@ -16,8 +16,9 @@ from torch.distributions import Categorical
 from artperl.agent.actions import MOVE, SCALE, TURN
 from artperl.agent.decision_process import Fitting, View
 from artperl.agent.policy import Policy
-from artperl.core.batch import concatenate
+from artperl.core.batch import Batch, concatenate
 from artperl.core.pose import Theta
+from artperl.core.ranks import ALONE, Ranks
 from artperl.core.trees import KINDS
 
 _PRISMATIC = KINDS.index("prismatic")
@@ -66,8 +67,8 @@ sharper."""
 
 
 @dataclass(frozen=True, eq=False)
-class Buffer:
-    """Replay buffer of one batch of episodes. T steps of B environments, flat: S = T * B rows."""
+class Buffer(Batch):
+    """Replay buffer of one batch of episodes. T steps of B environments, flat: S = T * B rows, step by step."""
 
     view: View
     mask: Tensor
@@ -76,7 +77,6 @@ class Buffer:
     log_prob: Tensor
     advantage: Tensor
     result: Tensor
-    figures: dict[str, float]
 
 
 def algorithm_1(
@@ -88,6 +88,7 @@ def algorithm_1(
     seed: int,
     first: int,
     last: int,
+    ranks: Ranks = ALONE,
 ) -> Iterator[dict[str, float]]:
     """Algorithm 1, one round after the other; it goes on when the next figures are asked for.
 
@@ -96,7 +97,8 @@ def algorithm_1(
     policy : Policy
     optimizer : torch.optim.Optimizer
     episodes : function
-        Of the number of a round: environments at their start, and the goal that the expert steers to.
+        Of the number of a round: environments at their start, and the goal that the expert steers to; of several
+        processes, this one's share of them.
     phases : function
         Of the number of a round.
     options : PPOOptions
@@ -104,6 +106,9 @@ def algorithm_1(
         Of the actions; they depend on the number of the round beside it.
     first, last : int
         Rounds to run, the last left out.
+    ranks : Ranks
+        The processes that learn together: each rolls out its share of the episodes, and learns from its share of the
+        rows of an update.
 
     Yields
     ------
@@ -115,24 +120,39 @@ def algorithm_1(
         generator = torch.Generator(device).manual_seed((seed << 32) + n)
         phase = phases(n)
         fitting, goal = episodes(n)
-        buffer = rollout(policy, fitting, goal, phase, options, generator)
-        losses = update(policy, optimizer, buffer, phase, options, generator)
-        yield {name: sum(one[name] for one in losses) / len(losses) for name in losses[0]} | buffer.figures
+        own, figures = rollout(policy, fitting, goal, phase, options, generator, ranks)
+        buffer, told = together(own, figures, len(goal), ranks)
+        losses = update(policy, optimizer, buffer, phase, options, generator, ranks)
+        yield {name: sum(one[name] for one in losses) / len(losses) for name in losses[0]} | told
 
 
 @torch.no_grad()
 def rollout(
-    policy: Policy, fitting: Fitting, goal: Theta, phase: Phase, options: PPOOptions, generator: torch.Generator
-) -> Buffer:
-    """Run an episode of every environment with the stochastic policy, noting what the expert would have done."""
+    policy: Policy, fitting: Fitting, goal: Theta, phase: Phase, options: PPOOptions, generator: torch.Generator,
+    ranks: Ranks = ALONE,
+) -> tuple[Buffer, dict[str, float]]:  # fmt: skip
+    """Run an episode of every environment with the stochastic policy, noting what the expert would have done.
+
+    Of several processes, each has its share of the environments; chance is drawn for all of them by all.
+
+    Returns
+    -------
+    Buffer, dict
+        And means: the reward, and chamfer distances at the start and at the end.
+    """
+    counts = ranks.every(len(goal))
+    total, before = sum(counts), sum(counts[: ranks.rank])
+    own = slice(before, before + len(goal))
     views, masks, actions, experts, log_probs, values, rewards = [], [], [], [], [], [], []
     first = fitting.distance
     while not fitting.done:
         view, mask, expert = fitting.view(), fitting.mask, fitting.expert(goal)
         logits, value = policy(view)
         acting = phase.sharpness * logits
-        action = torch.multinomial(acting.softmax(-1).flatten(0, 2), 1, generator=generator).view(mask.shape)
-        guided = torch.rand(len(action), generator=generator, device=action.device) < phase.guided
+        device = acting.device
+        chance = torch.rand((total, *mask.shape[1:]), generator=generator, device=device)[own]
+        action = drawn(acting.softmax(-1), chance)
+        guided = torch.rand(total, generator=generator, device=device)[own] < phase.guided
         action = torch.where(guided[:, None, None], expert, action)
         views.append(view)
         masks.append(mask)
@@ -150,8 +170,41 @@ def rollout(
     }
     return Buffer(
         concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(experts), torch.cat(log_probs),
-        advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(), figures,
-    )  # fmt: skip
+        advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(),
+    ), figures  # fmt: skip
+
+
+def drawn(probability: Tensor, chance: Tensor) -> Tensor:
+    """Of probabilities (..., A), the index that numbers (...) from 0 to 1 stand for: the first whose sum is beyond."""
+    reached = probability.cumsum(-1) <= chance[..., None] * probability.sum(-1, keepdim=True)
+    return reached.sum(-1).clamp(max=probability.shape[-1] - 1)
+
+
+def together(own: Buffer, figures: dict[str, float], episodes: int, ranks: Ranks) -> tuple[Buffer, dict[str, float]]:
+    """The buffer of all processes with its rows as one process has them, and the means of their figures.
+
+    Parameters
+    ----------
+    own : Buffer
+    figures : dict
+        Means over this process' episodes, so many of them.
+    episodes : int
+    ranks : Ranks
+    """
+    if ranks.count == 1:
+        return own, figures
+    device = own.action.device
+    buffers, counts, means = zip(*ranks.every((own.to("cpu"), episodes, figures)), strict=True)
+    total, before, place = sum(counts), 0, []
+    for buffer, count in zip(buffers, counts, strict=True):
+        row = torch.arange(len(buffer))
+        place.append(row // count * total + before + row % count)  # its step and its episode among those of all
+        before += count
+    every: Buffer = concatenate(list(buffers))[torch.cat(place).argsort()]
+    told = {
+        name: sum(count * mean[name] for count, mean in zip(counts, means, strict=True)) / total for name in figures
+    }
+    return every.to(device), told
 
 
 def update(
@@ -161,26 +214,42 @@ def update(
     phase: Phase,
     options: PPOOptions,
     generator: torch.Generator,
+    ranks: Ranks = ALONE,
 ) -> list[dict[str, float]]:
-    """Several passes of minibatch updates over a buffer; figures of each update."""
+    """Several passes of minibatch updates over a buffer; figures of each update.
+
+    Of several processes, each has the same buffer and learns from its share of each minibatch: losses are parts of
+    means over all of it.
+    """
     figures, total = [], len(buffer.log_prob)
     advantage = (buffer.advantage - buffer.advantage.mean()) / (buffer.advantage.std() + 1e-8)
     for _ in range(options.epochs):
-        for rows in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
+        for batch in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
+            rows = batch[ranks.rows(len(batch))]
+            if len(rows) == 0:  # fewer rows than processes
+                rows, share = batch[:1], 0.0
+            else:
+                share = len(rows) / len(batch)
             logits, value = policy(buffer.view[rows])
             mask = buffer.mask[rows]
             losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
-            cloning = cloning_loss(logits, buffer.expert[rows], mask, buffer.view.kind[rows], options)
+            losses = {name: share * loss for name, loss in losses.items()}
+            weight = cloning_weight(buffer.mask[batch], buffer.view.kind[batch], options).sum()
+            cloning = (share > 0) * cloning_loss(
+                logits, buffer.expert[rows], mask, buffer.view.kind[rows], options, weight
+            )
             loss = cloning
             if phase.reinforcement:
                 reinforcement = losses["policy"] + options.lambda_value * losses["value"]
                 loss = reinforcement - options.lambda_entropy * losses["entropy"] + cloning
             optimizer.zero_grad()
             loss.backward()
+            ranks.add_gradients(policy)
             torch.nn.utils.clip_grad_norm_(policy.parameters(), options.max_gradient)
             optimizer.step()
-            right = ((logits.argmax(-1) == buffer.expert[rows]) & mask).sum() / mask.sum()
-            figures.append({k: v.item() for k, v in {**losses, "cloning": cloning, "accuracy": right}.items()})
+            right = share * ((logits.argmax(-1) == buffer.expert[rows]) & mask).sum() / mask.sum()
+            told = {**losses, "cloning": cloning, "accuracy": right}
+            figures.append(dict(zip(told, ranks.add([value.item() for value in told.values()]), strict=True)))
     return figures
 
 
@@ -216,13 +285,23 @@ def ppo_losses(
     }
 
 
-def cloning_loss(logits: Tensor, expert: Tensor, mask: Tensor, kind: Tensor, options: PPOOptions) -> Tensor:
-    """Weighted cross-entropy towards the expert's actions (equation 4), mean over the axes that there are."""
+def cloning_loss(
+    logits: Tensor, expert: Tensor, mask: Tensor, kind: Tensor, options: PPOOptions, total: Tensor | None = None
+) -> Tensor:
+    """Weighted cross-entropy towards the expert's actions (equation 4), mean over the axes that there are.
+
+    ``total``: the sum of the weights of which this is a part of the mean; by default that of these rows.
+    """
     wrong = torch.nn.functional.cross_entropy(logits.flatten(0, 2), expert.flatten(), reduction="none").view(mask.shape)
-    weight = torch.full_like(wrong, options.lambda_rotation)
+    weight = cloning_weight(mask, kind, options)
+    return (wrong * weight).sum() / (weight.sum() if total is None else total)
+
+
+def cloning_weight(mask: Tensor, kind: Tensor, options: PPOOptions) -> Tensor:
+    """Weights of the axes of actions in equation 4, 0 of those that there are not."""
+    weight = torch.full(mask.shape, options.lambda_rotation, device=mask.device)
     weight[..., MOVE] = options.lambda_translation
     weight[:, 0, SCALE] = options.lambda_scale
     slides = kind == _PRISMATIC
     weight[..., TURN.start] = torch.where(slides, options.lambda_translation, weight[..., TURN.start])
-    weight = weight * mask
-    return (wrong * weight).sum() / weight.sum()
+    return weight * mask

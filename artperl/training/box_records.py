@@ -19,12 +19,12 @@ from artperl.boxes.evidence import Evidence
 from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import Batch, concatenate
 from artperl.core.estimate import points_at_rest
+from artperl.core.ranks import ALONE, Ranks
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artperl.data.batches import ignore_interrupt
 from artperl.evaluation.metrics import true_poses
 from artperl.methods.full import Estimator
 from artperl.training.context import Report
-from artperl.training.ranks import ALONE, Ranks
 from artperl.training.steps import Stop, one_cycle, set_rate
 from artsim.common.progress import track
 from artsim.errors import DatasetError

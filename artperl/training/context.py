@@ -8,12 +8,12 @@ from typing import Any, Protocol, cast
 
 import torch
 
+from artperl.core.ranks import Ranks
 from artperl.estimator import load_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
-from artperl.training.ranks import Ranks
 from artperl.training.report import rounded
 from artperl.training.run_folder import RunFolder
 from artperl.training.state import RunState

@@ -18,8 +18,10 @@ from artperl.agent.decision_process import Fitting
 from artperl.agent.policy import Policy
 from artperl.agent.ppo import algorithm_1
 from artperl.agent.start import mean_start
+from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
+from artperl.core.ranks import ALONE, Ranks
 from artperl.core.shapes import Observed, Shapes
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
@@ -74,19 +76,25 @@ class RetrievalStage:
         network: Any = context.state.networks["siamese"]
         method = SegmentedRetrieval(segmentation, network, context.objects.base)
         network.train()  # the method has it evaluate
-        samples = view_source(context, POINTS, options.seed + 1, 1)
+        samples, ranks = view_source(context, POINTS, options.seed + 1, 1), context.ranks
         for step in range(first, options.retrieval_steps):
             set_rate(
                 context.state.optimizers["siamese"], options.perception_rate * one_cycle(step, options.retrieval_steps)
             )
             numbers = range(step * options.batch_size, (step + 1) * options.batch_size)
-            objects = [samples.object(i).with_diagonal(1.0) for i in numbers]
-            own = Shapes.from_objects(objects, base.points.shape[2], base.trees.num_rows).to(context.device)
-            points = _stacked([samples[i].points for i in numbers]).to(context.device)
+            mine = numbers[ranks.rows(len(numbers))]
+            objects = [samples.object(i).with_diagonal(1.0) for i in mine]
+            made = ranks.every((
+                Shapes.from_objects(objects, base.points.shape[2], base.trees.num_rows) if objects else None,
+                [samples[i].points for i in mine],
+            ))  # fmt: skip
+            own = concatenate([shapes for shapes, _ in made if shapes is not None]).to(context.device)
+            points = _stacked([cloud for _, clouds in made for cloud in clouds]).to(context.device)
             generator = torch.Generator().manual_seed((options.seed << 32) + step)
             vectors = network(Clouds.of(points).points, method.segment(points))
             loss = contrastive_loss(vectors, network(*canonical_clouds(own, generator)))
-            descend(context.state.optimizers["siamese"], network, loss)
+            # Every pair counts, so that each process learns from all: gradients are summed for all to stay the same.
+            descend(context.state.optimizers["siamese"], network, loss / ranks.count, ranks)
             yield {"loss": loss.item()}, f"loss {loss.item():.4f}"
 
 
@@ -99,13 +107,14 @@ class AgentStage:
     estimator : callable
         The method of a context.
     episodes : callable
-        Episodes and goals of a rollout, by the method, views, their number, a seed and the number of the rollout.
+        Episodes and goals of a rollout, by the method, views, their number, a seed and the number of the rollout; of
+        several processes, the share of this one.
     alone : int
         Views of a test of the agent without an expert, always the same ones.
     """
 
     estimator: Callable[[Context], Any]
-    episodes: Callable[[Any, Source, int, int, int], tuple[Any, Theta]]
+    episodes: Callable[[Any, Source, int, int, int, Ranks], tuple[Any, Theta]]
     alone: int
     name: str = "agent"
 
@@ -115,18 +124,18 @@ class AgentStage:
 
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
         options, total, method = context.options, context.options.agent_rollouts, self.estimator(context)
-        policy, optimizer = method.policy.train(), context.state.optimizers["policy"]
+        policy, optimizer, ranks = method.policy.train(), context.state.optimizers["policy"], context.ranks
         samples, unseen = (view_source(context, POINTS, options.seed + seed, _VIEWS) for seed in (2, 3))
 
         def episodes(n: int) -> tuple[Any, Theta]:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
-            return self.episodes(method, samples, options.episodes, options.seed, n)
+            return self.episodes(method, samples, options.episodes, options.seed, n, ranks)
 
-        rounds = algorithm_1(policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total)
+        rounds = algorithm_1(policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total, ranks)
         for n, figures in enumerate(rounds, first):
             line = None
-            if n % _ALONE_EVERY == 0 or n + 1 == total:
-                alone = agent_alone(policy, *self.episodes(method, unseen, self.alone, options.seed, 0))
+            if ranks.first and (n % _ALONE_EVERY == 0 or n + 1 == total):
+                alone = agent_alone(policy, *self.episodes(method, unseen, self.alone, options.seed, 0, ALONE))
                 context.report("agent_alone", alone, n)
                 line = f"alone: reward {alone['reward']:.3f}, {alone['rotation_deg']:.1f} deg"
             yield figures, line
@@ -141,7 +150,8 @@ class KeepStage:
     def run(self, context: Context) -> None:
         """Write the estimator."""
         context.save()
-        save_estimator(context.estimator(), context.folder.best, context.about({}))
+        if context.ranks.first:
+            save_estimator(context.estimator(), context.folder.best, context.about({}))
 
 
 def paper_stages(options: TrainOptions) -> list[Any]:
@@ -150,7 +160,9 @@ def paper_stages(options: TrainOptions) -> list[Any]:
     return [segmentation, RetrievalStage(), AgentStage(paper_estimator, fitting_episodes, _ALONE), KeepStage()]
 
 
-def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n: int) -> tuple[Fitting, Theta]:
+def fitting_episodes(
+    method: ArtPERL, samples: Source, count: int, seed: int, n: int, ranks: Ranks = ALONE
+) -> tuple[Fitting, Theta]:
     """Episodes of one rollout, and their goals: fresh views, as the method segments, retrieves and starts.
 
     The goal is the state of the retrieved reference that is nearest to the true 9D poses.
@@ -164,10 +176,12 @@ def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n:
         Episodes.
     seed, n : int
         Rollout ``n`` is a function of both.
+    ranks : Ranks
+        Of several processes, each has its share of the episodes.
     """
-    generator = torch.Generator().manual_seed((seed << 32) + n)
-    views = [samples[i] for i in range(n * count, (n + 1) * count)]
-    reference, observed = draw_references(method, views, generator)
+    generator, own = torch.Generator().manual_seed((seed << 32) + n), ranks.rows(count)
+    views = [samples[i] for i in range(n * count, (n + 1) * count)[own]]
+    reference, observed = draw_references(method, views, generator, own, count)
     trees = reference.trees
     truth = [part_truth(view, trees.num_rows) for view in views]
     _, rotation, center, size, _, _ = (torch.stack(values).to(method.device) for values in zip(*truth, strict=True))
@@ -178,13 +192,16 @@ def fitting_episodes(method: ArtPERL, samples: Source, count: int, seed: int, n:
 
 
 def draw_references(
-    method: AgentMethod, views: Sequence[Sample], generator: torch.Generator
-) -> tuple[Shapes, Observed]:  # fmt: skip
-    """For each of B views a reference among the nearest, by chance, and the cloud as the method segments it."""
+    method: AgentMethod, views: Sequence[Sample], generator: torch.Generator, own: slice, count: int
+) -> tuple[Shapes, Observed]:
+    """For each of B views a reference among the nearest, by chance, and the cloud as the method segments it.
+
+    They are the views ``own`` of ``count`` in all, for which chance is drawn.
+    """
     points = _stacked([view.points for view in views]).to(method.device)
     part = method.segment(points)
     nearest = method.retrieve(points, part, min(_CHOICES, len(method.base)))
-    drawn = torch.randint(nearest.shape[1], (len(views), 1), generator=generator).to(method.device)
+    drawn = torch.randint(nearest.shape[1], (count, 1), generator=generator)[own].to(method.device)
     return method.base.shapes[nearest.gather(1, drawn)[:, 0]], Observed.of(points, part)
 
 

@@ -15,14 +15,15 @@ with needs("training"):
     import torch
     from torch import nn
 
+from artperl.core.ranks import Ranks, several_started
 from artperl.estimator import load_estimator
+from artperl.methods import StoredMethod
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.perception.network import Perception
 from artperl.training.context import Context, Report
 from artperl.training.objects import TrainingObjects
 from artperl.training.options import TrainOptions
-from artperl.training.ranks import Ranks, several_started
 from artperl.training.recipes import Recipe, provenance
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
@@ -33,6 +34,10 @@ from artsim.errors import ConfigError
 
 _WEIGHT_DECAY, _PERCEPTION_DECAY = 1e-4, 1e-2
 """Of AdamW. Perception is the largest network and the one that has to generalise from families to real objects."""
+
+
+_SHARED: tuple[StoredMethod, ...] = ("full", "artperl")
+"""Methods that several processes can learn together."""
 
 
 class Training:
@@ -69,7 +74,7 @@ class Training:
         self.out, self._report = out, report
         objects, programme = TrainingObjects.of(options), PROGRAMMES[options.method]
         programme.check(objects)
-        if options.method != "full" and several_started():
+        if options.method not in _SHARED and several_started():
             raise ConfigError(
                 f"the method {options.method} learns in one process", "torchrun", "start it without torchrun"
             )

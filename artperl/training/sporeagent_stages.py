@@ -10,6 +10,7 @@ from torch import nn
 from artperl.agent.registration import REGISTRATION, RigidFitting, part_goals, part_problems
 from artperl.agent.start import mean_start
 from artperl.core.pose import Theta
+from artperl.core.ranks import ALONE, Ranks
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
 from artperl.methods.retrieved import Sizes
@@ -45,7 +46,7 @@ def sporeagent_stages(options: TrainOptions) -> list[Any]:
 
 
 def registration_episodes(
-    method: SporeAgent, samples: Source, count: int, seed: int, n: int
+    method: SporeAgent, samples: Source, count: int, seed: int, n: int, ranks: Ranks = ALONE
 ) -> tuple[RigidFitting, Theta]:
     """Episodes of one rollout, and their goals: the parts of fresh views, as the method segments and retrieves.
 
@@ -57,6 +58,8 @@ def registration_episodes(
         Views; each has an episode for every part that shows.
     seed, n : int
         Rollout ``n`` is a function of both.
+    ranks : Ranks
+        One process: how many parts show is known when all views are there.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def registration_episodes(
     """
     generator = torch.Generator().manual_seed((seed << 32) + n)
     views = [samples[i] for i in range(n * count, (n + 1) * count)]
-    reference, observed = draw_references(method, views, generator)
+    reference, observed = draw_references(method, views, generator, ranks.rows(count), count)
     start = mean_start(reference, observed.points, method.options.start)
     problems = part_problems(reference, observed, start, generator)
     if problems is None:

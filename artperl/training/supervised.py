@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from artperl.core.clouds import Clouds
+from artperl.core.ranks import ALONE, Ranks
 from artperl.data.batches import batches
 from artperl.data.truth import Truth
 from artperl.training.context import Context
@@ -35,6 +36,7 @@ class SupervisedStage:
         Of the stage.
     network : str
     loss : Loss
+        A mean over clouds.
     """
 
     name: str
@@ -48,17 +50,22 @@ class SupervisedStage:
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
         options = context.options
         network, optimizer = context.state.networks[self.network], context.state.optimizers[self.network]
+        ranks = context.ranks
         data = batches(
             context.objects.data, context.objects.num_rows, options.num_points, options.batch_size, first, options.seed,
-            context.workers,
+            context.workers, (ranks.rank, ranks.count), ranks.in_turn,
         )  # fmt: skip
         for step in range(first, options.perception_steps):
             clouds, truth = next(data)
+            own = ranks.rows(len(truth))
+            share = (own.stop - own.start) / len(truth)
             set_rate(optimizer, options.perception_rate * one_cycle(step, options.perception_steps))
             with autocast(context.device, options.mixed_precision):
-                loss, figures = self.loss(network, clouds.to(context.device), truth.to(context.device))
-            descend(optimizer, network, loss)
-            yield {"loss": loss.item(), **figures}, told(figures)
+                loss, figures = self.loss(network, clouds[own].to(context.device), truth[own].to(context.device))
+            descend(optimizer, network, share * loss, ranks)
+            means = {"loss": loss.item(), **figures}
+            means = dict(zip(means, ranks.add([share * value for value in means.values()]), strict=True))
+            yield means, told({name: means[name] for name in figures})
 
 
 def told(figures: dict[str, float]) -> str:
@@ -73,10 +80,11 @@ def segmentation_loss(network: nn.Module, clouds: Clouds, truth: Truth) -> tuple
     return loss, {"accuracy": float((logits.argmax(-1) == truth.part).float().mean())}
 
 
-def descend(optimizer: torch.optim.Optimizer, network: nn.Module, loss: Tensor) -> None:
-    """One step of an optimiser."""
+def descend(optimizer: torch.optim.Optimizer, network: nn.Module, loss: Tensor, ranks: Ranks = ALONE) -> None:
+    """One step of an optimiser down the sum of the losses that the processes have."""
     optimizer.zero_grad()
     loss.backward()
+    ranks.add_gradients(network)
     nn.utils.clip_grad_norm_(network.parameters(), 1.0)
     optimizer.step()
 
@@ -113,6 +121,7 @@ def take_steps(
             bar.set_postfix_str(line)
         bar.update()
         context.state.done[stage] = step + 1
+        context.stop.asked = context.ranks.add([context.stop.asked])[0] > 0
         if (step + 1) % save_every == 0:
             context.save()
         context.stop_if_asked()

@@ -20,6 +20,7 @@ from artperl.agent.ppo import (
     advantages,
     algorithm_1,
     cloning_loss,
+    drawn,
     log_probability,
     ppo_losses,
     rollout,
@@ -36,7 +37,7 @@ FITTING = FittingOptions(steps=3, observed_points=96, reference_points=32)
 def a_buffer(agent: Policy, phase: Phase, seed: int = 0, kinds: tuple[str, ...] = ("laptop",)) -> Buffer:
     problem = small_problem(*kinds)
     fitting = Fitting(problem.shapes, problem.observed, problem.start, FITTING)
-    return rollout(agent, fitting, problem.goal, phase, PPOOptions(), torch.Generator().manual_seed(seed))
+    return rollout(agent, fitting, problem.goal, phase, PPOOptions(), torch.Generator().manual_seed(seed))[0]
 
 
 def an_agent(seed: int = 0, width: int = 16) -> Policy:
@@ -151,6 +152,14 @@ def test_rewarded_actions_become_likelier() -> None:
     logits, _ = agent(buffer.view)
     gain = log_probability(JOINT.sharpness * logits, buffer.action, buffer.mask) - buffer.log_prob
     assert gain[1::2].mean() > gain[0::2].mean()
+
+
+def test_numbers_stand_for_actions_in_proportion() -> None:
+    probability = torch.tensor([0.1, 0.0, 0.6, 0.3])
+    chance = (torch.arange(1000) + 0.5) / 1000
+    counts = torch.bincount(drawn(probability.expand(1000, 4), chance), minlength=4)
+    assert counts.tolist() == [100, 0, 600, 300]
+    assert drawn(probability, torch.tensor(1.0)) == 3
 
 
 def test_the_policy_knows_parts_by_their_joints_not_by_their_rows() -> None:

@@ -11,7 +11,7 @@ import signal
 import sys
 from pathlib import Path
 
-from artperl.training.options import PRESETS, changed
+from artperl.training.options import changed, preset_of
 from artperl.training.run import Training
 
 if __name__ == "__main__":
@@ -25,7 +25,9 @@ if __name__ == "__main__":
             died.write_text(rank)
             os.kill(os.getpid(), signal.SIGKILL)
 
-    training = Training(changed(PRESETS["quick"], changes), out, 1, progress=False, report=die)
+    training = Training(
+        changed(preset_of(changes.get("method", "full"), "quick"), changes), out, 1, progress=False, report=die
+    )
     figures = training.run()
     (out.parent / f"{rank}.json").write_text(json.dumps(figures))
     training.context.ranks.close()

@@ -13,8 +13,8 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from artperl.training.options import PAPER_PRESETS
-from artperl.training.ranks import Ranks
+from artperl.core.ranks import Ranks
+from artperl.training.options import ANCSH_PRESETS
 from artperl.training.run import Training
 from artsim.errors import ConfigError
 from tests.conftest import ROOT
@@ -72,11 +72,25 @@ def test_two_processes_end_what_one_has_begun_though_one_of_them_dies(alone: Pat
     assert not [path for path in (tmp_path / "run").glob(".*") if path.name != ".lock"]
 
 
+def test_two_processes_make_the_rollouts_of_one(tmp_path: Path) -> None:
+    """Segmentation, retrieval and the agent of the paper's method: five episodes of unequal length, four updates."""
+    changes = {
+        "method": "artperl", "perception_steps": 2, "dense_steps": 0, "retrieval_steps": 2, "agent_rollouts": 2,
+        "episodes": 5, "cloning_share": 0.5, "box_views": 0,
+    }  # fmt: skip
+    for count in (1, 2):
+        done = learn(tmp_path / str(count) / "run", count, **changes)
+        assert done.returncode == 0, done.stderr
+    one, other = (load_file(tmp_path / str(count) / "run" / "state.safetensors") for count in (1, 2))
+    for name, tensor in one.items():
+        torch.testing.assert_close(tensor, other[name], rtol=1e-3, atol=1e-4, msg=lambda text, n=name: f"{n}: {text}")
+
+
 def test_a_method_that_learns_in_one_process_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("WORLD_SIZE", "2")
     monkeypatch.setenv("RANK", "0")
-    with pytest.raises(ConfigError, match="the method artperl learns in one process"):
-        Training(PAPER_PRESETS["quick"], tmp_path, progress=False)
+    with pytest.raises(ConfigError, match="the method ancsh learns in one process"):
+        Training(ANCSH_PRESETS["quick"], tmp_path, progress=False)
 
 
 def test_rows_of_a_batch_are_shared_out_once() -> None:

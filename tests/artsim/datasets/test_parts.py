@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import subprocess
@@ -137,3 +138,41 @@ def test_sigterm_in_each_phase_costs_the_work_in_hand_alone(tmp_path: Path) -> N
     subprocess.run([*command, str(tmp_path / "local")], check=True, capture_output=True)
     assert digests(out) == digests(tmp_path / "local")
     assert not list(out.rglob(".*.part"))
+
+
+_SMALL_FILES = (
+    "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+    "resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, resource.RLIM_INFINITY));"
+    "sys.argv[0] = 'generate.py'; from artsim.cli import generate_main; generate_main()"
+)
+
+
+@pytest.mark.slow
+def test_a_disk_that_fills_up_under_a_part_and_clocks_that_jump_leave_no_trace(tmp_path: Path) -> None:
+    """A limit on the size of files is a full disk: the same call fails. Each clock is a day off, now and then."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import itertools, time\n"
+        "_now, _calls = time.time, itertools.count()\n"
+        "time.time = lambda: _now() + (-86_400.0, 0.0, 86_400.0)[next(_calls) % 3]\n"
+        "time.time_ns = lambda: int(1e9 * time.time())\n"
+    )
+    options = [
+        "--categories", "laptop", "--objects-per-category", "6", "--num-samples", "40", "--num-points", "64",
+        "--shard-size", "10", "--workers", "1", "--out",
+    ]  # fmt: skip
+    jumping = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    whole, out = [sys.executable, str(ROOT / "generate.py"), *options], tmp_path / "out"
+    for number in range(2):
+        part = [str(out), "--part", f"{number}/2"]
+        full = subprocess.run(
+            [sys.executable, "-c", _SMALL_FILES, *options, *part], env=jumping, capture_output=True, text=True, cwd=ROOT
+        )
+        assert full.returncode == 2, full.stderr
+        assert "cannot write (File too large)" in full.stderr
+        assert not list(out.rglob("*.part"))
+        assert not list(out.glob("*.tar"))
+    for number in range(2):
+        subprocess.run([*whole, str(out), "--part", f"{number}/2"], env=jumping, check=True, capture_output=True)
+    merge(out, check=True, progress=False)
+    subprocess.run([*whole, str(tmp_path / "local")], check=True, capture_output=True)
+    assert digests(out) == digests(tmp_path / "local")

@@ -102,16 +102,18 @@ class Ranks:
                 owner = (owner + 1) % self.count
 
     def add_gradients(self, network: nn.Module) -> None:
-        """Let every process have the sum of all gradients."""
+        """Let every process have the sum of all gradients; what no process has a gradient of keeps none."""
         if self.count == 1:
             return
         parameters = [parameter for parameter in network.parameters() if parameter.requires_grad]
+        there = parameters[0].new_tensor([p.grad is not None for p in parameters], dtype=torch.float32)
         flat = torch.cat([
-            (torch.zeros_like(p) if p.grad is None else p.grad).flatten().float() for p in parameters
+            there, *((torch.zeros_like(p) if p.grad is None else p.grad).flatten().float() for p in parameters)
         ])  # fmt: skip
         distributed.all_reduce(flat)
-        for parameter, gradient in zip(parameters, flat.split([p.numel() for p in parameters]), strict=True):
-            parameter.grad = gradient.view_as(parameter).to(parameter.dtype)
+        there, *gradients = flat.split([len(parameters), *(p.numel() for p in parameters)])
+        for parameter, has, gradient in zip(parameters, there.tolist(), gradients, strict=True):
+            parameter.grad = gradient.view_as(parameter).to(parameter.dtype) if has else None
 
     def add(self, values: Sequence[float]) -> list[float]:
         """Sums over all processes."""
