@@ -52,8 +52,7 @@ def reart_objects() -> tuple[ArticulatedObject, ...]:
     found = list[ArticulatedObject]()
     for category, joints, number in OBJECTS:
         made = (make(category, seed) for seed in count(SEEDS))
-        wanted = (JOINTS[category][:1] * joints,) if category == "drawer" else (JOINTS[category],)
-        found += islice((obj for obj in made if obj.tree.types[1:] in wanted), number)
+        found += islice((obj for obj in made if obj.tree.types[1:] == JOINTS[category][:1] * joints), number)
     return tuple(found)
 
 
