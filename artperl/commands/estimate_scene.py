@@ -170,7 +170,8 @@ def scene_record(result: SceneEstimate, detections: Detections) -> dict[str, Any
         if obj.estimate is None:
             objects.append({**record, "error": obj.problem})
         else:
-            objects.append({**record, "score": obj.score, **plain_record(obj.estimate)})
+            own = {"score": obj.score, "moved": obj.moved.tolist(), **plain_record(obj.estimate)}
+            objects.append({**record, **own})
     return {
         "objects": objects, "skipped": list(detections.skipped), "notes": list(detections.notes),
         "milliseconds": result.milliseconds,

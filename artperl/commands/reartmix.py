@@ -55,8 +55,7 @@ def evaluate_reartmix(options: Evaluate) -> None:
     for text in () if detections is None else detections.skipped:
         say(f"left out: {text}")
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
-    estimator = SceneEstimator(named, options.detector or SHIPPED, **told)
+    estimator = SceneEstimator(named_estimators(options.estimators), options.detector or SHIPPED, **told)
     figures = run_reartmix(images, detections, estimator, True, say, options.picture)
     if options.json is not None:
         write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())
