@@ -35,8 +35,8 @@ class Evaluate:
     ablation are of the method full."""
     benchmark: Literal["artimage", "robustness", "reartmix"] | None = None
     """artimage: regenerated ArtImage, at least 500 views of each category in each row. robustness: sensors, occluders,
-    bad masks and few points, at least 100 views in each row; with --json, a run that was stopped goes on. reartmix:
-    several objects in each image, average precision at 5 degrees, 5 cm and IoU 0.5."""
+    bad masks and few points, at least 100 views in each row. reartmix: several objects in each image, average precision
+    at 5 degrees, 5 cm and IoU 0.5. With --json, a run of the last two that was stopped goes on."""
     ablation: bool = False
     """Measure what each stage brings: the estimators of all categories without one stage after the other, on validation
     objects. With --json, a run that was stopped goes on from the rows of the file."""

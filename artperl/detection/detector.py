@@ -46,10 +46,12 @@ class Detector:
     network : DetectorNetwork
     about : mapping, optional
         How it was trained, in JSON's terms.
+    sha256 : str
+        Digest of its file of weights, where it comes from one.
     """
 
-    def __init__(self, network: DetectorNetwork, about: Mapping[str, Any] | None = None):
-        self.network, self.about = network.eval(), dict(about or {})
+    def __init__(self, network: DetectorNetwork, about: Mapping[str, Any] | None = None, sha256: str = ""):
+        self.network, self.about, self.sha256 = network.eval(), dict(about or {}), sha256
 
     @property
     def categories(self) -> tuple[str, ...]:
@@ -183,11 +185,11 @@ def load_detector(name: str | Path = SHIPPED) -> Detector:
             raise ValueError(f"its size {size} is out of range")
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
-    tensors, _ = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
+    tensors, sha256 = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
     with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
         shapes = {k: t.shape for k, t in DetectorNetwork(size).state_dict().items() if t.is_floating_point()}
     if shapes != {k: t.shape for k, t in tensors.items()}:
         raise DatasetError("the weights are not of a detector of this size", folder, _AGAIN)
     network = DetectorNetwork(size)
     network.load_state_dict(tensors, strict=False)
-    return Detector(network, settings.get("about"))
+    return Detector(network, settings.get("about"), sha256)

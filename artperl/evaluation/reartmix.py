@@ -20,6 +20,7 @@ from artperl.evaluation.average_precision import CRITERIA, PosedObject, ap_table
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.realistic_detections import LEAST_VISIBLE, realistic_detections
 from artperl.evaluation.reartmix_files import AnnotatedImage, ReArtMixFolder, is_reartmix
+from artperl.evaluation.reartmix_record import ImageRecord, Kept, setup_of
 from artperl.inputs.detections import Detection, Detections
 from artperl.scene.drawing import draw_scene, scene_gallery
 from artperl.scene.estimator import SceneEstimator
@@ -40,6 +41,7 @@ PUBLISHED = {"5_degrees": 48.9, "5_cm": 77.4, "iou_50": 57.8}
 """Mean average precision of ArtPERL on the original images, per cent (its section 5.3); box has 82.3 at 5 degrees."""
 SEEDS = 1_000_000
 """First scene: objects of far smaller seeds are learnt from."""
+_STAGES = ("detector", "clouds", "estimates", "all")
 _SHOWN = 12
 """Images of a gallery."""
 
@@ -148,6 +150,7 @@ def run_reartmix(
     progress: bool = True,
     say: Callable[[str], None] = print,
     gallery: Path | None = None,
+    kept: Path | None = None,
 ) -> dict[str, Any]:
     """Estimate every detected object of every image, score, and print the table.
 
@@ -162,6 +165,9 @@ def run_reartmix(
         Gets each line.
     gallery : Path, optional
         PNG to write, of the first images with the estimates over them; over depth where there is no colour.
+    kept : Path, optional
+        File that keeps what was found while the run lasts: a stopped one goes on from it. The first images are
+        estimated again where a gallery shows them.
 
     Returns
     -------
@@ -171,30 +177,33 @@ def run_reartmix(
         that look the same count as wrong, ``images``, ``detections``, ``failures``, ``seconds`` (median of an image
         by stage), ``notes``.
     """
-    found, true, failures, pictures = list[PosedObject](), list[PosedObject](), list[str](), list[bytes]()
-    detected, times = 0, dict[str, list[float]]()
-    for key, image in track("images", images, total=len(images), unit="image", shown=progress):
-        true += image.objects
-        result = estimator(image.rgb, image.depth, image.K, None if detections is None else detections.of(key))
-        detected += len(result.objects)
-        for stage, own in {**result.milliseconds, "all": sum(result.milliseconds.values())}.items():
-            times.setdefault(stage, []).append(own / 1e3)
-        if gallery is not None and len(pictures) < _SHOWN:
-            pictures.append(draw_scene(_background(image), image.K, result))
-        for obj in result.objects:
-            if obj.estimate is None:
-                failures.append(obj.detection.category)
+    true, pictures = list[PosedObject](), list[bytes]()
+    record = Kept(kept, setup_of([str(key) for key in images.sizes], detections, estimator))
+    try:
+        for key, image in track("images", images, total=len(images), unit="image", shown=progress):
+            true += image.objects
+            drawn = gallery is not None and len(pictures) < _SHOWN
+            if str(key) in record.records and not drawn:
                 continue
-            boxes = obj.estimate.rotation, obj.estimate.translation, obj.estimate.size
-            found.append(PosedObject(str(key), obj.detection.category, *boxes, obj.score))
+            result = estimator(image.rgb, image.depth, image.K, None if detections is None else detections.of(key))
+            record.add(str(key), ImageRecord.of(key, result))
+            if drawn:
+                pictures.append(draw_scene(_background(image), image.K, result))
+    except BaseException:  # Ctrl-C, too
+        record.write()
+        raise
+    records = list(record.records.values())
+    found = [obj for own in records for obj in own.found]
+    times = {stage: [own.seconds[stage] for own in records if stage in own.seconds] for stage in _STAGES}
     table, strict = ap_table(found, true), ap_table(found, [replace(obj, equals=()) for obj in true])
     notes = [f"objects are found by {estimator.detector}"] if detections is None else list(detections.notes)
     have = [name for name in table if name in estimator.categories]
     figures: dict[str, Any] = {
         "categories": table, "mean": _mean(table, list(table)), "mean_with_estimator": _mean(table, have),
         "strict": strict, "mean_strict": _mean(strict, list(strict)),
-        "images": len(images), "detections": detected, "failures": len(failures),
-        "seconds": {stage: float(np.median(own)) for stage, own in times.items()}, "notes": notes,
+        "images": len(images), "detections": sum(own.detected for own in records),
+        "failures": sum(len(own.failures) for own in records),
+        "seconds": {stage: float(np.median(own)) for stage, own in times.items() if own}, "notes": notes,
     }  # fmt: skip
     lacking = [name for name in table if name not in have]
     if lacking:

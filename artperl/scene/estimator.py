@@ -112,7 +112,7 @@ class SceneEstimator:
         shipped |= {category: shipped.pop(name) for category, name in _IN_SCENES.items() if name in shipped}
         self.estimators: dict[str, str | Path] = {**shipped, **(estimators or {})}
         self.apart = apart
-        self._changes, self._loaded = changes, dict[str, Method]()
+        self.changes, self._loaded = changes, dict[str, Method]()
         self._detector_name = detector
         self._detector: Detector | None = None
 
@@ -189,7 +189,7 @@ class SceneEstimator:
 
     def _estimator(self, category: str) -> Method:
         if category not in self._loaded:
-            self._loaded[category] = load_estimator(self.estimators[category], **self._changes)
+            self._loaded[category] = load_estimator(self.estimators[category], **self.changes)
         return self._loaded[category]
 
 
