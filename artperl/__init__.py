@@ -55,8 +55,7 @@ def load_scene_estimator(
     detector : str or Path
         Name or folder of the detector, used where no detections are given.
     **changes
-        ``apart=False`` leaves estimates that stand in each other where they are; others are of the estimators'
-        options, such as ``seen_from=(-75.0, 75.0)``.
+        ``apart=True`` moves estimates that stand in each other apart; others are of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
 
     Raises
     ------

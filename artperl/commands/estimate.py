@@ -111,6 +111,9 @@ class Estimate:
     for each category. By default those that come with the package, by their names."""
     picture: Path | None = None
     """Of an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
+    apart: bool = False
+    """Of an image of several objects: move those whose boxes overlap apart, by 3 cm at most, as a simulator needs them.
+    It makes estimates less exact."""
     skip_bad: bool = False
     """Leave out detections that cannot be used, and list them, instead of refusing the file."""
     seen_from: tuple[float, float] | None = None
@@ -132,9 +135,9 @@ class Estimate:
         if self.detections is not None or self.detector is not None or is_image_pair(self.clouds):
             estimate_scene(self)
             return
-        if self.picture is not None or self.estimators or self.skip_bad:
+        if self.picture is not None or self.estimators or self.skip_bad or self.apart:
             raise ConfigError(
-                "these are of an image of several objects", "picture, estimators, skip_bad",
+                "these are of an image of several objects", "picture, estimators, skip_bad, apart",
                 "name the image in colour, then the depth image, and add --intrinsics camera.json",
             )  # fmt: skip
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"

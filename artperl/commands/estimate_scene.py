@@ -81,7 +81,9 @@ def estimate_scene(options: Estimate) -> None:
     depth = read_depth_image(depth_file, options.input_options())
     rgb = _colour(read_picture(image, "image").values, image)
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    estimator = SceneEstimator(named_estimators(options.estimators), options.detector or SHIPPED, **told)
+    estimator = SceneEstimator(
+        named_estimators(options.estimators), options.detector or SHIPPED, apart=options.apart, **told
+    )
     size = (depth.values.shape[1], depth.values.shape[0])
     given = None if options.detections is None else _read_detections(options, image, size)
     detections = given or Detections((), (), (f"objects are found by {estimator.detector}",))

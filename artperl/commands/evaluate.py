@@ -56,6 +56,8 @@ class Evaluate:
     train-detector wrote. By default detections are realistic ones, made from the truth."""
     detections: Path | None = None
     """For reartmix: COCO's results instead, with image_id as artperl detections writes it."""
+    apart: bool = False
+    """For reartmix: move estimates whose boxes overlap apart, as artperl estimate --apart does."""
     skip_bad: bool = False
     """For reartmix: leave out detections that cannot be used, and list them, instead of refusing the file."""
     estimators: tuple[str, ...] = ()
@@ -99,7 +101,7 @@ class Evaluate:
 
             evaluate_reartmix(self)
             return
-        names = ("detections", "detector", "estimators", "skip_bad", "picture")
+        names = ("detections", "detector", "estimators", "skip_bad", "picture", "apart")
         given = [name for name in names if getattr(self, name)]
         if given:
             raise ConfigError("these are of a benchmark", ", ".join(given), "add --benchmark reartmix")

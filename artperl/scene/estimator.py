@@ -98,13 +98,14 @@ class SceneEstimator:
     detector : str or Path
         Name or folder of the detector, loaded when an image comes without detections.
     apart : bool
-        Move estimates that stand in each other apart, by at most 3 cm.
+        Move estimates that stand in each other apart, by at most 3 cm, as a simulator needs them. They are less exact
+        then: one that is wrong moves its neighbours, too.
     **changes
         Of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
     """
 
     def __init__(
-        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = SHIPPED, apart: bool = True,
+        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = SHIPPED, apart: bool = False,
         **changes: Any,
     ):  # fmt: skip
         shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}

@@ -150,7 +150,7 @@ def test_a_stopped_run_goes_on_from_the_images_that_it_has_seen(tmp_path: Path) 
     assert len(asked) == 4
     told = {name: own for name, own in again.items() if name != "seconds"}
     assert told == {name: own for name, own in figures.items() if name != "seconds"}
-    run_reartmix(images, detections, Stopped(apart=False), False, whole.append, kept=kept)
+    run_reartmix(images, detections, Stopped(apart=True), False, whole.append, kept=kept)
     assert len(asked) == 7  # of another setup nothing is kept
     kept.write_text(kept.read_text().replace('"detected"', '"found so far"'))
     with pytest.raises(ConfigError, match="damaged"):

@@ -61,10 +61,10 @@ def test_what_is_found_twice_in_one_place_is_moved_apart_and_says_so() -> None:
     found = [
         Detection(0, "laptop", score, told["segmentation"], tuple(told["bbox"]), (320, 240)) for score in (0.9, 0.8)
     ]
-    here, there = load_scene_estimator()(None, frame.depth, CAMERA.K, found).objects
+    here, there = load_scene_estimator(apart=True)(None, frame.depth, CAMERA.K, found).objects
     assert 0.003 < np.linalg.norm(here.moved) <= 0.03  # half of the thickness of the base, or of the lid
     np.testing.assert_allclose(here.moved, -there.moved, atol=1e-9)
-    left = load_scene_estimator(apart=False)(None, frame.depth, CAMERA.K, found)
+    left = load_scene_estimator()(None, frame.depth, CAMERA.K, found)
     first, second = left.objects
     assert first.estimate is not None
     assert second.estimate is not None
