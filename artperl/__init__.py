@@ -55,7 +55,8 @@ def load_scene_estimator(
     detector : str or Path
         Name or folder of the detector, used where no detections are given.
     **changes
-        ``apart=True`` moves estimates that stand in each other apart; others are of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
+        ``apart=True`` moves estimates that stand in each other apart; others are of the estimators' options, such as
+        ``seen_from=(-75.0, 75.0)``.
 
     Raises
     ------
