@@ -12,6 +12,7 @@ import shlex
 import subprocess
 import sys
 from dataclasses import fields
+from functools import cache
 from importlib.metadata import metadata
 from pathlib import Path
 from typing import Any
@@ -82,9 +83,15 @@ def test_every_command_that_is_shown_exists_with_its_options(page: str, words: l
     verb = PROGRAMS[words[0]]
     shown = [word for word in options if word.startswith("--")]
     help_of = options[:1] if words[0] in ("artsim", "artperl") else []
-    text = told(verb, [*help_of, "--help"])
+    text = help_text(verb, *help_of)
     for option in shown:
         assert re.search(rf"{option}(?![\w-])", text), f"{page}: {words[0]} {' '.join(help_of)} has no {option}"
+
+
+@cache
+def help_text(verb: Any, *words: str) -> str:
+    """What a command explains of itself."""
+    return told(verb, [*words, "--help"])
 
 
 def told(verb: Any, words: list[str]) -> str:

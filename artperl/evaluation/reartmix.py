@@ -177,11 +177,12 @@ def run_reartmix(
         that look the same count as wrong, ``images``, ``detections``, ``failures``, ``seconds`` (median of an image
         by stage), ``notes``.
     """
-    true, pictures = list[PosedObject](), list[bytes]()
+    true, pictures, colourless = list[PosedObject](), list[bytes](), 0
     record = Kept(kept, setup_of([str(key) for key in images.sizes], detections, estimator))
     try:
         for key, image in track("images", images, total=len(images), unit="image", shown=progress):
             true += image.objects
+            colourless += image.rgb is None
             drawn = gallery is not None and len(pictures) < _SHOWN
             if str(key) in record.records and not drawn:
                 continue
@@ -197,6 +198,8 @@ def run_reartmix(
     times = {stage: [own.seconds[stage] for own in records if stage in own.seconds] for stage in _STAGES}
     table, strict = ap_table(found, true), ap_table(found, [replace(obj, equals=()) for obj in true])
     notes = [f"objects are found by {estimator.detector}"] if detections is None else list(detections.notes)
+    if detections is None and colourless:
+        notes.append(f"{colourless} images have no colour: their objects are found by depth alone")
     have = [name for name in table if name in estimator.categories]
     figures: dict[str, Any] = {
         "categories": table, "mean": _mean(table, list(table)), "mean_with_estimator": _mean(table, have),

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from artperl.evaluation.average_precision import PosedObject
 from artperl.inputs.depth_images import read_depth
 from artperl.inputs.detections import ALIASES, Detection, Detections
+from artperl.inputs.images import read_picture
 from artperl.inputs.intrinsics import read_intrinsics
 from artsim.common.files import read_json
 from artsim.datasets import json_values
@@ -117,7 +118,20 @@ class ReArtMixFolder:
         places = [self.folder / "camera_intrinsic" / key.split("/")[0], path.parent, self.folder]
         camera = next((p / _CAMERA for p in places if (p / _CAMERA).is_file()), self.folder / _CAMERA)
         objects = tuple(self._object(key, own, path) for own in _instances(document, path))
-        return AnnotatedImage(key, image.values * (0.001 if image.whole else 1.0), read_intrinsics(camera), objects)
+        depth = image.values * (0.001 if image.whole else 1.0)
+        return AnnotatedImage(key, depth, read_intrinsics(camera), objects, self._colour(document, path))
+
+    def _colour(self, document: dict[str, Any], path: Path) -> NDArray[np.uint8] | None:
+        """(H, W, 3) colours; None where the folder comes without any."""
+        folder = self.folder / "color"
+        if not folder.is_dir():
+            return None
+        file = _inside(folder, document.get("color_path"), path)
+        values = read_picture(file, "colour image").values
+        width, height = _size(document, path)
+        if values.dtype != np.uint8 or values.ndim != 3 or values.shape[:2] != (height, width) or values.shape[2] < 3:
+            raise DatasetError(f"is no image in colour of {width} x {height}", file, _FIX)
+        return np.ascontiguousarray(values[..., :3])
 
     def _object(self, key: str, own: dict[str, Any], path: Path) -> PosedObject:
         boxes = self._boxes.get(own["urdf_id"])

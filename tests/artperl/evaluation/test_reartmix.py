@@ -17,7 +17,7 @@ from artperl.evaluation.reartmix import SceneImages, open_images, run_reartmix
 from artperl.evaluation.reartmix_files import NAMES, ReArtMixFolder
 from artperl.inputs.detections import read_detections
 from artperl.scene.estimator import SceneEstimate, SceneEstimator
-from artsim.errors import ConfigError, DatasetError
+from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.model.kinematics import transform_points
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun, generate_scenes, open_scenes
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
@@ -103,6 +103,23 @@ def test_what_was_written_is_read(scenes: SceneDataset, tmp_path: Path) -> None:
     table = ap_table(true, true)
     assert all(own[rule] == 1.0 for own in table.values() for rule in ("5_degrees", "5_cm", "iou_50"))
     assert len(images.own_detections(0).all) == len(true)
+
+
+def test_colour_is_read_where_it_comes_along(scenes: SceneDataset, tmp_path: Path) -> None:
+    images = ReArtMixFolder(export(scenes, tmp_path))
+    assert [image.rgb for _, image in images] == [None]
+    file = tmp_path / "color" / "scene_7" / "0000.jpg"
+    file.parent.mkdir(parents=True)
+    Image.new("RGB", (640, 360), (200, 60, 20)).save(file)
+    ((_, image),) = images
+    assert image.rgb is not None
+    assert np.abs(image.rgb.astype(int) - [200, 60, 20]).max() < 4  # JPEG
+    Image.new("L", (640, 360)).save(file)
+    with pytest.raises(DatasetError, match="no image in colour of 640 x 360"):
+        list(images)
+    file.unlink()
+    with pytest.raises(ArtsimError, match=r"0000\.jpg"):
+        list(images)
 
 
 def test_boxes_hold_the_points_that_are_seen(scenes: SceneDataset) -> None:
