@@ -55,9 +55,8 @@ def evaluate_reartmix(options: Evaluate) -> None:
     for text in () if detections is None else detections.skipped:
         say(f"left out: {text}")
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    estimator = SceneEstimator(
-        named_estimators(options.estimators), options.detector or SHIPPED, apart=options.apart, **told
-    )
+    named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
+    estimator = SceneEstimator(named, options.detector or SHIPPED, apart=options.apart, **told)
     figures = run_reartmix(images, detections, estimator, True, say, options.picture, options.json)
     if options.json is not None:
         write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())

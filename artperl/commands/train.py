@@ -72,9 +72,9 @@ class Train:
     and from other sides; for objects that were not learnt from use artperl evaluate --files."""
     package_roots: Annotated[PackageRoots, tyro.conf.arg(name="package-root")] = field(default_factory=dict)
     """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
-    parts: Literal["artimage", "reartmix", "any"] | None = None
+    parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage or ReArtMix, such as body and three drawers;
-    reartmix: the same, and drawers with one; any: all objects of the families."""
+    any: all objects of the families."""
     seed: int | None = None
     perception_steps: int | None = None
     """Batches that perception learns from."""

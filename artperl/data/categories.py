@@ -34,15 +34,11 @@ JOINTS: dict[str, tuple[str, ...]] = {
     "stapler": ("revolute",),
     "cutter": ("prismatic",),
 }
-"""The same of ArtImage and of ReArtMix (Liu et al. 2022), but for its drawers."""
+"""The same of ArtImage and of ReArtMix (Liu et al. 2022). Drawers of ReArtMix have one sliding part, or three."""
 
-REARTMIX_DRAWERS: tuple[tuple[str, ...], ...] = (("prismatic",), JOINTS["drawer"])
-"""Drawers of ReArtMix have one sliding part, or three."""
-
-Parts = Literal["artimage", "reartmix", "any"]
+Parts = Literal["artimage", "any"]
 """artimage: objects with the joints that their category has in :data:`JOINTS` (any, for other categories), whose
-drawers open to the front; reartmix: the same, and drawers with one sliding part; any: all, with their parts in the
-order in which they are seen."""
+drawers open to the front; any: all, with their parts in the order in which they are seen."""
 
 _ATTEMPTS = 200
 _BACKWARDS = 0.5
@@ -62,9 +58,8 @@ def has_parts(category: str, joint_types: Sequence[str], joint_axes: ArrayLike, 
     """
     if parts == "any" or category not in JOINTS:
         return True
-    drawers = category == "drawer"
-    wanted = REARTMIX_DRAWERS if drawers and parts == "reartmix" else (JOINTS[category],)
-    return tuple(joint_types[1:]) in wanted and not (drawers and opens_to_the_back(joint_types, joint_axes))
+    backwards = category == "drawer" and opens_to_the_back(joint_types, joint_axes)
+    return tuple(joint_types[1:]) == JOINTS[category] and not backwards
 
 
 def opens_to_the_back(joint_types: Sequence[str], joint_axes: ArrayLike) -> bool:

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 _MOST_POINTS = 8192
 """Of an object's cloud: what estimators are tested with. More cost time and bring nothing."""
-_IN_SCENES = {"drawer": "reartmix_drawer"}
-"""Estimators that take the place of those that have the name of the category: drawers have one or three."""
 _MOST_MOVED = 0.03
 """Metres. An estimate that is deeper in another one is wrong in another way."""
 _FAR, _NEAR = 30.0, 0.05
@@ -110,7 +108,6 @@ class SceneEstimator:
     ):  # fmt: skip
         shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
         shipped.pop("any", None)  # of no category
-        shipped |= {category: shipped.pop(name) for category, name in _IN_SCENES.items() if name in shipped}
         self.estimators: dict[str, str | Path] = {**shipped, **(estimators or {})}
         self.apart = apart
         self.changes, self._loaded = changes, dict[str, Method]()

@@ -48,7 +48,7 @@ class TrainOptions:
     """Procedural categories; several share one estimator, and one that is named twice is seen twice as often."""
     parts: Parts = "artimage"
     """artimage: objects with the parts that their category has in ArtImage or ReArtMix, such as body and three drawers;
-    reartmix: the same, and drawers with one; any: all objects of the families."""
+    any: all objects of the families."""
     max_parts: int | None = None
     """The most parts that an object may have."""
     files: tuple[str, ...] = ()

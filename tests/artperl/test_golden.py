@@ -22,14 +22,14 @@ _DEGREES, _SHARE = 0.2, 0.005
 """By which another processor's rounding may move an estimate, with a margin of ten; a share of the object's size."""
 
 MEDIAN_DEGREES = {
-    "laptop": (0.1, 0.1),
+    "laptop": (0.2, 0.1),
     "eyeglasses": (1.1, 1.7, 1.7),
     "dishwasher": (0.03, 0.04),
     "scissors": (1.5, 1.9),
     "drawer": (0.03, 0.03, 0.03, 0.03),
 }
-"""Median rotation error of each part, from the front: about twice what ``artperl evaluate --benchmark artimage`` prints
-for many more views."""
+"""Median rotation error of each part, from the front: two to five times what ``artperl evaluate --benchmark artimage``
+prints for many more views."""
 
 
 @pytest.fixture(scope="module")
