@@ -23,7 +23,7 @@ from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
 from artperl.training.perception import PerceptionStage
 from artperl.training.sporeagent_stages import sporeagent_estimator, sporeagent_run_networks, sporeagent_stages
-from artperl.training.validation import Calibration
+from artperl.training.validation import Calibration, Validation
 
 
 class Stage(Protocol):
@@ -87,7 +87,7 @@ def _full_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]
 
 
 def _full_stages(options: TrainOptions) -> list[Stage]:
-    return [*perception_stages(options), Calibration(), BoxStage()]
+    return [*perception_stages(options), Validation(), BoxStage(), Calibration()]
 
 
 def _full_estimator(context: Context) -> Estimator:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +18,7 @@ from artperl.evaluation.samples import (
     frozen_samples,
     samples_of,
 )
-from artperl.evaluation.scoring import evaluate, evaluate_foreign, headline
+from artperl.evaluation.scoring import Scored, evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
 from artperl.training.context import Context
@@ -33,15 +34,35 @@ _AS_GOOD = 1.01
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """Validates the estimator of a run that has no other stage to learn in: its confidence is calibrated anew."""
+class Validation:
+    """Validates the estimator of a run that has no other stage to learn in."""
 
-    name: str = "calibration"
+    name: str = "validation"
 
     def run(self, context: Context) -> None:
         """Validate, unless another stage has."""
         if not context.state.history:
             validate(context)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Calibrates the confidence of the best estimator when it has learnt all: its boxes decide what is right, too."""
+
+    name: str = "calibration"
+
+    def run(self, context: Context) -> None:
+        """Calibrate, unless that is done. Of several processes the first one does, while the others wait."""
+        state = context.state
+        if state.done[self.name]:
+            return
+        if context.ranks.first:
+            best = context.best()
+            assert isinstance(best, Estimator)
+            samples = unseen_samples(context, context.options.validation_views, VALIDATION_SEEDS)
+            save_estimator(_calibrated(best, samples, context), context.folder.best, context.about({}))
+        state.done[self.name] = context.ranks.same(1)
+        context.save()
 
 
 def step_taken(context: Context, stage: str, done: int, total: int, validate_every: int, save_every: int) -> None:
@@ -76,19 +97,29 @@ def _validate(context: Context) -> None:
     assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves
     samples = unseen_samples(context, options.validation_views, VALIDATION_SEEDS)
     scored = evaluate(estimator, samples, context.progress)
-    degraded = evaluate(estimator, degraded_samples(samples), context.progress) if options.degraded else []
+    degraded = _of_degraded(estimator, samples, context)
     figures, score = summary(scored), headline([*scored, *degraded])
     state.history.append({"step": state.step, "score": score, "done": dict(state.done)})
     context.report("validation", scalars(figures) | {"score": score}, state.step)
     if score < _AS_GOOD * state.best:
         state.best = min(score, state.best)
-        # By votes, any parts are right if they are where they are.
-        judge = evaluate if options.votes else evaluate_foreign
-        foreign = judge(estimator, foreign_samples(context.objects.base.categories, options.foreign_categories))
-        best = calibrated(estimator, [*scored, *degraded], foreign)
-        save_estimator(best, context.folder.best, context.about({"validation": figures}))
+        save_estimator(estimator, context.folder.best, context.about({"validation": figures}))
     context.save()
     say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
+
+
+def _of_degraded(estimator: Estimator, samples: Sequence[Sample], context: Context) -> list[Scored]:
+    """What becomes of the same samples cut and dirty, where a run learns from such clouds."""
+    return evaluate(estimator, degraded_samples(samples), context.progress) if context.options.degraded else []
+
+
+def _calibrated(estimator: Estimator, samples: Sequence[Sample], context: Context) -> Estimator:
+    """The estimator with its confidence by how it does on samples, degraded ones, and objects of other categories."""
+    options = context.options
+    scored = evaluate(estimator, samples, context.progress) + _of_degraded(estimator, samples, context)
+    judge = evaluate if options.votes else evaluate_foreign  # by votes, any parts are right if they are where they are
+    foreign = judge(estimator, foreign_samples(context.objects.base.categories, options.foreign_categories))
+    return calibrated(estimator, scored, foreign)
 
 
 def test(context: Context) -> dict[str, Any]:
