@@ -120,7 +120,7 @@ def test_a_denser_cloud_is_read_as_well(category: str) -> None:
     net = load_estimator(category).perception
     samples = frozen_samples([category], 6, 2, SampleOptions(num_points=2048), first_seed=VALIDATION_SEEDS)
     right = {n: np.mean([_read(net, sample, n) for sample in samples]) for n in (1024, 2048)}
-    assert min(right.values()) > 0.9
+    assert min(right.values()) > 0.85  # drawers learn from 4,096 points, and the gaps between fronts are few of 1,024
     assert right[2048] > right[1024] - 0.01
 
 
