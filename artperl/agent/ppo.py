@@ -225,17 +225,15 @@ def update(
     advantage = (buffer.advantage - buffer.advantage.mean()) / (buffer.advantage.std() + 1e-8)
     for _ in range(options.epochs):
         for batch in torch.randperm(total, generator=generator, device=generator.device).split(options.minibatch):
-            rows = batch[ranks.rows(len(batch))]
-            if len(rows) == 0:  # fewer rows than processes
-                rows, share = batch[:1], 0.0
-            else:
-                share = len(rows) / len(batch)
+            own = batch[ranks.rows(len(batch))]
+            share = len(own) / len(batch)
+            rows = own if share else batch[:1]  # of fewer rows than processes some have none: theirs count for nothing
             logits, value = policy(buffer.view[rows])
             mask = buffer.mask[rows]
             losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
             losses = {name: share * loss for name, loss in losses.items()}
             weight = cloning_weight(buffer.mask[batch], buffer.view.kind[batch], options).sum()
-            cloning = (share > 0) * cloning_loss(
+            cloning = bool(share) * cloning_loss(
                 logits, buffer.expert[rows], mask, buffer.view.kind[rows], options, weight
             )
             loss = cloning
