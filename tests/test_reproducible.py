@@ -62,13 +62,13 @@ def test_a_dataset_is_the_same_bytes_on_every_processor(made: dict[str, dict[str
 
 def test_the_processors_do_differ() -> None:
     """Where NumPy's own functions give the same bits on all of them, the tests above show nothing."""
-    if "AVX512F" not in Path("/proc/cpuinfo").read_text().upper().split():
-        pytest.skip("this processor has no AVX-512: there is one less to tell apart")
+    best = "AVX512F" in Path("/proc/cpuinfo").read_text().upper().split()
+    here = [name for name in PROCESSORS if best or name != "with AVX-512"]
     numpy_own = (
         "import numpy as np; x = np.random.default_rng(0).uniform(0.1, 7, 9999);"
         "print(np.exp(x).tobytes().hex()[-99999:] + (x.reshape(-1, 3) @ x[:9].reshape(3, 3)).tobytes().hex())"
     )
-    assert len({on(processor, "-c", numpy_own) for processor in PROCESSORS}) == 3
+    assert len({on(processor, "-c", numpy_own) for processor in here}) == len(here)
 
 
 MODULES = {
