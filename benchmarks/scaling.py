@@ -25,6 +25,8 @@ from artsim.common.files import file_sha256
 from benchmarks.demo_objects import ASSETS
 
 _TICKS = os.sysconf("SC_CLK_TCK")
+_EVERY = 0.5
+"""Seconds between two looks: each takes some milliseconds of a core that the run wants."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def measure(out: Path, options: Options, way: Sequence[str]) -> Cost:
         last = (time.perf_counter() - start, sum(used.values()), made) if made > last[2] else last
         if first is None and made:
             first = last
-        time.sleep(0.1)
+        time.sleep(_EVERY)
     if process.returncode != 0 or first is None:
         raise RuntimeError(f"generate.py {' '.join(way)} ended with exit code {process.returncode}")
     thousands = options.shard_size * (last[2] - first[2]) / 1000
