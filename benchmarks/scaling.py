@@ -33,11 +33,11 @@ _EVERY = 0.5
 class Options:
     """Measure processor time of a sample, each way."""
 
-    samples: int = 20_000
+    samples: int = 40_000
     num_points: int = 2048
     shard_size: int = 256
     ways: tuple[str, ...] = ("--workers 1", "--workers 2", "--ray local")
-    rounds: int = 3
+    rounds: int = 1
     """Turns that each way has."""
 
 

@@ -20,7 +20,8 @@ from artperl.evaluation.artimage import row_objects, row_samples
 from artperl.evaluation.comparison import row_record
 from artperl.evaluation.comparison_page import html_page, markdown
 from artperl.evaluation.pictures import curves, overlays
-from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, samples_of
+from artperl.evaluation.robotarm import ARM, arm_samples, seven_part_arm
+from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.methods import StoredMethod
 from artperl.methods.protocol import Method
@@ -28,10 +29,9 @@ from artperl.training.options import PRESETS, TrainOptions, preset_of
 from artperl.training.run import Training
 from artperl.viewer import page
 from artsim.common.files import read_json, write_atomic
-from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError
 from artsim.export import export
-from artsim.families import make
+from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
@@ -43,11 +43,11 @@ METHODS: dict[Benchmark, tuple[StoredMethod, ...]] = {
     "robotarm": ("full", "artperl", "ancsh"),
 }
 """Methods of a benchmark, as in the paper."""
-ARM = "robot_arm"
-"""The category of the benchmark robotarm."""
-_ARM_SEED = TEST_SEEDS + 25
-"""The first arm of the test seeds that has seven parts in a chain."""
 _STAGES = ("perception_steps", "retrieval_steps", "prior_steps", "agent_rollouts")
+_NOISY, _DEGRADED = 0.5, 0.6
+"""Shares of the clouds that trainings for the arm see with a sensor's noise; cut, dirty or sparse: its masks are bad."""
+_ARM_STEPS = 6000
+"""Batches that the estimator for any tree learns on from an arm."""
 _MAX_ROW = 4_000_000
 _OVERLAYS = 4
 """Views of a category that are drawn."""
@@ -66,6 +66,8 @@ class ComparisonOptions:
     benchmark: Benchmark = "artimage"
     categories: tuple[str, ...] = ()
     """Of ArtImage; by default all. The benchmark robotarm has one."""
+    arm: str = ""
+    """URDF file of the arm of the benchmark robotarm; by default a procedural one of seven parts."""
     methods: tuple[StoredMethod, ...] = ()
     """By default those of the paper's table, and full."""
     preset: Preset = "full"
@@ -90,6 +92,8 @@ class ComparisonOptions:
                 raise ConfigError(
                     f"{self.benchmark} has no {', '.join(sorted(wrong))}", name, f"use {', '.join(offered)}"
                 )
+        if self.arm and self.benchmark != "robotarm":
+            raise ConfigError("only the benchmark robotarm has an arm", "arm", "leave it out, or use robotarm")
         if self.objects < 1 or self.views < 1:
             raise ConfigError("there is nothing to test", "objects, views", "use at least 1 of each")
 
@@ -190,6 +194,7 @@ def _asked(options: ComparisonOptions, method: StoredMethod) -> dict[str, Any]:
     for name in ("categories", "methods"):
         own.pop(name)
     own["method"] = method
+    own["arm"] = load(Path(options.arm)).sha256 if options.arm else ""
     return dict(json.loads(json.dumps(own)))
 
 
@@ -208,11 +213,11 @@ def training_options(options: ComparisonOptions, category: str, method: StoredMe
     if options.benchmark == "artimage":
         own = replace(preset_of(method, options.preset), categories=(category,))
     else:
-        arm = str(arm_folder(out))
+        arm = options.arm or str(arm_folder(out))
         preset = PRESETS["joint"] if method == "full" else preset_of(method, options.preset)
-        own = replace(preset, categories=(), files=(arm,), parts="any", sample=SampleOptions(noise="d435"))
-        if method == "full":  # as benchmarks/robot_arm.py does
-            own = replace(own, start_from="any", perception_steps=2000)
+        own = replace(preset, categories=(), files=(arm,), parts="any", noisy=_NOISY, degraded=_DEGRADED)
+        if method == "full":
+            own = replace(own, start_from="any", perception_steps=_ARM_STEPS)
     # Stages that a method does not have stay without steps.
     changes = {
         name: value for name, value in (options.train or {}).items() if name not in _STAGES or getattr(own, name)
@@ -241,14 +246,8 @@ def tested_views(options: ComparisonOptions, category: str, out: Path) -> tuple[
     if options.benchmark == "artimage":
         objects = row_objects("procedural", category, None, options.objects)
         return objects, row_samples("procedural", objects, options.views, options.num_points)
-    objects = [seven_part_arm()]
-    sample = SampleOptions(num_points=options.num_points, noise="d435")
-    return objects, samples_of(objects, options.views, sample)
-
-
-def seven_part_arm() -> ArticulatedObject:
-    """The arm of the benchmark robotarm: seven parts in a chain, as the paper's has."""
-    return make(ARM, _ARM_SEED)
+    arm = load(Path(options.arm)) if options.arm else seven_part_arm()
+    return [arm], arm_samples(arm, options.views, options.num_points)
 
 
 def arm_folder(out: Path) -> Path:
@@ -273,7 +272,10 @@ def notes(options: ComparisonOptions) -> list[str]:
         full = "is trained like the others" if options.retrain_full else "has the weights that come with the package"
         lines.append(f"The method full {full}; it may have learnt longer than the others.")
     else:
-        lines.append("One procedural arm of seven parts, as an Intel D435 sees it; learnt and tested in other states.")
+        lines.append(
+            "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435, each of an arm "
+            "among other things, within a mask that is not exact. Trainings see clouds that are cut, dirty or noisy."
+        )
     return lines
 
 

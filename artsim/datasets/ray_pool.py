@@ -45,7 +45,8 @@ class RayPool:
     Parameters
     ----------
     place : path, str or Storage
-        Of the dataset. A path is this machine's; a FolderStorage is a folder that every node sees.
+        Of the dataset. A path is this machine's: other machines get and send its files through this one. A FolderStorage
+        is a folder that every node sees.
     address : str
         "auto" for the cluster that this machine belongs to, "local" to start one here, or HOST:PORT of its head.
 
@@ -70,8 +71,9 @@ class RayPool:
         )
         hub = ray.remote(num_cpus=0, max_concurrency=8, scheduling_strategy=here)(_Hub)
         self._hub = hub.remote(_absolute(self.storage))
-        shared = isinstance(place, FolderStorage) or not isinstance(self.storage, FolderStorage)
-        self._seen = self.storage if shared else RelayStorage(self._hub, self.storage.place)
+        # A cluster that is started here has no other machine.
+        shared = address == "local" or isinstance(place, FolderStorage) or not isinstance(self.storage, FolderStorage)
+        self._seen = _absolute(self.storage) if shared else RelayStorage(self._hub, self.storage.place)
         self._task = ray.remote(num_cpus=1, max_retries=0)(_do)
         self._versions = {name: version(name) for name in VERSIONS_OF}
 

@@ -73,6 +73,7 @@ class Arrangement:
         coats: tuple[Coat, ...],
         rng: np.random.Generator,
         turn: tuple[float, float] = (-0.6, 0.6),
+        upright: bool = False,
     ) -> Thing | None:
         """Put an object down where there is room for it.
 
@@ -85,20 +86,22 @@ class Arrangement:
         turn : 2 float
             Range in radians about the vertical for what stands upright, 0 having its front towards -X; what lies lies
             any way.
+        upright : bool
+            It is held, and need not stand or lie steadily.
 
         Returns
         -------
         Thing or None
             None where no room was found.
         """
-        upright = resting_rotation(obj)
-        if upright[2, 2] < _UPRIGHT:
+        resting = np.eye(3) if upright else resting_rotation(obj)
+        if resting[2, 2] < _UPRIGHT:
             turn = (-np.pi, np.pi)
         at_origin = Thing(obj, q, np.eye(4), coats).vertices
-        tall = float(np.ptp(dot(at_origin, upright[2])))
+        tall = float(np.ptp(dot(at_origin, resting[2])))
         best, least, found = None, np.inf, 0
         for _ in range(_TRIES):
-            rotation = matmul(rotation_about((0, 0, 1), rng.uniform(*turn)), upright)
+            rotation = matmul(rotation_about((0, 0, 1), rng.uniform(*turn)), resting)
             posed = apply(rotation, at_origin)
             low, high = posed.min(axis=0), posed.max(axis=0)
             room_low, room_high = np.asarray(self.area.low) - low[:2], np.asarray(self.area.high) - high[:2]

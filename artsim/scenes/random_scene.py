@@ -34,6 +34,7 @@ _DRAWS = 12  # of a procedural object until one is small enough for a table
 _CROWD = 2.5  # of the sum of footprints: the area that things are spread over
 _CLOSER = 0.6  # of that area in a crowded scene
 _ATTEMPTS = 4  # arrangements that are begun before a scene is given up
+_STATES = 200  # that are drawn for a bolted object: of those of an arm, one in ten to one in two stays above its base
 _KIN = {"knife": "folding_knife", "table": "drawer"}
 """Families whose sizes the real objects of other categories have."""
 
@@ -95,6 +96,9 @@ class SceneOptions:
     corner of its box. By default sizes are usual ones."""
     crowded: bool = False
     """Things stand close together, and before one another: more of each is hidden."""
+    bolted: bool = False
+    """Objects are bolted down by their base, as robot arms are: they stand upright in any state. A state in which a part
+    would reach below the base is drawn again."""
     states: StateOptions = field(default_factory=lambda: StateOptions(fraction_open=(0.3, 0.7)))
     obj: Annotated[tuple[ArticulatedObject, ...], tyro.conf.Suppress] = ()
     """Objects as they are, besides."""
@@ -139,7 +143,7 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
         raise ConfigError(f"seed {seed} is negative", "seed", "use 0 or more")
     objects = _objects(options, seed)
     rng = np.random.default_rng([seed, 1])
-    states = [sample_state(obj, options.states, rng) for obj in objects]
+    states = [(_state_above_base if options.bolted else sample_state)(obj, options.states, rng) for obj in objects]
     looks = np.random.default_rng([seed, 2])
     coats = [painted_coats(obj) or draw_coats(obj, looks) for obj in objects]
     others = [distractor(rng) for _ in range(options.distractors)]
@@ -149,7 +153,7 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
     solids = [*zip(objects, states, coats, strict=True), *((obj, np.zeros(1), coat) for obj, coat in others)]
     for attempt in range(_ATTEMPTS):
         area = _area(solids, on_table, attempt, options.crowded)
-        things = _arrange(solids, area, rng, options.crowded)
+        things = _arrange(solids, area, rng, options.crowded, len(objects) if options.bolted else 0)
         if things is not None:
             break
     else:
@@ -246,14 +250,33 @@ def _area(solids: list[_Placeable], on_table: bool, attempt: int, crowded: bool 
     return Area((-0.5 * depth, -0.5 * width), (0.5 * depth, 0.5 * width))
 
 
+def _state_above_base(obj: ArticulatedObject, options: StateOptions, rng: np.random.Generator) -> Array:
+    """Joint states in which no part reaches below the lowest point of the root.
+
+    Raises
+    ------
+    ConfigError
+        When none is found.
+    """
+    for _ in range(_STATES):
+        thing = Thing(obj, sample_state(obj, options, rng), np.eye(4), ())
+        low = thing.part_boxes[:, 0, 2]
+        if low[1:].min(initial=np.inf) >= low[0]:
+            return thing.q
+    raise ConfigError(
+        f"in each of {_STATES} states of {obj.category} {obj.object_id} a part reaches below the base", "bolted",
+        "do without it, or give states in which none does",
+    )  # fmt: skip
+
+
 def _arrange(
-    solids: list[_Placeable], area: Area, rng: np.random.Generator, crowded: bool = False
+    solids: list[_Placeable], area: Area, rng: np.random.Generator, crowded: bool = False, bolted: int = 0
 ) -> list[Thing] | None:
-    """All things put down, the largest first; None where they do not fit."""
+    """All things put down, the largest first, and the first so many upright; None where they do not fit."""
     arrangement = Arrangement(area, crowded=crowded)
     placed: dict[int, Thing] = {}
     for number in sorted(range(len(solids)), key=lambda n: -solids[n][0].diagonal):
-        thing = arrangement.put(*solids[number], rng)
+        thing = arrangement.put(*solids[number], rng, upright=number < bolted)
         if thing is None:
             return None
         placed[number] = thing
