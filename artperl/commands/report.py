@@ -26,8 +26,8 @@ class Report:
     """
 
     benchmark: Literal["artimage", "robotarm"] = "artimage"
-    """artimage: regenerated ArtImage, tables 1 and 2 of the paper; robotarm: an arm of seven parts among other things, in
-    RGB-D images with noise and masks that are not exact, its table 3."""
+    """artimage: regenerated ArtImage, tables 1 and 2 of the paper; robotarm: an arm of seven parts among other things,
+    in RGB-D images with noise and masks that are not exact, its table 3."""
     arm: Path | None = None
     """URDF file of another arm for robotarm, such as your own; by default a procedural one of seven parts."""
     out: Path | None = None
@@ -56,8 +56,8 @@ class Report:
             from artperl.training.comparison_run import ComparisonOptions, run_comparison
 
         options = ComparisonOptions(
-            self.benchmark, self.category, self.methods, self.preset, self.objects, self.views,
-            retrain_full=self.retrain_full, arm="" if self.arm is None else str(self.arm),
+            self.benchmark, self.category, "" if self.arm is None else str(self.arm), self.methods, self.preset,
+            self.objects, self.views, retrain_full=self.retrain_full,
         )  # fmt: skip
         if self.quick:
             from artperl.training.comparison_run import quick_comparison

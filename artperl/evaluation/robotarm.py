@@ -1,7 +1,7 @@
 """RobotArm: one arm of seven parts, bolted to a table or a floor among other things, in RGB-D images of a D435.
 
-Its cloud comes from the image as a user's does: depth with noise and missing returns, within a mask whose border is off,
-which may lack a piece or take in what is beside it. No ground truth is used but for the mask, which is made worse.
+Its cloud comes from the image as a user's does: depth with noise and missing returns, within a mask whose border is
+off, which may lack a piece or take in what is beside it. No ground truth is used but for the mask, which is made worse.
 """
 
 from __future__ import annotations
@@ -92,5 +92,6 @@ def image_sample(view: SceneView, num_points: int, rng: np.random.Generator) -> 
         own_frame = (points[shown] - T[:3, 3]) @ T[:3, :3]
         npcs[shown] = 0.5 + (own_frame - sample.box_center[k]) / np.linalg.norm(sample.box_size[k])
     return replace(
-        sample, points=points.astype(np.float32), part=part.astype(np.uint8), npcs=npcs.astype(np.float32), part_mask=None
+        sample, points=points.astype(np.float32), part=part.astype(np.uint8), npcs=npcs.astype(np.float32),
+        part_mask=None,
     )  # fmt: skip

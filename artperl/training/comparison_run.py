@@ -45,7 +45,7 @@ METHODS: dict[Benchmark, tuple[StoredMethod, ...]] = {
 """Methods of a benchmark, as in the paper."""
 _STAGES = ("perception_steps", "retrieval_steps", "prior_steps", "agent_rollouts")
 _NOISY, _DEGRADED = 0.5, 0.6
-"""Shares of the clouds that trainings for the arm see with a sensor's noise; cut, dirty or sparse: its masks are bad."""
+"""Shares of the clouds that trainings for the arm see with a sensor's noise; cut, dirty or sparse, as by bad masks."""
 _ARM_STEPS = 6000
 """Batches that the estimator for any tree learns on from an arm."""
 _MAX_ROW = 4_000_000
@@ -273,8 +273,8 @@ def notes(options: ComparisonOptions) -> list[str]:
         lines.append(f"The method full {full}; it may have learnt longer than the others.")
     else:
         lines.append(
-            "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435, each of an arm "
-            "among other things, within a mask that is not exact. Trainings see clouds that are cut, dirty or noisy."
+            "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435, in which the "
+            "arm stands among other things, within masks that are not exact. Trainings see cut, dirty and noisy clouds."
         )
     return lines
 

@@ -45,8 +45,8 @@ class RayPool:
     Parameters
     ----------
     place : path, str or Storage
-        Of the dataset. A path is this machine's: other machines get and send its files through this one. A FolderStorage
-        is a folder that every node sees.
+        Of the dataset. A path is this machine's: other machines get and send its files through this one. A
+        FolderStorage is a folder that every node sees.
     address : str
         "auto" for the cluster that this machine belongs to, "local" to start one here, or HOST:PORT of its head.
 

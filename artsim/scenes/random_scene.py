@@ -97,8 +97,8 @@ class SceneOptions:
     crowded: bool = False
     """Things stand close together, and before one another: more of each is hidden."""
     bolted: bool = False
-    """Objects are bolted down by their base, as robot arms are: they stand upright in any state. A state in which a part
-    would reach below the base is drawn again."""
+    """Objects are bolted down by their base, as robot arms are: they stand upright in any state. A state in which a
+    part would reach below the base is drawn again."""
     states: StateOptions = field(default_factory=lambda: StateOptions(fraction_open=(0.3, 0.7)))
     obj: Annotated[tuple[ArticulatedObject, ...], tyro.conf.Suppress] = ()
     """Objects as they are, besides."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from artperl.evaluation.robotarm import seven_part_arm
 from artperl.training.comparison_run import (
     ComparisonOptions,
     arm_folder,
@@ -15,7 +16,6 @@ from artperl.training.comparison_run import (
     run_comparison,
     training_options,
 )
-from artperl.evaluation.robotarm import seven_part_arm
 from artsim.errors import ConfigError
 from artsim.loading.urdf import load
 
