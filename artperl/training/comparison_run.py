@@ -273,8 +273,8 @@ def notes(options: ComparisonOptions) -> list[str]:
         lines.append(f"The method full {full}; it may have learnt longer than the others.")
     else:
         lines.append(
-            "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435, in which the "
-            "arm stands among other things, within masks that are not exact. Trainings see cut, dirty and noisy clouds."
+            "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435: the arm "
+            "stands among other things, and masks are not exact. Trainings see cut, dirty and noisy clouds.",
         )
     return lines
 
