@@ -66,6 +66,7 @@ class AssetPaths:
     declared: Mapping[str, Path]
     repairs: list[Repair] = field(default_factory=list)
     _said: set[str] = field(default_factory=set)
+    _folders: dict[Path, Path] = field(default_factory=dict)
 
     def resolve(self, filename: str) -> Path:
         """Path of an existing file, confined to the allowed folders.
@@ -161,10 +162,19 @@ class AssetPaths:
     def _is_inside(self, path: Path, package: str | None) -> bool:
         allowed = self._allowed if package is None else [*self._allowed, *self._of_name(package)]
         try:
-            real = path.resolve()
+            real = self._real(path)
         except (OSError, RuntimeError, ValueError):  # links that go round in a circle, names with a zero byte
             return False
         return any(real.is_relative_to(folder) for folder in allowed)
+
+    def _real(self, path: Path) -> Path:
+        """Where a path leads, links followed. A folder of hundreds of meshes is followed once."""
+        if path.name in ("", ".."):
+            return path.resolve()
+        if path.parent not in self._folders:
+            self._folders[path.parent] = path.parent.resolve()
+        file = self._folders[path.parent] / path.name
+        return file.resolve() if file.is_symlink() else file
 
     def _split(self, filename: str) -> tuple[str | None, str]:
         """Package (None for a plain path) and the rest of a name."""

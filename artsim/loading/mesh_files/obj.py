@@ -9,7 +9,15 @@ import numpy as np
 
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, quote_name
-from artsim.loading.mesh_files.text import Rows, first_numbers, numbers, numbers_per_row, plain_text, substitute
+from artsim.loading.mesh_files.text import (
+    Rows,
+    first_numbers,
+    first_of_each,
+    numbers,
+    numbers_per_row,
+    plain_text,
+    substitute,
+)
 
 _HARMLESS = ("vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", "mg", "lod", "bevel", "c_interp",
              "d_interp", "shadow_obj", "trace_obj")  # fmt: skip
@@ -42,17 +50,16 @@ class Statements:
     counts: Indices
     references: bytes
 
-    def indices(self, references: bytes, declared: np.ndarray) -> Indices:
+    def indices(self, wanted: Indices, declared: np.ndarray) -> Indices:
         """(C,) number, from 0, of what each corner refers to; out of range where it refers to nothing.
 
         Parameters
         ----------
-        references : bytes
-            One number a corner: from 1, or negative to count back from the face's own row.
+        wanted : (C,) int
+            From 1, or negative to count back from the face's own row.
         declared : (R,) bool
             Which rows declare what is referred to.
         """
-        wanted = numbers(references, np.int64, 0, int(self.counts.sum()))
         if len(wanted) != self.counts.sum():  # a corner that begins with a slash
             raise UnusableMeshError("its faces cannot be read")
         if (wanted < 0).any():
@@ -100,11 +107,9 @@ def read_obj(data: bytes, bounds: Bounds) -> Surface:
 def _surface(found: Statements, declared: int, bounds: Bounds) -> Surface:
     """The surface that statements describe; its ``corners`` number the corners of all faces."""
     draft = Draft(declared=declared)
-    references = found.references
-    if b"/" in references:
-        references = substitute(rb"/[^ \n]*", b"", references)
-    bounds.check(int(found.counts.sum()) - 2 * len(found.counts), "triangles")
-    corners = found.indices(references, found.vertex_rows)
+    total = int(found.counts.sum())
+    bounds.check(total - 2 * len(found.counts), "triangles")
+    corners = found.indices(first_of_each(found.references, total), found.vertex_rows)
     made = triangulate(found.points, corners, found.counts)
     draft.accounted = len(found.counts)
     made.tell(draft)
@@ -155,7 +160,8 @@ def read_painted(data: bytes, bounds: Bounds) -> Painted:
     of_corner = np.repeat(of_statement[np.cumsum(used)[found.face_rows]], found.counts)
     places = first_numbers(_strip_comment(found.rows.rest(found.rows.which(b"vt"), b"vt")), 2)
     uv = np.append(places, [[np.nan, np.nan]], axis=0)
-    index = found.indices(_textures(found.references), found.rows.which(b"vt"))[surface.corners]
+    textures = numbers(_textures(found.references), np.int64, 0, int(found.counts.sum()))
+    index = found.indices(textures, found.rows.which(b"vt"))[surface.corners]
     index[(index < 0) | (index >= len(places))] = len(places)
     files = _names(found.rows.rest(libraries, b"mtllib"))
     return Painted(surface, files, list(number), of_corner[surface.corners[:, 0]], uv[index])
@@ -173,8 +179,8 @@ def _textures(references: bytes) -> bytes:
 
 def _tell_others(found: Statements, draft: Draft) -> None:
     """Name the statements that are not read."""
-    other = ~found.vertex_rows & ~found.face_rows & ~found.rows.are_comments()
-    for word in (b"vt", b"vn", b"usemtl", b"g", b"o", b"s"):
+    other = ~found.vertex_rows & ~found.face_rows & ~found.rows.are_silent()
+    for word in (b"vt", b"vn", b"usemtl", b"g", b"s"):
         other &= ~found.rows.which(word)
     if not other.any():
         return

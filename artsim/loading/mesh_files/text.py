@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 import warnings
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -30,6 +31,9 @@ _BLOCK = 1_000_000
 
 _SMALL = 4096
 """Letters of a text that are read word by word where need be."""
+
+_RUNS = 100
+"""Runs of rows that are copied one by one."""
 
 _MAX_UNREADABLE = 20_000
 """Words that are no numbers in a file that is damaged; more make it something else."""
@@ -89,24 +93,41 @@ class Rows:
     @cached_property
     def _first(self) -> NDArray[np.uint8]:
         """The first letter of each row, or its newline."""
-        return self._bytes[np.minimum(self._starts, self._ends)]
+        return self._bytes[self._starts]
+
+    @cached_property
+    def _two(self) -> NDArray[np.uint16]:
+        """The first two letters of each row as one number; newlines for those that are not there."""
+        return self._first * np.uint16(256) + self._bytes[np.minimum(self._starts + 1, self._ends)]
 
     def which(self, word: bytes) -> NDArray[np.bool_]:
         """Which rows begin with a word, alone or before a blank."""
-        rows = np.flatnonzero(self._first == word[0])
-        for i, letter in enumerate(word[1:] + b" ", start=1):
+        head = word[0] << 8
+        if len(word) == 1:
+            return (self._two == head + ord(" ")) | (self._two == head + ord("\n"))
+        here = self._two == head + word[1]
+        rows = np.flatnonzero(here)
+        if len(rows) == 0:
+            return here
+        for i, letter in enumerate(word[2:] + b" ", start=2):
             found = self._bytes[np.minimum(self._starts[rows] + i, self._ends[rows])]
-            rows = rows[(found == letter) | ((found == ord("\n")) & (i == len(word)))]
-        here = np.zeros(len(self._starts), dtype=bool)
-        here[rows] = True
+            fits = (found == letter) | ((found == ord("\n")) & (i == len(word)))
+            here[rows] &= fits
+            rows = rows[fits]
         return here
 
-    def are_comments(self) -> NDArray[np.bool_]:
-        """Which rows begin with #."""
-        return self._first == ord("#")
+    def are_silent(self) -> NDArray[np.bool_]:
+        """Which rows are blank, or begin with #."""
+        return (self._first == ord("#")) | (self._first == ord("\n"))
 
     def rest(self, which: NDArray[np.bool_], word: bytes) -> bytes:
         """What follows a word in the rows that begin with it, each with its newline."""
+        steps = np.flatnonzero(np.concatenate([which[:1], which[1:] != which[:-1], which[-1:]]))
+        if len(steps) <= 2 * _RUNS:  # rows of a kind mostly stand together
+            runs = steps.reshape(-1, 2)
+            places = zip(self._starts[runs[:, 0]].tolist(), (self._ends[runs[:, 1] - 1] + 1).tolist(), strict=True)
+            text = b"".join([self._bytes[start:end].tobytes() for start, end in places])
+            return text[len(word) :].replace(b"\n" + word, b"\n")
         starts, ends = self._starts[which] + len(word), self._ends[which]
         change = np.zeros(len(self._bytes) + 1, dtype=np.int8)
         change[starts] = 1
@@ -117,6 +138,11 @@ class Rows:
         """How many of some rows begin with each word, by its first letters; "..." stands for the rare ones."""
         which = which & (self._starts < self._ends)
         starts, ends = self._starts[which], self._ends[which]
+        if len(starts) <= _MAX_WORDS:
+            rows = [self._bytes[a:b].tobytes() for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+            heads = sorted(head for row in rows if (head := row.partition(b" ")[0][:_WORD]))
+            few = Counter(head.decode("ascii", "replace") for head in heads)
+            return dict(few.most_common())
         letters = np.stack([self._bytes[np.minimum(starts + i, ends)] for i in range(_WORD)], axis=1)
         blank = (letters == ord(" ")) | (letters == ord("\n"))
         letters[np.logical_or.accumulate(blank, axis=1)] = 0
@@ -174,14 +200,9 @@ def _blocks(
     """The numbers of a text, in pieces: halves are tried again until the words that are no numbers stand alone."""
     if not text or text.isspace():  # NumPy would find a number in it
         return []
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # how NumPy says, in some versions, that it stopped in the middle
-            found = np.fromstring(text, dtype=dtype, sep=" ")
-        if len(found) == (_num_words(text) if count is None else count):
-            return [found]
-    except (ValueError, DeprecationWarning):
-        pass
+    found = _read(text, dtype)
+    if found is not None and len(found) == (_num_words(text) if count is None else count):
+        return [found]
     middle = text.find(b" ", len(text) // 2)
     if len(text) < _SMALL or middle < 0:
         values = [_number(word, dtype) for word in text.translate(_BLANKS).split()]
@@ -191,6 +212,35 @@ def _blocks(
         return [np.array([unreadable if value is None else value for value in values], dtype)]
     halves = text[:middle], text[middle:]
     return [block for half in halves for block in _blocks(half, dtype, unreadable, None, patience)]
+
+
+def _read(text: bytes, dtype: type[np.generic]) -> NDArray[Any] | None:
+    """Numbers of a text; None, or too few, where a word is none."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # how NumPy says, in some versions, that it stopped in the middle
+            return np.fromstring(text, dtype=dtype, sep=" ")
+    except (ValueError, DeprecationWarning):
+        return None
+
+
+def first_of_each(text: bytes, count: int) -> NDArray[np.int64]:
+    """The first number of each word such as ``1/2/3``, 0 where it is none; ``count`` is how many words there are.
+
+    Raises
+    ------
+    UnusableMeshError
+        When very many words are no numbers.
+    """
+    slashes, odd = divmod(text.count(b"/"), max(count, 1))
+    if slashes and not odd:  # all words may be alike: then their numbers are read at once
+        frame = text.translate(None, b"-0123456789\n")
+        found = _read(text.replace(b"/", b" "), np.int64) if frame == (b" " + b"/" * slashes) * count else None
+        # Words such as 1//3 have a number less, if all have their slashes side by side.
+        each = slashes if slashes == 2 and text.count(b"//") == count else slashes + 1
+        if found is not None and len(found) == count * each:
+            return found[::each].astype(np.int64)
+    return numbers(substitute(rb"/[^ \n]*", b"", text) if b"/" in text else text, np.int64, 0, count)
 
 
 def _num_words(text: bytes) -> int:

@@ -155,3 +155,21 @@ def test_a_hundred_thousand_faces_take_less_than_half_a_second() -> None:
     assert len(faces) == len(sphere.faces)
     assert said == ""
     assert min(times) < 0.5
+
+
+@pytest.mark.parametrize(
+    "corners",
+    ["1/1/1 2/2/2 3/3/3", "1//1 2//2 3//3", "1/1 2/2 3/3", "1/2/ 2/2/ 3/1/", "1/1/1 2//2 3/3", "-3/1/1 -2/2/2 -1/3/3",
+     "1/1/1  2/2/2 3/3/3 ", "1/1.0/1 2/x/2 3/3/3", "1/ 2/2 3/3"],
+)  # fmt: skip
+def test_the_first_number_of_a_corner_names_its_vertex_however_it_goes_on(corners: str) -> None:
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf {corners}\n"
+    _, faces, said = read(text, ".obj")
+    assert faces.tolist() == [[0, 1, 2]]
+    assert said == ""
+
+
+@pytest.mark.parametrize("corners", ["/1/1 2/2/2 3/3/3", "/1/1 /2/2 /3/3", "1/1/1 2/2/2 //3"])
+def test_a_corner_without_a_vertex_is_none(corners: str) -> None:
+    with pytest.raises(UnusableMeshError):
+        read(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf {corners}\n", ".obj")
