@@ -145,6 +145,8 @@ class Options:
     """Some of: faces parts points pixels shards samples."""
     repeats: int = 5
     """Readings of each size, of which the least counts."""
+    picture: Path | None = None
+    """PNG or SVG file to draw the times into."""
     most: float = 1.1
     """Exponents above are reported as failures."""
 
@@ -160,13 +162,16 @@ def main(options: Options) -> None:
     """Measure all, and print exponents."""
     compile_now()  # as in a process that makes many clouds
     exponents: dict[str, float] = {}
+    times: dict[str, tuple[list[float], list[float]]] = {}
     for name in options.only or GROWTHS:
         growth = GROWTHS[name]
         work = [_SIZE.get(name, float)(size) for size in growth.sizes]
         seconds = least_seconds(growth, options.repeats)
-        exponents[name] = exponent(work, seconds)
+        exponents[name], times[name] = exponent(work, seconds), (work, seconds)
         shown = ", ".join(f"{size:,.0f}: {1e3 * time_:.3g} ms" for size, time_ in zip(work, seconds, strict=True))
         print(f"{name:8} exponent {exponents[name]:5.2f}  {growth.what} ({shown})", flush=True)
+    if options.picture is not None:
+        draw(times, exponents, options.picture)
     over = sorted(name for name, value in exponents.items() if value > options.most)
     print(json.dumps({"exponents": {k: round(v, 3) for k, v in exponents.items()}, "over": over}))
 
@@ -182,6 +187,30 @@ def least_seconds(growth: Growth, repeats: int) -> list[float]:
                 work()
                 least[i] = min(least[i], time.process_time() - start)
     return least
+
+
+def draw(times: dict[str, tuple[list[float], list[float]]], exponents: dict[str, float], file: Path) -> None:
+    """Time over work, each on a panel of its own with the line of proportion."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot as plt
+
+    across = min(3, len(times))
+    figure, axes = plt.subplots(-(-len(times) // across), across, figsize=(3.2 * across, 5), squeeze=False)
+    for axis, (name, (work, seconds)) in zip(axes.flat, times.items(), strict=False):
+        proportion = [seconds[-1] * size / work[-1] for size in work]
+        axis.loglog(work, [1e3 * time_ for time_ in proportion], ":", color="0.6", label="in proportion")
+        axis.loglog(work, [1e3 * time_ for time_ in seconds], "o-", color="#0072b2")
+        axis.set_title(f"{GROWTHS[name].what}\nexponent {exponents[name]:.2f}", fontsize=8)
+        axis.set_xlabel(name, fontsize=8)
+        axis.set_ylabel("ms", fontsize=8)
+        axis.tick_params(labelsize=7, which="both")
+    for axis in axes.flat[len(times) :]:
+        axis.set_axis_off()
+    axes.flat[0].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(file, dpi=110)
 
 
 def exponent(work: Sequence[float], seconds: Sequence[float]) -> float:

@@ -1,15 +1,18 @@
 """Clouds beside other programs: ``python -m benchmarks.peers``.
 
 The same objects, states, cameras and pixels: each program gives depth and part at pixels, and the cloud is drawn of
-them as artsim draws its own. trimesh casts only the rays of the cloud, through Embree, against the posed triangles; the
-others draw whole frames. artsim's clouds carry all ground truth, those of the others points and parts. What is not
-installed is named. Processor time, all by turns; the last line is one JSON object.
+them as artsim draws its own. trimesh and open3d cast only the rays of the cloud, through Embree, against the posed
+triangles; the others draw whole frames. artsim's clouds carry all ground truth, those of the others points and parts.
+open3d and pyrender are no dependencies of artsim: ``pip install open3d pyrender`` adds them. What is not installed is
+named. Blender is left out, since its package needs NumPy 1. Processor time; the last line is one JSON object.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import time
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -44,6 +47,8 @@ class Options:
     """Of each object; slow programs see as many as fit in --seconds."""
     seconds: float = 30.0
     """Processor time of each program, at most."""
+    only: tuple[str, ...] = ()
+    """Programs beside artsim; by default all."""
 
     def __post_init__(self) -> None:
         if min(self.objects, self.views) < 1:
@@ -52,6 +57,10 @@ class Options:
 
 def main(options: Options) -> None:
     """Measure and print."""
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        os.environ[f"{library}_NUM_THREADS"] = "1"
+    for library in ("MUJOCO_GL", "PYOPENGL_PLATFORM"):
+        os.environ.setdefault(library, "egl")
     rng = np.random.default_rng(0)
     scenes: list[Scene] = []
     for obj in benchmark_objects(options.objects):
@@ -63,6 +72,8 @@ def main(options: Options) -> None:
     print(f"{len(scenes)} scenes, artsim's loops {'compiled' if compiled else 'in NumPy'}")
     rates: dict[str, float] = {}
     for name, program in PROGRAMS.items():
+        if options.only and name not in ("artsim", *options.only):
+            continue
         try:
             cloud = program()
             cloud(scenes[0])
@@ -70,7 +81,7 @@ def main(options: Options) -> None:
             print(
                 f"{name:14} {rates[name]:8.1f} clouds/s   artsim / it {rates['artsim'] / rates[name]:6.1f}", flush=True
             )
-        except (ArtsimError, ImportError) as error:
+        except (ArtsimError, ImportError, OSError) as error:
             print(f"{name:14} not measured: {error}")
     best = max((rate for name, rate in rates.items() if name != "artsim"), default=float("nan"))
     ratio = rates["artsim"] / best
@@ -108,12 +119,7 @@ def frames_of(renderer: str) -> Callable[[], Callable[[Scene], Cloud]]:
 
         def cloud(scene: Scene) -> Cloud:
             frame = drawer.render(*scene)
-            return draw_visible(
-                pose(*scene),
-                lambda row, column: (frame.depth[row, column], frame.part_ids[row, column]),
-                NUM_POINTS,
-                np.random.default_rng(0),
-            )
+            return _of_frame(pose(*scene), frame.depth, frame.part_ids)
 
         return cloud
 
@@ -153,9 +159,134 @@ def trimesh_rays() -> Callable[[Scene], Cloud]:
     return cloud
 
 
+def open3d_rays() -> Callable[[Scene], Cloud]:
+    """Rays of Open3D, which hands them to Embree, against the posed parts."""
+    import open3d as o3d
+
+    def cloud(scene: Scene) -> Cloud:
+        obj, _, camera = scene
+        posed, rays = pose(*scene), o3d.t.geometry.RaycastingScene(nthreads=1)
+        part_of = np.full(len(obj) + 1, BACKGROUND, np.uint8)
+        for k in (k for k in range(len(obj)) if len(obj.parts[k].faces)):
+            corners = transform_points(posed.T_camera_part[k], obj.scale * obj.parts[k].vertices)
+            faces = obj.parts[k].faces.astype(np.uint32)
+            part_of[rays.add_triangles(o3d.core.Tensor(corners.astype(np.float32)), o3d.core.Tensor(faces))] = k
+
+        def look(row: Any, column: Any) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+            cast = np.zeros((len(row), 6), np.float32)
+            cast[:, 3:] = camera.directions(row * camera.width + column)
+            found = rays.cast_rays(o3d.core.Tensor(cast), nthreads=1)
+            number = np.minimum(found["geometry_ids"].numpy(), len(obj))
+            return found["t_hit"].numpy(), part_of[number]
+
+        return draw_visible(posed, look, NUM_POINTS, np.random.default_rng(0))
+
+    return cloud
+
+
+def mujoco_frames() -> Callable[[Scene], Cloud]:
+    """Depth and segmentation of MuJoCo's renderer; one model for each object, its parts moved as mocap bodies."""
+    import mujoco
+
+    kept: weakref.WeakKeyDictionary[ArticulatedObject, tuple[Any, ...]] = weakref.WeakKeyDictionary()
+
+    def prepare(obj: ArticulatedObject, camera: Camera) -> tuple[Any, ...]:
+        spec = mujoco.MjSpec()
+        spec.visual.global_.offwidth, spec.visual.global_.offheight = camera.width, camera.height
+        spec.worldbody.add_camera(name="camera", quat=[0.0, 1.0, 0.0, 0.0])  # looks along +Z, y down
+        solid = [k for k in range(len(obj)) if len(obj.parts[k].faces)]
+        for k in solid:
+            mesh = spec.add_mesh(name=f"m{k}", inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+            mesh.uservert = (obj.scale * obj.parts[k].vertices).ravel()
+            mesh.userface = obj.parts[k].faces.ravel()
+            body = spec.worldbody.add_body(name=f"p{k}", mocap=True)
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"m{k}", contype=0, conaffinity=0)
+        model = spec.compile()
+        model.stat.extent, model.vis.map.znear, model.vis.map.zfar = 1.0, 0.05, 100.0
+        data = mujoco.MjData(model)
+        return model, data, mujoco.Renderer(model, camera.height, camera.width), solid
+
+    def cloud(scene: Scene) -> Cloud:
+        obj, _, camera = scene
+        if obj not in kept:
+            kept[obj] = prepare(obj, camera)
+        model, data, drawer, solid = kept[obj]
+        posed = pose(*scene)
+        for slot, k in enumerate(solid):
+            T = posed.T_camera_part[k]
+            data.mocap_pos[slot] = T[:3, 3]
+            mujoco.mju_mat2Quat(data.mocap_quat[slot], T[:3, :3].ravel())
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
+        model.cam_fovy[0] = np.rad2deg(2.0 * np.arctan(0.5 * camera.height / camera.K[1, 1]))
+        drawer.update_scene(data, "camera")
+        drawer.enable_depth_rendering()
+        depth = drawer.render()
+        drawer.disable_depth_rendering()
+        drawer.enable_segmentation_rendering()
+        geom = drawer.render()[..., 0]
+        drawer.disable_segmentation_rendering()
+        part = np.array([*solid, BACKGROUND], np.uint8)[geom]  # -1 where there is nothing
+        return _of_frame(posed, depth, part)
+
+    return cloud
+
+
+def pyrender_frames() -> Callable[[Scene], Cloud]:
+    """Depth and segmentation of pyrender's renderer; meshes stay on the card."""
+    import pyrender
+    from trimesh import Trimesh
+
+    kept: weakref.WeakKeyDictionary[ArticulatedObject, tuple[Any, ...]] = weakref.WeakKeyDictionary()
+    drawers: dict[tuple[int, int], Any] = {}
+
+    def prepare(obj: ArticulatedObject, camera: Camera) -> tuple[Any, ...]:
+        scene = pyrender.Scene()
+        nodes = {
+            k: scene.add(
+                pyrender.Mesh.from_trimesh(
+                    Trimesh(obj.scale * obj.parts[k].vertices, obj.parts[k].faces, process=False), smooth=False
+                )
+            )
+            for k in range(len(obj)) if len(obj.parts[k].faces)
+        }  # fmt: skip
+        K = camera.K
+        look = pyrender.IntrinsicsCamera(K[0, 0], K[1, 1], K[0, 2], K[1, 2], znear=0.05, zfar=100.0)
+        eye = scene.add(look, pose=np.diag([1.0, -1.0, -1.0, 1.0]))
+        return scene, nodes, eye
+
+    def cloud(asked: Scene) -> Cloud:
+        obj, _, camera = asked
+        size = camera.width, camera.height
+        if size not in drawers:
+            drawers[size] = pyrender.OffscreenRenderer(*size)
+        if obj not in kept:
+            kept[obj] = prepare(obj, camera)
+        scene, nodes, eye = kept[obj]
+        posed, K = pose(*asked), camera.K
+        eye.camera.fx, eye.camera.fy, eye.camera.cx, eye.camera.cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+        for k, node in nodes.items():
+            scene.set_pose(node, posed.T_camera_part[k])
+        colours = {node: (k + 1, 0, 0) for k, node in nodes.items()}
+        marked, depth = drawers[size].render(scene, pyrender.RenderFlags.SEG, colours)
+        part = (marked[..., 0].astype(np.int16) - 1).astype(np.uint8)  # 255 where there is nothing
+        return _of_frame(posed, depth, part)
+
+    return cloud
+
+
+def _of_frame(posed: Any, depth: NDArray[np.float32], part: NDArray[np.uint8]) -> Cloud:
+    return draw_visible(
+        posed, lambda row, column: (depth[row, column], part[row, column]), NUM_POINTS, np.random.default_rng(0)
+    )
+
+
 PROGRAMS: dict[str, Callable[[], Callable[[Scene], Cloud]]] = {
     "artsim": artsim_cloud,
     "trimesh": trimesh_rays,
+    "open3d": open3d_rays,
+    "mujoco": mujoco_frames,
+    "pyrender": pyrender_frames,
     "pybullet": frames_of("pybullet"),
     "pybullet-egl": frames_of("pybullet-egl"),
     "sapien": frames_of("sapien"),
