@@ -215,6 +215,21 @@ def _check_method(settings: Mapping[str, Any], method: str, folder: Path) -> Non
         )
 
 
+def stored_method(name: str | Path) -> str:
+    """Name of the method that an estimator's folder holds; see :func:`load_estimator`.
+
+    Raises
+    ------
+    DatasetError
+        When there is no such estimator, or it is of no known method.
+    """
+    folder = folder_of(name)
+    found = read_settings(folder).get("method", "full")
+    if found not in STORED_METHODS:
+        raise DatasetError(f"this is an estimator of an unknown method, {found!r:.40}", folder, _AGAIN)
+    return str(found)
+
+
 _MAX_ROWS, _MAX_WIDTH = MAX_PARTS, 2048
 
 

@@ -61,8 +61,8 @@ class Evaluate:
     skip_bad: bool = False
     """For reartmix: leave out detections that cannot be used, and list them, instead of refusing the file."""
     estimators: tuple[str, ...] = ()
-    """For reartmix: CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category. By default
-    those that come with the package, by their names, and any for drawers, whose number varies."""
+    """For reartmix: CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category, of any
+    method. By default those that come with the package, by their names, and any for drawers, whose number varies."""
     picture: Path | None = None
     """For reartmix: write the first 12 images with the estimates over them here, as PNG."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from artperl.core.estimate import Estimate
 from artperl.detection import SHIPPED
-from artperl.estimator import WEIGHTS, load_estimator
+from artperl.estimator import WEIGHTS, load_estimator, stored_method
 from artperl.inputs.depth_images import points_of_depth
 from artperl.inputs.detections import Detection
 from artperl.methods.protocol import Method
@@ -92,7 +92,8 @@ class SceneEstimator:
     Parameters
     ----------
     estimators : mapping, optional
-        Name or folder of the estimator of each category; by default those that come with the package, by their names.
+        Name or folder of the estimator of each category, of any method that is trained; by default those that come with
+        the package, by their names.
     detector : str or Path
         Name or folder of the detector, loaded when an image comes without detections.
     apart : bool
@@ -187,7 +188,10 @@ class SceneEstimator:
 
     def _estimator(self, category: str) -> Method:
         if category not in self._loaded:
-            self._loaded[category] = load_estimator(self.estimators[category], **self.changes)
+            name = self.estimators[category]
+            method = stored_method(name)
+            # The other methods have no options.
+            self._loaded[category] = load_estimator(name, method=method, **(self.changes if method == "full" else {}))
         return self._loaded[category]
 
 

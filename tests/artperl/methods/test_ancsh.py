@@ -14,13 +14,17 @@ from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
 from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.scoring import Scored, score
+from artperl.inputs.detections import Detection
 from artperl.methods.ancsh import ANCSH, ANCSHSizes, ancsh_networks
 from artperl.perception.ancsh_networks import CoordinateNetwork, Coordinates, JointNetwork, JointPoints
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.scene.estimator import SceneEstimator
 from artperl.training.ancsh_stages import coordinate_loss, joint_loss, joint_targets, miou_loss
 from artperl.training.options import ANCSH_PRESETS
 from artperl.training.run import Training
 from artsim.errors import ConfigError
+from artsim.formats.coco import mask_record
+from artsim.model.frame import BACKGROUND
 from artsim.observing.sample import Sample
 from tests.artperl.worlds import view
 
@@ -133,6 +137,15 @@ def test_a_saved_estimator_loads_to_the_same_estimates(tmp_path: Path) -> None:
     save_estimator(method, tmp_path, {})
     loaded = load_estimator(tmp_path, method="ancsh")
     np.testing.assert_allclose(method(sample.points).T_camera_part, loaded(sample.points).T_camera_part, atol=1e-6)
+    # Images of several objects take it by its folder, whatever its method.
+    obj, camera = artsim.make("laptop", 5).with_diagonal(0.4), artsim.Camera.look_at((-0.9, 0.35, 0.6), (0, 0, 0))
+    frame = artsim.render(obj, obj.tree.rest, camera)
+    told = mask_record(frame.part_ids != BACKGROUND)
+    found = Detection(0, "laptop", 1.0, told["segmentation"], tuple(told["bbox"]), (camera.width, camera.height))
+    scene = SceneEstimator({"laptop": tmp_path}, seen_from=(-75.0, 75.0))
+    (posed,) = scene(None, frame.depth, camera.K, [found]).objects
+    assert posed.estimate is not None
+    assert len(posed.estimate.rotation) == 2
 
 
 def test_objects_with_different_trees_are_refused_before_anything_is_learnt(tmp_path: Path) -> None:
