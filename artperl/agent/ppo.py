@@ -55,6 +55,8 @@ class Phase:
     """Share of the steps that the expert takes."""
     sharpness: float
     """The policy that acts has that many times the logits of the one that is cloned."""
+    cloning: bool = True
+    """Learn from the expert (equation 4)."""
 
 
 CLONING = Phase(reinforcement=False, guided=0.7, sharpness=1.0)
@@ -64,6 +66,9 @@ JOINT = Phase(reinforcement=True, guided=0.5, sharpness=3.0)
 """Both losses. Quick runs that drew all actions of this phase ended worse than they began. Cloning leaves each axis as
 unsure as the expert's next step is, so that one axis of many would take a long step astray at every turn: what acts is
 sharper."""
+
+REWARDS = Phase(reinforcement=True, guided=0.0, sharpness=1.0, cloning=False)
+"""PPO without an expert, to tell what each brings (``benchmarks/agents.py``)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,10 +241,10 @@ def update(
             cloning = bool(share) * cloning_loss(
                 logits, buffer.expert[rows], mask, buffer.view.kind[rows], options, weight
             )
-            loss = cloning
+            loss = phase.cloning * cloning
             if phase.reinforcement:
                 reinforcement = losses["policy"] + options.lambda_value * losses["value"]
-                loss = reinforcement - options.lambda_entropy * losses["entropy"] + cloning
+                loss = reinforcement - options.lambda_entropy * losses["entropy"] + loss
             optimizer.zero_grad()
             loss.backward()
             ranks.add_gradients(policy)

@@ -55,17 +55,24 @@ class Problems:
         References are drawn from the few that are most like the object.
     batch_size, num_points : int
     seed : int
+    far : float
+        How far off starts are, over what they usually are.
     """
 
     def __init__(
-        self, data: DataOptions, base: ShapeBase, batch_size: int = 64, num_points: int = 512, seed: int = 0
+        self, data: DataOptions, base: ShapeBase, batch_size: int = 64, num_points: int = 512, seed: int = 0,
+        far: float = 1.0,
     ):  # fmt: skip
         self.samples = data.source(base.shapes.trees.num_rows, num_points, seed, _VIEWS)
-        self.base, self.batch_size, self.seed = base, batch_size, seed
+        self.base, self.batch_size, self.seed, self.far = base, batch_size, seed, far
+
+    def sample(self, i: int) -> Sample:
+        """What problem ``i`` shows."""
+        return self.samples[i]
 
     def __getitem__(self, n: int) -> Problem:
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + n)
-        samples = [self.samples[i] for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
+        samples = [self.sample(i) for i in range(n * self.batch_size, (n + 1) * self.batch_size)]
         rows = self.base.shapes.trees.num_rows
         truth = [part_truth(sample, rows) for sample in samples]
         valid, rotation, center, size, box_center, box_size = (torch.stack(t) for t in zip(*truth, strict=True))
@@ -81,7 +88,7 @@ class Problems:
         part = torch.from_numpy(np.stack([s.part for s in samples]).astype(np.int64))
         observed = Observed.of(points, part)
         radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
-        return Problem(shapes, observed, draw_starts(shapes, goal, radius, generator), goal)
+        return Problem(shapes, observed, draw_starts(shapes, goal, radius, generator, self.far), goal)
 
 
 def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
@@ -104,7 +111,9 @@ def part_truth(sample: Sample, rows: int) -> tuple[Tensor, ...]:
     return torch.arange(rows) < K, rotation, pad(center), pad(sample.box_size), *boxes
 
 
-def draw_starts(shapes: Shapes, goal: Theta, radius: Tensor, generator: torch.Generator) -> Theta:
+def draw_starts(
+    shapes: Shapes, goal: Theta, radius: Tensor, generator: torch.Generator, far: float = 1.0
+) -> Theta:  # fmt: skip
     """Starts around goals, with the reference's own shape, and joint states anywhere in their limits."""
     B, P = shapes.trees.valid.shape
     plain = Theta(
@@ -113,8 +122,8 @@ def draw_starts(shapes: Shapes, goal: Theta, radius: Tensor, generator: torch.Ge
     )  # fmt: skip
     step = 2.0 * torch.rand(B, P, NUM_AXES, generator=generator) - 1.0
     axis = torch.nn.functional.normalize(torch.randn(B, 3, generator=generator), dim=-1)
-    step[:, 0, TURN] = axis * (_TURN * step[:, 0, :1])
-    step[:, 0, MOVE] *= _MOVE
+    step[:, 0, TURN] = axis * (far * _TURN * step[:, 0, :1])
+    step[:, 0, MOVE] *= far * _MOVE
     step[:, 0, SCALE] *= _SCALE
     step[:, 1:, MOVE] = 0.0
     step[:, 1:, STATE] = 0.0
