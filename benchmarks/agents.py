@@ -3,10 +3,10 @@
 An agent learns by cloning alone, by PPO alone, and by Algorithm 1 (cloning, then both), each from the same number of
 rollouts on the same problems, several times from other random weights. A problem is a fresh object with its true
 labels, one of the four references most like it, and a start that is off. Each agent is then tested alone, without
-refinement, on unseen objects: on clean clouds, with the noise of a Kinect v1, with 40 % of the points hidden, and from starts that are
-twice as far off. ``robot_arm`` has the longest chains. Every run is written down when it is done: the same command goes
-on. Prints mean and standard deviation over the runs of the parts' mean rotation error, in degrees; the last line is one
-JSON object.
+refinement, on unseen objects: on clean clouds, with the noise of a Kinect v1, with 40 % of the points hidden, and
+from starts that are twice as far off. ``robot_arm`` has the longest chains. Every run is written down when it is
+done: the same command goes on. Prints mean and standard deviation over the runs of the parts' mean rotation error, in
+degrees; the last line is one JSON object.
 """
 
 from __future__ import annotations
