@@ -51,8 +51,10 @@ class Options:
     seeds: int = 3
     """Runs of each way in each category."""
     rollouts: int = 60
-    episodes: int = 24
+    episodes: int = 16
     """Of a rollout."""
+    width: int = 32
+    """Of the policy: half of what trainings have, so that a run takes a minute."""
     rate: float = 3e-3
     cloning_share: float = 0.7
     """Of the rollouts of Algorithm 1, those by cloning alone."""
@@ -108,7 +110,7 @@ def main(options: Options) -> None:
 def learnt(data: DataOptions, base: ShapeBase, way: str, seed: int, options: Options) -> Policy:
     """An agent after all its rollouts."""
     torch.manual_seed(seed)
-    policy = Policy().train()
+    policy = Policy(options.width).train()
     optimizer = torch.optim.Adam(policy.parameters(), options.rate)
     problems = Problems(data, base, options.episodes, seed=1 + seed)
 
