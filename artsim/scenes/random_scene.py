@@ -24,6 +24,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.renderers.scene import Scene, Thing
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
+from artsim.scenes.settling import settle
 
 if TYPE_CHECKING:
     from artsim.loading.sources import Source
@@ -96,6 +97,9 @@ class SceneOptions:
     corner of its box. By default sizes are usual ones."""
     crowded: bool = False
     """Things stand close together, and before one another: more of each is hidden."""
+    settle: bool = False
+    """Things fall onto the support and onto each other, in any attitude, and come to rest by physics (MuJoCo): they
+    lean on each other and lie in each other. Joints are held. By default each stands or lies on its own."""
     bolted: bool = False
     """Objects are bolted down by their base, as robot arms are: they stand upright in any state. A state in which a
     part would reach below the base is drawn again."""
@@ -110,6 +114,8 @@ class SceneOptions:
             raise ConfigError(f"{self.count} is no range of counts", "count", "write LOW HIGH, such as 3 6")
         if self.diagonal is not None and not 0 < self.diagonal[0] <= self.diagonal[1] < np.inf:
             raise ConfigError(f"{self.diagonal} is no range of metres", "diagonal", "write LOW HIGH, such as 0.18 0.38")
+        if self.bolted and self.settle:
+            raise ConfigError("what is bolted down does not fall", "bolted, settle", "leave one of them out")
         if self.place not in ("auto", "table", "floor"):
             raise ConfigError(f"there is no place {self.place!r}", "place", "use auto, table or floor")
         if not (self.categories or self.objects or self.obj):
@@ -153,7 +159,8 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
     solids = [*zip(objects, states, coats, strict=True), *((obj, np.zeros(1), coat) for obj, coat in others)]
     for attempt in range(_ATTEMPTS):
         area = _area(solids, on_table, attempt, options.crowded)
-        things = _arrange(solids, area, rng, options.crowded, len(objects) if options.bolted else 0)
+        bolted = len(objects) if options.bolted else 0
+        things = settle(solids, area, rng) if options.settle else _arrange(solids, area, rng, options.crowded, bolted)
         if things is not None:
             break
     else:
