@@ -2,9 +2,10 @@
 
 The same objects, states, cameras and pixels: each program gives depth and part at pixels, and the cloud is drawn of
 them as artsim draws its own. trimesh and open3d cast only the rays of the cloud, through Embree, against the posed
-triangles; the others draw whole frames. artsim's clouds carry all ground truth, those of the others points and parts.
-open3d and pyrender are no dependencies of artsim: ``pip install open3d pyrender`` adds them. What is not installed is
-named. Blender is left out, since its package needs NumPy 1. Processor time; the last line is one JSON object.
+triangles; the others draw whole frames. The pixels of a cloud are drawn by artsim's own loops for all. artsim's
+clouds carry all ground truth, those of the others points and parts. open3d and pyrender are no dependencies of
+artsim: ``pip install open3d pyrender`` adds them. What is not installed is named. Blender is left out, since its
+package needs NumPy 1. Processor time; the last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -159,8 +160,13 @@ def trimesh_rays() -> Callable[[Scene], Cloud]:
     return cloud
 
 
-def open3d_rays() -> Callable[[Scene], Cloud]:
-    """Rays of Open3D, which hands them to Embree, against the posed parts."""
+def open3d_frames() -> Callable[[Scene], Cloud]:
+    """Rays of Open3D through all pixels."""
+    return open3d_rays(whole=True)
+
+
+def open3d_rays(whole: bool = False) -> Callable[[Scene], Cloud]:
+    """Rays of Open3D, which hands them to Embree, against the posed parts: those of the cloud, or of all pixels."""
     import open3d as o3d
 
     def cloud(scene: Scene) -> Cloud:
@@ -179,6 +185,10 @@ def open3d_rays() -> Callable[[Scene], Cloud]:
             number = np.minimum(found["geometry_ids"].numpy(), len(obj))
             return found["t_hit"].numpy(), part_of[number]
 
+        if whole:
+            row, column = np.divmod(np.arange(camera.width * camera.height), camera.width)
+            depth, part = (values.reshape(camera.height, camera.width) for values in look(row, column))
+            return _of_frame(posed, depth, part)
         return draw_visible(posed, look, NUM_POINTS, np.random.default_rng(0))
 
     return cloud
@@ -285,6 +295,7 @@ PROGRAMS: dict[str, Callable[[], Callable[[Scene], Cloud]]] = {
     "artsim": artsim_cloud,
     "trimesh": trimesh_rays,
     "open3d": open3d_rays,
+    "open3d-frames": open3d_frames,
     "mujoco": mujoco_frames,
     "pyrender": pyrender_frames,
     "pybullet": frames_of("pybullet"),

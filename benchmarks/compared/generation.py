@@ -96,12 +96,10 @@ def wall_of_drawers(parts: int) -> Any:
     return rack.build("wall_of_drawers", str(parts))
 
 
-def end_to_end(folder: Path, workers: int) -> Callable[[], Work]:
+def end_to_end(folder: Path, workers: int, samples: int = 3000) -> Callable[[], Work]:
     """A dataset made from the objects of some families, which are made first, and from the demo objects."""
     from artsim import generate
     from artsim.loading.sources import family_sources
-
-    samples = 3000
 
     def work() -> Work:
         out = folder / "dataset"

@@ -12,12 +12,11 @@ from . import Work
 from .generation import digest_of, real_objects
 
 
-def verified(folder: Path, workers: int) -> Callable[[], Work]:
+def verified(folder: Path, workers: int, samples: int = 2000) -> Callable[[], Work]:
     """A sound dataset verified, by several processes where that is possible."""
     from artsim import generate, verify
     from artsim.loading.sources import family_sources
 
-    samples = 2000
     options = {"workers": workers} if workers > 1 and "workers" in signature(verify).parameters else {}
     sources = family_sources(["laptop", "drawer", "scissors", "eyeglasses"], 2)
     generate(sources, folder / "dataset", num_samples=samples, shard_size=100, workers=1, progress=False)
