@@ -187,8 +187,9 @@ def open3d_rays(whole: bool = False) -> Callable[[Scene], Cloud]:
 
         if whole:
             row, column = np.divmod(np.arange(camera.width * camera.height), camera.width)
-            depth, part = (values.reshape(camera.height, camera.width) for values in look(row, column))
-            return _of_frame(posed, depth, part)
+            depth, part = look(row, column)
+            size = camera.height, camera.width
+            return _of_frame(posed, depth.reshape(size), part.reshape(size))
         return draw_visible(posed, look, NUM_POINTS, np.random.default_rng(0))
 
     return cloud
