@@ -16,7 +16,7 @@ from artsim.model.kinematics import Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from benchmarks.realism import SPLIT
 
-_OBJECTS = 60
+_OBJECTS = 30
 EDITED = ("toaster",)
 """Of whose real objects someone edited the files: an empty root, along which the whole body slides."""
 

@@ -23,9 +23,8 @@ CATEGORIES = sorted(FAMILIES)
 
 @pytest.fixture(scope="session")
 def outcomes() -> list[Outcome]:
-    """The audit of 240 objects, equally many of each category; ``make audit`` takes 10,000."""
-    per_category = -(-240 // len(CATEGORIES))
-    sources = [FamilySource(category, seed) for category in CATEGORIES for seed in range(per_category)]
+    """The audit of two objects of each category; ``make audit`` takes 10,000."""
+    sources = [FamilySource(category, seed) for category in CATEGORIES for seed in range(2)]
     with ProcessPoolExecutor(2, get_context("spawn")) as team:
         return list(team.map(audit, sources, chunksize=16))
 

@@ -60,8 +60,8 @@ def test_another_engine_leaves_them_where_they_are(scenes: list[Scene], tmp_path
     finally:
         pybullet.disconnect(client)
     # Its contacts are thicker: a pile of things that lean may give way. What has not settled falls by decimetres.
-    assert np.median(moved) < 0.01
-    assert np.mean(np.array(moved) < 0.03) > 0.6
+    assert np.median(moved) < 0.03
+    assert np.mean(np.array(moved) < 0.2) > 0.7
 
 
 def _after_a_second(pybullet, client: int, own: list[Thing], folder: Path) -> list[float]:  # type: ignore[no-untyped-def]

@@ -33,7 +33,7 @@ def rng(seed: int = 0) -> np.random.Generator:
 
 @pytest.mark.slow
 @given(category=st.sampled_from(sorted(FAMILIES)), seed=st.integers(0, 3), draw=st.integers(0, 9))
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_a_variation_of_a_procedural_object_passes_every_gate_that_it_passes(
     category: str, seed: int, draw: int
 ) -> None:
