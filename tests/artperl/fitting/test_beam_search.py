@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pybullet_data
 import pytest
 import torch
 from torch import Tensor
@@ -23,6 +22,7 @@ from artperl.fitting.refine_options import RefineOptions
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.model.kinematics import Joint, KinematicTree, Mimic
 from artsim.renderers import shared_renderer
+from tests.conftest import installed
 
 _RIGID = RefineOptions(sigma_scale=1e-3, sigma_aspect=1e-3, sigma_stretch=1e-3, sigma_shift=1e-3)
 
@@ -127,7 +127,7 @@ def test_a_part_as_an_object_of_its_own_is_where_it_is_in_the_whole() -> None:
 
 
 def test_half_turns_leave_what_hangs_from_a_shoulder_where_it_is() -> None:
-    arm = artsim.load(Path(pybullet_data.getDataPath(), "franka_panda", "panda.urdf"))
+    arm = artsim.load(Path(installed("pybullet_data").getDataPath(), "franka_panda", "panda.urdf"))
     shapes = Shapes.from_objects([arm], 64)
     rest = Theta.at_rest(shapes.trees)
     state = rest.state.clone()

@@ -27,7 +27,7 @@ from artsim.physics.bullet_body import BulletBody
 from artsim.physics.options import PhysicsOptions
 from artsim.physics.world import ENGINES, Simulation
 from artsim.renderers.bullet import import_pybullet
-from tests.conftest import DEMO
+from tests.conftest import DEMO, installed
 
 FREE = PhysicsOptions(damping=0.0, friction=0.0)
 
@@ -176,7 +176,7 @@ def test_damped_joints_move_as_in_mujoco(category: str) -> None:
 
 @pytest.mark.parametrize("category", ["drawer", "door", "laptop", "globe", "window", "coffee_machine"])
 def test_damped_joints_move_as_in_sapien(category: str, tmp_path: Path) -> None:
-    import sapien
+    sapien = installed("sapien")
 
     obj, q, push = released(category)
     export(obj, tmp_path, ("urdf",))
