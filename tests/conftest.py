@@ -35,7 +35,7 @@ def absent(message: str) -> NoReturn:
     """Something that a test needs is missing: a skip that says so on a developer's machine, a failure in CI."""
     if os.environ.get("CI"):
         pytest.fail(message)
-    pytest.skip(message)
+    pytest.skip(message, allow_module_level=True)
 
 
 def installed(module: str) -> ModuleType:

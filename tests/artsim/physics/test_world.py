@@ -260,6 +260,7 @@ def test_engines_agree_on_every_family() -> None:
 
 
 def test_a_ball_comes_to_rest_on_a_closed_laptop() -> None:
+    installed("pybullet")
     bullet = import_pybullet()
     obj = make("laptop", 0)
     simulation = Simulation(obj, PhysicsOptions(engine="pybullet"))
