@@ -24,7 +24,7 @@ import tyro
 from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting
 from artperl.agent.policy import Policy
-from artperl.agent.ppo import CLONING, JOINT, REWARDS, Phase, PPOOptions, algorithm_1
+from artperl.agent.ppo import CLONING, JOINT, Phase, PPOOptions, algorithm_1
 from artperl.core.pose import Theta, pose_parts
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problems
@@ -41,6 +41,8 @@ from artsim.observing.sample import Sample
 
 _MAX_RECORD = 10_000_000
 _WAYS = ("cloning", "PPO", "cloning, then both")
+_REWARDS = Phase(reinforcement=True, guided=0.0, sharpness=1.0, cloning=False)
+"""PPO without an expert."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def learnt(data: DataOptions, base: ShapeBase, way: str, seed: int, options: Opt
     def phase(n: int) -> Phase:
         if way == "cloning, then both":
             return CLONING if n < options.cloning_share * options.rollouts else JOINT
-        return CLONING if way == "cloning" else REWARDS
+        return CLONING if way == "cloning" else _REWARDS
 
     rounds = algorithm_1(
         policy, optimizer, episodes, phase, PPOOptions(epochs=2), seed, 0, options.rollouts

@@ -67,9 +67,6 @@ JOINT = Phase(reinforcement=True, guided=0.5, sharpness=3.0)
 unsure as the expert's next step is, so that one axis of many would take a long step astray at every turn: what acts is
 sharper."""
 
-REWARDS = Phase(reinforcement=True, guided=0.0, sharpness=1.0, cloning=False)
-"""PPO without an expert, to tell what each brings (``benchmarks/agents.py``)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Buffer(Batch):

@@ -13,6 +13,7 @@ import numpy as np
 from artperl.evaluation.realistic_detections import LEAST_VISIBLE, Flaws, imperfect
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS
 from artperl.scene.denoise import denoise
+from artsim.errors import ConfigError
 from artsim.families import make
 from artsim.model.draws import StateOptions
 from artsim.model.objects import ArticulatedObject
@@ -27,6 +28,8 @@ _SEED = TEST_SEEDS + 25
 """The first arm of the test seeds that has seven parts in a chain."""
 _DISTRACTORS = 5
 """Things around the arm; some stand before it."""
+_SCENES = 10
+"""Images that are made for each one wanted, at most: of an arm that can be seen, nearly all show enough of it."""
 _FEWEST = 64
 """Points of a cloud: with fewer of them nobody would ask for an estimate."""
 
@@ -37,7 +40,11 @@ def seven_part_arm() -> ArticulatedObject:
 
 
 def arm_scenes(arm: ArticulatedObject) -> SceneRun:
-    """Scenes of an arm: its states are anywhere above its base, its views those that trainings have."""
+    """Scenes of an arm: its states are anywhere above its base.
+
+    It is seen from up to 109 degrees beside its front: the camera from up to 75, as in training, and the arm stands
+    turned by up to 34.
+    """
     scene = SceneOptions(
         (), obj=(arm,), distractors=_DISTRACTORS, crowded=True, bolted=True, states=StateOptions()
     )  # fmt: skip
@@ -61,14 +68,24 @@ def arm_samples(
         Of a cloud, at most.
     seed : int
         Of the first scene.
+
+    Raises
+    ------
+    ConfigError
+        When next to no image shows the arm.
     """
     run, samples = arm_scenes(arm), list[Sample]()
-    while len(samples) < views:
-        (view,) = run.observe(seed)
-        sample = image_sample(view, num_points, np.random.default_rng([seed, 1]))
+    for own in range(seed, seed + _SCENES * views):
+        (view,) = run.observe(own)
+        sample = image_sample(view, num_points, np.random.default_rng([own, 1]))
         samples += [] if sample is None else [sample]
-        seed += 1
-    return samples
+        if len(samples) == views:
+            return samples
+    raise ConfigError(
+        f"{len(samples)} of {_SCENES * views} images show enough of {arm.object_id}",
+        "arm",
+        "use an arm that is thicker",
+    )
 
 
 def image_sample(view: SceneView, num_points: int, rng: np.random.Generator) -> Sample | None:

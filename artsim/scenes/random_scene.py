@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 import tyro
 
-from artsim.appearance import Coat, Colour, Lights, Sun
+from artsim.appearance import Colour, Lights, Sun
 from artsim.appearance.finishes import draw_coats, repaint_coats
 from artsim.common.elementary import cos, sin, tan
 from artsim.common.products import norm
@@ -24,7 +24,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.renderers.scene import Scene, Thing
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table
-from artsim.scenes.settling import settle
+from artsim.scenes.settling import Placeable, settle
 
 if TYPE_CHECKING:
     from artsim.loading.sources import Source
@@ -165,6 +165,11 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
             break
     else:
         where = "table" if on_table else "floor"
+        if options.settle:
+            raise ConfigError(
+                f"of {len(solids)} things some fall off the {where}, or do not come to rest", "settle",
+                "use fewer or smaller ones, another seed, or the floor",
+            )  # fmt: skip
         raise ConfigError(
             f"{len(solids)} things do not fit on a {where} of {area.high[0] - area.low[0]:.2f} x "
             f"{area.high[1] - area.low[1]:.2f} m", "scene", "use fewer or smaller ones, fewer distractors, or the floor"
@@ -238,10 +243,7 @@ def _in_usual_size(obj: ArticulatedObject, seed: int) -> ArticulatedObject:
     return obj.with_diagonal(make(family, seed).diagonal) if family in FAMILIES else obj
 
 
-_Placeable = tuple[ArticulatedObject, Array, tuple[Coat, ...]]
-
-
-def _area(solids: list[_Placeable], on_table: bool, attempt: int, crowded: bool = False) -> Area:
+def _area(solids: list[Placeable], on_table: bool, attempt: int, crowded: bool = False) -> Area:
     """Room for some things, more of it with each attempt; a table has its limits."""
     sizes = np.array([np.sort(obj.bounds[1] - obj.bounds[0])[1:] for obj, _, _ in solids])
     crowd = _CROWD if on_table else 2.0 * _CROWD  # so that what is small need not stand behind furniture
@@ -277,7 +279,7 @@ def _state_above_base(obj: ArticulatedObject, options: StateOptions, rng: np.ran
 
 
 def _arrange(
-    solids: list[_Placeable], area: Area, rng: np.random.Generator, crowded: bool = False, bolted: int = 0
+    solids: list[Placeable], area: Area, rng: np.random.Generator, crowded: bool = False, bolted: int = 0
 ) -> list[Thing] | None:
     """All things put down, the largest first, and the first so many upright; None where they do not fit."""
     arrangement = Arrangement(area, crowded=crowded)

@@ -64,7 +64,7 @@ def settle(solids: Sequence[Placeable], area: Area, rng: np.random.Generator) ->
         _add(mujoco, spec, f"thing{number}", obj, q)
     model = spec.compile()
     data = mujoco.MjData(model)
-    top = _let_fall(data, solids, area, rng)
+    top = _let_fall(mujoco, data, solids, area, rng)
     if not _run(mujoco, model, data, (top - area.height) / _FASTEST + _LONGEST):
         return None
     things = []
@@ -107,7 +107,7 @@ def _volume(vertices: Array, faces: Any) -> float:
     return abs(float((a * np.cross(b, c)).sum())) / 6.0
 
 
-def _let_fall(data: Any, solids: Sequence[Placeable], area: Area, rng: np.random.Generator) -> float:
+def _let_fall(mujoco: Any, data: Any, solids: Sequence[Placeable], area: Area, rng: np.random.Generator) -> float:
     """Put all things above each other, the largest lowest; the height of the last."""
     middle, half = 0.5 * (np.add(area.low, area.high)), 0.5 * _CLUSTER * np.subtract(area.high, area.low)
     floor = area.height
@@ -124,17 +124,9 @@ def _let_fall(data: Any, solids: Sequence[Placeable], area: Area, rng: np.random
         place = data.qpos[7 * number : 7 * number + 7]
         place[:2] = middle + rng.uniform(-1.0, 1.0, 2) * half - 0.5 * (low + high)[:2]
         place[2] = floor + 0.01 - low[2]
-        place[3:] = _quaternion(rotation)
+        mujoco.mju_mat2Quat(place[3:], np.ascontiguousarray(rotation).ravel())
         floor = place[2] + high[2]
     return float(floor)
-
-
-def _quaternion(rotation: Array) -> Array:
-    import mujoco
-
-    found = np.empty(4)
-    mujoco.mju_mat2Quat(found, np.ascontiguousarray(rotation).ravel())
-    return found
 
 
 def _run(mujoco: Any, model: Any, data: Any, seconds: float) -> bool:
