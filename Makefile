@@ -5,6 +5,9 @@ PY := $(VENV)/bin/python
 # Two processes of one thread each: four threads on two cores wait for each other.
 PYTEST := OMP_NUM_THREADS=1 $(PY) -m pytest -n 2
 
+# Tests start hundreds of programs: each would compile all modules anew where this is set.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help demo check test lint bench audit weights gpu assets system clean
 
 help:  ## list the targets

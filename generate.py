@@ -3,12 +3,11 @@
 import sys
 from pathlib import Path
 
-try:
-    from artsim.cli import generate_main
-except ModuleNotFoundError as missing:  # a clone in which nothing has been installed yet
-    fix = f"pip install -e '{Path(__file__).resolve().parent}'"
-    print(f"error: {missing.name} is not installed. Fix: {fix}", file=sys.stderr)
-    sys.exit(2)
-
-if __name__ == "__main__":
+if __name__ == "__main__":  # worker processes import this file, too, and want none of it
+    try:
+        from artsim.cli import generate_main
+    except ModuleNotFoundError as missing:  # a clone in which nothing has been installed yet
+        fix = f"pip install -e '{Path(__file__).resolve().parent}'"
+        print(f"error: {missing.name} is not installed. Fix: {fix}", file=sys.stderr)
+        sys.exit(2)
     generate_main()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import multiprocessing
 import operator
@@ -44,6 +45,12 @@ def installed(module: str) -> ModuleType:
         return importlib.import_module(module)
     except ImportError as error:
         absent(f"{module} cannot be imported ({error}): what needs it is not tested")
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of collected tests stay: no collection of garbage need look at them, and ManiSkill collects often."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

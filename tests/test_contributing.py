@@ -33,7 +33,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the packages, with every block of code of every walk in its place."""
     folder = tmp_path_factory.mktemp("clone")
     for name in ("artsim", "artperl", "benchmarks", "tests"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("weights", "golden", "__pycache__"))
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("weights", "golden"))
     (folder / "artperl" / "weights").symlink_to(ROOT / "artperl" / "weights")
     (folder / "urdf_assets").symlink_to(ASSETS)
     for name in ("generate.py", "pyproject.toml"):

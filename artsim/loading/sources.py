@@ -12,10 +12,9 @@ from pathlib import Path
 from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make_constrained, source_name
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
-from artsim.loading.meshes import LoadLimits
-from artsim.loading.object_files import OTHER_FILES, find_urdf, max_bytes, read_urdf
-from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
+
+# The modules that read files take longer to import than a procedural object to make: who makes some does without.
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,8 @@ class FileSource:
 
     def load(self) -> ArticulatedObject:
         """The object."""
+        from artsim.loading.urdf import load
+
         return load(self.path, package_roots=self.package_roots)
 
 
@@ -139,6 +140,9 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
     AssetError
         When a path does not exist or holds no object.
     """
+    from artsim.loading.meshes import LoadLimits
+    from artsim.loading.object_files import find_urdf, max_bytes, read_urdf
+
     sources = []
     for given in (Path(path).absolute() for path in paths):
         if given.is_dir():
@@ -157,6 +161,8 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
 
 
 def _below(folder: Path) -> list[Path]:
+    from artsim.loading.object_files import OTHER_FILES
+
     found = []
     visited = set()
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
+import itertools
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +28,34 @@ def bounding_corners(points: Array) -> Array:
     (C, 3) float
         Their convex hull contains the points.
     """
-    from scipy.spatial import HalfspaceIntersection, QhullError
-
     reach = matmul(points, _NORMALS.T)
     low, high = reach.min(axis=0), reach.max(axis=0)
     slack = 1e-5 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
-    faces = np.concatenate([np.column_stack([_NORMALS, -high - slack]), np.column_stack([-_NORMALS, low - slack])])
-    with contextlib.suppress(QhullError):
-        corners = HalfspaceIntersection(faces, points.mean(axis=0)).intersections
-        around = matmul(corners, _NORMALS.T)
-        if np.isfinite(around).all() and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
-            return corners
+    away = np.concatenate([high, -low]) + slack
+    inverses, planes = _meetings()
+    corners = np.einsum("mij,mj->mi", inverses, away[planes])
+    near = 1e-3 * slack  # corners where more than three faces meet are found more than once, a little apart
+    off_middle = abs(_NORMALS @ corners.T - 0.5 * (low + high)[:, None])
+    corners = corners[(off_middle <= (0.5 * (high - low) + slack + near)[:, None]).all(axis=0)]
+    corners = corners[np.unique(np.round(corners / near).astype(np.int64), axis=0, return_index=True)[1]]
+    around = matmul(corners, _NORMALS.T)
+    if len(corners) and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
+        return corners
     box = np.stack([points.min(axis=0), points.max(axis=0)])
     return np.array([(box[a, 0], box[b, 1], box[c, 2]) for a in (0, 1) for b in (0, 1) for c in (0, 1)])
 
 
 _NORMALS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)])
 _NORMALS = unit(_NORMALS)
+
+
+@cache
+def _meetings() -> tuple[Array, NDArray[np.int64]]:
+    """Of all three faces that meet in a point: the inverse of their normals, and which they are."""
+    normals = np.concatenate([_NORMALS, -_NORMALS])
+    planes = np.array(list(itertools.combinations(range(len(normals)), 3)))
+    planes = planes[abs(np.linalg.det(normals[planes])) > 1e-3]
+    return np.linalg.inv(normals[planes]), planes
 
 
 _TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right

@@ -1,0 +1,12 @@
+"""The program ``artperl``; ``python -m artperl`` is the same."""
+
+
+def main() -> None:
+    """Run it. Worker processes import this module, too, and want none of the program."""
+    from artperl.cli import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()
