@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.common.elementary import cos, tan
-from artsim.common.products import matmul, unit
+from artsim.common.products import dot, matmul, unit
 from artsim.model.camera import Camera
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -32,10 +32,10 @@ def bounding_corners(points: Array) -> Array:
     low, high = reach.min(axis=0), reach.max(axis=0)
     slack = 1e-5 * float((high - low).max()) + 1e-12  # gives flat parts a thickness
     away = np.concatenate([high, -low]) + slack
-    inverses, planes = _meetings()
-    corners = np.einsum("mij,mj->mi", inverses, away[planes])
+    planes, weights = _meetings()
+    corners = sum(weights[k] * away[planes[k]] for k in range(3)).T
     near = 1e-3 * slack  # corners where more than three faces meet are found more than once, a little apart
-    off_middle = abs(_NORMALS @ corners.T - 0.5 * (low + high)[:, None])
+    off_middle = abs(matmul(_NORMALS, corners.T) - 0.5 * (low + high)[:, None])
     corners = corners[(off_middle <= (0.5 * (high - low) + slack + near)[:, None]).all(axis=0)]
     corners = corners[np.unique(np.round(corners / near).astype(np.int64), axis=0, return_index=True)[1]]
     around = matmul(corners, _NORMALS.T)
@@ -50,12 +50,16 @@ _NORMALS = unit(_NORMALS)
 
 
 @cache
-def _meetings() -> tuple[Array, NDArray[np.int64]]:
-    """Of all three faces that meet in a point: the inverse of their normals, and which they are."""
+def _meetings() -> tuple[NDArray[np.int64], Array]:
+    """All three faces that meet in a point: (3, M) which, and (3, 3, M) the point by how far away each of them is."""
     normals = np.concatenate([_NORMALS, -_NORMALS])
     planes = np.array(list(itertools.combinations(range(len(normals)), 3)))
-    planes = planes[abs(np.linalg.det(normals[planes])) > 1e-3]
-    return np.linalg.inv(normals[planes]), planes
+    a, b, c = (normals[planes[:, k]] for k in range(3))
+    volume = dot(a, np.cross(b, c))
+    meet = abs(volume) > 1e-3
+    # Cramer's rule, in vectors
+    weights = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])[:, meet] / volume[meet, None]
+    return planes[meet].T, np.ascontiguousarray(np.swapaxes(weights, 1, 2))
 
 
 _TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right
