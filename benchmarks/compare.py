@@ -68,9 +68,8 @@ class Checkout:
             "from compared.serve import main; main()"
         )
         environment = {**os.environ, "PYTHONPATH": str(tree), **_ONE_THREAD}
-        environment.pop(
-            "PYTHONDONTWRITEBYTECODE", None
-        )  # programs start as those of users do: modules are compiled once
+        # Programs start as those of users do, who compile modules once.
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
         self._process = subprocess.Popen(
             [sys.executable, "-c", start],
             stdin=subprocess.PIPE,

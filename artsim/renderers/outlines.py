@@ -37,7 +37,7 @@ def bounding_corners(points: Array) -> Array:
     near = 1e-3 * slack  # corners where more than three faces meet are found more than once, a little apart
     off_middle = abs(matmul(_NORMALS, corners.T) - 0.5 * (low + high)[:, None])
     corners = corners[(off_middle <= (0.5 * (high - low) + slack + near)[:, None]).all(axis=0)]
-    corners = corners[np.unique(np.round(corners / near).astype(np.int64), axis=0, return_index=True)[1]]
+    corners = corners[np.unique(np.round(corners / near), axis=0, return_index=True)[1]]
     around = matmul(corners, _NORMALS.T)
     if len(corners) and (around.min(axis=0) <= low).all() and (around.max(axis=0) >= high).all():
         return corners
