@@ -18,6 +18,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -67,6 +68,8 @@ class AssetPaths:
     repairs: list[Repair] = field(default_factory=list)
     _said: set[str] = field(default_factory=set)
     _folders: dict[Path, Path] = field(default_factory=dict)
+    _first: dict[str, Path] = field(default_factory=dict)
+    """Where names that start alike are looked for first, of those that were found there."""
 
     def resolve(self, filename: str) -> Path:
         """Path of an existing file, confined to the allowed folders.
@@ -78,6 +81,10 @@ class AssetPaths:
         AssetError
             When it would lie outside the allowed folders, or is on the web.
         """
+        start, _, name = filename.rpartition("/")
+        plain = "\\" not in filename and filename == filename.strip()
+        if plain and start in self._first and _is_own_file(self._first[start] / name):
+            return self._first[start] / name
         package, rest = self._split(filename)
         names = dict.fromkeys((rest, unquote(rest)))
         candidates = (candidate for name in names for candidate in self._candidates(package, name))
@@ -91,6 +98,8 @@ class AssetPaths:
                 if path is not None and _is_file(path) and is_inside(path):
                     self._say(candidate.assumed)
                     self._say(f"{filename!r} is {path.name!r} on disk: read" if respelt else "")
+                    if plain and len(tried) == 1 and not respelt and path.name == name:
+                        self._first[start] = path.parent
                     return path
         inside = [candidate for candidate in tried if is_inside(candidate.path)]
         found_outside = next((c.path for c in tried if c not in inside and _is_file(c.path)), None)
@@ -292,6 +301,14 @@ def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name too long for the file system, or with a zero byte
+        return False
+
+
+def _is_own_file(path: Path) -> bool:
+    """Whether a path is a file and no link."""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except (OSError, ValueError):  # as above
         return False
 
 

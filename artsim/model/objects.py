@@ -308,10 +308,10 @@ class ArticulatedObject(Showable):
         return not bool((high > low).any())
 
     def scaled(self, scale: float) -> ArticulatedObject:
-        """The same object at ``scale`` times its native size; geometry is shared, not copied."""
+        """The same object at ``scale`` times its native size: itself, if it has that scale. Geometry is shared."""
         if not 1.0 / LARGEST <= scale <= LARGEST:
             raise ConfigError(f"an object cannot have scale {scale}")
-        return replace(self, scale=float(scale))
+        return self if scale == self.scale else replace(self, scale=float(scale))
 
     def with_diagonal(self, diagonal: float) -> ArticulatedObject:
         """The same object scaled so that its rest-state box has this diagonal, metres."""

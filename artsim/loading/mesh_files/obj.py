@@ -10,6 +10,7 @@ import numpy as np
 from artsim.loading.mesh_files.polygons import triangulate
 from artsim.loading.mesh_files.surface import Array, Bounds, Draft, Indices, Surface, UnusableMeshError, quote_name
 from artsim.loading.mesh_files.text import (
+    FEW_WORDS,
     Rows,
     first_numbers,
     first_of_each,
@@ -180,10 +181,10 @@ def _textures(references: bytes) -> bytes:
 def _tell_others(found: Statements, draft: Draft) -> None:
     """Name the statements that are not read."""
     other = ~found.vertex_rows & ~found.face_rows & ~found.rows.are_silent()
-    for word in (b"vt", b"vn", b"usemtl", b"g", b"s"):
+    for word in (b"vn", b"vt", b"usemtl", b"g", b"s"):
+        if np.count_nonzero(other) <= FEW_WORDS:
+            break
         other &= ~found.rows.which(word)
-    if not other.any():
-        return
     for statement, count in found.rows.words(other).items():
         if statement in ("l", "p"):
             draft.left_out(count, "lines" if statement == "l" else "points")

@@ -59,7 +59,9 @@ def triangulate(points: Array, corners: Indices, counts: Indices) -> Triangulati
     usable = counts >= 3
     few = int((~usable).sum())
     good = (corners >= 0) & (corners < len(points))
-    good[good] = np.isfinite(points[corners[good]]).all(axis=1)  # not of all points: many lists may share them
+    finite = np.isfinite(points[corners[good]])  # not of all points: many lists may share them
+    if not finite.all():
+        good[good] = finite.all(axis=1)
     if not good.all():
         bad_before = np.concatenate([[0], np.cumsum(~good)])
         usable &= bad_before[starts + counts] == bad_before[starts]

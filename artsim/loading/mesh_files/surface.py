@@ -147,12 +147,12 @@ class Draft:
                 raise UnusableMeshError(f"declares {_readable(self.declared)} faces, none of which could be read")
             self.note(f"declares {_readable(self.declared)} faces, but {self.accounted} were found")
         vertices, faces = join_pieces(self.pieces)
-        near = np.all(np.abs(vertices) <= FAR, axis=1)  # false for what is not a number, too
-        usable = (faces >= 0).all(axis=1)
-        if not near.all():
-            usable &= near[faces].all(axis=1)
+        near = np.abs(vertices) <= FAR  # false for what is not a number, too
         corners = self.corners
-        if not usable.all():
+        if not near.all() or faces.min(initial=0) < 0:
+            usable = (faces >= 0).all(axis=1)
+            if not near.all():
+                usable &= np.all(near, axis=1)[faces].all(axis=1)
             self.left_out(int((~usable).sum()), "triangles", NO_POINT)
             vertices, faces = join_pieces([(vertices, faces[usable])])
             corners = None if corners is None else corners[usable]

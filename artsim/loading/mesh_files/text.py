@@ -24,8 +24,8 @@ _BLANKS = bytes(c if c == ord("\n") else max(c, ord(" ")) for c in range(256))
 _MAX_ROWS = 8_000_000
 """For as many faces as a mesh may have, and their vertices; each takes some 20 bytes of memory besides its text."""
 
-_MAX_WORDS = 10
-"""Of the words that are not known, the most frequent ones are named."""
+FEW_WORDS = 10
+"""Rows whose first words are read one by one. Of more, as many words are named: the most frequent ones."""
 
 _BLOCK = 1_000_000
 
@@ -138,7 +138,7 @@ class Rows:
         """How many of some rows begin with each word, by its first letters; "..." stands for the rare ones."""
         which = which & (self._starts < self._ends)
         starts, ends = self._starts[which], self._ends[which]
-        if len(starts) <= _MAX_WORDS:
+        if len(starts) <= FEW_WORDS:
             rows = [self._bytes[a:b].tobytes() for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
             heads = sorted(head for row in rows if (head := row.partition(b" ")[0][:_WORD]))
             few = Counter(head.decode("ascii", "replace") for head in heads)
@@ -148,7 +148,7 @@ class Rows:
         letters[np.logical_or.accumulate(blank, axis=1)] = 0
         found, counts = np.unique(np.ascontiguousarray(letters).view(">u8"), return_counts=True)
         found, counts = found[found > 0], counts[found > 0]  # without blank rows
-        most = np.argsort(-counts, kind="stable")[:_MAX_WORDS]
+        most = np.argsort(-counts, kind="stable")[:FEW_WORDS]
         words = found[most].astype(">u8").tobytes()
         texts = [words[at : at + _WORD].rstrip(b"\0").decode("ascii", "replace") for at in range(0, len(words), _WORD)]
         told = {text: int(n) for text, n in zip(texts, counts[most].tolist(), strict=True)}
@@ -174,9 +174,10 @@ def first_numbers(text: bytes, width: int) -> NDArray[np.float64]:
         When very many words are no numbers.
     """
     per_row = numbers_per_row(text)
-    values = np.append(numbers(text, np.float64, np.nan, int(per_row.sum())), np.nan)
+    values = numbers(text, np.float64, np.nan, int(per_row.sum()))
     if (per_row == width).all():
-        return values[:-1].reshape(-1, width)
+        return values.reshape(-1, width)
+    values = np.append(values, np.nan)
     at = (np.cumsum(per_row) - per_row)[:, None] + np.arange(width)
     return values[np.where(per_row[:, None] >= width, at, len(values) - 1)]
 
@@ -191,7 +192,8 @@ def numbers(text: bytes, dtype: type[np.generic], unreadable: float, count: int 
     UnusableMeshError
         When very many words are no numbers.
     """
-    return np.concatenate([np.zeros(0, dtype), *_blocks(text, dtype, unreadable, count, [_MAX_UNREADABLE])])
+    blocks = _blocks(text, dtype, unreadable, count, [_MAX_UNREADABLE])
+    return blocks[0] if len(blocks) == 1 else np.concatenate([np.zeros(0, dtype), *blocks])
 
 
 def _blocks(

@@ -10,6 +10,7 @@ import trimesh
 
 from artsim import load
 from artsim.errors import AssetError
+from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.roots import PackageRoots
 
 CUBE = trimesh.creation.box((1, 1, 1)).export(file_type="obj")
@@ -108,6 +109,26 @@ def test_nothing_outside_is_read(
     link.symlink_to(tmp_path / file)
     with pytest.raises(AssetError, match="lies outside the asset's folder"):
         load(place(tmp_path, urdf, "link.obj", **manifests))
+
+
+def test_a_file_after_others_of_its_folder_is_judged_by_itself(tmp_path: Path) -> None:
+    folder, secret = tmp_path / "x" / "meshes", tmp_path / "secret" / "m.obj"
+    for file in (folder / "a.obj", folder / "b.obj", secret):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("v 0 0 0")
+    (folder / "link.obj").symlink_to(secret)
+    (folder / "inner.obj").symlink_to(folder / "b.obj")
+    paths = AssetPaths(tmp_path / "x", {})
+    assert [paths.resolve(f"meshes/{name}") for name in ("a.obj", "b.obj", "inner.obj")] == [
+        folder / name for name in ("a.obj", "b.obj", "inner.obj")
+    ]
+    assert paths.resolve("meshes/A.obj") == folder / "a.obj"
+    for name in ("meshes/link.obj", "meshes/../../secret/m.obj"):
+        with pytest.raises(AssetError, match="outside"):
+            paths.resolve(name)
+    for name in ("meshes/c.obj", "meshes/..", "meshes/", "meshes/a\0.obj"):
+        with pytest.raises((MissingFileError, AssetError)):
+            paths.resolve(name)
 
 
 def test_a_home_and_the_folder_of_temporary_files_are_no_assets(
