@@ -67,6 +67,11 @@ class Context:
         return initial_pose.start(clouds, self.perceived.of_points(few), shapes, len(shapes))
 
     @cached_property
+    def has_chain(self) -> bool:
+        """Whether joints form a chain, in which a state counts only together with those above and below it."""
+        return bool(self.options.beam) and int(self.start[0][:1].trees.depth[0].max()) >= _CHAIN
+
+    @cached_property
     def observed(self) -> Observed:
         """The points that references are fitted to, labelled by perception."""
         part = self.perceived.part[:, : self.options.fit_points]
@@ -140,9 +145,9 @@ def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
 def chain_states(context: Context, best: Best | None) -> Hypotheses | None:
     """The first reference in the states that a beam search finds, where joints form a chain."""
     options = context.options
-    shapes, theta = context.start[0][:1], context.start[1][:1]
-    if not options.beam or int(shapes.trees.depth[0].max()) < _CHAIN:
+    if not context.has_chain:
         return None
+    shapes, theta = context.start[0][:1], context.start[1][:1]
     probability = context.perceived.part_probability[..., : shapes.trees.num_rows]
     states = beam_search.beam(
         shapes, context.cloud, probability, theta, _BEAM_HYPOTHESES, options.beam, options.refine

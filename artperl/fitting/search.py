@@ -1,7 +1,8 @@
 """The search for the pose that explains a cloud: hypotheses, one score, one fit.
 
-The hypotheses of a round are refined on few points. The one with the best score is fitted to all points. The second
-round turns the best fit, and its fit replaces the best one only with a better score.
+The hypotheses of a round are refined on few points. The one with the best score is fitted to all points; a chain of
+joints is fitted again until it gets no better. The second round turns the best fit, and its fit replaces the best one
+only with a better score.
 """
 
 from __future__ import annotations
@@ -90,6 +91,10 @@ def score(residual: Values, outside: Values) -> Values:
     return residual + _NEVER * outside
 
 
+_AGAIN, _GAIN = 4, 0.01
+"""Times that a chain's fit may be fitted again, and the share of the residual that has to be gained each time: what
+hangs from a chain moves with each of its joints, so one fit leaves it half way."""
+
 ROUNDS = (perceived_pose, hinged_root, chain_states), (half_turn, other_sides)
 """Generators whose hypotheses compete: those of perception, then those of the best fit of these."""
 
@@ -105,13 +110,27 @@ def find_fit(context: Context, clock: Clock) -> Fit:
             some += [] if hypotheses is None else [hypotheses]
         if some:
             fit = settle(Hypotheses.join(some), context, clock)
-            if best is None or score(fit.residual, fit.outside) < score(best.residual, best.outside):
-                best = fit
+            fit = _fit_again(fit, context, clock) if context.has_chain else fit
+            best = fit if best is None else min(best, fit, key=_score)
     assert best is not None  # perception always proposes some
     with clock("labels"):
         observed = Observed.of(context.cloud, context.perceived.part)
         part = labels_by_surface(best.shapes, observed, best.theta, context.perceived.part_logits)
     return replace(best, observed=replace(observed, part=part))
+
+
+def _score(fit: Fit) -> float:
+    return score(fit.residual, fit.outside)
+
+
+def _fit_again(fit: Fit, context: Context, clock: Clock) -> Fit:
+    """A fit that is fitted anew from where it ends, its points labelled anew, as long as that makes it better."""
+    for _ in range(_AGAIN):
+        after = settle(Hypotheses(fit.shapes, fit.theta, [fit.row]), context, clock)
+        before, fit = fit, min(fit, replace(after, start=fit.start), key=_score)
+        if fit.residual > (1.0 - _GAIN) * before.residual:
+            break
+    return fit
 
 
 def settle(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
