@@ -20,7 +20,10 @@ Array = NDArray[np.float32]
 CHANNELS = 8
 """Colour (3), inverse depth, inverse depth over the plane, whether depth was measured, x and y of the ray."""
 WIDTH = 640
-"""Columns that the network looks at: half of those of a common depth camera, four times those of its answer."""
+"""Columns that the network learns from: half of those of a common depth camera, four times those of its answer."""
+LOOK_WIDTH = 960
+"""Columns in which it looks for objects: they are larger than those that it has learnt from, and thin ones show. With
+as many columns as in training, it finds a tenth less (docs/experiments.md)."""
 CELL = 4
 """Pixels of the network's image along a cell of its answer."""
 _TRIES = 64
@@ -51,7 +54,7 @@ class Look:
     unit: float
 
 
-def look_at(rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, width: int = WIDTH) -> Look:
+def look_at(rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, width: int = LOOK_WIDTH) -> Look:
     """An image, made smaller, as the network sees it.
 
     Parameters
