@@ -162,7 +162,7 @@ def _html_of(text: str) -> str:
             out.append("<table>" if table else "</table>")
         if table and not line.startswith("| ---"):
             tag = "td" if was_table else "th"
-            cells = (html.escape(cell.strip()) for cell in line[1:-1].split("|"))
+            cells = (_cell_html(cell.strip()) for cell in line[1:-1].split("|"))
             out.append("<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>")
         elif line.startswith("#"):
             level = len(line.split()[0])
@@ -173,13 +173,21 @@ def _html_of(text: str) -> str:
     return "\n".join([*out, "</table>" if before.startswith("|") else ""])
 
 
+def _cell_html(cell: str) -> str:
+    """A cell; the interval of a mean stands below it, so that tables of many parts fit a page."""
+    mean, bracket, interval = html.escape(cell).partition(" [")
+    return f"{mean}<small>{interval.rstrip(']').replace(', ', ' to ')}</small>" if bracket else mean
+
+
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
 <style>
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1.5em auto; max-width: 72em; padding: 0 1em; color: #1b1b1b; }}
-table {{ border-collapse: collapse; margin: 0.4em 0 1.2em; display: block; overflow-x: auto; }}
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1.5em auto; max-width: 84em; padding: 0 1em; color: #1b1b1b; }}
+table {{ border-collapse: collapse; margin: 0.4em 0 1.2em; display: block; overflow-x: auto; font-size: 0.85em; }}
 th, td {{ border-bottom: 1px solid #ddd; padding: 0.25em 0.8em 0.25em 0; text-align: right; white-space: nowrap; }}
+th {{ white-space: normal; vertical-align: bottom; }} td {{ vertical-align: top; }}
+td small {{ display: block; color: #666; }}
 th:first-child, td:first-child {{ text-align: left; }}
 li {{ margin-left: 1.2em; overflow-wrap: anywhere; }}
 h3 {{ margin: 1em 0 0.2em; font-size: 1em; }}

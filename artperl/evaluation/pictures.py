@@ -112,7 +112,7 @@ def _overlay(axes: Axes, sample: Sample, estimate: Estimate) -> None:
     if len(estimate.state) == len(sample.joint_type):
         error = compare(estimate, sample, 0.0)
         title += "\n" + " ".join(f"{x:.1f}°" for x in error.rotation)
-        title += "   " + " ".join(f"{100 * x:.1f}" for x in error.translation) + " %"
+        title += "\n" + " ".join(f"{100 * x:.1f}" for x in error.translation) + " %"
     axes.set_title(title, fontsize=7, parse_math=False)  # a dollar sign in a name begins no formula
     axes.set_aspect("equal")
     axes.invert_yaxis()

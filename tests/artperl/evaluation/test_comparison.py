@@ -94,6 +94,8 @@ def test_the_page_is_whole_and_what_it_shows_cannot_leave_its_frame(record) -> N
 
     Balanced().feed(page)
     assert not open_tags
+    mean = record["parts"][0]["rotation_deg"]
+    assert f"<td>{mean['mean']:.2f}<small>{mean['low']:.2f} to {mean['high']:.2f}</small></td>" in page
     assert page.count("<table>") == len(re.findall(r"^\| ---", text, re.MULTILINE))
 
 
