@@ -49,6 +49,24 @@ def installed(module: str) -> ModuleType:
         absent(f"{module} cannot be imported ({error}): what needs it is not tested")
 
 
+def pytest_sessionstart() -> None:
+    """Let Embree have no threads in this process: it counts processors once, as its first scene is built.
+
+    Fixtures fork this process (`quick_workers`). A copy has no threads, and would wait for Embree's for ever.
+    """
+    if not hasattr(os, "sched_setaffinity"):  # not on macOS
+        return
+    processors = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(processors)})
+    try:
+        triangles = trimesh.creation.box().triangles.astype(np.float32)
+        scene = EmbreeScene()
+        TriangleMesh(scene, triangles)
+        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="DISTANCE")
+    finally:
+        os.sched_setaffinity(0, processors)
+
+
 def pytest_collection_finish() -> None:
     """Thousands of collected tests stay: no collection of garbage need look at them, and ManiSkill collects often."""
     gc.collect()
@@ -138,21 +156,3 @@ def box_laptop(tmp_path: Path) -> Path:
     path = tmp_path / "box_laptop.urdf"
     path.write_text(BOX_LAPTOP)
     return path
-
-
-def pytest_sessionstart() -> None:
-    """Let Embree have no threads in this process: it counts processors once, as its first scene is built.
-
-    Fixtures fork this process (`quick_workers`). A copy has no threads, and would wait for Embree's for ever.
-    """
-    if not hasattr(os, "sched_setaffinity"):  # not on macOS
-        return
-    processors = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(processors)})
-    try:
-        triangles = trimesh.creation.box().triangles.astype(np.float32)
-        scene = EmbreeScene()
-        TriangleMesh(scene, triangles)
-        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="DISTANCE")
-    finally:
-        os.sched_setaffinity(0, processors)

@@ -337,10 +337,9 @@ def _pose_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
 
 def _part_slices(sample: Sample) -> tuple[NDArray[np.int64], list[tuple[int, slice]]]:
     """An order of the points in which those of a part stand together, and where in it each part that is seen stands."""
-    ends = np.cumsum(np.bincount(sample.part))
-    starts = [0, *ends[:-1].tolist()]
-    slices = [(k, slice(start, end)) for k, (start, end) in enumerate(zip(starts, ends.tolist(), strict=True))]
-    return np.argsort(sample.part, kind="stable"), [(k, mine) for k, mine in slices if mine.start < mine.stop]
+    counts = np.bincount(sample.part)
+    ends = zip(counts.tolist(), np.cumsum(counts).tolist(), strict=True)
+    return np.argsort(sample.part, kind="stable"), [(k, slice(end - n, end)) for k, (n, end) in enumerate(ends) if n]
 
 
 def _true_points(sample: Sample) -> Array:

@@ -151,7 +151,7 @@ class Draft:
         corners = self.corners
         if not near.all() or faces.min(initial=0) < 0:
             usable = (faces >= 0).all(axis=1)
-            if not near.all():
+            if len(vertices):  # without any, no triangle can be used
                 usable &= np.all(near, axis=1)[faces].all(axis=1)
             self.left_out(int((~usable).sum()), "triangles", NO_POINT)
             vertices, faces = join_pieces([(vertices, faces[usable])])
