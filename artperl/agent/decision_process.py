@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from artperl.agent.actions import NOTHING, action_mask, apply, expert
+from artperl.agent.actions import NOTHING, action_mask, apply, expert, move, residual
 from artperl.core.batch import Batch
 from artperl.core.pose import Posed, Theta, joint_axes, pose_parts
 from artperl.core.shapes import Observed, Shapes, faces_camera
@@ -154,6 +154,12 @@ class Fitting:
     def expert(self, goal: Theta) -> Tensor:
         """(B, P, 9) the expert's action towards a goal."""
         return expert(self.shapes, self.theta, goal, self.radius)
+
+    def place(self, start: Theta, goal: Theta, share: Tensor) -> None:
+        """Be where each axis has gone its share (B, P, 9) of the way from ``start`` to ``goal``."""
+        missing = residual(self.shapes, start, goal, self.radius)
+        self.theta = move(self.shapes, start, share * missing, self.radius)
+        self._look()
 
     def step(self, action: Tensor) -> Tensor:
         """Take an action (B, P, 9), of which :attr:`mask` counts; returns the reward (B,) of equation 3."""

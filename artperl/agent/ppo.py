@@ -1,7 +1,7 @@
 """Composited reinforcement learning and behaviour cloning: Algorithm 1 of ArtPERL.
 
-:func:`algorithm_1` is the loop; :func:`rollout` fills the replay buffer, :func:`update` learns from it. A
-:class:`Phase` says what the agent learns by, and how it acts meanwhile.
+:func:`algorithm_1` is the loop; :func:`scatter` or :func:`rollout` fills the replay buffer, :func:`update` learns from
+it. A :class:`Phase` says what the agent learns by, and how it acts meanwhile.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from artperl.core.pose import Theta
 from artperl.core.ranks import ALONE, Ranks
 from artperl.core.trees import KINDS
 
+_APART = 0.2
+"""Of the way to the goal, how far axes of a scattered state are apart at most; some are beyond the goal."""
 _PRISMATIC = KINDS.index("prismatic")
 
 
@@ -57,11 +59,13 @@ class Phase:
     """The policy that acts has that many times the logits of the one that is cloned."""
     cloning: bool = True
     """Learn from the expert (equation 4)."""
+    scattered: bool = False
+    """States are drawn at random between start and goal, not reached by actions."""
 
 
-CLONING = Phase(reinforcement=False, guided=0.7, sharpness=1.0)
-"""Behaviour cloning alone. Actions on nine axes that are drawn apart stray in a few steps to where nothing can be
-learnt: the expert takes most steps."""
+CLONING = Phase(reinforcement=False, guided=0.0, sharpness=1.0, scattered=True)
+"""Behaviour cloning alone, on random states as in section 4.3. States of a trajectory are much alike, and most are near
+its end: in the same time, states that are drawn apart leave a third less error."""
 JOINT = Phase(reinforcement=True, guided=0.5, sharpness=3.0)
 """Both losses. Quick runs that drew all actions of this phase ended worse than they began. Cloning leaves each axis as
 unsure as the expert's next step is, so that one axis of many would take a long step astray at every turn: what acts is
@@ -115,14 +119,17 @@ def algorithm_1(
     Yields
     ------
     dict
-        Mean losses, reward, and chamfer distances at the start and at the end of the episodes.
+        Mean losses; of rollouts the reward, too, and chamfer distances at the start and at the end of the episodes.
     """
     device = next(policy.parameters()).device
     for n in range(first, last):
         generator = torch.Generator(device).manual_seed((seed << 32) + n)
         phase = phases(n)
         fitting, goal = episodes(n)
-        own, figures = rollout(policy, fitting, goal, phase, options, generator, ranks)
+        if phase.scattered:
+            own, figures = scatter(fitting, goal, generator, ranks), dict[str, float]()
+        else:
+            own, figures = rollout(policy, fitting, goal, phase, options, generator, ranks)
         buffer, told = together(own, figures, len(goal), ranks)
         losses = update(policy, optimizer, buffer, phase, options, generator, ranks)
         yield {name: sum(one[name] for one in losses) / len(losses) for name in losses[0]} | told
@@ -174,6 +181,30 @@ def rollout(
         concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(experts), torch.cat(log_probs),
         advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(),
     ), figures  # fmt: skip
+
+
+@torch.no_grad()
+def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ranks = ALONE) -> Buffer:
+    """As many states as an episode has, anywhere between its start and the goal, and what the expert would do.
+
+    Each axis goes its own share of the way, near to that of its neighbours, so that in the mean of all states the
+    distance left falls evenly. There are no actions and no rewards: only equation 4 learns from them.
+    """
+    counts = ranks.every(len(goal))
+    total, before = sum(counts), sum(counts[: ranks.rank])
+    start, views, masks, experts = fitting.theta, [], [], []
+    while not fitting.done:
+        size, device = (total, *fitting.mask.shape[1:]), start.state.device
+        common = torch.rand((total, 1, 1), generator=generator, device=device).sqrt()
+        own = torch.rand(size, generator=generator, device=device)
+        fitting.place(start, goal, (common + _APART * own)[before : before + len(goal)])
+        views.append(fitting.view())
+        masks.append(fitting.mask)
+        experts.append(fitting.expert(goal))
+        fitting.steps_taken += 1
+    expert = torch.cat(experts)
+    none = torch.zeros(len(expert), device=expert.device)
+    return Buffer(concatenate(views), torch.cat(masks), expert, expert, none, none, none)
 
 
 def drawn(probability: Tensor, chance: Tensor) -> Tensor:

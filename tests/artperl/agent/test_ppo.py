@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.agent.actions import MOVE, NUM_AXES, NUM_BINS, SCALE, action_mask
+from artperl.agent.actions import MOVE, NOTHING, NUM_AXES, NUM_BINS, SCALE, action_mask, residual
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
 from artperl.agent.ppo import (
@@ -24,6 +24,7 @@ from artperl.agent.ppo import (
     log_probability,
     ppo_losses,
     rollout,
+    scatter,
     update,
 )
 from artperl.core.pose import Theta
@@ -37,6 +38,8 @@ FITTING = FittingOptions(steps=3, observed_points=96, reference_points=32)
 def a_buffer(agent: Policy, phase: Phase, seed: int = 0, kinds: tuple[str, ...] = ("laptop",)) -> Buffer:
     problem = small_problem(*kinds)
     fitting = Fitting(problem.shapes, problem.observed, problem.start, FITTING)
+    if phase.scattered:
+        return scatter(fitting, problem.goal, torch.Generator().manual_seed(seed))
     return rollout(agent, fitting, problem.goal, phase, PPOOptions(), torch.Generator().manual_seed(seed))[0]
 
 
@@ -135,6 +138,21 @@ def test_the_agent_learns_what_the_expert_does(phase: Phase) -> None:
     seen = update(agent, optimizer, buffer, phase, options, torch.Generator().manual_seed(0))
     assert seen[-1]["cloning"] < 0.8 * seen[0]["cloning"]
     assert seen[-1]["accuracy"] > seen[0]["accuracy"] + 0.1
+
+
+def test_scattered_states_are_all_along_the_way() -> None:
+    """The expert takes its longest steps in some, none in others, and the other way round where a state is beyond."""
+    problem = small_problem("laptop")
+    fitting = Fitting(problem.shapes, problem.observed, problem.start, FittingOptions(steps=60, reference_points=8))
+    whole = residual(problem.shapes, problem.start, problem.goal, fitting.radius)[:, 0, 0]
+    buffer = scatter(fitting, problem.goal, torch.Generator().manual_seed(0))
+    assert len(buffer.expert) == 60 * 2 * len(problem)
+    states = (buffer.expert[:, 0, 0] - NOTHING).unflatten(0, (-1, len(problem)))
+    far = whole.abs() > 0.3
+    steps = (states * whole.sign())[:, far]
+    assert steps.max() == 5
+    assert (steps > 0).float().mean() > 0.5
+    assert -1 >= steps.min() >= -4  # some have gone too far, by a fifth of the way at most
 
 
 def test_rewarded_actions_become_likelier() -> None:
