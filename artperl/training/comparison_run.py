@@ -12,8 +12,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, load_estimator
 from artperl.evaluation.artimage import row_objects, row_samples
@@ -160,7 +158,7 @@ def run_comparison(
             estimator = trained(options, category, method, out, workers, progress, say)
             learnt = time.perf_counter() - begun
             if category not in tested:
-                tested[category] = tested_views(options, category, out)
+                tested[category] = tested_views(options, category)
             objects, samples = tested[category]
             scored = evaluate(estimator, samples, progress, object_symmetries(objects))
             row = {
@@ -177,7 +175,7 @@ def run_comparison(
     text = markdown(options.benchmark, rows, notes(options))
     write_atomic(out / "report.json", (json.dumps(report, indent=1) + "\n").encode())
     write_atomic(out / "report.md", text.encode())
-    pictures, views = drawn(options, out, tested, say)
+    pictures, views = drawn(options, out, say)
     write_atomic(out / "report.html", html_page(text, f"{options.benchmark}, compared", pictures, views).encode())
     say(f"report: {out / 'report.html'}, report.md, report.json")
     return report
@@ -241,7 +239,7 @@ def trained(
     return load_estimator(folder / "best", method=name)
 
 
-def tested_views(options: ComparisonOptions, category: str, out: Path) -> tuple[list[ArticulatedObject], list[Sample]]:
+def tested_views(options: ComparisonOptions, category: str) -> tuple[list[ArticulatedObject], list[Sample]]:
     """Objects that nothing was learnt from, and views of them: always the same ones."""
     if options.benchmark == "artimage":
         objects = row_objects("procedural", category, None, options.objects)
@@ -279,22 +277,19 @@ def notes(options: ComparisonOptions) -> list[str]:
     return lines
 
 
-def drawn(
-    options: ComparisonOptions, out: Path, tested: dict[str, tuple[list[ArticulatedObject], list[Sample]]],
-    say: Callable[[str], None],
-) -> tuple[dict[str, bytes], dict[str, str]]:  # fmt: skip
-    """Pictures and pages of a report: overlays of the best method, its estimates to turn, and curves of the agent."""
+def drawn(options: ComparisonOptions, out: Path, say: Callable[[str], None]) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Pictures and pages of a report: overlays of the best method, its estimates to turn, and curves of the agent.
+
+    They show test objects in few views, so that a report that goes on does not make all of them again.
+    """
     pictures, views = {}, {}
-    first = options.of_methods[0]
+    first, few = options.of_methods[0], min(_OVERLAYS, options.views)
     for category in options.of_categories:
-        if category not in tested:
-            tested[category] = tested_views(options, category, out)
-        samples = tested[category][1]
+        shown = tested_views(replace(options, objects=min(options.objects, few), views=few), category)[1][:few]
         try:
             estimator = trained(options, category, first, out, 0, False, say) if first == "full" and (
                 options.benchmark == "artimage" and not options.retrain_full
             ) else load_estimator(out / "train" / f"{category}-{first}" / "best", method=f"{first}")  # fmt: skip
-            shown = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _OVERLAYS).astype(int))]
             pictures[f"{category}: estimates of {first}, true boxes dashed"] = overlays(estimator, shown)
             estimate = estimator(shown[0].points)
             last = replace(estimate, trajectory=estimate.trajectory[-1:])
