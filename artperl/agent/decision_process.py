@@ -155,10 +155,14 @@ class Fitting:
         """(B, P, 9) the expert's action towards a goal."""
         return expert(self.shapes, self.theta, goal, self.radius)
 
-    def place(self, start: Theta, goal: Theta, share: Tensor) -> None:
-        """Be where each axis has gone its share (B, P, 9) of the way from ``start`` to ``goal``."""
-        missing = residual(self.shapes, start, goal, self.radius)
-        self.theta = move(self.shapes, start, share * missing, self.radius)
+    def missing(self, goal: Theta) -> Tensor:
+        """(B, P, 9) steps that would lead to a goal at once."""
+        return residual(self.shapes, self.theta, goal, self.radius)
+
+    def place(self, goal: Theta, missing: Tensor) -> None:
+        """Be where steps (B, P, 9) would lead to a goal at once, as far as limits of joints allow."""
+        away = -missing * action_mask(self.shapes.trees)
+        self.theta = move(self.shapes, replace(goal, stretch=self.theta.stretch), away, self.radius)
         self._look()
 
     def step(self, action: Tensor) -> Tensor:

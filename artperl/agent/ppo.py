@@ -185,19 +185,22 @@ def rollout(
 
 @torch.no_grad()
 def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ranks = ALONE) -> Buffer:
-    """As many states as an episode has, anywhere between its start and the goal, and what the expert would do.
+    """As many states as an episode has, anywhere on the way to the goal, and what the expert would do.
 
-    Each axis goes its own share of the way, near to that of its neighbours, so that in the mean of all states the
-    distance left falls evenly. There are no actions and no rewards: only equation 4 learns from them.
+    Each state is off as the start of one of the episodes is, by a share of it: the shares of its axes are near to each
+    other. There are no actions and no rewards: only equation 4 learns from them.
     """
     counts = ranks.every(len(goal))
     total, before = sum(counts), sum(counts[: ranks.rank])
-    start, views, masks, experts = fitting.theta, [], [], []
+    missing = fitting.missing(goal)
+    others = torch.cat([rows.to(missing.device) for rows in ranks.every(missing.cpu())])
+    views, masks, experts = [], [], []
     while not fitting.done:
-        size, device = (total, *fitting.mask.shape[1:]), start.state.device
-        common = torch.rand((total, 1, 1), generator=generator, device=device).sqrt()
-        own = torch.rand(size, generator=generator, device=device)
-        fitting.place(start, goal, (common + _APART * own)[before : before + len(goal)])
+        other = torch.randint(total, (total,), generator=generator, device=missing.device)
+        common = torch.rand((total, 1, 1), generator=generator, device=missing.device).sqrt()
+        own = torch.rand(others.shape, generator=generator, device=missing.device)
+        left = (1.0 - common - _APART * own) * others[other]
+        fitting.place(goal, left[before : before + len(goal)])
         views.append(fitting.view())
         masks.append(fitting.mask)
         experts.append(fitting.expert(goal))

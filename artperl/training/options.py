@@ -199,8 +199,8 @@ one estimator for many categories, with any parts."""
 
 PAPER_PRESETS = {
     "quick": TrainOptions(
-        method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=120, batch_size=16,
-        num_points=768, retrieval_steps=60, agent_rollouts=110, episodes=24, agent_rate=3e-3, cloning_share=0.7,
+        method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=400, batch_size=16,
+        num_points=768, retrieval_steps=30, agent_rollouts=150, episodes=24, agent_rate=3e-3, cloning_share=0.7,
         test_objects=20, test_views=2, ppo=PPOOptions(epochs=2),
     ),
     "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=1500, episodes=64),
@@ -209,7 +209,7 @@ PAPER_PRESETS = {
 
 ANCSH_PRESETS = {
     "quick": TrainOptions(
-        method="ancsh", base_objects=32, reference_points=32, width=32, perception_steps=250, batch_size=16,
+        method="ancsh", base_objects=32, reference_points=32, width=32, perception_steps=1200, batch_size=16,
         num_points=768, test_objects=20, test_views=2,
     ),
     "full": TrainOptions(method="ancsh", reference_points=32),
@@ -218,7 +218,7 @@ ANCSH_PRESETS = {
 
 OMAD_PRESETS = {
     "quick": TrainOptions(
-        method="omad", base_objects=32, reference_points=96, width=32, prior_steps=600, perception_steps=500,
+        method="omad", base_objects=32, reference_points=96, width=32, prior_steps=600, perception_steps=2000,
         batch_size=16, num_points=768, test_objects=20, test_views=2,
     ),
     "full": TrainOptions(method="omad", prior_steps=4000),
@@ -239,7 +239,7 @@ METHOD_PRESETS: dict[StoredMethod, dict[str, TrainOptions]] = {
     "omad": OMAD_PRESETS,
     "sporeagent": SPOREAGENT_PRESETS,
 }
-"""Presets of each method."""
+"""Presets of each method; of the paper and its baselines, quick ones take six to eight minutes of one core each."""
 
 
 def preset_of(method: StoredMethod, name: str) -> TrainOptions:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 import torch
 
-from artperl.agent.actions import NOTHING, residual
+from artperl.agent.actions import NOTHING
 from artperl.agent.decision_process import FAR, Fitting, FittingOptions, nearest_distance, nearest_distances
 from artperl.data.fitting_problems import Problem
 from tests.artperl.worlds import small_problem
@@ -56,19 +56,16 @@ def test_doing_nothing_costs_a_tenth(problem: Problem) -> None:
     torch.testing.assert_close(reward, torch.full_like(reward, -0.05))
 
 
-def test_a_share_of_the_way_leaves_the_rest_of_it(problem: Problem) -> None:
-    """Half of the way halves every residual, all of the way leaves nothing for the expert to do."""
+def test_an_episode_is_placed_as_far_from_its_goal_as_is_asked(problem: Problem) -> None:
+    """Half of what the start misses, of which the expert's residual is the oracle; nothing is nothing to do."""
     fitting = Fitting(problem.shapes, problem.observed, problem.start, OPTIONS)
-    shape = (*problem.shapes.trees.valid.shape, 9)
-
-    def left() -> torch.Tensor:
-        return residual(problem.shapes, fitting.theta, problem.goal, fitting.radius)
-
-    whole = left()
-    for share in (0.0, 0.5, 1.0):
-        fitting.place(problem.start, problem.goal, torch.full(shape, share))
-        torch.testing.assert_close(left(), (1.0 - share) * whole, atol=1e-4, rtol=1e-3)
+    whole = fitting.missing(problem.goal)
+    assert whole.abs().amax() > 0.3
+    for share in (1.0, 0.5, 0.0):
+        fitting.place(problem.goal, share * whole)
+        torch.testing.assert_close(fitting.missing(problem.goal), share * whole, atol=1e-4, rtol=1e-3)
     assert (fitting.expert(problem.goal) == NOTHING).all()
+    assert torch.equal(fitting.theta.stretch, problem.start.stretch)
 
 
 def test_the_expert_brings_the_clouds_together(problem: Problem) -> None:
