@@ -74,11 +74,15 @@ sharper."""
 
 @dataclass(frozen=True, eq=False)
 class Buffer(Batch):
-    """Replay buffer of one batch of episodes. T steps of B environments, flat: S = T * B rows, step by step."""
+    """Replay buffer of one batch of episodes. T steps of B environments, flat: S = T * B rows, step by step.
+
+    ``own`` tells the policy's actions (1) from the expert's (0), of which equation 5 does not learn.
+    """
 
     view: View
     mask: Tensor
     action: Tensor
+    own: Tensor
     expert: Tensor
     log_prob: Tensor
     advantage: Tensor
@@ -152,7 +156,7 @@ def rollout(
     counts = ranks.every(len(goal))
     total, before = sum(counts), sum(counts[: ranks.rank])
     own = slice(before, before + len(goal))
-    views, masks, actions, experts, log_probs, values, rewards = [], [], [], [], [], [], []
+    views, masks, actions, own_steps, experts, log_probs, values, rewards = [], [], [], [], [], [], [], []
     first = fitting.distance
     while not fitting.done:
         view, mask, expert = fitting.view(), fitting.mask, fitting.expert(goal)
@@ -166,6 +170,7 @@ def rollout(
         views.append(view)
         masks.append(mask)
         actions.append(action)
+        own_steps.append((~guided).float())
         experts.append(expert)
         log_probs.append(log_probability(acting, action, mask))
         values.append(value)
@@ -178,8 +183,8 @@ def rollout(
         "chamfer_end": fitting.distance.mean().item(),
     }
     return Buffer(
-        concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(experts), torch.cat(log_probs),
-        advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(),
+        concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(own_steps), torch.cat(experts),
+        torch.cat(log_probs), advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(),
     ), figures  # fmt: skip
 
 
@@ -207,7 +212,7 @@ def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ra
         fitting.steps_taken += 1
     expert = torch.cat(experts)
     none = torch.zeros(len(expert), device=expert.device)
-    return Buffer(concatenate(views), torch.cat(masks), expert, expert, none, none, none)
+    return Buffer(concatenate(views), torch.cat(masks), expert, none, expert, none, none, none)
 
 
 def drawn(probability: Tensor, chance: Tensor) -> Tensor:
@@ -306,16 +311,20 @@ def log_probability(logits: Tensor, action: Tensor, mask: Tensor) -> Tensor:
 def ppo_losses(
     logits: Tensor, value: Tensor, buffer: Buffer, advantage: Tensor, rows: Tensor, options: PPOOptions
 ) -> dict[str, Tensor]:
-    """Clipped surrogate, squared value error, entropy, and the approximate divergence from the buffer's policy."""
-    mask = buffer.mask[rows]
-    log_ratio = log_probability(logits, buffer.action[rows], mask) - buffer.log_prob[rows]
+    """Clipped surrogate, squared value error, entropy, and the approximate divergence from the buffer's policy.
+
+    The policy would hardly have taken the expert's steps, so that the ratio of an update to the policy that acted means
+    nothing there: they count in no ratio.
+    """
+    mask, own = buffer.mask[rows], buffer.own[rows]
+    log_ratio = own * (log_probability(logits, buffer.action[rows], mask) - buffer.log_prob[rows])
     ratio, gain = log_ratio.exp(), advantage[rows]
     clipped = ratio.clamp(1.0 - options.clip, 1.0 + options.clip)
     return {
-        "policy": -torch.minimum(ratio * gain, clipped * gain).mean(),
+        "policy": -(own * torch.minimum(ratio * gain, clipped * gain)).mean(),
         "value": torch.nn.functional.mse_loss(value, buffer.result[rows]),
         "entropy": (Categorical(logits=logits).entropy() * mask).sum((1, 2)).mean(),
-        "divergence": ((ratio - 1.0) - log_ratio).mean(),
+        "divergence": (own * ((ratio - 1.0) - log_ratio)).mean(),
     }
 
 

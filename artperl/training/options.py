@@ -97,8 +97,8 @@ class TrainOptions:
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
     agent_rate: float = 1e-3
-    episodes: int = 64
-    """Episodes of a rollout."""
+    episodes: int = 192
+    """Episodes of a rollout. An update learns from states of few of them: of many, these are of many objects."""
     box_views: int = 2500
     """Fresh views of the last stage, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
     box_steps: int = 12000
@@ -200,10 +200,10 @@ one estimator for many categories, with any parts."""
 PAPER_PRESETS = {
     "quick": TrainOptions(
         method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=400, batch_size=16,
-        num_points=768, retrieval_steps=30, agent_rollouts=150, episodes=24, agent_rate=3e-3, cloning_share=0.7,
+        num_points=768, retrieval_steps=30, agent_rollouts=20, agent_rate=3e-3, cloning_share=0.7,
         test_objects=20, test_views=2, ppo=PPOOptions(epochs=2),
     ),
-    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=1500, episodes=64),
+    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500),
 }  # fmt: skip
 """Presets of the method artperl."""
 

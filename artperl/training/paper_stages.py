@@ -38,9 +38,9 @@ from artsim.observing.sample import Sample
 
 _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
-_SAVE_ROLLOUTS = 10
+_SAVE_ROLLOUTS = 2
 """Rollouts after which a run is saved, against a stop that nobody asked for."""
-_ALONE_EVERY = 10
+_ALONE_EVERY = 2
 """Rollouts between tests of the agent without an expert."""
 _ALONE = 48
 """Views of such a test."""

@@ -67,7 +67,7 @@ def test_losses_are_those_of_stable_baselines() -> None:
     options = PPOOptions()
     buffer = a_buffer(an_agent(), JOINT)
     has = buffer.mask[0]
-    rows = (buffer.mask == has).all((1, 2)).nonzero()[:, 0]  # so that the oracle's action space has no masked axes
+    rows = ((buffer.mask == has).all((1, 2)) & (buffer.own > 0)).nonzero()[:, 0]  # so that the oracle's action space has no masked axes
     assert len(rows) > 2
     logits, value = an_agent(1)(buffer.view[rows])
     logits = JOINT.sharpness * logits
@@ -95,7 +95,8 @@ def test_a_policy_has_not_yet_diverged_from_itself() -> None:
     logits, value = agent(buffer.view)
     losses = ppo_losses(JOINT.sharpness * logits, value, buffer, buffer.advantage, rows, options)
     assert losses["divergence"].item() == pytest.approx(0.0, abs=1e-5)
-    assert losses["policy"].item() == pytest.approx(-buffer.advantage.mean().item(), abs=1e-5)
+    assert 0.2 < buffer.own.mean() < 0.8
+    assert losses["policy"].item() == pytest.approx(-(buffer.own * buffer.advantage).mean().item(), abs=1e-5)
 
 
 def test_actions_are_drawn_as_likely_as_the_policy_says() -> None:
