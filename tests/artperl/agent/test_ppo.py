@@ -67,7 +67,8 @@ def test_losses_are_those_of_stable_baselines() -> None:
     options = PPOOptions()
     buffer = a_buffer(an_agent(), JOINT)
     has = buffer.mask[0]
-    rows = ((buffer.mask == has).all((1, 2)) & (buffer.own > 0)).nonzero()[:, 0]  # so that the oracle's action space has no masked axes
+    alike = (buffer.mask == has).all((1, 2))  # so that the oracle's action space has no masked axes
+    rows = (alike & (buffer.own > 0)).nonzero()[:, 0]
     assert len(rows) > 2
     logits, value = an_agent(1)(buffer.view[rows])
     logits = JOINT.sharpness * logits
