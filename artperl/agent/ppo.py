@@ -65,7 +65,7 @@ class Phase:
 
 CLONING = Phase(reinforcement=False, guided=0.0, sharpness=1.0, scattered=True)
 """Behaviour cloning alone, on random states as in section 4.3. States of a trajectory are much alike, and most are near
-its end: in the same time, states that are drawn apart leave a third less error."""
+its end: by as many states that are drawn apart, a quarter less error is left."""
 JOINT = Phase(reinforcement=True, guided=0.5, sharpness=3.0)
 """Both losses. Quick runs that drew all actions of this phase ended worse than they began. Cloning leaves each axis as
 unsure as the expert's next step is, so that one axis of many would take a long step astray at every turn: what acts is

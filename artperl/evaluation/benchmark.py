@@ -23,11 +23,14 @@ def find_estimator(folder: Path | None, category: str, **changes: Any) -> Estima
     return load_estimator(category_folder(folder, category), **changes)
 
 
-def category_folder(folder: Path | None, category: str) -> Path:
-    """Where the estimator of a category is, in a folder of them or of training runs; by default the package's."""
-    folder = folder or WEIGHTS
-    run = folder / category / "best"
-    return run if run.is_dir() else folder / category
+def category_folder(folder: Path | None, category: str, method: str = "full") -> Path:
+    """Where the estimator of a category is, in a folder of them or of training runs; by default the package's.
+
+    A run's folder has the name of the category, or that which ``artperl train`` gives it, with method and preset.
+    """
+    folder, named = folder or WEIGHTS, category if method == "full" else f"{category}-{method}"
+    runs = (folder / name / "best" for name in (category, f"{named}-full", f"{named}-quick"))
+    return next((run for run in runs if run.is_dir()), folder / category)
 
 
 def run_original(
@@ -69,7 +72,7 @@ def run_original(
             continue
         files = ArtImageFiles(root, category, "test", num_points)
         samples = list(files.samples(views))
-        estimator = load_estimator(category_folder(weights, category), method=method)
+        estimator = load_estimator(category_folder(weights, category, method), method=method)
         figures = summary(evaluate(estimator, track(category, samples, unit="view", shown=progress)))
         figures[category]["objects"] = len({sample.object_id for sample in samples})
         result |= figures

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from artperl.estimator import save_estimator
-from artperl.evaluation.benchmark import run_benchmark
+from artperl.evaluation.benchmark import category_folder, run_benchmark
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from tests.artperl.worlds import small_base
@@ -18,6 +18,15 @@ def test_rows_are_run_with_the_estimators_of_a_folder(tmp_path: Path) -> None:
     assert figures["procedural"]["laptop"]["instances"] == 2
     assert figures["procedural"]["laptop"]["objects"] == 1
     assert "published" in "\n".join(lines)
+
+
+def test_runs_are_found_by_the_names_that_training_gives_them(tmp_path: Path) -> None:
+    for name in ("laptop-full", "laptop-quick", "scissors-ancsh-quick", "scissors-quick"):
+        (tmp_path / name / "best").mkdir(parents=True)
+    assert category_folder(tmp_path, "laptop") == tmp_path / "laptop-full" / "best"
+    assert category_folder(tmp_path, "scissors") == tmp_path / "scissors-quick" / "best"
+    assert category_folder(tmp_path, "scissors", "ancsh") == tmp_path / "scissors-ancsh-quick" / "best"
+    assert category_folder(tmp_path, "drawer") == tmp_path / "drawer"
 
 
 def test_what_could_not_learn_from_real_objects_is_left_out_of_their_row(tmp_path: Path) -> None:
