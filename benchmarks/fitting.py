@@ -22,6 +22,7 @@ from artperl.agent.actions import NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
 from artperl.agent.ppo import JOINT, PPOOptions, rollout, update
+from artperl.core.mixed_precision import autocast
 from artperl.data.batches import batches
 from artperl.data.categories import objects_of
 from artperl.data.fitting_problems import Problem, Problems
@@ -31,7 +32,6 @@ from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.training.objects import BASE_SEEDS
 from artperl.training.perception_losses import perception_losses
-from artperl.training.steps import autocast
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from artperl.agent.actions import MOVE, SCALE, TURN
 from artperl.agent.decision_process import Fitting, View
 from artperl.agent.policy import Policy
 from artperl.core.batch import Batch, concatenate
+from artperl.core.mixed_precision import autocast
 from artperl.core.pose import Theta
 from artperl.core.ranks import ALONE, Ranks
 from artperl.core.trees import KINDS
@@ -99,6 +100,7 @@ def algorithm_1(
     first: int,
     last: int,
     ranks: Ranks = ALONE,
+    mixed_precision: bool = False,
 ) -> Iterator[dict[str, float]]:
     """Algorithm 1, one round after the other; it goes on when the next figures are asked for.
 
@@ -119,6 +121,8 @@ def algorithm_1(
     ranks : Ranks
         The processes that learn together: each rolls out its share of the episodes, and learns from its share of the
         rows of an update.
+    mixed_precision : bool
+        Phases of cloning alone multiply in bfloat16, where the processor can. Ratios of equation 5 need more bits.
 
     Yields
     ------
@@ -135,7 +139,7 @@ def algorithm_1(
         else:
             own, figures = rollout(policy, fitting, goal, phase, options, generator, ranks)
         buffer, told = together(own, figures, len(goal), ranks)
-        losses = update(policy, optimizer, buffer, phase, options, generator, ranks)
+        losses = update(policy, optimizer, buffer, phase, options, generator, ranks, mixed_precision)
         yield {name: sum(one[name] for one in losses) / len(losses) for name in losses[0]} | told
 
 
@@ -256,6 +260,7 @@ def update(
     options: PPOOptions,
     generator: torch.Generator,
     ranks: Ranks = ALONE,
+    mixed_precision: bool = False,
 ) -> list[dict[str, float]]:
     """Several passes of minibatch updates over a buffer; figures of each update.
 
@@ -269,7 +274,8 @@ def update(
             own = batch[ranks.rows(len(batch))]
             share = len(own) / len(batch)
             rows = own if share else batch[:1]  # of fewer rows than processes some have none: theirs count for nothing
-            logits, value = policy(buffer.view[rows])
+            with autocast(buffer.mask.device, mixed_precision and not phase.reinforcement):
+                logits, value = policy(buffer.view[rows])
             mask = buffer.mask[rows]
             losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
             losses = {name: share * loss for name, loss in losses.items()}

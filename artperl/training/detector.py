@@ -17,6 +17,7 @@ from torch import Tensor
 from torch.nn import functional
 from torch.utils.data import DataLoader
 
+from artperl.core.mixed_precision import autocast
 from artperl.data.scene_cells import Cells, SceneCells
 from artperl.detection.detector import Detector, save_detector
 from artperl.detection.images import WIDTH
@@ -25,7 +26,7 @@ from artperl.training.recipes import commit
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
 from artperl.training.state import RunState
-from artperl.training.steps import Stop, autocast, one_cycle, set_rate
+from artperl.training.steps import Stop, one_cycle, set_rate
 from artperl.training.supervised import SAVE_STEPS, descend
 from artsim.common.progress import track
 from artsim.errors import ConfigError

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from artperl.core.clouds import Clouds
+from artperl.core.mixed_precision import autocast
 from artperl.core.shapes import Shapes
 from artperl.data.batches import row_batches
 from artperl.data.sources import Source
@@ -27,7 +28,7 @@ from artperl.perception.omad_networks import (
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import KeepStage
-from artperl.training.steps import autocast, one_cycle, set_rate
+from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import Taken, descend, take_steps, told
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample

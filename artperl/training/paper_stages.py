@@ -131,7 +131,10 @@ class AgentStage:
             set_rate(optimizer, options.agent_rate * one_cycle(n, total))
             return self.episodes(method, samples, options.episodes, options.seed, n, ranks)
 
-        rounds = algorithm_1(policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total, ranks)
+        rounds = algorithm_1(
+            policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total, ranks,
+            options.mixed_precision,
+        )  # fmt: skip
         for n, figures in enumerate(rounds, first):
             line = None
             if ranks.first and (n % _ALONE_EVERY == 0 or n + 1 == total):

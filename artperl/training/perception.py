@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from artperl.core.mixed_precision import autocast
 from artperl.core.ranks import Ranks
 from artperl.data.batches import batches
 from artperl.training.context import Context
 from artperl.training.perception_losses import perception_figures, perception_losses
-from artperl.training.steps import autocast, one_cycle, set_rate
+from artperl.training.steps import one_cycle, set_rate
 from artperl.training.validation import step_taken
 from artsim.common.progress import track
 

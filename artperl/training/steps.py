@@ -1,4 +1,4 @@
-"""Steps of learning: their rate, their precision, and how they are stopped."""
+"""Steps of learning: their rate, and how they are stopped."""
 
 from __future__ import annotations
 
@@ -34,13 +34,6 @@ class Stop:
     def _in_charge(self) -> bool:
         """Only the main thread hears signals."""
         return threading.current_thread() is threading.main_thread()
-
-
-def autocast(device: torch.device, wanted: bool = True) -> torch.autocast:
-    """Matrix products in bfloat16, where they are wanted and the processor has them."""
-    known = device.type != "cpu" or torch.ops.mkldnn._is_mkldnn_bf16_supported()
-    # Weights that are kept in bfloat16 would outlive the steps that change them.
-    return torch.autocast(device.type, torch.bfloat16, enabled=wanted and known, cache_enabled=False)
 
 
 def one_cycle(step: int, total: int) -> float:

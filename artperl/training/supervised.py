@@ -9,11 +9,12 @@ import torch
 from torch import Tensor, nn
 
 from artperl.core.clouds import Clouds
+from artperl.core.mixed_precision import autocast
 from artperl.core.ranks import ALONE, Ranks
 from artperl.data.batches import batches
 from artperl.data.truth import Truth
 from artperl.training.context import Context
-from artperl.training.steps import autocast, one_cycle, set_rate
+from artperl.training.steps import one_cycle, set_rate
 from artsim.common.progress import track
 
 Loss = Callable[[nn.Module, Clouds, Truth], tuple[Tensor, dict[str, float]]]
