@@ -52,8 +52,8 @@ class Options:
     categories: tuple[str, ...] = ("laptop", "eyeglasses", "dishwasher", "scissors", "drawer", "robot_arm")
     seeds: int = 3
     """Runs of each way in each category."""
-    rollouts: int = 60
-    episodes: int = 16
+    rollouts: int = 12
+    episodes: int = 192
     """Of a rollout."""
     width: int = 32
     """Of the policy: half of what trainings have, so that a run takes a minute."""
