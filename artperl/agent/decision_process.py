@@ -160,10 +160,11 @@ class Fitting:
         return residual(self.shapes, self.theta, goal, self.radius)
 
     def place(self, goal: Theta, missing: Tensor) -> None:
-        """Be where steps (B, P, 9) would lead to a goal at once, as far as limits of joints allow."""
+        """Take a step to where steps (B, P, 9) would lead to a goal at once, as far as limits of joints allow."""
         away = -missing * action_mask(self.shapes.trees)
         self.theta = move(self.shapes, replace(goal, stretch=self.theta.stretch), away, self.radius)
         self._look()
+        self.steps_taken += 1
 
     def step(self, action: Tensor) -> Tensor:
         """Take an action (B, P, 9), of which :attr:`mask` counts; returns the reward (B,) of equation 3."""

@@ -57,7 +57,7 @@ class Phase:
     guided: float
     """Share of the steps that the expert takes."""
     sharpness: float
-    """The policy that acts has that many times the logits of the one that is cloned."""
+    """The policy that acts has that many times the logits of the one that is cloned. Scattered states have no acts."""
     cloning: bool = True
     """Learn from the expert (equation 4)."""
     scattered: bool = False
@@ -127,7 +127,8 @@ def algorithm_1(
     Yields
     ------
     dict
-        Mean losses; of rollouts the reward, too, and chamfer distances at the start and at the end of the episodes.
+        Means: the loss of cloning and the share of actions that are the expert's; of rollouts the reward, and chamfer
+        distances at the start and at the end of the episodes; where rewards teach, the losses of equation 5.
     """
     device = next(policy.parameters()).device
     for n in range(first, last):
@@ -157,9 +158,7 @@ def rollout(
     Buffer, dict
         And means: the reward, and chamfer distances at the start and at the end.
     """
-    counts = ranks.every(len(goal))
-    total, before = sum(counts), sum(counts[: ranks.rank])
-    own = slice(before, before + len(goal))
+    total, own = _share(len(goal), ranks)
     views, masks, actions, own_steps, experts, log_probs, values, rewards = [], [], [], [], [], [], [], []
     first = fitting.distance
     while not fitting.done:
@@ -199,24 +198,29 @@ def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ra
     Each state is off as the start of one of the episodes is, by a share of it: the shares of its axes are near to each
     other. There are no actions and no rewards: only equation 4 learns from them.
     """
-    counts = ranks.every(len(goal))
-    total, before = sum(counts), sum(counts[: ranks.rank])
-    missing = fitting.missing(goal)
-    others = torch.cat([rows.to(missing.device) for rows in ranks.every(missing.cpu())])
+    total, own = _share(len(goal), ranks)
+    device = fitting.distance.device
+    starts = torch.cat(ranks.every(fitting.missing(goal).cpu())).to(device)
     views, masks, experts = [], [], []
     while not fitting.done:
-        other = torch.randint(total, (total,), generator=generator, device=missing.device)
-        common = torch.rand((total, 1, 1), generator=generator, device=missing.device).sqrt()
-        own = torch.rand(others.shape, generator=generator, device=missing.device)
-        left = (1.0 - common - _APART * own) * others[other]
-        fitting.place(goal, left[before : before + len(goal)])
-        views.append(fitting.view())
+        other = torch.randint(total, (total,), generator=generator, device=device)
+        common = torch.rand((total, 1, 1), generator=generator, device=device).sqrt()
+        apart = torch.rand(starts.shape, generator=generator, device=device)
+        left = (1.0 - common - _APART * apart) * starts[other]
         masks.append(fitting.mask)
+        fitting.place(goal, left[own])
+        views.append(fitting.view())
         experts.append(fitting.expert(goal))
-        fitting.steps_taken += 1
     expert = torch.cat(experts)
     none = torch.zeros(len(expert), device=expert.device)
     return Buffer(concatenate(views), torch.cat(masks), expert, none, expert, none, none, none)
+
+
+def _share(episodes: int, ranks: Ranks) -> tuple[int, slice]:
+    """Episodes of all processes, and which of them are this one's."""
+    counts = ranks.every(episodes)
+    before = sum(counts[: ranks.rank])
+    return sum(counts), slice(before, before + episodes)
 
 
 def drawn(probability: Tensor, chance: Tensor) -> Tensor:
@@ -277,14 +281,14 @@ def update(
             with autocast(buffer.mask.device, mixed_precision and not phase.reinforcement):
                 logits, value = policy(buffer.view[rows])
             mask = buffer.mask[rows]
-            losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
-            losses = {name: share * loss for name, loss in losses.items()}
             weight = cloning_weight(buffer.mask[batch], buffer.view.kind[batch], options).sum()
             cloning = bool(share) * cloning_loss(
                 logits, buffer.expert[rows], mask, buffer.view.kind[rows], options, weight
             )
-            loss = phase.cloning * cloning
+            loss, losses = phase.cloning * cloning, dict[str, Tensor]()
             if phase.reinforcement:
+                losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
+                losses = {name: share * own_loss for name, own_loss in losses.items()}
                 reinforcement = losses["policy"] + options.lambda_value * losses["value"]
                 loss = reinforcement - options.lambda_entropy * losses["entropy"] + loss
             optimizer.zero_grad()

@@ -239,7 +239,8 @@ METHOD_PRESETS: dict[StoredMethod, dict[str, TrainOptions]] = {
     "omad": OMAD_PRESETS,
     "sporeagent": SPOREAGENT_PRESETS,
 }
-"""Presets of each method; of the paper and its baselines, quick ones take six to eight minutes of one core each."""
+"""Presets of each method; of the paper and its baselines, quick ones take six to fourteen minutes of a busy core
+each."""
 
 
 def preset_of(method: StoredMethod, name: str) -> TrainOptions:
