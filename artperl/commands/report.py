@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ class Report:
     The tables of the paper, in hours on two cores: artperl report --benchmark artimage
 
     Of some methods and categories: artperl report --category laptop --methods full ancsh omad
+
+    The same methods on real objects, without another training, in report-real.html: artperl report --row real
     """
 
     benchmark: Literal["artimage", "robotarm"] = "artimage"
@@ -42,8 +45,12 @@ class Report:
     """Of the trainings: quick ones take some minutes each, full ones an hour and more."""
     retrain_full: bool = False
     """Train the method full, too, instead of taking the estimators that come with the package."""
+    row: Literal["procedural", "real"] = "procedural"
+    """Objects to test on: unseen procedural ones, or the half of PartNet-Mobility's that is for testing."""
+    partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
+    """Folder of real objects; by default that which ARTSIM_PARTNET_DIR names."""
     objects: int = 40
-    """Unseen objects of each category."""
+    """Unseen procedural objects of each category."""
     views: int = 120
     """Views of each category, at least."""
     workers: int = 1
@@ -57,7 +64,8 @@ class Report:
 
         options = ComparisonOptions(
             self.benchmark, self.category, "" if self.arm is None else str(self.arm), self.methods, self.preset,
-            self.objects, self.views, retrain_full=self.retrain_full,
+            self.objects, self.views, retrain_full=self.retrain_full, row=self.row,
+            partnet="" if self.partnet is None else str(self.partnet),
         )  # fmt: skip
         if self.quick:
             from artperl.training.comparison_run import quick_comparison
@@ -69,4 +77,4 @@ class Report:
         except KeyboardInterrupt:
             print(f"stopped; the same command goes on from {out}", file=sys.stderr)
             sys.exit(130)
-        print((out / "report.md").read_text(), end="")
+        print((out / f"report{options.suffix}.md").read_text(), end="")

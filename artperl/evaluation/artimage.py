@@ -104,9 +104,9 @@ def real_objects(category: str, half: Literal["train", "test"], partnet: Path | 
     return objects
 
 
-def has_train_half(category: str) -> bool:
-    """Whether there are real objects of a category to learn from, and not only to test on."""
-    return bool(json.loads(SPLIT.read_text())[category]["train"])
+def has_half(category: str, half: Literal["train", "test"]) -> bool:
+    """Whether there are real objects of a category to learn from, or to test on."""
+    return bool(json.loads(SPLIT.read_text())[category][half])
 
 
 def real_train_objects(categories: Sequence[str]) -> list[ArticulatedObject]:

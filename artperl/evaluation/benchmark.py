@@ -8,7 +8,7 @@ from typing import Any
 
 from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, load_estimator
-from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_train_half, row_objects, row_samples
+from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_half, row_objects, row_samples
 from artperl.evaluation.artimage_files import ArtImageFiles
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
@@ -128,7 +128,7 @@ def run_benchmark(
         say(f"{row}: regenerated ArtImage")
         result[row] = {}
         for category in categories:
-            if row == "real_trained" and not has_train_half(category):
+            if row == "real_trained" and not has_half(category, "train"):
                 say(f"{category}: no real object to learn from")
                 continue
             tested = row_objects(row, category, partnet, objects)

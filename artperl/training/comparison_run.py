@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, load_estimator
-from artperl.evaluation.artimage import row_objects, row_samples
+from artperl.evaluation.artimage import has_half, row_objects, row_samples
 from artperl.evaluation.comparison import row_record
 from artperl.evaluation.comparison_page import html_page, markdown
 from artperl.evaluation.pictures import curves, overlays
@@ -79,6 +79,10 @@ class ComparisonOptions:
     """Other values of fields of TrainOptions, for every training."""
     retrain_full: bool = False
     """The method full is trained, too; by default the estimators that come with the package are taken."""
+    row: Literal["procedural", "real"] = "procedural"
+    """Of ArtImage made anew: objects to test on. Trainings are the same, and need not be repeated."""
+    partnet: str = ""
+    """Folder of real objects."""
 
     def __post_init__(self) -> None:
         known = tuple(ARTIMAGE) if self.benchmark == "artimage" else (ARM,)
@@ -92,18 +96,31 @@ class ComparisonOptions:
                 )
         if self.arm and self.benchmark != "robotarm":
             raise ConfigError("only the benchmark robotarm has an arm", "arm", "leave it out, or use robotarm")
+        if self.row == "real":
+            if self.benchmark != "artimage":
+                raise ConfigError(f"{self.benchmark} has no real objects", "row", "use --benchmark artimage")
+            if not self.partnet:
+                raise ConfigError("no folder of real objects is named", "partnet", "set ARTSIM_PARTNET_DIR")
+            if not self.of_categories:
+                raise ConfigError(f"there is no real {' or '.join(self.categories)}", "row", "use another category")
         if self.objects < 1 or self.views < 1:
             raise ConfigError("there is nothing to test", "objects, views", "use at least 1 of each")
 
     @property
     def of_categories(self) -> tuple[str, ...]:
-        """Categories, all if none is named."""
-        return self.categories or (tuple(ARTIMAGE) if self.benchmark == "artimage" else (ARM,))
+        """Categories, all if none is named; of real objects, those that there are."""
+        asked = self.categories or (tuple(ARTIMAGE) if self.benchmark == "artimage" else (ARM,))
+        return asked if self.row == "procedural" else tuple(own for own in asked if has_half(own, "test"))
 
     @property
     def of_methods(self) -> tuple[StoredMethod, ...]:
         """Methods, all if none is named."""
         return self.methods or METHODS[self.benchmark]
+
+    @property
+    def suffix(self) -> str:
+        """End of the names of files about this row: one folder holds both."""
+        return "" if self.row == "procedural" else f"-{self.row}"
 
 
 def quick_comparison(options: ComparisonOptions) -> ComparisonOptions:
@@ -147,10 +164,12 @@ def run_comparison(
     """
     steps = [(category, method) for category in options.of_categories for method in options.of_methods]
     say(f"{len(steps)} rows: {', '.join(options.of_methods)} on {', '.join(options.of_categories)}")
+    for category in set(replace(options, row="procedural").of_categories) - set(options.of_categories):
+        say(f"{category}: no real object to test on")
     rows: dict[str, dict[str, Any]] = {category: {} for category in options.of_categories}
     tested: dict[str, tuple[list[ArticulatedObject], list[Sample]]] = {}
     for number, (category, method) in enumerate(steps, 1):
-        kept = out / "rows" / f"{category}-{method}.json"
+        kept = out / "rows" / f"{category}-{method}{options.suffix}.json"
         asked = _asked(options, method)
         row = _kept_row(kept, asked)
         if row is None:
@@ -171,13 +190,15 @@ def run_comparison(
             f"{number} of {len(steps)}, {method} on {category}: training {row['training_minutes']:.1f} min, test "
             f"{row['testing_minutes']:.1f} min, {_told(row['record'])}"
         )
-    report = {"options": asdict(options), "rows": rows}
-    text = markdown(options.benchmark, rows, notes(options))
-    write_atomic(out / "report.json", (json.dumps(report, indent=1) + "\n").encode())
-    write_atomic(out / "report.md", text.encode())
+    told = asdict(options)
+    told.pop("partnet")  # a path of this machine
+    report = {"options": told, "rows": rows}
+    text, name = markdown(options.benchmark, rows, notes(options)), f"report{options.suffix}"
+    write_atomic(out / f"{name}.json", (json.dumps(report, indent=1) + "\n").encode())
+    write_atomic(out / f"{name}.md", text.encode())
     pictures, views = drawn(options, out, say)
-    write_atomic(out / "report.html", html_page(text, f"{options.benchmark}, compared", pictures, views).encode())
-    say(f"report: {out / 'report.html'}, report.md, report.json")
+    write_atomic(out / f"{name}.html", html_page(text, f"{options.benchmark}, compared", pictures, views).encode())
+    say(f"report: {out / name}.html, {name}.md, {name}.json")
     return report
 
 
@@ -189,7 +210,7 @@ def _told(record: dict[str, Any]) -> str:
 def _asked(options: ComparisonOptions, method: StoredMethod) -> dict[str, Any]:
     """What a row depends on, in JSON's terms."""
     own = asdict(options)
-    for name in ("categories", "methods"):
+    for name in ("categories", "methods", "row", "partnet"):  # what the name of the file tells, or what is elsewhere
         own.pop(name)
     own["method"] = method
     own["arm"] = load(Path(options.arm)).sha256 if options.arm else ""
@@ -242,8 +263,8 @@ def trained(
 def tested_views(options: ComparisonOptions, category: str) -> tuple[list[ArticulatedObject], list[Sample]]:
     """Objects that nothing was learnt from, and views of them: always the same ones."""
     if options.benchmark == "artimage":
-        objects = row_objects("procedural", category, None, options.objects)
-        return objects, row_samples("procedural", objects, options.views, options.num_points)
+        objects = row_objects(options.row, category, Path(options.partnet), options.objects)
+        return objects, row_samples(options.row, objects, options.views, options.num_points)
     arm = load(Path(options.arm)) if options.arm else seven_part_arm()
     return [arm], arm_samples(arm, options.views, options.num_points)
 
@@ -259,9 +280,13 @@ def arm_folder(out: Path) -> Path:
 def notes(options: ComparisonOptions) -> list[str]:
     """How a report is made, for people."""
     train = "" if not options.train else f", with {json.dumps(options.train)}"
+    objects = {
+        "procedural": "Objects and views are made here.",
+        "real": "Objects are real, of the half for testing; no method has learnt from a real one. Views are made here.",
+    }[options.row]
     lines = [
         f"Trainings have the preset {options.preset}{train}.",
-        "Objects and views are made here. Published figures are of other images, in columns of their own.",
+        f"{objects} Published figures are of other images, in columns of their own.",
         "Brackets have the 95 % interval of the mean, by a bootstrap over objects.",
         *(["These trainings are far too short: no figure of them says anything of a method."] if options.train else []),
         "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",

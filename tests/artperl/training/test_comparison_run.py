@@ -49,6 +49,28 @@ def test_a_report_has_every_method_and_goes_on_where_it_stopped(tmp_path: Path) 
         run_comparison(replace(TINY, views=1), tmp_path, 0, False, said.append)
 
 
+@pytest.mark.slow
+def test_real_objects_are_another_row_of_the_same_trainings(tmp_path: Path, partnet_dir: Path) -> None:
+    said: list[str] = []
+    asked = replace(TINY, methods=("full",), categories=("laptop", "scissors"), row="real", partnet=str(partnet_dir))
+    report = run_comparison(asked, tmp_path, 0, False, said.append)
+    assert "scissors: no real object to test on" in said
+    assert report["rows"]["laptop"]["full"]["objects"] == 7
+    assert report["rows"]["laptop"]["full"]["parts"][0]["rotation_deg"]["mean"] < 5.0
+    assert str(partnet_dir) not in (tmp_path / "report-real.json").read_text()
+    assert "Objects are real" in (tmp_path / "report-real.md").read_text()
+    assert [path.name for path in (tmp_path / "rows").iterdir()] == ["laptop-full-real.json"]
+
+
+def test_real_objects_are_asked_for_where_there_are_some() -> None:
+    with pytest.raises(ConfigError, match="set ARTSIM_PARTNET_DIR"):
+        ComparisonOptions(row="real")
+    with pytest.raises(ConfigError, match="there is no real scissors"):
+        ComparisonOptions(categories=("scissors",), row="real", partnet="partnet")
+    with pytest.raises(ConfigError, match="robotarm has no real objects"):
+        ComparisonOptions("robotarm", row="real", partnet="partnet")
+
+
 def test_methods_and_categories_are_those_of_the_benchmark() -> None:
     with pytest.raises(ConfigError, match="robotarm has no omad"):
         ComparisonOptions("robotarm", methods=("omad",))
