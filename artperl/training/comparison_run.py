@@ -24,6 +24,7 @@ from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.methods import StoredMethod
 from artperl.methods.protocol import Method
 from artperl.training.options import PRESETS, TrainOptions, preset_of
+from artperl.training.recipes import about_tested
 from artperl.training.run import Training
 from artperl.viewer import page
 from artsim.common.files import read_json, write_atomic
@@ -254,8 +255,10 @@ def trained(
     if method == "full" and options.benchmark == "artimage" and not options.retrain_full:
         return load_estimator(WEIGHTS / category)
     folder = out / "train" / f"{category}-{method}"
-    say(f"training {method} on {category} in {folder}: it may be stopped, and goes on by the same command")
-    Training(training_options(options, category, method, out), folder, workers, progress).run()
+    training = Training(training_options(options, category, method, out), folder, workers, progress)
+    if not about_tested(folder):
+        say(f"training {method} on {category} in {folder}: it may be stopped, and goes on by the same command")
+        training.run()
     name: str = method
     return load_estimator(folder / "best", method=name)
 

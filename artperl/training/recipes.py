@@ -95,12 +95,17 @@ def provenance(options: TrainOptions, recipe: Recipe | None) -> dict[str, Any]:
 
 def is_made(out: Path, recipe: Recipe) -> bool:
     """Whether the run in a folder has made and tested the estimator of this very recipe."""
+    found = about_tested(out).get("recipe")
+    return isinstance(found, dict) and found.get("sha256") == recipe.sha256
+
+
+def about_tested(out: Path) -> dict[str, Any]:
+    """What the estimator of a run says of itself; nothing before the run has come to its end, its test."""
     try:
-        about = read_settings(out / "best")["about"]
+        about: dict[str, Any] = read_settings(out / "best")["about"]
     except DatasetError:
-        return False
-    found = about.get("recipe")
-    return "test" in about and isinstance(found, dict) and found.get("sha256") == recipe.sha256
+        return {}
+    return about if "test" in about else {}
 
 
 def commit() -> str:

@@ -45,6 +45,9 @@ def test_a_report_has_every_method_and_goes_on_where_it_stopped(tmp_path: Path) 
     (tmp_path / "rows" / "laptop-full.json").unlink()
     again = run_comparison(TINY, tmp_path, 0, False, said.append)
     assert again["rows"]["laptop"]["ancsh"]["seconds"] == 1234.5
+    row.unlink()  # a run that has come to its end is not run again
+    run_comparison(TINY, tmp_path, 0, False, said.append)
+    assert sum("training ancsh" in line for line in said) == 1
     with pytest.raises(ConfigError, match="figures of other options"):
         run_comparison(replace(TINY, views=1), tmp_path, 0, False, said.append)
 
