@@ -203,7 +203,7 @@ class Evaluate:
             self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
         )
         views, parts = self.views or 4, learnt.get("parts", "artimage")
-        categories = self.category or tuple(learnt.get("categories", estimator.categories))
+        categories = tuple(dict.fromkeys(self.category or learnt.get("categories", estimator.categories)))
         if self.files:
             sources = find_sources(self.files, self.package_root)
             objects = [match_category(source.load(), categories, parts) for source in sources]

@@ -79,12 +79,19 @@ def iou_rest_exact(center: ArrayLike, size: ArrayLike, true_center: ArrayLike, t
     return iou_aligned(center, size, true_center, true_size)
 
 
+def direction_error(estimate: ArrayLike, truth: ArrayLike) -> Array:
+    """Angle between directions (..., 3), degrees, 0 to 180."""
+    estimate, truth = np.asarray(estimate, np.float64), np.asarray(truth, np.float64)
+    angle: Array = np.rad2deg(
+        np.arctan2(np.linalg.norm(np.cross(estimate, truth), axis=-1), (estimate * truth).sum(-1))
+    )
+    return angle
+
+
 def axis_error(estimate: ArrayLike, truth: ArrayLike) -> Array:
     """Angle between directions (..., 3), degrees, 0 to 90: opposite directions are one axis."""
-    a, b = np.asarray(estimate, np.float64), np.asarray(truth, np.float64)
-    sine, cosine = np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)
-    angle: Array = np.rad2deg(np.arctan2(sine, np.abs(cosine)))
-    return angle
+    angle = direction_error(estimate, truth)
+    return np.minimum(angle, 180.0 - angle)
 
 
 def state_error(estimate: ArrayLike, truth: ArrayLike, joint_type: Sequence[str]) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,12 @@ from scipy.optimize import linear_sum_assignment
 
 from artperl.core.confidence import PartSymptoms, Symptoms
 from artperl.core.estimate import Estimate
-from artperl.evaluation.metrics import METRICS, rotation_error, translation_error, true_poses
+from artperl.evaluation.metrics import METRICS, direction_error, rotation_error, translation_error, true_poses
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.interference import FOREIGN
+from artsim.observing.roundness import round_axes
 from artsim.observing.sample import Sample
 from artsim.observing.symmetry import Symmetry, equivalent_sample, symmetries
 
@@ -44,8 +45,8 @@ class Scored:
     errors : dict of (K,) float
         Values of :data:`artperl.evaluation.metrics.METRICS`, by the same keys.
     parts_found : float
-        Share of parts with an estimated one of their own near their true pose, whatever its number; of as many as there
-        are, or as were estimated if those are more.
+        Share of parts with an estimated one of their own near their true pose, or one that looks the same, whatever its
+        number; of as many as there are, or as were estimated if those are more.
     segmentation : float
         Share of points with the right part.
     failed : bool
@@ -95,7 +96,16 @@ class Scored:
         return bool((self.rotation <= _RIGHT[0]).all() and (self.translation <= _RIGHT[1]).all())
 
 
-Symmetries = Mapping[str, Sequence[Symmetry]]
+class LooksSame(NamedTuple):
+    """Turns of an object and of its parts that nobody sees."""
+
+    whole: Sequence[Symmetry] = ()
+    """Of the object as a whole, with parts exchanged."""
+    round: Sequence[Array] = ()
+    """Of each part, axes (A, 3) that it is round about; none for objects of which that is not known."""
+
+
+Symmetries = Mapping[str, LooksSame]
 """SHA-256 of an object -> the ways in which it looks the same."""
 
 
@@ -105,23 +115,24 @@ def evaluate(
     """Score an estimator on samples, one at a time; where symmetries are given, up to these as well."""
     views = track("evaluating", samples, unit="view", leave=False, shown=progress)
     known = symmetric or {}
-    return [score(estimator, sample, known.get(sample.object_sha256, ())) for sample in views]
+    return [score(estimator, sample, known.get(sample.object_sha256, LooksSame())) for sample in views]
 
 
-def object_symmetries(objects: Iterable[ArticulatedObject]) -> dict[str, tuple[Symmetry, ...]]:
-    """Symmetries of those objects that have any, by the objects' SHA-256."""
-    found = {obj.sha256: symmetries(obj) for obj in objects}
-    return {digest: some for digest, some in found.items() if some}
+def object_symmetries(objects: Iterable[ArticulatedObject]) -> dict[str, LooksSame]:
+    """In what ways each object looks the same, by the objects' SHA-256."""
+    return {obj.sha256: LooksSame(symmetries(obj), round_axes(obj)) for obj in objects}
 
 
 def evaluate_foreign(estimator: Estimating, samples: Iterable[Sample]) -> list[Scored]:
     """Scores of estimates for objects that are not of the estimator's categories: whatever it says is wrong."""
     estimates = ((sample, estimator(sample.points)) for sample in samples)
-    return [_mismatch(sample, estimate, sum(estimate.milliseconds.values())) for sample, estimate in estimates]
+    return [
+        _mismatch(sample, estimate, sum(estimate.milliseconds.values()), LooksSame()) for sample, estimate in estimates
+    ]
 
 
-def score(estimator: Estimating, sample: Sample, symmetric: Sequence[Symmetry] = ()) -> Scored:
-    """Errors of the estimate of one sample, whose object has these symmetries."""
+def score(estimator: Estimating, sample: Sample, symmetric: LooksSame = LooksSame()) -> Scored:  # noqa: B008
+    """Errors of the estimate of one sample, whose object looks the same in these ways."""
     begun = time.perf_counter()
     try:
         estimate = estimator(sample.points)
@@ -129,30 +140,35 @@ def score(estimator: Estimating, sample: Sample, symmetric: Sequence[Symmetry] =
         return _failure(sample, 1e3 * (time.perf_counter() - begun))
     milliseconds = 1e3 * (time.perf_counter() - begun)
     if len(estimate.state) != len(sample.joint_type):
-        return _mismatch(sample, estimate, milliseconds)
+        return _mismatch(sample, estimate, milliseconds, symmetric)
     return compare(estimate, sample, milliseconds, symmetric)
 
 
-def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: Sequence[Symmetry] = ()) -> Scored:
+def compare(
+    estimate: Estimate,
+    sample: Sample,
+    milliseconds: float,
+    symmetric: LooksSame = LooksSame(),  # noqa: B008
+) -> Scored:
     """Errors of an estimate that has as many parts as the sample.
 
     Of the truths that look the same, the nearest is that of the least mean error in rotation.
     """
     errors = _errors(estimate, sample)
-    others = [_errors(estimate, equivalent_sample(sample, symmetry)) for symmetry in symmetric]
+    others = [_errors(estimate, equivalent_sample(sample, symmetry)) for symmetry in symmetric.whole]
     nearest = min([errors, *others], key=lambda found: float(found["rotation_deg"].mean())) if others else None
     return Scored(
         category=sample.category,
         errors=errors,
         symmetric_errors=nearest,
-        parts_found=match_share(estimate, sample),
+        parts_found=match_share(estimate, sample, symmetric),
         segmentation=float((estimate.part == np.where(sample.part == FOREIGN, -1, sample.part.astype(int))).mean()),
         failed=False,
         symptoms=estimate.symptoms,
         confidence=estimate.confidence,
         milliseconds=milliseconds,
         part_confidence=estimate.part_confidence,
-        part_right=match_parts(estimate, sample),
+        part_right=match_parts(estimate, sample, symmetric),
         part_symptoms=estimate.part_symptoms,
     )
 
@@ -161,15 +177,31 @@ def _errors(estimate: Estimate, sample: Sample) -> dict[str, Array]:
     return {name: metric.errors(estimate, sample) for name, metric in METRICS.items()}
 
 
-def match_share(estimate: Estimate, sample: Sample) -> float:
+def match_share(estimate: Estimate, sample: Sample, symmetric: LooksSame = LooksSame()) -> float:  # noqa: B008
     """See :attr:`Scored.parts_found`."""
-    return float(match_parts(estimate, sample).sum() / max(len(estimate.rotation), len(sample.box_size)))
+    return float(match_parts(estimate, sample, symmetric).sum() / max(len(estimate.rotation), len(sample.box_size)))
 
 
-def match_parts(estimate: Estimate, sample: Sample) -> NDArray[np.bool_]:
-    """See :attr:`Scored.part_right`."""
+def match_parts(
+    estimate: Estimate,
+    sample: Sample,
+    symmetric: LooksSame = LooksSame(),  # noqa: B008
+) -> NDArray[np.bool_]:
+    """See :attr:`Scored.part_right`: of the truths that look the same, by the one that most parts are near to."""
+    found = [_matched(estimate, sample, symmetric.round)]
+    for symmetry in symmetric.whole:
+        axes = [symmetric.round[k] @ symmetry.rotation for k in symmetry.parts] if symmetric.round else ()
+        found.append(_matched(estimate, equivalent_sample(sample, symmetry), axes))
+    return max(found, key=np.count_nonzero)
+
+
+def _matched(estimate: Estimate, sample: Sample, round_axes: Sequence[Array]) -> NDArray[np.bool_]:
+    """Whether each estimated part is near a true one of its own; how far a round one is turned does not count."""
     rotation, center = true_poses(sample)
     off = rotation_error(estimate.rotation[:, None], rotation[None])
+    for k, axes in enumerate(round_axes):
+        if len(axes):
+            off[:, k] = direction_error(estimate.rotation @ axes[0], rotation[k] @ axes[0]) if len(axes) == 1 else 0.0
     away = translation_error(estimate.translation[:, None], center[None], sample.diagonal)
     near = (off <= _RIGHT[0]) & (away <= _RIGHT[1])
     estimated, true = linear_sum_assignment(near, maximize=True)
@@ -203,13 +235,17 @@ def mean_iou(scored: Sequence[Scored]) -> float:
     return float(np.mean(np.concatenate([s.errors[name] for s in scored for name in ("iou_exact", "iou_rest_exact")])))
 
 
-def _mismatch(sample: Sample, estimate: Estimate, milliseconds: float) -> Scored:
+def _mismatch(sample: Sample, estimate: Estimate, milliseconds: float, symmetric: LooksSame) -> Scored:
     """An estimate with other parts than the object has: it fails, but says how well it fits."""
     return replace(
-        _failure(sample, milliseconds), parts_found=match_share(estimate, sample), symptoms=estimate.symptoms,
-        confidence=estimate.confidence, part_confidence=estimate.part_confidence,
-        part_right=match_parts(estimate, sample), part_symptoms=estimate.part_symptoms,
-    )  # fmt: skip
+        _failure(sample, milliseconds),
+        parts_found=match_share(estimate, sample, symmetric),
+        symptoms=estimate.symptoms,
+        confidence=estimate.confidence,
+        part_confidence=estimate.part_confidence,
+        part_right=match_parts(estimate, sample, symmetric),
+        part_symptoms=estimate.part_symptoms,
+    )
 
 
 def _failure(sample: Sample, milliseconds: float) -> Scored:

@@ -62,7 +62,7 @@ def symmetries(obj: ArticulatedObject, tolerance: float = TOLERANCE) -> tuple[Sy
     ]
     if not possible:  # of most objects, whose surfaces take long
         return ()
-    clouds = [_surface(obj, k) for k in range(len(obj))]
+    clouds = [surface_points(obj, k) for k in range(len(obj))]
     trees = [cKDTree(cloud) if len(cloud) else None for cloud in clouds]
     return tuple(
         own for own in possible
@@ -107,7 +107,7 @@ def _cube_rotations() -> list[Array]:
     return found
 
 
-def _surface(obj: ArticulatedObject, k: int) -> Array:
+def surface_points(obj: ArticulatedObject, k: int) -> Array:
     """(N, 3) points spread evenly over a part's faces; always the same."""
     part = obj.parts[k]
     if len(part.faces) == 0:

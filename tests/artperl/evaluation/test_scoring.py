@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from artperl.evaluation.metrics import METRICS, true_poses
 from artperl.evaluation.samples import frozen_samples, samples_of
@@ -14,7 +15,7 @@ from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
 from artsim.errors import ArtsimError
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import box
+from artsim.making.solids import box, cylinder
 from artsim.observing.sample import Sample
 from artsim.observing.symmetry import equivalent_sample
 
@@ -86,7 +87,8 @@ def test_an_estimate_with_equal_parts_exchanged_is_right_up_to_symmetry(estimato
     assembly.add("upper", box((-0.02, -0.2, 0.011), (0.02, 0.1, 0.021)), joint, density=500.0)
     (sample,) = samples_of([assembly.build("scissors", "0")], 1)
     known = object_symmetries([assembly.build("scissors", "0")])
-    (symmetry,) = known[sample.object_sha256]
+    alike = known[sample.object_sha256]
+    (symmetry,) = alike.whole
     other = equivalent_sample(sample, symmetry)
     rotation, center = true_poses(other)
     exchanged = replace(
@@ -94,7 +96,7 @@ def test_an_estimate_with_equal_parts_exchanged_is_right_up_to_symmetry(estimato
         T_camera_part=other.T_camera_part, state=other.joint_state, joint_axis=other.joint_axis_camera,
         part=other.part.astype(np.int64),
     )  # fmt: skip
-    scored = compare(exchanged, sample, 1.0, [symmetry])
+    scored = compare(exchanged, sample, 1.0, alike)
     assert not scored.right
     assert scored.rotation.max() > 90.0
     judged = scored.up_to_symmetry
@@ -105,3 +107,28 @@ def test_an_estimate_with_equal_parts_exchanged_is_right_up_to_symmetry(estimato
     assert figures["up_to_symmetry"]["right"] == 1.0
     assert "up to symmetry (in 100 % of views): 100 % right" in table(summary([scored]))
     assert "up_to_symmetry" not in summary([compare(exchanged, sample, 1.0)])["scissors"]
+
+
+def test_how_far_a_round_part_is_turned_does_not_count_but_where_its_axis_points_does(estimator: Estimator) -> None:
+    assembly = Assembly()
+    assembly.add("body", cylinder((0, 0, 0), (0, 0, 0.2), 0.04), density=500.0)
+    turning = revolute("body", (0, 0, 1), (0, 0, 0.2), 0.0, 1.0)
+    assembly.add("lid", box((-0.03, -0.01, 0.201), (0.03, 0.01, 0.22)), turning, density=500.0)
+    bottle = assembly.build("bottle", "0")
+    (sample,) = samples_of([bottle], 1)
+    known = object_symmetries([bottle])[bottle.sha256]
+    rotation, center = true_poses(sample)
+    seen = replace(estimator(sample.points), rotation=rotation, translation=center)
+
+    def found(k: int, axis: list[float]) -> float:
+        turned = rotation.copy()
+        turned[k] = rotation[k] @ Rotation.from_rotvec(np.deg2rad(70.0) * np.array(axis)).as_matrix()
+        return match_share(replace(seen, rotation=turned), sample, known)
+
+    assert found(0, [0, 0, 1]) == 1.0
+    assert found(0, [1, 0, 0]) == 0.5  # it leans
+    assert found(1, [0, 0, 1]) == 0.5  # a bar is not round
+    upside_down = rotation.copy()
+    upside_down[0] = rotation[0] @ np.diag([1.0, -1.0, -1.0])
+    assert match_share(replace(seen, rotation=upside_down), sample, known) == 0.5
+    assert match_share(replace(seen, rotation=rotation @ np.diag([-1.0, -1.0, 1.0])), sample) == 0.0  # nothing known
