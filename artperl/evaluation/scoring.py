@@ -105,6 +105,8 @@ class LooksSame(NamedTuple):
     """Of each part, axes (A, 3) that it is round about; none for objects of which that is not known."""
 
 
+AS_IT_IS = LooksSame()
+"""Of an object that looks the same in no other way, or of which that is not known."""
 Symmetries = Mapping[str, LooksSame]
 """SHA-256 of an object -> the ways in which it looks the same."""
 
@@ -115,7 +117,7 @@ def evaluate(
     """Score an estimator on samples, one at a time; where symmetries are given, up to these as well."""
     views = track("evaluating", samples, unit="view", leave=False, shown=progress)
     known = symmetric or {}
-    return [score(estimator, sample, known.get(sample.object_sha256, LooksSame())) for sample in views]
+    return [score(estimator, sample, known.get(sample.object_sha256, AS_IT_IS)) for sample in views]
 
 
 def object_symmetries(objects: Iterable[ArticulatedObject]) -> dict[str, LooksSame]:
@@ -127,11 +129,11 @@ def evaluate_foreign(estimator: Estimating, samples: Iterable[Sample]) -> list[S
     """Scores of estimates for objects that are not of the estimator's categories: whatever it says is wrong."""
     estimates = ((sample, estimator(sample.points)) for sample in samples)
     return [
-        _mismatch(sample, estimate, sum(estimate.milliseconds.values()), LooksSame()) for sample, estimate in estimates
+        _mismatch(sample, estimate, sum(estimate.milliseconds.values()), AS_IT_IS) for sample, estimate in estimates
     ]
 
 
-def score(estimator: Estimating, sample: Sample, symmetric: LooksSame = LooksSame()) -> Scored:  # noqa: B008
+def score(estimator: Estimating, sample: Sample, symmetric: LooksSame = AS_IT_IS) -> Scored:
     """Errors of the estimate of one sample, whose object looks the same in these ways."""
     begun = time.perf_counter()
     try:
@@ -144,31 +146,26 @@ def score(estimator: Estimating, sample: Sample, symmetric: LooksSame = LooksSam
     return compare(estimate, sample, milliseconds, symmetric)
 
 
-def compare(
-    estimate: Estimate,
-    sample: Sample,
-    milliseconds: float,
-    symmetric: LooksSame = LooksSame(),  # noqa: B008
-) -> Scored:
+def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: LooksSame = AS_IT_IS) -> Scored:
     """Errors of an estimate that has as many parts as the sample.
 
     Of the truths that look the same, the nearest is that of the least mean error in rotation.
     """
-    errors = _errors(estimate, sample)
+    errors, part_right = _errors(estimate, sample), match_parts(estimate, sample, symmetric)
     others = [_errors(estimate, equivalent_sample(sample, symmetry)) for symmetry in symmetric.whole]
     nearest = min([errors, *others], key=lambda found: float(found["rotation_deg"].mean())) if others else None
     return Scored(
         category=sample.category,
         errors=errors,
         symmetric_errors=nearest,
-        parts_found=match_share(estimate, sample, symmetric),
+        parts_found=found_share(part_right, sample),
         segmentation=float((estimate.part == np.where(sample.part == FOREIGN, -1, sample.part.astype(int))).mean()),
         failed=False,
         symptoms=estimate.symptoms,
         confidence=estimate.confidence,
         milliseconds=milliseconds,
         part_confidence=estimate.part_confidence,
-        part_right=match_parts(estimate, sample, symmetric),
+        part_right=part_right,
         part_symptoms=estimate.part_symptoms,
     )
 
@@ -177,16 +174,12 @@ def _errors(estimate: Estimate, sample: Sample) -> dict[str, Array]:
     return {name: metric.errors(estimate, sample) for name, metric in METRICS.items()}
 
 
-def match_share(estimate: Estimate, sample: Sample, symmetric: LooksSame = LooksSame()) -> float:  # noqa: B008
-    """See :attr:`Scored.parts_found`."""
-    return float(match_parts(estimate, sample, symmetric).sum() / max(len(estimate.rotation), len(sample.box_size)))
+def found_share(part_right: NDArray[np.bool_], sample: Sample) -> float:
+    """:attr:`Scored.parts_found` of estimated parts of which it is known whether they are right."""
+    return float(part_right.sum() / max(len(part_right), len(sample.box_size)))
 
 
-def match_parts(
-    estimate: Estimate,
-    sample: Sample,
-    symmetric: LooksSame = LooksSame(),  # noqa: B008
-) -> NDArray[np.bool_]:
+def match_parts(estimate: Estimate, sample: Sample, symmetric: LooksSame = AS_IT_IS) -> NDArray[np.bool_]:
     """See :attr:`Scored.part_right`: of the truths that look the same, by the one that most parts are near to."""
     found = [_matched(estimate, sample, symmetric.round)]
     for symmetry in symmetric.whole:
@@ -195,11 +188,11 @@ def match_parts(
     return max(found, key=np.count_nonzero)
 
 
-def _matched(estimate: Estimate, sample: Sample, round_axes: Sequence[Array]) -> NDArray[np.bool_]:
+def _matched(estimate: Estimate, sample: Sample, round_about: Sequence[Array]) -> NDArray[np.bool_]:
     """Whether each estimated part is near a true one of its own; how far a round one is turned does not count."""
     rotation, center = true_poses(sample)
     off = rotation_error(estimate.rotation[:, None], rotation[None])
-    for k, axes in enumerate(round_axes):
+    for k, axes in enumerate(round_about):
         if len(axes):
             off[:, k] = direction_error(estimate.rotation @ axes[0], rotation[k] @ axes[0]) if len(axes) == 1 else 0.0
     away = translation_error(estimate.translation[:, None], center[None], sample.diagonal)
@@ -237,13 +230,14 @@ def mean_iou(scored: Sequence[Scored]) -> float:
 
 def _mismatch(sample: Sample, estimate: Estimate, milliseconds: float, symmetric: LooksSame) -> Scored:
     """An estimate with other parts than the object has: it fails, but says how well it fits."""
+    part_right = match_parts(estimate, sample, symmetric)
     return replace(
         _failure(sample, milliseconds),
-        parts_found=match_share(estimate, sample, symmetric),
+        parts_found=found_share(part_right, sample),
         symptoms=estimate.symptoms,
         confidence=estimate.confidence,
         part_confidence=estimate.part_confidence,
-        part_right=match_parts(estimate, sample, symmetric),
+        part_right=part_right,
         part_symptoms=estimate.part_symptoms,
     )
 

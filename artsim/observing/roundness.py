@@ -15,12 +15,12 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.symmetry import surface_points
 
 _TOLERANCE = 0.03
-"""In the part's own diagonals: most points of the turned surface lie that near to the surface, as those of a prism of
-eight sides and more do."""
+"""In the part's own diagonals: most points of the turned surface lie that near to the surface. Those of prisms of eight
+sides and more do; of six and seven sides, those of thin plates and long bars may."""
 _MOST = 0.98
 _PROBES = 500
 _TURNS = np.deg2rad([25.0, 47.0, 77.0])
-"""No prism of fewer sides is the same after all three."""
+"""No prism of five sides and fewer is the same after all three."""
 _PARALLEL = np.cos(np.deg2rad(3.0))
 
 
@@ -29,23 +29,39 @@ def round_axes(obj: ArticulatedObject) -> tuple[Array, ...]:
 
     A is 0 for most parts, 1 for round ones, and more for balls and for parts without a surface.
     """
-    return tuple(_of_part(surface_points(obj, k), np.asarray(obj.tree.axes[k])) for k in range(len(obj)))
+    return tuple(_of_part(obj, k) for k in range(len(obj)))
 
 
-def _of_part(points: Array, joint_axis: Array) -> Array:
-    if len(points) == 0:
+def _of_part(obj: ArticulatedObject, k: int) -> Array:
+    part = obj.parts[k]
+    if len(part.faces) == 0:
         return np.eye(3)
-    low, high = points.min(0), points.max(0)
-    points = points - 0.5 * (low + high)
-    bound, tree = _TOLERANCE * float(np.linalg.norm(high - low)), cKDTree(points)
+    corners = obj.scale * part.vertices[np.unique(part.faces)]
+    bound = _TOLERANCE * float(np.linalg.norm(np.ptp(corners, axis=0)))
+    axes = [axis for axis in _candidates(obj.tree.axes[k]) if _as_wide_as_high(corners, axis, 2.0 * bound)]
+    if not axes:  # of most parts, whose surfaces take long
+        return np.zeros((0, 3))
+    points = surface_points(obj, k)
+    points = points - 0.5 * (points.min(0) + points.max(0))
+    tree = cKDTree(points)
 
     def same(turn: Array) -> bool:
         away, _ = tree.query(points[:_PROBES] @ Rotation.from_rotvec(turn).as_matrix().T)
         return bool(np.quantile(away, _MOST) <= bound)
 
-    found: list[Array] = []
-    for axis in (*np.eye(3), joint_axis):
-        known = any(abs(axis @ other) > _PARALLEL for other in found)
-        if not known and axis.any() and all(same(turn * axis) and same(-turn * axis) for turn in _TURNS):
-            found.append(axis)
+    found = [axis for axis in axes if all(same(turn * axis) and same(-turn * axis) for turn in _TURNS)]
     return np.array(found).reshape(-1, 3)
+
+
+def _candidates(joint_axis: Array) -> list[Array]:
+    """Axes of the rest frame, and that of the joint unless it is one of them, or there is none."""
+    along = np.abs(joint_axis).max()
+    return [*np.eye(3), *([] if along == 0.0 or along > _PARALLEL else [np.asarray(joint_axis)])]
+
+
+def _as_wide_as_high(corners: Array, axis: Array, tolerance: float) -> bool:
+    """Whether points reach equally far in two directions across an axis."""
+    one = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    one /= np.linalg.norm(one)
+    width, height = (np.ptp(corners @ across) for across in (one, np.cross(axis, one)))
+    return bool(abs(width - height) <= tolerance)

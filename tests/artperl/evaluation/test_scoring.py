@@ -10,7 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from artperl.evaluation.metrics import METRICS, true_poses
 from artperl.evaluation.samples import frozen_samples, samples_of
-from artperl.evaluation.scoring import compare, evaluate, evaluate_foreign, headline, match_share, object_symmetries
+from artperl.evaluation.scoring import (
+    compare,
+    evaluate,
+    evaluate_foreign,
+    found_share,
+    headline,
+    match_parts,
+    object_symmetries,
+)
 from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
 from artsim.errors import ArtsimError
@@ -40,12 +48,15 @@ def test_a_perfect_estimate_has_no_error(estimator: Estimator, sample: Sample) -
 def test_parts_are_found_whatever_their_numbers_are(estimator: Estimator, sample: Sample) -> None:
     rotation, center = true_poses(sample)
     seen = replace(estimator(sample.points), rotation=rotation, translation=center)
-    assert match_share(replace(seen, rotation=rotation[::-1], translation=center[::-1]), sample) == 1.0
+    assert (
+        found_share(match_parts(replace(seen, rotation=rotation[::-1], translation=center[::-1]), sample), sample)
+        == 1.0
+    )
     away = center + [[0, 0, 0], [0, 0, 0.06 * sample.diagonal]]
-    assert match_share(replace(seen, translation=away), sample) == 0.5
+    assert found_share(match_parts(replace(seen, translation=away), sample), sample) == 0.5
     twice = replace(seen, rotation=rotation[[0, 1, 1, 1]], translation=center[[0, 1, 1, 1]])
-    assert match_share(twice, sample) == 0.5  # two parts too many
-    assert match_share(replace(seen, rotation=rotation[:1], translation=center[:1]), sample) == 0.5
+    assert found_share(match_parts(twice, sample), sample) == 0.5  # two parts too many
+    assert found_share(match_parts(replace(seen, rotation=rotation[:1], translation=center[:1]), sample), sample) == 0.5
 
 
 def test_failures_count_with_the_worst_values(sample: Sample) -> None:
@@ -123,12 +134,13 @@ def test_how_far_a_round_part_is_turned_does_not_count_but_where_its_axis_points
     def found(k: int, axis: list[float]) -> float:
         turned = rotation.copy()
         turned[k] = rotation[k] @ Rotation.from_rotvec(np.deg2rad(70.0) * np.array(axis)).as_matrix()
-        return match_share(replace(seen, rotation=turned), sample, known)
+        return found_share(match_parts(replace(seen, rotation=turned), sample, known), sample)
 
     assert found(0, [0, 0, 1]) == 1.0
     assert found(0, [1, 0, 0]) == 0.5  # it leans
     assert found(1, [0, 0, 1]) == 0.5  # a bar is not round
     upside_down = rotation.copy()
     upside_down[0] = rotation[0] @ np.diag([1.0, -1.0, -1.0])
-    assert match_share(replace(seen, rotation=upside_down), sample, known) == 0.5
-    assert match_share(replace(seen, rotation=rotation @ np.diag([-1.0, -1.0, 1.0])), sample) == 0.0  # nothing known
+    assert found_share(match_parts(replace(seen, rotation=upside_down), sample, known), sample) == 0.5
+    nothing_known = match_parts(replace(seen, rotation=rotation @ np.diag([-1.0, -1.0, 1.0])), sample)
+    assert found_share(nothing_known, sample) == 0.0

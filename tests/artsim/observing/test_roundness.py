@@ -8,7 +8,7 @@ import trimesh
 
 from artsim.loading.sources import FamilySource
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, box, cylinder
+from artsim.making.solids import Solid, box, cylinder, prism
 from artsim.observing.roundness import round_axes
 
 _LEANING = np.array([0.6, 0.0, 0.8])
@@ -36,6 +36,14 @@ def test_a_cylinder_that_leans_is_round_about_the_axis_of_its_joint() -> None:
     assert len(axes_of(leaning)) == 0  # about an axis that is none of its own
 
 
+@pytest.mark.parametrize("height", [0.005, 0.1, 0.4])
+def test_prisms_of_many_sides_are_round_and_those_of_few_are_not(height: float) -> None:
+    for sides in (3, 4, 5, 8, 9, 12):
+        angle = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+        outline = 0.1 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        assert len(axes_of(prism(outline, 0.0, height))) == (sides >= 8), sides
+
+
 def test_a_cube_and_a_plate_are_not_round() -> None:
     assert len(axes_of(box((0, 0, 0), (0.1, 0.1, 0.1)))) == 0
     assert len(axes_of(box((0, 0, 0), (0.2, 0.1, 0.01)))) == 0
@@ -49,7 +57,7 @@ def test_a_globe_is_a_ball() -> None:
 
 @pytest.mark.parametrize("family", ["bottle", "cart", "kettle", "kitchen_pot", "chair", "fan"])
 def test_what_is_round_has_equal_moments_of_inertia_across_its_axis(family: str) -> None:
-    """As trimesh integrates them over the surface's points. All other parts may have them, too."""
+    """Moments of points that trimesh spreads over its surface. All other parts may have equal ones, too."""
     count = 0
     for seed in range(6):
         obj = FamilySource(family, seed).load()
