@@ -35,7 +35,8 @@ def test_none_has_seen_a_real_object(name: str) -> None:
     assert options["start_from"] in (None, f"artperl/weights/{name}")  # its own earlier self
     known = {*ARTIMAGE, "storage_furniture", "robot_arm"} if name == "any" else {name}
     assert set(options["categories"]) == known
-    assert set(load_estimator(name).base.categories) == set(options["categories"])
+    left_out = {"scissors"} if name == "any" else set()  # it learnt them in another frame than the family has
+    assert set(load_estimator(name).base.categories) == set(options["categories"]) - left_out
 
 
 @pytest.mark.parametrize("category", JOINTS)
@@ -66,13 +67,23 @@ def test_objects_at_rest_are_found(category: str) -> None:
 
 
 def test_the_estimator_for_any_tree_finds_parts() -> None:
-    """In eight views of each category. Of arms it finds a tenth, which eight views do not show, of scissors nothing."""
+    """In eight views of each category. Of arms it finds a tenth, which eight views do not show."""
     estimator = load_estimator("any")
     for category, least in {
         "laptop": 0.7, "eyeglasses": 0.7, "dishwasher": 0.4, "drawer": 0.2, "storage_furniture": 0.3
     }.items():  # fmt: skip
         scored = evaluate(estimator, frozen_samples([category], 4, 2, first_seed=_SEEDS, parts="any"))
         assert np.mean([one.parts_found for one in scored]) > least, category
+
+
+def test_the_estimator_for_any_tree_is_not_sure_of_a_category_without_references() -> None:
+    """Of scissors. Of laptops it is."""
+    estimator = load_estimator("any")
+    sure, unsure = (
+        np.median([estimator(sample.points).confidence for sample in frozen_samples([name], 4, 2, first_seed=_SEEDS)])
+        for name in ("laptop", "scissors")
+    )
+    assert unsure < 0.4 < sure
 
 
 def test_who_knows_where_the_camera_is_gets_no_other_answer() -> None:
