@@ -119,14 +119,18 @@ def table(figures: dict[str, Any]) -> str:
         )
         if "up_to_symmetry" in figure:
             lines.append(" " * _NAME + _symmetric_line(figure["up_to_symmetry"]))
-        if figure["confidence_auroc"] is not None:
-            lines.append(
-                f"{'':{_NAME}s}confidence of right ones {100 * figure['confidence_of_right']:.0f} %, of wrong ones "
-                f"{100 * figure['confidence_of_wrong']:.0f} % in the median, AUROC {figure['confidence_auroc']:.2f}"
-            )
+        lines.append(" " * _NAME + _confidence_line(figure))
         if figure["detection"]["precision"] is not None:
             lines.append(" " * _NAME + part_line(figure["detection"]))
     return "\n".join(lines)
+
+
+def _confidence_line(figure: dict[str, Any]) -> str:
+    """Where all are right, or all wrong, there is no AUROC."""
+    medians = {"right": figure["confidence_of_right"], "wrong": figure["confidence_of_wrong"]}
+    told = ", ".join(f"of {kind} ones {100 * value:.0f} %" for kind, value in medians.items() if value is not None)
+    curve = figure["confidence_auroc"]
+    return f"confidence {told} in the median" + ("" if curve is None else f", AUROC {curve:.2f}")
 
 
 def _symmetric_line(figure: dict[str, Any]) -> str:
