@@ -4,6 +4,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 # Two processes of one thread each: four threads on two cores wait for each other.
 PYTEST := OMP_NUM_THREADS=1 $(PY) -m pytest -n 2
+TIMED := scripts/timed.sh
 
 # Tests start hundreds of programs: each would compile all modules anew where this is set.
 unexport PYTHONDONTWRITEBYTECODE
@@ -14,19 +15,17 @@ help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*##/\1 /p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-8s %s\n' "$$name" "$$text"; done
 
 demo: $(VENV)/.ready  ## draw all categories, make a dataset, train a small estimator, in out/demo
-	$(PY) examples/demo/main.py out/demo
+	$(TIMED) demo $(PY) examples/demo/main.py out/demo
 
 check: $(VENV)/.ready-dev lint  ## lint, types and the fast tests: in two minutes, before each commit
 	$(PYTEST) --dist worksteal -m "not slow"
 
 test: system $(VENV)/.ready-dev lint  ## lint, types and every test: what continuous integration runs
-	$(PYTEST) --dist loadfile
+	$(TIMED) tests env $(PYTEST) --dist loadfile --durations 30 --durations-min 1
 
+lint: export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 lint: $(VENV)/.ready-dev  ## format, lint, types and import contracts
-	$(VENV)/bin/ruff format --check .
-	$(VENV)/bin/ruff check .
-	$(VENV)/bin/mypy
-	$(VENV)/bin/lint-imports
+	$(TIMED) lint sh -ec 'ruff format --check .; ruff check .; mypy; lint-imports'
 
 bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 	$(PY) -m benchmarks.kinematics
@@ -67,18 +66,16 @@ assets: $(VENV)/.ready-dev  ## make the objects in urdf_assets again
 # System libraries that PyBullet's EGL renderer needs, SAPIEN's Vulkan driver and a browser for the tests of pages;
 # everything else comes from pip.
 system:  ## install what EGL, SAPIEN and the tests of pages need; wants root
-	scripts/install-system.sh
-	scripts/install-vulkan.sh
-	scripts/install-browser.sh
+	$(TIMED) "system libraries" sh -ec 'for name in system vulkan browser; do scripts/install-$$name.sh; done'
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view,train]'
+	$(TIMED) install $(PY) -m pip install --quiet -c constraints.txt -e '.[view,train,sim]'
 	touch $@
 
 $(VENV)/.ready-dev: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet -c constraints.txt -e '.[pybullet,view,train,dev]'
+	$(TIMED) "install for tests" $(PY) -m pip install --quiet -c constraints.txt -e '.[dev]'
 	touch $(VENV)/.ready $@
 
 clean:  ## remove the environment and everything made

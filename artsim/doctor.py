@@ -135,7 +135,7 @@ def _renderer_fps(name: str) -> float:
     return _rate(lambda: renderer.render(obj, obj.tree.rest, camera))
 
 
-def _processor() -> str:
+def processor() -> str:
     """Name of the processor, where the system tells."""
     try:
         with open("/proc/cpuinfo") as file:  # noqa: PTH123
@@ -147,7 +147,7 @@ def _processor() -> str:
 
 def _renderer(name: str) -> tuple[str, float | None]:
     """A renderer that draws on the processor."""
-    return _processor(), _renderer_fps(name)
+    return processor(), _renderer_fps(name)
 
 
 def _pybullet_egl() -> tuple[str, float | None]:
@@ -187,7 +187,7 @@ def _warp() -> tuple[str, float | None]:
     from artsim.renderers.warp import WarpRenderer, import_warp
 
     device = import_warp().get_device(WarpRenderer().device)
-    return str(device.name) if device.is_cuda else _processor(), _renderer_fps("warp")
+    return str(device.name) if device.is_cuda else processor(), _renderer_fps("warp")
 
 
 def _ray() -> tuple[str, float | None]:
@@ -205,7 +205,7 @@ def _torch_device() -> str:
 def _torch() -> tuple[str, float | None]:
     import torch
 
-    device = torch.cuda.get_device_name() if _torch_device() == "cuda" else _processor()
+    device = torch.cuda.get_device_name() if _torch_device() == "cuda" else processor()
     torch.ones(2, device=_torch_device()).sum().item()
     return device, None
 

@@ -20,6 +20,8 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from hypothesis import settings
 
+from artsim.common.program import cores
+from artsim.doctor import processor
 from artsim.errors import RenderError
 from artsim.families import make
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
@@ -27,6 +29,7 @@ from artsim.making.solids import box, cylinder, ring
 from artsim.model.kinematics import Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers import Renderer, make_renderer
+from tests.processors import PROCESSORS, can_run, left_out
 
 T = TypeVar("T")
 ROOT = Path(__file__).resolve().parent.parent
@@ -71,6 +74,12 @@ def pytest_collection_finish() -> None:
     """Thousands of collected tests stay: no collection of garbage need look at them, and ManiSkill collects often."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Which processor this was, and which code the tests of equal bytes leave out."""
+    kinds = [name if can_run(name) else left_out(name) for name in PROCESSORS]
+    terminalreporter.write_line(f"{processor()}, {cores()} of its cores; bytes compared {', '.join(kinds)}")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

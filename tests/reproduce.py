@@ -1,40 +1,109 @@
-"""What a processor makes of procedural objects and of a dataset: ``python -m tests.reproduce`` prints JSON."""
+"""What a processor makes of objects, clouds and a dataset: ``python -m tests.reproduce`` prints it as JSON.
+
+``python -m tests.reproduce --record`` writes the record that every processor is compared with. Do that after a change
+that gives objects or samples other bytes, with the packages of ``constraints.txt``.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import hashlib
 import json
 import os
+import re
+import sys
+import tarfile
 import tempfile
+from collections.abc import Iterator
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
+import embreex
 import numpy as np
+from embreex.rtcore import EmbreeDevice
+from embreex.rtcore_scene import EmbreeScene
 
 import artsim
 from artsim.datasets.plan import SampleOptions
+from artsim.doctor import processor
 from artsim.families import CATEGORIES, make
-from artsim.loading.sources import Source, family_sources, find_sources
-from artsim.model.draws import StateOptions, ViewOptions
+from artsim.loading.sources import family_sources, find_sources
+from artsim.model.camera import Camera
+from artsim.model.draws import StateOptions, ViewOptions, sample_state
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.capture import observe
+from artsim.observing.sample import Sample
+from artsim.observing.sensor import SENSORS
+from artsim.renderers import compiled, raycast
 from tests.conftest import ASSETS
+from tests.processors import EMBREE, can_run
 
+RECORD = Path(__file__).with_name("reproduced.json")
 NUM_SAMPLES = 120
+LOADED = [ASSETS / name for name in ("laptop", "scissors", "quirks/primitives", "quirks/formats")]
+PACKAGES = ("numpy", "scipy", "trimesh", "manifold3d", "lxml", "pillow", "pycollada")
+"""What makes bytes, other than this project: the record holds for these versions of them."""
 
 
 def main() -> None:
-    """Print name -> digest."""
+    """Print what is made here, or record it."""
+    made = everything()
+    if sys.argv[1:] != ["--record"]:
+        print(json.dumps(made))
+        return
+    record = {
+        "made on": f"{processor()}, {' '.join(name for name in EMBREE if can_run(name))}",
+        "packages": packages(),
+        **{section: made[section] for section in ("objects", "compiled objects", "labels", "noise")},
+        "clouds": made["clouds"][max(made["clouds"], key=len)],
+    }
+    RECORD.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    print(f"recorded in {RECORD}")
+
+
+def packages() -> dict[str, str]:
+    """Version of each package that makes bytes."""
+    return {name: version(name) for name in PACKAGES}
+
+
+def everything() -> dict[str, Any]:
+    """Sections of the record, and what is only compared between runs on one processor."""
+    objects = [make(category, seed) for seed, category in enumerate(CATEGORIES)]
     with tempfile.TemporaryDirectory() as folder:
-        print(json.dumps(object_digests() | dataset_digests(Path(folder) / "dataset")))
+        make_dataset(Path(folder) / "dataset")
+        files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
+        digests = {path.relative_to(folder).as_posix(): sha256(path.read_bytes()) for path in files}
+        labels = {key: digest for path in files if path.suffix == ".tar" for key, digest in label_digests(path)}
+    return {
+        "objects": object_digests(objects),
+        "real object": real_object(),
+        "compiled objects": {Path(name).stem: digest for name, digest in digests.items() if name.endswith(".npz")},
+        "labels": labels,
+        "noise": noise_digests(),
+        "clouds": {EMBREE[name]: clouds(objects, EMBREE[name]) for name in EMBREE if can_run(name)},
+        "clouds by numba": clouds_by_numba(objects),
+        "files": digests,
+    }
 
 
-def object_digests() -> dict[str, str]:
-    """An object of every family: its own SHA-256, and one of every number of its shape and its joints."""
-    digests = {}
-    for seed, category in enumerate(CATEGORIES):
-        obj = make(category, seed)
-        digests[f"{category}:{seed}"] = obj.sha256
-        digests[f"{category}:{seed} whole"] = whole_digest(obj)
-    return digests
+def sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+# --- objects ---------------------------------------------------------------------------------------------------------
+
+
+def object_digests(objects: list[ArticulatedObject]) -> dict[str, str]:
+    """Of each object its own SHA-256, and one of every number of its shape and its joints."""
+    return {
+        f"{obj.category}:{obj.object_id}{what}": digest
+        for obj in objects
+        for what, digest in (("", obj.sha256), (" whole", whole_digest(obj)))
+    }
 
 
 def whole_digest(obj: ArticulatedObject) -> str:
@@ -48,10 +117,21 @@ def whole_digest(obj: ArticulatedObject) -> str:
     return digest.hexdigest()
 
 
-def dataset_digests(folder: Path) -> dict[str, str]:
-    """Every file of a dataset of clouds and images with noise, of procedural and of loaded objects."""
+def real_object() -> str:
+    """Digest of a real object and of a cloud of it; empty where there is none. No record has it."""
+    if "ARTSIM_PARTNET_DIR" not in os.environ:
+        return ""
+    obj = artsim.load(sorted(Path(os.environ["ARTSIM_PARTNET_DIR"]).glob("*/*/mobility.urdf"))[0])
+    return whole_digest(obj) + sha256(cloud(obj).points.tobytes())
+
+
+# --- samples ---------------------------------------------------------------------------------------------------------
+
+
+def make_dataset(folder: Path) -> None:
+    """Clouds and images with noise, of every other family, of objects of files and of primitive shapes."""
     artsim.generate(
-        sources(),
+        [*family_sources(CATEGORIES[::2], 1), *find_sources(LOADED)],
         folder,
         num_samples=NUM_SAMPLES,
         sample=SampleOptions(
@@ -66,16 +146,78 @@ def dataset_digests(folder: Path) -> dict[str, str]:
         shard_size=40,
         progress=False,
     )
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def sources() -> list[Source]:
-    """Every other family, an object of files and one of primitive shapes, and a real one where there are any."""
-    paths = [ASSETS / name for name in ("laptop", "scissors", "quirks/primitives", "quirks/formats")]
-    if "ARTSIM_PARTNET_DIR" in os.environ:
-        paths += sorted(Path(os.environ["ARTSIM_PARTNET_DIR"]).glob("*/*/mobility.urdf"))[:1]
-    return [*family_sources(CATEGORIES[::2], 1), *find_sources(paths)]
+def label_digests(shard: Path) -> Iterator[tuple[str, str]]:
+    """Key and digest of the labels of each sample: poses, joints, boxes and camera.
+
+    Labels do without Embree, but for the share of each part that is visible: a ray that grazes an edge may miss it on
+    another processor.
+    """
+    with tarfile.open(shard) as archive:
+        for member in archive:
+            if member.name.endswith(".json"):
+                content = archive.extractfile(member)
+                assert content is not None
+                labels, found = re.subn(rb'"visible_fraction": ?\[[^]]*\]', b"", content.read())
+                assert found == 1, member.name
+                yield member.name.removesuffix(".json"), sha256(labels)
+
+
+def noise_digests() -> dict[str, str]:
+    """What every sensor makes of a ball before a wall: depth of which each bit is known."""
+    camera = Camera.look_at((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 64, 48)
+    row, column = np.mgrid[:48, :64]
+    ball = np.maximum(400 - (row - 24) ** 2 - (column - 30) ** 2, 0)
+    depth = (1.5 - 0.01 * np.sqrt(ball) + 0.002 * column * (ball == 0)).astype(np.float32)
+    return {
+        name: sha256(sensor.read_image(depth, camera, key).tobytes())
+        for key, (name, sensor) in enumerate(sorted(SENSORS.items()))
+    }
+
+
+def cloud(obj: ArticulatedObject) -> Sample:
+    """256 points of an object, without noise."""
+    rng = np.random.default_rng(1)
+    eye = obj.diagonal * np.array([-1.2, 0.4, 0.7])
+    camera = Camera.look_at(eye, (0.0, 0.0, 0.0), 160, 120)
+    return observe(obj, sample_state(obj, StateOptions(), rng), camera, num_points=256, rng=rng)
+
+
+def clouds(objects: list[ArticulatedObject], code: str) -> dict[str, list[float]]:
+    """Mean of the points of each object's cloud, in metres, as Embree's code for other instructions finds them."""
+    with embree(code):
+        return {obj.category: cloud(obj).points.mean(axis=0, dtype=np.float64).tolist() for obj in objects}
+
+
+def clouds_by_numba(objects: list[ArticulatedObject]) -> dict[str, str]:
+    """Digest of the clouds with the loops around the rays as NumPy does them, and as numba compiles them."""
+    made = {}
+    for name, by_numba in (("NumPy", False), ("numba", True)):
+        with compiled.use(by_numba) as used:
+            assert used == by_numba, "numba compiles nothing here"
+            made[name] = sha256(b"".join(cloud(obj).points.tobytes() for obj in objects[::3]))
+    return made
+
+
+@contextlib.contextmanager
+def embree(code: str) -> Iterator[None]:
+    """Let Embree run its code for other instructions, which embreex has no option for."""
+    library = ctypes.CDLL(str(next(Path(embreex.__path__[0] + ".libs").glob("libembree*"))))
+    library.rtcNewDevice.restype = ctypes.c_void_p
+    device = EmbreeDevice()
+    # The object holds one thing behind what every object of Python has: Embree's own device, which is exchanged.
+    assert EmbreeDevice.__basicsize__ == object.__basicsize__ + ctypes.sizeof(ctypes.c_void_p)
+    held = ctypes.c_void_p.from_address(id(device) + object.__basicsize__)
+    own, held.value = held.value, library.rtcNewDevice(f"isa={code}".encode())
+    assert held.value, f"Embree has no code {code}"
+    raycast._surfaces.clear()
+    try:
+        with patch.object(raycast, "EmbreeScene", partial(EmbreeScene, device)):
+            yield
+    finally:
+        raycast._surfaces.clear()
+        held.value = own
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """From objects, made and loaded, to labelled partial clouds, and on to an estimator of poses: all in one page."""
 
-import importlib.util
 import os
 import sys
 from pathlib import Path
@@ -15,13 +14,10 @@ ASSETS = Path(__file__).resolve().parents[2] / "urdf_assets"
 
 
 def main(out: Path) -> None:
-    # 1. Objects: procedural ones, a few URDF folders, PyBullet's Franka Panda, and real ones where there are any.
+    # 1. Objects: procedural ones, a few URDF folders, and real ones where there are any.
     out.mkdir(parents=True, exist_ok=True)
     (out / "gallery.png").write_bytes(draw_gallery([artsim.make(category) for category in sorted(CATEGORIES)]))
     objects = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
-    data = importlib.util.find_spec("pybullet_data")
-    if data is not None and data.submodule_search_locations:
-        objects.append(Path(data.submodule_search_locations[0]) / "franka_panda" / "panda.urdf")
     if "ARTSIM_PARTNET_DIR" in os.environ:
         objects.append(Path(os.environ["ARTSIM_PARTNET_DIR"]))
 
