@@ -5,6 +5,8 @@ PY := $(VENV)/bin/python
 # Two processes of one thread each: four threads on two cores wait for each other.
 PYTEST := OMP_NUM_THREADS=1 $(PY) -m pytest -n 2
 TIMED := scripts/timed.sh
+# The pinned versions exist for Python 3.11 and later.
+PINS := $(shell $(PYTHON) -c 'import sys; print("-c constraints.txt" * (sys.version_info >= (3, 11)))')
 
 # Tests start hundreds of programs: each would compile all modules anew where this is set.
 unexport PYTHONDONTWRITEBYTECODE
@@ -70,12 +72,12 @@ system:  ## install what EGL, SAPIEN and the tests of pages need; wants root
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(TIMED) install $(PY) -m pip install --quiet -c constraints.txt -e '.[view,train,sim]'
+	$(TIMED) install $(PY) -m pip install --quiet $(PINS) -e '.[view,train,sim]'
 	touch $@
 
 $(VENV)/.ready-dev: pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(TIMED) "install for tests" $(PY) -m pip install --quiet -c constraints.txt -e '.[dev]'
+	$(TIMED) "install for tests" $(PY) -m pip install --quiet $(PINS) -e '.[dev]'
 	touch $(VENV)/.ready $@
 
 clean:  ## remove the environment and everything made

@@ -17,6 +17,7 @@ from artsim.loading.urdf import load
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
 from tests.conftest import ASSETS, DEMO
+from tests.processors import can_run, left_out
 
 INF, QUARTER = np.inf, np.pi / 2
 QUIRKS = ASSETS / "quirks"
@@ -315,6 +316,8 @@ def test_parts_of_the_demo_objects_never_touch(folder: Path) -> None:
 @pytest.mark.slow
 def test_rebuilding_changes_no_byte(tmp_path: Path) -> None:
     """In a process of its own: build.py tells numpy which kernels to use."""
+    if not can_run("with AVX2"):
+        pytest.skip(left_out("with AVX2"))
     subprocess.run([sys.executable, ASSETS / "build.py", tmp_path], check=True)
     built = {path.relative_to(tmp_path): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     changed = [str(name) for name, content in built.items() if (ASSETS / name).read_bytes() != content]

@@ -5,17 +5,13 @@ meshes, an empty ``base`` link, and joints without rotations of their own. The b
 written too; all other quirk cases are written by hand. ``procedural`` holds one exported object of each family.
 
 Last digits of the demo objects and of inertias depend on which kernels numpy and its BLAS choose for a processor.
-They are told here to use those that every x86-64 processor with AVX2 and FMA has, which must happen before numpy is
-imported.
+The program starts itself anew with those that every x86-64 processor with AVX2 and FMA has.
 """
 
 from __future__ import annotations
 
-import os
-
-os.environ |= {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
-
 import json
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -24,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from numpy._core._multiarray_umath import __cpu_features__
 from numpy.typing import NDArray
 from shapely import LineString, Point, Polygon, unary_union  # type: ignore[import-untyped]
 from trimesh import Trimesh as Mesh
@@ -33,6 +30,7 @@ from artsim.export import export
 from artsim.families import FAMILIES
 
 SEEDS_TO_CHOOSE_FROM = 12
+KERNELS = {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
@@ -446,5 +444,14 @@ def main(folder: Path) -> None:
         write(build(), folder / name)
 
 
+def use_common_kernels() -> None:
+    """Start this program anew where numpy and its BLAS, which are loaded by now, have chosen for this processor."""
+    if not __cpu_features__.get("X86_V3"):
+        sys.exit("this processor has no AVX2 and FMA, or NPY_DISABLE_CPU_FEATURES names them. Fix: use another machine")
+    if not os.environ.items() >= KERNELS.items():
+        os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | KERNELS)
+
+
 if __name__ == "__main__":
+    use_common_kernels()
     main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent)

@@ -7,13 +7,16 @@ Every import of an optional dependency stands in :func:`needs`, or is reached th
 from __future__ import annotations
 
 import contextlib
+import importlib
 import importlib.util
+import platform
 import re
 import shlex
 import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 from artsim.errors import ArtsimError, ConfigError
 
@@ -79,6 +82,31 @@ def needs(where: str, kind: type[ArtsimError] = ConfigError, extra: str = "") ->
         raise import_failure(error, where, kind, extra) from error
 
 
+def import_mujoco(where: str, extra: str = "") -> ModuleType:
+    """MuJoCo; parameters as of :func:`needs`.
+
+    Raises
+    ------
+    ConfigError
+        When it is not installed. On an x86-64 processor without AVX, too: its wheels consist of such instructions, and
+        the first one would end this process without a word.
+    """
+    if platform.machine() in ("x86_64", "AMD64") and not _has_avx():
+        raise ConfigError("MuJoCo needs a processor with AVX, which this one lacks", where, "use another machine")
+    with needs(where, extra=extra):
+        import mujoco
+    module: ModuleType = mujoco
+    return module
+
+
+def _has_avx() -> bool:
+    """Whether the processor has AVX: NumPy looks for it anyway."""
+    with contextlib.suppress(ImportError):  # NumPy before 1.26 has it elsewhere
+        features = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
+        return bool(features.get("AVX", True))
+    return True
+
+
 def is_own_module(error: ImportError) -> bool:
     """Whether a module of this project is what cannot be imported: a fault whose traceback is wanted."""
     return (error.name or "").partition(".")[0] in _OURS
@@ -92,7 +120,9 @@ def import_failure(
     name, own = MODULES.get(module, (module, ""))
     fix = install_command(extra or own)
     if name == "PyBullet" and sys.version_info >= (3, 12):
-        fix = "PyBullet has wheels for Python 3.10 and 3.11: use one of these, or MuJoCo as physics and another renderer"
+        fix = (
+            "PyBullet has wheels for Python 3.10 and 3.11: use one of these, or MuJoCo as physics and another renderer"
+        )
     if isinstance(error, ModuleNotFoundError) and module and importlib.util.find_spec(module) is None:
         return kind(f"{name} is not installed", where, fix)
     if re.search(r"\.so\b|shared object|DLL|\.dylib", str(error)):

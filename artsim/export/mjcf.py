@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from lxml import etree
 
-from artsim.common.extras import needs
+from artsim.common.extras import import_mujoco
 from artsim.errors import AssetError
 from artsim.export.looks import NO_FINISH, Finish, Look, looks_text
 from artsim.export.options import ExportOptions
@@ -196,8 +196,7 @@ def _unused(name: str, robot: Robot) -> str:
 
 
 def _compile(text: str, robot: Robot, finish: Finish) -> None:
-    with needs("MJCF files"):  # a file that MuJoCo does not compile is not written
-        import mujoco
+    mujoco = import_mujoco("MJCF files")  # a file that MuJoCo does not compile is not written
 
     files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
     files |= {f"{look.name}.obj": looks_text([look]).encode() for looks in finish.looks.values() for look in looks}

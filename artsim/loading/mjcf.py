@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.common.extras import needs
+from artsim.common.extras import import_mujoco
 from artsim.common.products import apply
 from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
@@ -88,8 +88,7 @@ def read_mjcf(
     ConfigError
         When MuJoCo is not installed.
     """
-    with needs("MJCF files"):
-        import mujoco
+    mujoco = import_mujoco("MJCF files")
 
     repairs: list[Repair] = []
     document = safe_mjcf(data, file, limits, repairs)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.common.extras import needs
+from artsim.common.extras import import_mujoco
 from artsim.export.robot import Robot
 from artsim.model.kinematics import Array
 from artsim.physics.options import PhysicsOptions
@@ -26,8 +26,7 @@ class MujocoBody:
     """
 
     def __init__(self, robot: Robot, options: PhysicsOptions):
-        with needs("physics", extra="envs"):
-            import mujoco
+        mujoco = import_mujoco("physics", extra="envs")
 
         self._mujoco, self._time_step = mujoco, options.time_step
         spec = mujoco.MjSpec()

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from artsim.common.extras import needs
+from artsim.common.extras import import_mujoco, needs
 from artsim.errors import ArtsimError
 from artsim.loading.object_files import find_urdf
 from artsim.loading.urdf import load
@@ -107,8 +107,7 @@ def _bullet_client() -> int:
 
 def in_mujoco(file: Path) -> LoadedFile:
     """Load a URDF or MJCF file in MuJoCo."""
-    with needs("mujoco"):
-        import mujoco
+    mujoco = import_mujoco("mujoco")
 
     spec = mujoco.MjSpec.from_file(str(file))
     spec.compiler.fusestatic = False

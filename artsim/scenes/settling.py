@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from artsim.appearance import Coat
-from artsim.common.extras import needs
+from artsim.common.extras import import_mujoco
 from artsim.common.products import apply, matmul, norm
 from artsim.making.solids import rotation_about
 from artsim.model.convex_bodies import add_bodies, convex_hull
@@ -51,8 +51,7 @@ def settle(solids: Sequence[Placeable], area: Area, rng: np.random.Generator) ->
     ConfigError
         When MuJoCo is not installed.
     """
-    with needs("physics", extra="envs"):
-        import mujoco
+    mujoco = import_mujoco("physics", extra="envs")
 
     spec = mujoco.MjSpec()
     spec.option.timestep = _STEP

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -18,7 +19,7 @@ import pytest
 import artperl.cli
 import artsim
 import artsim.cli
-from artsim.common.extras import MODULES, import_failure, install_command, needs
+from artsim.common.extras import MODULES, import_failure, import_mujoco, install_command, needs
 from artsim.errors import ConfigError, RenderError
 from artsim.renderers import RENDERERS
 from tests.conftest import BOX_LAPTOP, ROOT, absent
@@ -277,6 +278,27 @@ def test_the_extra_that_is_named_brings_the_module(module: str) -> None:
 def load_films() -> None:
     with needs("films", RenderError):
         import mujoco  # noqa: F401
+
+
+def test_mujoco_says_that_the_processor_lacks_avx_instead_of_ending_the_process(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    import_mujoco("physics")  # what runs here has AVX
+    monkeypatch.setitem(importlib.import_module("numpy._core._multiarray_umath").__cpu_features__, "AVX", False)
+    monkeypatch.setattr("platform.machine", lambda: "x86_64")
+    with pytest.raises(ConfigError, match=r"^physics: MuJoCo needs a processor with AVX.* Fix: use another machine"):
+        import_mujoco("physics")
+    monkeypatch.setattr("platform.machine", lambda: "aarch64")
+    import_mujoco("physics")  # ARM's wheels have no AVX
+
+
+def test_pybullet_says_which_pythons_have_wheels(monkeypatch: pytest.MonkeyPatch) -> None:
+    absent_module = ModuleNotFoundError("No module named 'pybullet'", name="pybullet")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("artsim.common.extras.sys.version_info", (3, 11))
+    assert "[pybullet]" in str(import_failure(absent_module, "films"))
+    monkeypatch.setattr("artsim.common.extras.sys.version_info", (3, 12))
+    assert "PyBullet is not installed. Fix: PyBullet has wheels for" in str(import_failure(absent_module, "films"))
 
 
 def test_a_library_of_the_system_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
