@@ -78,8 +78,11 @@ def pytest_collection_finish() -> None:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Which processor this was, and which code the tests of equal bytes leave out."""
-    kinds = [name if can_run(name) else left_out(name) for name in PROCESSORS]
-    terminalreporter.write_line(f"{processor()}, {cores()} of its cores; bytes compared {', '.join(kinds)}")
+    run = ", ".join(filter(can_run, PROCESSORS)) or "of no other kind"
+    terminalreporter.write_line(f"{processor()}, {cores()} of its cores; bytes are compared as on processors {run}")
+    for name in PROCESSORS:
+        if not can_run(name):
+            terminalreporter.write_line(left_out(name))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
