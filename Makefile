@@ -6,7 +6,7 @@ PY := $(VENV)/bin/python
 PYTEST := OMP_NUM_THREADS=1 $(PY) -m pytest -n 2
 TIMED := scripts/timed.sh
 # The pinned versions exist for Python 3.11 and later.
-PINS := $(shell $(PYTHON) -c 'import sys; print("-c constraints.txt" * (sys.version_info >= (3, 11)))')
+PINS = $(shell $(PYTHON) -c 'import sys; print("-c constraints.txt" * (sys.version_info >= (3, 11)))')
 
 # Tests start hundreds of programs: each would compile all modules anew where this is set.
 unexport PYTHONDONTWRITEBYTECODE

@@ -1,13 +1,10 @@
 #!/usr/bin/env bash
-# Run a command, and say how many minutes it took: timed.sh NAME COMMAND... A line of $MINUTES, a file, says so too.
+# Run a command, and say how long it took: timed.sh NAME COMMAND... The file $MINUTES, where set, gets a line of it too.
 set -uo pipefail
 
-name=$1
-start=$(date +%s%N)
 "${@:2}"
 code=$?
-minutes=$((($(date +%s%N) - start) / 6000000))
-line=$(printf '%s: %d.%02d minutes' "$name" $((minutes / 10000)) $((minutes % 10000 / 100)))
+line="$1: $((SECONDS / 60)) min $((SECONDS % 60)) s"
 echo "$line"
 [ -z "${MINUTES:-}" ] || echo "$line" >>"$MINUTES"
 exit $code

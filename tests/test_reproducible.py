@@ -19,7 +19,7 @@ import pytest
 import artsim
 from artsim.families import CATEGORIES
 from tests.conftest import absent
-from tests.processors import NO_AVX512, PROCESSORS, can_run, left_out
+from tests.processors import NEEDS, NO_AVX512, PROCESSORS, can_run, left_out
 from tests.reproduce import NUM_SAMPLES, RECORD, packages
 
 ROOT = Path(artsim.__file__).resolve().parent
@@ -109,6 +109,18 @@ def test_the_processors_do_differ() -> None:
         "print(np.exp(x).tobytes().hex()[-99999:] + (x.reshape(-1, 3) @ x[:9].reshape(3, 3)).tobytes().hex())"
     )
     assert len({on(processor, "-c", numpy_own) for processor in HERE}) == len(HERE)
+
+
+def test_nothing_is_left_out_that_linux_says_is_there() -> None:
+    """So that no test is skipped for a name that NumPy changes."""
+    flags = set(Path("/proc/cpuinfo").read_text().split())
+    has = {
+        "with AVX-512": {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"} <= flags,
+        "with AVX2": {"avx2", "fma", "f16c", "bmi1", "bmi2", "abm", "movbe"} <= flags,
+        "with SSE4": {"sse4_2"} <= flags,
+    }
+    told = os.environ.get("NPY_DISABLE_CPU_FEATURES", "").split()
+    assert [name for name in PROCESSORS if has[name] and NEEDS[name] not in told] == HERE
 
 
 def test_code_that_the_processor_lacks_is_left_out_and_named() -> None:

@@ -119,11 +119,9 @@ def import_failure(
     module = (error.name or "").partition(".")[0]
     name, own = MODULES.get(module, (module, ""))
     fix = install_command(extra or own)
-    if name == "PyBullet" and sys.version_info >= (3, 12):
-        fix = (
-            "PyBullet has wheels for Python 3.10 and 3.11: use one of these, or MuJoCo as physics and another renderer"
-        )
     if isinstance(error, ModuleNotFoundError) and module and importlib.util.find_spec(module) is None:
+        if name == "PyBullet" and sys.version_info >= (3, 12):
+            fix = "it has wheels for Python 3.10 and 3.11: use one of these, or MuJoCo as physics and another renderer"
         return kind(f"{name} is not installed", where, fix)
     if re.search(r"\.so\b|shared object|DLL|\.dylib", str(error)):
         fix = "install the system library that it names (scripts/install-system.sh does it on Debian and Ubuntu)"

@@ -298,7 +298,7 @@ def test_pybullet_says_which_pythons_have_wheels(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("artsim.common.extras.sys.version_info", (3, 11))
     assert "[pybullet]" in str(import_failure(absent_module, "films"))
     monkeypatch.setattr("artsim.common.extras.sys.version_info", (3, 12))
-    assert "PyBullet is not installed. Fix: PyBullet has wheels for" in str(import_failure(absent_module, "films"))
+    assert "PyBullet is not installed. Fix: it has wheels for" in str(import_failure(absent_module, "films"))
 
 
 def test_a_library_of_the_system_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
