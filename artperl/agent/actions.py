@@ -1,9 +1,9 @@
 """The discrete action space, what an action does, and the expert that knows the way (ArtPERL, section 4.3).
 
 Each step chooses, for every part, one of 11 bins on each of 9 axes: nothing, or one of five magnitudes in either
-direction. The root's free joint turns about three camera axes through its box centre, moves along them, and scales
-along the axes of the rest frame. A hinge turns about its axis and moves its anchor; a slide moves along its axis. The
-axes that a joint does not have are masked.
+direction. The root's free joint turns about the axes of its rest frame through its box centre, moves along them, and
+scales along them: seen from the reference, the same error needs the same action wherever the camera is. A hinge turns
+about its axis and moves its anchor; a slide moves along its axis. The axes that a joint does not have are masked.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ NUM_AXES = 9
 
 STEPS = torch.tensor([*(-m for m in reversed(MAGNITUDES)), 0.0, *MAGNITUDES])
 """(11,) signed step of each bin."""
+_FINE = 0.03
+"""Radians, or radii: 512 points of a cloud tell steps of this size apart, and hardly smaller ones."""
 
 
 def action_mask(trees: Trees) -> Tensor:
@@ -63,7 +65,7 @@ def move(shapes: Shapes, theta: Theta, step: Tensor, radius: Tensor) -> Theta:
     root, metres = step[:, 0], radius[:, None]
     trees = shapes.trees
     center = rotate(theta.rotation, _root_center(shapes, theta)) + theta.translation
-    rotation = rotation_from_vector(root[:, TURN]) @ theta.rotation
+    rotation = theta.rotation @ rotation_from_vector(root[:, TURN])
     log_scale = theta.log_scale + root[:, SCALE]
     slides = (trees.slide != 0) & (trees.turn == 0)
     along = reach(trees, log_scale)
@@ -72,7 +74,8 @@ def move(shapes: Shapes, theta: Theta, step: Tensor, radius: Tensor) -> Theta:
     shift = theta.shift + step[..., MOVE] * metres[..., None]
     shift = torch.cat([theta.shift[:, :1], shift[:, 1:]], dim=1)
     moved = replace(theta, rotation=rotation, log_scale=log_scale, state=state, shift=shift)
-    translation = center + root[:, MOVE] * metres - rotate(rotation, _root_center(shapes, moved))
+    shifted = center + rotate(theta.rotation, root[:, MOVE] * metres)
+    translation = shifted - rotate(rotation, _root_center(shapes, moved))
     return replace(moved, translation=translation)
 
 
@@ -80,10 +83,10 @@ def residual(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor) -> Tenso
     """(B, P, 9) steps that would lead from ``theta`` to ``goal`` at once: the inverse of :func:`move`."""
     trees, metres = shapes.trees, radius[:, None]
     steps = torch.zeros(*trees.valid.shape, NUM_AXES, dtype=radius.dtype, device=radius.device)
-    steps[:, 0, TURN] = rotation_vector(goal.rotation @ theta.rotation.transpose(-1, -2))
+    steps[:, 0, TURN] = rotation_vector(theta.rotation.transpose(-1, -2) @ goal.rotation)
     here = rotate(theta.rotation, _root_center(shapes, theta)) + theta.translation
     there = rotate(goal.rotation, _root_center(shapes, goal)) + goal.translation
-    steps[:, 0, MOVE] = (there - here) / metres
+    steps[:, 0, MOVE] = rotate(theta.rotation.transpose(-1, -2), there - here) / metres
     steps[:, 0, SCALE] = goal.log_scale - theta.log_scale
     slides = (trees.slide != 0) & (trees.turn == 0)
     missing = goal.state - theta.state
@@ -93,33 +96,27 @@ def residual(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor) -> Tenso
     return steps * action_mask(trees)
 
 
+def compressed(step: Tensor) -> Tensor:
+    """Steps of any size on the scale that errors are counted on: as they are up to :data:`_FINE`, then by logarithm.
+
+    Points cannot tell smaller steps apart. If these counted like large ones, an agent would mostly learn their noise.
+    """
+    return (step / _FINE).asinh()
+
+
+BINS = compressed(STEPS)
+"""(11,) where the bins stand on that scale."""
+
+
+def nearest_bin(step: Tensor) -> Tensor:
+    """(...) int64 bins nearest to steps of any size, on the scale of :func:`compressed`."""
+    middles = 0.5 * (BINS[1:] + BINS[:-1])
+    return torch.bucketize(compressed(step), middles.to(step))
+
+
 def expert(shapes: Shapes, theta: Theta, goal: Theta, radius: Tensor) -> Tensor:
-    """(B, P, 9) int64: the action of an expert that knows the goal (the labels of equation 4).
-
-    It is steady: on each axis it takes the largest step that does not overshoot.
-    """
-    missing = residual(shapes, theta, goal, radius)
-    bin_of = (missing.abs()[..., None] >= STEPS[NOTHING:].to(missing)).sum(-1) - 1
-    return NOTHING + torch.where(missing < 0, -bin_of, bin_of)
-
-
-def expected_action(logits: Tensor) -> Tensor:
-    """The action whose steps are nearest to the policy's mean.
-
-    The most likely bin is nearly always that of no step while the policy is not sure: the steps that it takes for
-    possible are many, and nothing is one.
-
-    Parameters
-    ----------
-    logits : (..., 11) float
-
-    Returns
-    -------
-    (...) int64
-    """
-    steps = STEPS.to(logits)
-    mean = (logits.softmax(-1) * steps).sum(-1)
-    return (mean[..., None] - steps).abs().argmin(-1)
+    """(B, P, 9) int64: the action of an expert that knows the goal: on each axis the bin nearest to what is missing."""
+    return nearest_bin(residual(shapes, theta, goal, radius))
 
 
 def rotation_vector(rotation: Tensor) -> Tensor:

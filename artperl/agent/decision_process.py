@@ -8,24 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.agent.actions import NOTHING, action_mask, apply, expert, move, residual
+from artperl.agent.part_neighbours import nearest_of_part
 from artperl.core.batch import Batch
-from artperl.core.pose import Posed, Theta, joint_axes, pose_parts
+from artperl.core.pose import Theta, parent_pose, pose_parts
+from artperl.core.rotations import rotate
 from artperl.core.shapes import Observed, Shapes, faces_camera
-from artsim.common.compiled import compiled
-
-Single = NDArray[np.float32]
-
-FAR = 1e6
-"""Coordinate of reference points that stand for nothing: parts without a surface."""
 
 _FARTHEST = 2.0
-"""Radii: most that one reference point counts for in the distance."""
+"""Radii: most that a point counts for in the distance, and that of points whose part the other cloud does not show."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +32,44 @@ class FittingOptions:
     """Reward of a step that brings the clouds closer (equation 3)."""
     tolerance: float = 1e-4
     """Relative change of the distance that counts as none."""
-    observed_points: int = 128
-    """Points of the cloud that the episode sees, the first of all."""
-    reference_points: int = 48
+    observed_points: int = 512
+    """Points of the cloud that the distance is measured by, the first of all."""
+    reference_points: int = 192
     """Points of each part of the reference: the first ones are spread as evenly as all."""
+    seen_points: int = 256
+    """Points of the cloud that the agent sees, the first of all."""
+    seen_reference: int = 48
+    """Points of each part of the reference that the agent sees."""
 
 
 @dataclass(frozen=True, eq=False)
 class View(Batch):
-    """What the agent sees of B environments. Lengths are in radii of the observed cloud, about its centre.
+    """What the agent sees of B environments.
+
+    Lengths are in radii of the observed cloud. Places and directions are the root's: from the middle of its box, along
+    the axes of its rest frame, as it stands now.
 
     Attributes
     ----------
     observed : (B, N, 3) float
     part : (B, N) int64
+    gap : (B, N, 3) float
+        From each observed point to the nearest point of the reference's same part that faces the camera; 0 where there
+        is none.
+    gap_normal : (B, N, 3) float
+        Outward normal of the reference there.
     reference : (B, P, M, 3) float
+    normal : (B, P, M, 3) float
     shown : (B, P, M) bool
-        Reference points that count, those whose surface faces the camera; the others are 0.
-    joint : (B, P, 6) float
-        Axis, and anchor of each part's joint.
+        Reference points that count, those whose surface faces the camera; of the others everything is 0.
+    reference_gap : (B, P, M, 3) float
+        From each point of the reference to the nearest observed one of its part; 0 where there is none.
+    frame : (B, P, 3, 3) float
+        Axes of the rest frame as each part carries it.
+    axis, anchor : (B, P, 3) float
+        Of each part's joint; the root's are 0.
+    sight : (B, 3) float
+        Unit vector from the camera to the cloud.
     kind : (B, P) int64
         Index into ``artperl.core.trees.KINDS``.
     parent : (B, P) int64
@@ -64,17 +77,30 @@ class View(Batch):
     state : (B, P, 2) float
         Where each joint stands in its range, 0 to 1, and the range itself, in radians or radii (both 0 where it has
         none).
+    turn : (B, P) bool
+        Parts that act next.
+    left : (B, 1) float
+        Share of the steps that are left.
     """
 
     observed: Tensor
     part: Tensor
+    gap: Tensor
+    gap_normal: Tensor
     reference: Tensor
+    normal: Tensor
     shown: Tensor
-    joint: Tensor
+    reference_gap: Tensor
+    frame: Tensor
+    axis: Tensor
+    anchor: Tensor
+    sight: Tensor
     kind: Tensor
     parent: Tensor
     valid: Tensor
     state: Tensor
+    turn: Tensor
+    left: Tensor
 
 
 class Fitting:
@@ -92,7 +118,14 @@ class Fitting:
         Segmented clouds; labels may be predicted.
     start : Theta
     options : FittingOptions, optional
+
+    Attributes
+    ----------
+    distance : (B,) float
+        Chamfer distance of equation 3, in radii: the mean of both directions, each point to the nearest of its part.
     """
+
+    distance: Tensor
 
     def __init__(self, shapes: Shapes, observed: Observed, start: Theta, options: FittingOptions | None = None):
         self.options = options or FittingOptions()
@@ -101,9 +134,7 @@ class Fitting:
         self.observed = observed.map(lambda values: values[:, : self.options.observed_points])
         self.theta, points = start, self.observed.points
         self.center = points.mean(1)
-        local = points - self.center[:, None]
-        self.radius = torch.linalg.vector_norm(local, dim=-1).amax(1).clamp(min=1e-9)
-        self._local = local / self.radius[:, None, None]
+        self.radius = torch.linalg.vector_norm(points - self.center[:, None], dim=-1).amax(1).clamp(min=1e-9)
         self.steps_taken = 0
         self._mask, self._levels = action_mask(shapes.trees), int(shapes.trees.depth.max()) + 1
         self._look()
@@ -111,35 +142,60 @@ class Fitting:
     @property
     def mask(self) -> Tensor:
         """(B, P, 9) bool: the axes that the next step moves."""
+        return self._mask & self._turn[..., None]
+
+    @property
+    def _turn(self) -> Tensor:
+        """(B, P) bool: parts of the level whose turn it is."""
         depth = self.shapes.trees.depth
-        level = self.steps_taken % (depth.amax(1, keepdim=True) + 1)
-        return self._mask & (depth == level)[..., None]
+        return depth == self.steps_taken % (depth.amax(1, keepdim=True) + 1)
 
     def _look(self) -> None:
         """Pose the reference, and measure the chamfer distance."""
         self.posed = pose_parts(self.shapes.trees, self.theta, self.shapes.box_center)
-        points = self.posed.points(self.shapes.points, self.shapes.box_center)
-        faces = faces_camera(points, self.posed.normals(self.shapes.normals))
-        self.shown = self.shapes.has_surface[..., None] & faces
-        local = (points - self.center[:, None, None]) / self.radius[:, None, None, None]
-        self.reference = torch.where(self.shown[..., None], local, FAR)
-        reference, shown = self.reference.flatten(1, 2), self.shown.flatten(1)
-        there, back = nearest_distances(self._local, reference)
-        back = back.clamp(max=_FARTHEST) * shown
-        self.distance = 0.5 * (there.mean(1) + back.sum(1) / shown.sum(1).clamp(min=1))
+        self._points = self.posed.points(self.shapes.points, self.shapes.box_center)
+        self._normals = self.posed.normals(self.shapes.normals)
+        self.shown = self.shapes.has_surface[..., None] & faces_camera(self._points, self._normals)
+        self._near = nearest_of_part(self.observed.points, self.observed.part, self._points, self.shown)
+        radius = self.radius[:, None]
+        there = (self._near.there_distance / radius).clamp(max=_FARTHEST).mean(1)
+        back = (self._near.back_distance / radius[..., None]).clamp(max=_FARTHEST) * self.shown
+        self.distance = 0.5 * (there + back.sum((1, 2)) / self.shown.sum((1, 2)).clamp(min=1))
 
     def view(self) -> View:
         """What the agent sees now."""
-        reference = torch.where(self.shown[..., None], self.reference, 0.0)
-        trees = self.shapes.trees
-        return View(
-            self._local, self.observed.part, reference, self.shown, self._joints(self.posed), trees.kind, trees.parent,
-            trees.valid, self._ranges(),
-        )  # fmt: skip
+        options, trees, posed, near = self.options, self.shapes.trees, self.posed, self._near
+        few, part_few = slice(options.seen_points), slice(options.seen_reference)
+        back = posed.rotation[:, :1]  # rows of vectors times a rotation turn them back
+        radius = self.radius[:, None, None]
+        middle = posed.center[:, :1]
+        B, P, M, _ = self._points.shape
+        observed, part = self.observed.points[:, few], self.observed.part[:, few]
+        index, known = part * M + near.there_index[:, few], torch.isfinite(near.there_distance[:, few])[..., None]
 
-    def _joints(self, posed: Posed) -> Tensor:
-        axis, anchor = joint_axes(self.shapes.trees, posed)
-        return torch.cat([axis, (anchor - self.center[:, None]) / self.radius[:, None, None]], dim=-1)
+        def at_nearest(values: Tensor) -> Tensor:
+            return values.reshape(B, P * M, 3).gather(1, index[..., None].expand(-1, -1, 3))
+
+        shown, own = self.shown[:, :, part_few, None], self._points[:, :, part_few]
+        other = near.back_index[:, :, part_few]
+        nearest = self.observed.points.gather(1, other.flatten(1)[..., None].expand(-1, -1, 3)).reshape(own.shape)
+        met = shown & torch.isfinite(near.back_distance[:, :, part_few, None])
+        parent_rotation, parent_translation = parent_pose(trees, posed)
+        anchor = rotate(parent_rotation, posed.origin_rest) + parent_translation
+        child = (trees.depth > 0)[..., None]
+        return View(
+            (observed - middle) @ back[:, 0] / radius, part,
+            torch.where(known, (at_nearest(self._points) - observed) @ back[:, 0] / radius, 0.0),
+            torch.where(known, at_nearest(self._normals) @ back[:, 0], 0.0),
+            torch.where(shown, (own - middle[:, None]) @ back / radius[..., None], 0.0),
+            torch.where(shown, self._normals[:, :, part_few] @ back, 0.0), self.shown[:, :, part_few],
+            torch.where(met, (nearest - own) @ back / radius[..., None], 0.0),
+            back.mT @ posed.rotation, torch.where(child, rotate(back.mT @ parent_rotation, trees.axis), 0.0),
+            torch.where(child, (anchor - middle) @ back[:, 0] / radius, 0.0),
+            torch.nn.functional.normalize(self.center[:, None] @ back[:, 0], dim=-1)[:, 0],
+            trees.kind, trees.parent, trees.valid, self._ranges(), self._turn,
+            torch.full_like(self.radius, max(0.0, 1.0 - self.steps_taken / self.num_steps))[:, None],
+        )  # fmt: skip
 
     def _ranges(self) -> Tensor:
         trees = self.shapes.trees
@@ -182,48 +238,11 @@ class Fitting:
         return torch.where((self.distance - before).abs() <= tolerance, -0.1 * eta, reward)
 
     @property
+    def num_steps(self) -> int:
+        """Steps of an episode."""
+        return self.options.steps * self._levels
+
+    @property
     def done(self) -> bool:
         """Whether the episodes have come to their last step."""
-        return self.steps_taken >= self.options.steps * self._levels
-
-
-def nearest_distances(points: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
-    """(B, N) distances of points (B, N, 3) from the nearest of others (B, M, 3), and (B, M) the other way round."""
-    if points.device.type != "cpu":
-        return nearest_distance(points, others), nearest_distance(others, points)
-    pairs = zip(points.detach().float().numpy(), others.detach().float().mT.contiguous().numpy(), strict=True)
-    found = [_nearest_squared(*pair) for pair in pairs]
-    there, back = (torch.from_numpy(np.sqrt(np.stack(values))) for values in zip(*found, strict=True))
-    return there.to(points.dtype), back.to(points.dtype)
-
-
-@compiled
-def _nearest_squared(points: Single, others: Single) -> tuple[Single, Single]:
-    """Squared distances between points (N, 3) and others (3, M), each from the nearest: (N,) and (M,).
-
-    Bits of numbers that are not negative, taken for whole numbers, are in their order. Least whole numbers are found in
-    wide registers.
-    """
-    N, M = len(points), others.shape[1]
-    there, back, apart = np.empty(N, dtype=np.float32), np.full(M, np.inf, dtype=np.float32), np.empty(M, np.float32)
-    nearest, bits = there.view(np.int32), apart.view(np.int32)
-    for n in range(N):
-        x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        for m in range(M):
-            dx, dy, dz = others[0, m] - x, others[1, m] - y, others[2, m] - z
-            apart[m] = dx * dx + dy * dy + dz * dz
-        least = np.int32(2**31 - 1)
-        for m in range(M):
-            least = min(least, bits[m])
-            back[m] = min(back[m], apart[m])
-        nearest[n] = least
-    return there, back
-
-
-def nearest_distance(asked: Tensor, offered: Tensor) -> Tensor:
-    """(B, N) distances of points (B, N, 3) from the nearest of others (B, M, 3)."""
-    square = (offered**2).sum(-1, keepdim=True)
-    # |x - y|^2 less |x|^2 is one product of four numbers.
-    seeking = torch.cat([-2.0 * asked, torch.ones_like(asked[..., :1])], dim=-1)
-    placed = torch.cat([offered, square], dim=-1).transpose(1, 2)
-    return ((seeking @ placed).amin(-1) + (asked**2).sum(-1)).clamp(min=0.0).sqrt()
+        return self.steps_taken >= self.num_steps

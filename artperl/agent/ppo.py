@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 from torch.distributions import Categorical
 
-from artperl.agent.actions import MOVE, SCALE, TURN
+from artperl.agent.actions import BINS, MOVE, SCALE, TURN, compressed, nearest_bin
 from artperl.agent.decision_process import Fitting, View
 from artperl.agent.policy import Policy
 from artperl.core.batch import Batch, concatenate
@@ -22,8 +22,6 @@ from artperl.core.pose import Theta
 from artperl.core.ranks import ALONE, Ranks
 from artperl.core.trees import KINDS
 
-_APART = 0.2
-"""Of the way to the goal, how far axes of a scattered state are apart at most; some are beyond the goal."""
 _PRISMATIC = KINDS.index("prismatic")
 
 
@@ -50,40 +48,38 @@ class PPOOptions:
 
 @dataclass(frozen=True)
 class Phase:
-    """What the agent learns by, and how it acts meanwhile."""
+    """What the agent learns by."""
 
-    reinforcement: bool
-    """Learn from rewards (equation 5), beside the expert (equation 4)."""
-    guided: float
-    """Share of the steps that the expert takes."""
-    sharpness: float
-    """The policy that acts has that many times the logits of the one that is cloned. Scattered states have no acts."""
-    cloning: bool = True
+    cloning: bool
     """Learn from the expert (equation 4)."""
+    reinforcement: bool
+    """Learn from rewards (equation 5)."""
     scattered: bool = False
-    """States are drawn at random between start and goal, not reached by actions."""
+    """States are drawn at random between start and goal, not reached by actions: there are no rewards to learn from."""
 
 
-CLONING = Phase(reinforcement=False, guided=0.0, sharpness=1.0, scattered=True)
-"""Behaviour cloning alone, on random states as in section 4.3. States of a trajectory are much alike, and most are near
-its end: by as many states that are drawn apart, a quarter less error is left."""
-JOINT = Phase(reinforcement=True, guided=0.5, sharpness=3.0)
-"""Both losses. Quick runs that drew all actions of this phase ended worse than they began. Cloning leaves each axis as
-unsure as the expert's next step is, so that one axis of many would take a long step astray at every turn: what acts is
-sharper."""
+CLONING = Phase(cloning=True, reinforcement=False, scattered=True)
+"""Behaviour cloning on random states as in section 4.3. States of a trajectory are much alike, and most are near its
+end: by as many states that are drawn apart, a quarter less error is left."""
+OWN_STATES = Phase(cloning=True, reinforcement=False)
+"""Behaviour cloning on states that the agent comes to by itself; the value is learnt beside it."""
+JOINT = Phase(cloning=True, reinforcement=True)
+"""Both losses, on the agent's own actions."""
+REINFORCEMENT = Phase(cloning=False, reinforcement=True)
+"""PPO alone."""
 
 
 @dataclass(frozen=True, eq=False)
 class Buffer(Batch):
     """Replay buffer of one batch of episodes. T steps of B environments, flat: S = T * B rows, step by step.
 
-    ``own`` tells the policy's actions (1) from the expert's (0), of which equation 5 does not learn.
+    ``expert`` (S, P, 9) is the steps that would lead to the goal at once. Scattered states have no actions: their
+    ``action``, ``log_prob``, ``advantage`` and ``result`` mean nothing.
     """
 
     view: View
     mask: Tensor
     action: Tensor
-    own: Tensor
     expert: Tensor
     log_prob: Tensor
     advantage: Tensor
@@ -138,7 +134,7 @@ def algorithm_1(
         if phase.scattered:
             own, figures = scatter(fitting, goal, generator, ranks), dict[str, float]()
         else:
-            own, figures = rollout(policy, fitting, goal, phase, options, generator, ranks)
+            own, figures = rollout(policy, fitting, goal, options, generator, ranks)
         buffer, told = together(own, figures, len(goal), ranks)
         losses = update(policy, optimizer, buffer, phase, options, generator, ranks, mixed_precision)
         yield {name: sum(one[name] for one in losses) / len(losses) for name in losses[0]} | told
@@ -146,10 +142,10 @@ def algorithm_1(
 
 @torch.no_grad()
 def rollout(
-    policy: Policy, fitting: Fitting, goal: Theta, phase: Phase, options: PPOOptions, generator: torch.Generator,
+    policy: Policy, fitting: Fitting, goal: Theta, options: PPOOptions, generator: torch.Generator,
     ranks: Ranks = ALONE,
 ) -> tuple[Buffer, dict[str, float]]:  # fmt: skip
-    """Run an episode of every environment with the stochastic policy, noting what the expert would have done.
+    """Run an episode of every environment with the policy, noting what the expert would have done.
 
     Of several processes, each has its share of the environments; chance is drawn for all of them by all.
 
@@ -159,26 +155,21 @@ def rollout(
         And means: the reward, and chamfer distances at the start and at the end.
     """
     total, own = _share(len(goal), ranks)
-    views, masks, actions, own_steps, experts, log_probs, values, rewards = [], [], [], [], [], [], [], []
+    views, masks, actions, experts, log_probs, values, rewards = [], [], [], [], [], [], []
     first = fitting.distance
     while not fitting.done:
-        view, mask, expert = fitting.view(), fitting.mask, fitting.expert(goal)
+        view, mask = fitting.view(), fitting.mask
         logits, value = policy(view)
-        acting = phase.sharpness * logits
-        device = acting.device
-        chance = torch.rand((total, *mask.shape[1:]), generator=generator, device=device)[own]
-        action = drawn(acting.softmax(-1), chance)
-        guided = torch.rand(total, generator=generator, device=device)[own] < phase.guided
-        action = torch.where(guided[:, None, None], expert, action)
+        chance = torch.rand((total, *mask.shape[1:]), generator=generator, device=logits.device)[own]
+        action = drawn(logits.softmax(-1), chance)
         views.append(view)
         masks.append(mask)
         actions.append(action)
-        own_steps.append((~guided).float())
-        experts.append(expert)
-        log_probs.append(log_probability(acting, action, mask))
+        experts.append(fitting.missing(goal))
+        log_probs.append(log_probability(logits, action, mask))
         values.append(value)
         rewards.append(fitting.step(action))
-    values.append(policy(fitting.view())[1])
+    values.append(torch.zeros_like(values[0]))  # an episode ends with its last step, and the agent knows which that is
     advantage = advantages(torch.stack(rewards), torch.stack(values), options)
     figures = {
         "reward": torch.stack(rewards).mean().item(),
@@ -186,8 +177,8 @@ def rollout(
         "chamfer_end": fitting.distance.mean().item(),
     }
     return Buffer(
-        concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(own_steps), torch.cat(experts),
-        torch.cat(log_probs), advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(),
+        concatenate(views), torch.cat(masks), torch.cat(actions), torch.cat(experts), torch.cat(log_probs),
+        advantage.flatten(), (advantage + torch.stack(values[:-1])).flatten(),
     ), figures  # fmt: skip
 
 
@@ -195,8 +186,9 @@ def rollout(
 def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ranks = ALONE) -> Buffer:
     """As many states as an episode has, anywhere on the way to the goal, and what the expert would do.
 
-    Each state is off as the start of one of the episodes is, by a share of it: the shares of its axes are near to each
-    other. There are no actions and no rewards: only equation 4 learns from them.
+    Each state is off as the start of one of the episodes is, by shares of it that are as often large as small: one for
+    the turn, the move and the scale of the root, and those of each joint. If they had one in common, what is easily
+    seen would tell the others. There are no actions and no rewards: only equation 4 learns from them.
     """
     total, own = _share(len(goal), ranks)
     device = fitting.distance.device
@@ -204,16 +196,15 @@ def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ra
     views, masks, experts = [], [], []
     while not fitting.done:
         other = torch.randint(total, (total,), generator=generator, device=device)
-        common = torch.rand((total, 1, 1), generator=generator, device=device).sqrt()
-        apart = torch.rand(starts.shape, generator=generator, device=device)
-        left = (1.0 - common - _APART * apart) * starts[other]
+        share = torch.rand((*starts.shape[:2], 3), generator=generator, device=device)
+        left = share.repeat_interleave(3, dim=2) * starts[other]
         masks.append(fitting.mask)
         fitting.place(goal, left[own])
         views.append(fitting.view())
-        experts.append(fitting.expert(goal))
+        experts.append(fitting.missing(goal))
+    none = torch.zeros(sum(map(len, masks)), device=device)
     expert = torch.cat(experts)
-    none = torch.zeros(len(expert), device=expert.device)
-    return Buffer(concatenate(views), torch.cat(masks), expert, none, expert, none, none, none)
+    return Buffer(concatenate(views), torch.cat(masks), nearest_bin(expert), expert, none, none, none)
 
 
 def _share(episodes: int, ranks: Ranks) -> tuple[int, slice]:
@@ -286,17 +277,18 @@ def update(
                 logits, buffer.expert[rows], mask, buffer.view.kind[rows], options, weight
             )
             loss, losses = phase.cloning * cloning, dict[str, Tensor]()
-            if phase.reinforcement:
-                losses = ppo_losses(phase.sharpness * logits, value, buffer, advantage, rows, options)
+            if not phase.scattered:
+                losses = ppo_losses(logits, value, buffer, advantage, rows, options)
                 losses = {name: share * own_loss for name, own_loss in losses.items()}
-                reinforcement = losses["policy"] + options.lambda_value * losses["value"]
-                loss = reinforcement - options.lambda_entropy * losses["entropy"] + loss
+                loss = loss + options.lambda_value * losses["value"]
+            if phase.reinforcement:
+                loss = loss + losses["policy"] - options.lambda_entropy * losses["entropy"]
             optimizer.zero_grad()
             loss.backward()
             ranks.add_gradients(policy)
             torch.nn.utils.clip_grad_norm_(policy.parameters(), options.max_gradient)
             optimizer.step()
-            right = share * ((logits.argmax(-1) == buffer.expert[rows]) & mask).sum() / mask.sum()
+            right = share * ((logits.argmax(-1) == nearest_bin(buffer.expert[rows])) & mask).sum() / mask.sum()
             told = {**losses, "cloning": cloning, "accuracy": right}
             figures.append(dict(zip(told, ranks.add([value.item() for value in told.values()]), strict=True)))
     return figures
@@ -321,20 +313,16 @@ def log_probability(logits: Tensor, action: Tensor, mask: Tensor) -> Tensor:
 def ppo_losses(
     logits: Tensor, value: Tensor, buffer: Buffer, advantage: Tensor, rows: Tensor, options: PPOOptions
 ) -> dict[str, Tensor]:
-    """Clipped surrogate, squared value error, entropy, and the approximate divergence from the buffer's policy.
-
-    The policy would hardly have taken the expert's steps, so that the ratio of an update to the policy that acted means
-    nothing there: they count in no ratio.
-    """
-    mask, own = buffer.mask[rows], buffer.own[rows]
-    log_ratio = own * (log_probability(logits, buffer.action[rows], mask) - buffer.log_prob[rows])
+    """Clipped surrogate, squared value error, entropy, and the approximate divergence from the buffer's policy."""
+    mask = buffer.mask[rows]
+    log_ratio = log_probability(logits, buffer.action[rows], mask) - buffer.log_prob[rows]
     ratio, gain = log_ratio.exp(), advantage[rows]
     clipped = ratio.clamp(1.0 - options.clip, 1.0 + options.clip)
     return {
-        "policy": -(own * torch.minimum(ratio * gain, clipped * gain)).mean(),
+        "policy": -torch.minimum(ratio * gain, clipped * gain).mean(),
         "value": torch.nn.functional.mse_loss(value, buffer.result[rows]),
         "entropy": (Categorical(logits=logits).entropy() * mask).sum((1, 2)).mean(),
-        "divergence": (own * ((ratio - 1.0) - log_ratio)).mean(),
+        "divergence": ((ratio - 1.0) - log_ratio).mean(),
     }
 
 
@@ -343,9 +331,15 @@ def cloning_loss(
 ) -> Tensor:
     """Weighted cross-entropy towards the expert's actions (equation 4), mean over the axes that there are.
 
-    ``total``: the sum of the weights of which this is a part of the mean; by default that of these rows.
+    An expert's step between two bins (S, P, 9) counts for both, for the nearer one more: the mean of the policy is
+    drawn to the step itself. ``total``: the sum of the weights of which this is a part of the mean; by default that of
+    these rows.
     """
-    wrong = torch.nn.functional.cross_entropy(logits.flatten(0, 2), expert.flatten(), reduction="none").view(mask.shape)
+    place, bins = compressed(expert), BINS.to(expert)
+    below = (torch.bucketize(place, bins) - 1).clamp(0, len(bins) - 2)
+    upper = ((place - bins[below]) / (bins[below + 1] - bins[below])).clamp(0.0, 1.0)
+    gathered = logits.log_softmax(-1).gather(-1, torch.stack([below, below + 1], dim=-1))
+    wrong = -(gathered[..., 0] * (1.0 - upper) + gathered[..., 1] * upper)
     weight = cloning_weight(mask, kind, options)
     return (wrong * weight).sum() / (weight.sum() if total is None else total)
 

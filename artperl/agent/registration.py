@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor, nn
 
-from artperl.agent.actions import MOVE, NUM_AXES, NUM_BINS, SCALE
+from artperl.agent.actions import MOVE, NUM_AXES, SCALE
 from artperl.agent.decision_process import Fitting, FittingOptions, View
+from artperl.agent.policy import logits_about
 from artperl.core.batch import Batch, concatenate
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.rotations import rotate
@@ -20,7 +21,7 @@ from artperl.core.shapes import Observed, Shapes
 
 CLOSER, ALIKE, FARTHER = 0.5, -0.1, -0.6
 """Rewards of a step that brings the clouds closer, that leaves them, and that moves them apart (ReAgent, section 3)."""
-REGISTRATION = FittingOptions(steps=10, observed_points=128, reference_points=64)
+REGISTRATION = FittingOptions(steps=10, observed_points=128, reference_points=64, seen_points=128, seen_reference=64)
 """The decision process: ten steps, as the paper's."""
 _FEWEST = 4
 """Points of a part below which there is nothing to register."""
@@ -60,7 +61,7 @@ class RegistrationPolicy(nn.Module):
             layers += [nn.Linear(width << level, width << (level + 1)), nn.ReLU()]
         self.encoder = nn.Sequential(*layers)
         both = 2 * (width << 4)
-        self.turn, self.move = (self._head(both, 3 * NUM_BINS) for _ in range(2))
+        self.turn, self.move = (self._head(both, 3) for _ in range(2))
         self.value = self._head(both, 1)
 
     def _head(self, inputs: int, outputs: int) -> nn.Sequential:
@@ -76,10 +77,9 @@ class RegistrationPolicy(nn.Module):
         # Features are not negative, so that 0 stands for points that do not count.
         reference = (self.encoder(view.reference[:, 0]) * view.shown[:, 0, :, None]).amax(1)
         both = torch.cat([observed, reference], dim=-1)
-        logits = both.new_zeros(len(both), NUM_AXES, NUM_BINS)
-        turn, move = (head(both).unflatten(-1, (3, NUM_BINS)) for head in (self.turn, self.move))
-        logits = torch.cat([turn, move, logits[:, MOVE.stop :]], dim=1)
-        return logits[:, None].float(), self.value(both)[:, 0].float()
+        still = both.new_zeros(len(both), NUM_AXES - MOVE.stop)
+        means = torch.cat([self.turn(both), self.move(both), still], dim=1).float()
+        return logits_about(means)[:, None], self.value(both)[:, 0].float()
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,16 +122,17 @@ def batches(
 def row_batches(
     data: DataOptions, num_rows: int, num_points: int = 1024, batch_size: int = 32, first_batch: int = 0,
     seed: int = 0, workers: int = 1, more: MoreRows | None = None, share: tuple[int, int] = (0, 1),
-    in_turn: InTurn = iter,
+    in_turn: InTurn = iter, views_per_object: int | None = None,
 ) -> Iterator[dict[str, Tensor]]:  # fmt: skip
     """Batches as :func:`batches` makes them, as rows for :func:`artperl.data.truth.to_batch`, and more rows.
 
     Of several processes that learn together, each makes every n-th batch of fresh clouds; ``in_turn`` lets all see all.
+    ``views_per_object``: of the fresh clouds; by default all are of one object.
     """
     spare = (data.stretched or data.degraded) and data.dataset is None
     made_points = _SPARE * num_points if spare else num_points
     fresh, begin = max(1, batch_size // _USES), max(0, first_batch - _WINDOW + 1)
-    samples = data.source(num_rows, made_points, seed, fresh)
+    samples = data.source(num_rows, made_points, seed, views_per_object or fresh)
     sensed = [samples.seen_by(sensor) for sensor in SENSORS] if data.noisy else []
     rows = _Rows(samples, sensed, num_points, fresh, begin * fresh, data, more, share)
     loader = DataLoader(

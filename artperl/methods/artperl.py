@@ -13,17 +13,20 @@ from typing import ClassVar
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
 
-from artperl.agent.actions import expected_action
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
 from artperl.agent.start import MeanView, mean_start
+from artperl.core.batch import concatenate
 from artperl.core.clock import Clock
 from artperl.core.confidence import Calibration, Symptoms
 from artperl.core.estimate import Estimate, estimate_of_fit
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.fitting.paper_energy import refine_by_gradient
+from artperl.fitting.hypotheses import part_weights
+from artperl.fitting.levenberg_marquardt import Refined, refine
+from artperl.fitting.refine_options import RefineOptions
 from artperl.methods.retrieved import AgentMethod
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import Cloud
@@ -36,16 +39,16 @@ class ArtPERLOptions:
 
     num_points: int = 2048
     """Points of an observation (section 5.1)."""
-    refine_points: int = 1024
-    """Of these, points that the refinement sees."""
-    refine_iterations: int = 100
-    """Steps of the gradient optimiser."""
-    refine_rate: float = 0.01
-    """Its first step, in radians and diagonals."""
-    start: MeanView = field(default_factory=MeanView)
-    """View that the reference is turned to before the agent's first step."""
+    early_points: int = 512
+    """Of these, points by which the best of the agent's ends is found."""
+    early_iterations: int = 8
+    """Iterations of the refinement of every end, before the best one is kept."""
+    starts: tuple[MeanView, ...] = (MeanView(-50.0), MeanView(), MeanView(50.0))
+    """Views that the reference is turned to before the agent's first step; the middle one is the mean view."""
     fitting: FittingOptions = field(default_factory=FittingOptions)
     """The decision process of the agent."""
+    refine: RefineOptions = field(default_factory=RefineOptions)
+    """The last refinement."""
 
 
 class ArtPERL(AgentMethod):
@@ -77,28 +80,48 @@ class ArtPERL(AgentMethod):
         with clock("retrieval"):
             row = int(self.retrieve(sampled, part)[0, 0])
             reference = self.base.shapes[[row]]
-        observed = Observed.of(sampled, part)
+        observed = Observed.of(sampled, part, part_weights(part))
         with clock("agent"):
-            path = self.fit(reference, observed)
+            paths = self.fit(reference, observed)
         with clock("refinement"):
-            few = observed.map(lambda values: values[:, : self.options.refine_points])
-            refined = refine_by_gradient(
-                reference, few, path[-1], self.options.refine_iterations, self.options.refine_rate
-            )
+            path, refined = self.refined(reference, observed, paths)
         observed, reference = observed.to("cpu"), reference.to("cpu")
         labels = cloud.for_every_point(observed.part[0].numpy(), -1)
         steps = [theta.to("cpu") for theta in (*path, refined.theta)]
         return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
 
+    def starts(self, reference: Shapes, points: Tensor) -> list[Theta]:
+        """Where episodes begin: references at clouds (B, N, 3) as they are seen in each of the views of the options."""
+        return [mean_start(reference, points, view) for view in self.options.starts]
+
     @torch.no_grad()
     def fit(self, reference: Shapes, observed: Observed) -> list[Theta]:
-        """States of the reference from the start on, after each action of the agent, section 4.3."""
-        start = mean_start(reference, observed.points, self.options.start)
-        fitting, path = Fitting(reference, observed, start, self.options.fitting), [start]
+        """States of one reference from its S starts on, S rows, after each action of the agent, section 4.3.
+
+        The agent takes the action that its policy holds for the most likely one.
+        """
+        start = concatenate(self.starts(reference, observed.points))
+        fitting = Fitting(
+            reference.repeat(len(start)), observed.repeat(len(start)), start, self.options.fitting
+        )  # fmt: skip
+        path = [start]
         while not fitting.done:
-            fitting.step(expected_action(self.policy(fitting.view())[0]))
+            fitting.step(self.policy(fitting.view())[0].argmax(-1))
             path.append(fitting.theta)
         return path
+
+    def refined(self, reference: Shapes, observed: Observed, paths: list[Theta]) -> tuple[list[Theta], Refined]:
+        """The path from the best start, and its end refined, section 4.4.
+
+        Every end is refined on few points with its shape as it is; the one with the least energy is refined on all.
+        """
+        options, ends = self.options, paths[-1]
+        few = observed.map(lambda values: values[:, : options.early_points]).repeat(len(ends))
+        early = replace(options.refine, iterations=min(options.early_iterations, options.refine.iterations))
+        first = refine(reference.repeat(len(ends)), few, ends, early, rigid=True)
+        best = [int(first.energy.argmin())]
+        refined = refine(reference, observed, first.theta[best], options.refine)
+        return [theta[best] for theta in paths], refined
 
     def _report(
         self, row: int, reference: Shapes, observed: Observed, path: list[Theta], labels: NDArray[np.int64],

@@ -14,7 +14,6 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from artperl.agent.actions import expected_action
 from artperl.agent.registration import REGISTRATION, PartProblems, RegistrationPolicy, RigidFitting, part_problems
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.clock import Clock
@@ -77,7 +76,7 @@ class SporeAgent(AgentMethod):
         fitting = RigidFitting(problems.shapes, problems.observed, problems.start, REGISTRATION)
         best, least = fitting.theta, fitting.distance
         while not fitting.done:
-            fitting.step(expected_action(self.policy(fitting.view())[0]))
+            fitting.step(self.policy(fitting.view())[0].argmax(-1))
             better = fitting.distance < least
             best, least = fitting.theta.where(better, best), torch.where(better, fitting.distance, least)
         return best

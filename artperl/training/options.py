@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, TypeVar
 
-from artperl.agent.ppo import CLONING, JOINT, Phase, PPOOptions
+from artperl.agent.ppo import CLONING, JOINT, OWN_STATES, Phase, PPOOptions
 from artperl.data.categories import Parts
 from artperl.methods import StoredMethod
+from artperl.training.steps import one_cycle
 from artsim.common.json_records import from_json_values
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
@@ -96,8 +97,11 @@ class TrainOptions:
     """Batches of episodes that the agent of the method artperl learns from."""
     cloning_share: float = 0.6
     """Of the rollouts, the first ones that the agent learns from by behaviour cloning alone."""
-    agent_rate: float = 1e-3
-    episodes: int = 192
+    agent_rate: float = 2e-3
+    """Of cloning."""
+    reinforcement_rate: float = 2e-4
+    """Of the agent once it learns from rewards."""
+    episodes: int = 128
     """Episodes of a rollout. An update learns from states of few of them: of many, these are of many objects."""
     box_views: int = 2500
     """Fresh views of the last stage, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
@@ -126,7 +130,7 @@ class TrainOptions:
         for name in _SHARES:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ConfigError(f"{getattr(self, name)} is no share", name, "use 0 to 1")
-        for name in ("perception_rate", "agent_rate"):
+        for name in ("perception_rate", "agent_rate", "reinforcement_rate"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ConfigError(f"{getattr(self, name)} is no learning rate", name, "use 1e-4 to 1e-2")
         if self.noisy and (self.dataset is not None or self.sample.noise != "none"):
@@ -148,8 +152,21 @@ class TrainOptions:
             raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
 
     def phase(self, rollout: int) -> Phase:
-        """The phase of Algorithm 1 that a rollout is in."""
-        return CLONING if rollout < self.cloning_share * self.agent_rollouts else JOINT
+        """The phase of Algorithm 1 that a rollout is in: cloning on states of either kind in turn, then both losses."""
+        if rollout >= self._cloning_rollouts:
+            return JOINT
+        return OWN_STATES if rollout % 2 else CLONING
+
+    def rate_of_agent(self, rollout: int) -> float:
+        """The agent's learning rate, a cycle for each phase."""
+        cloning = self._cloning_rollouts
+        if rollout < cloning:
+            return self.agent_rate * one_cycle(rollout, cloning)
+        return self.reinforcement_rate * one_cycle(rollout - cloning, self.agent_rollouts - cloning)
+
+    @property
+    def _cloning_rollouts(self) -> int:
+        return round(self.cloning_share * self.agent_rollouts)
 
     @property
     def votes(self) -> bool:
@@ -200,8 +217,8 @@ one estimator for many categories, with any parts."""
 PAPER_PRESETS = {
     "quick": TrainOptions(
         method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=400, batch_size=16,
-        num_points=768, retrieval_steps=30, agent_rollouts=20, agent_rate=3e-3, cloning_share=0.7,
-        test_objects=20, test_views=2, ppo=PPOOptions(epochs=2),
+        num_points=768, retrieval_steps=30, agent_rollouts=40, cloning_share=0.7,
+        test_objects=20, test_views=2,
     ),
     "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500),
 }  # fmt: skip

@@ -5,24 +5,24 @@ Each goes on where it stopped: its batches, rates and actions are functions of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from artperl.agent.actions import expected_action, rotation_vector
+from artperl.agent.actions import rotation_vector
 from artperl.agent.decision_process import Fitting
 from artperl.agent.policy import Policy
 from artperl.agent.ppo import algorithm_1
-from artperl.agent.start import mean_start
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
-from artperl.core.pose import Theta, clamp_state, theta_from_parts
-from artperl.core.ranks import ALONE, Ranks
+from artperl.core.pose import Theta, clamp_state, pose_parts, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
+from artperl.data.batches import row_batches
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
 from artperl.estimator import save_estimator
@@ -35,6 +35,8 @@ from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps
 from artsim.observing.sample import Sample
+
+Rows = dict[str, Tensor]
 
 _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
@@ -107,14 +109,13 @@ class AgentStage:
     estimator : callable
         The method of a context.
     episodes : callable
-        Episodes and goals of a rollout, by the method, views, their number, a seed and the number of the rollout; of
-        several processes, the share of this one.
+        Episodes and goals of a rollout, by the method, views, their number, the rows of this process, and chance.
     alone : int
         Views of a test of the agent without an expert, always the same ones.
     """
 
     estimator: Callable[[Context], Any]
-    episodes: Callable[[Any, Source, int, int, int, Ranks], tuple[Any, Theta]]
+    episodes: Callable[[Any, Rows, int, slice, torch.Generator], tuple[Any, Theta]]
     alone: int
     name: str = "agent"
 
@@ -125,11 +126,13 @@ class AgentStage:
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
         options, total, method = context.options, context.options.agent_rollouts, self.estimator(context)
         policy, optimizer, ranks = method.policy.train(), context.state.optimizers["policy"], context.ranks
-        samples, unseen = (view_source(context, POINTS, options.seed + seed, _VIEWS) for seed in (2, 3))
+        views = agent_views(context, options.episodes, first, options.seed + 2)
+        unseen = next(agent_views(replace(context, workers=0), self.alone, 0, options.seed + 3))
 
         def episodes(n: int) -> tuple[Any, Theta]:
-            set_rate(optimizer, options.agent_rate * one_cycle(n, total))
-            return self.episodes(method, samples, options.episodes, options.seed, n, ranks)
+            set_rate(optimizer, options.rate_of_agent(n))
+            generator = torch.Generator().manual_seed((options.seed << 32) + n)
+            return self.episodes(method, next(views), options.episodes, ranks.rows(options.episodes), generator)
 
         rounds = algorithm_1(
             policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total, ranks,
@@ -138,7 +141,9 @@ class AgentStage:
         for n, figures in enumerate(rounds, first):
             line = None
             if ranks.first and (n % _ALONE_EVERY == 0 or n + 1 == total):
-                alone = agent_alone(policy, *self.episodes(method, unseen, self.alone, options.seed, 0, ALONE))
+                generator = torch.Generator().manual_seed(options.seed)
+                problems = self.episodes(method, unseen, self.alone, slice(0, self.alone), generator)
+                alone = agent_alone(policy, *problems)
                 context.report("agent_alone", alone, n)
                 line = f"alone: reward {alone['reward']:.3f}, {alone['rotation_deg']:.1f} deg"
             yield figures, line
@@ -164,44 +169,47 @@ def paper_stages(options: TrainOptions) -> list[Any]:
 
 
 def fitting_episodes(
-    method: ArtPERL, samples: Source, count: int, seed: int, n: int, ranks: Ranks = ALONE
+    method: ArtPERL, views: Rows, count: int, own: slice, generator: torch.Generator
 ) -> tuple[Fitting, Theta]:
-    """Episodes of one rollout, and their goals: fresh views, as the method segments, retrieves and starts.
+    """Episodes of one rollout, and their goals: views as the method segments, retrieves and starts.
 
-    The goal is the state of the retrieved reference that is nearest to the true 9D poses.
+    The goal is the state of the retrieved reference that is nearest to the true 9D poses. Each episode begins with one
+    of the method's starts.
 
     Parameters
     ----------
     method : ArtPERL
         Its segmentation and retrieval are taken as they are.
-    samples : Source
+    views : Rows
+        As of :func:`agent_views`.
     count : int
         Episodes.
-    seed, n : int
-        Rollout ``n`` is a function of both.
-    ranks : Ranks
-        Of several processes, each has its share of the episodes.
+    own : slice
+        Of several processes, the episodes of this one, and how many there are in all.
+    generator : torch.Generator
+        Draws references and starts, for all of them.
     """
-    generator, own = torch.Generator().manual_seed((seed << 32) + n), ranks.rows(count)
-    views = [samples[i] for i in range(n * count, (n + 1) * count)[own]]
-    reference, observed = draw_references(method, views, generator, own, count)
+    reference, observed = draw_references(method, views, count, own, generator)
     trees = reference.trees
-    truth = [part_truth(view, trees.num_rows) for view in views]
-    _, rotation, center, size, _, _ = (torch.stack(values).to(method.device) for values in zip(*truth, strict=True))
-    goal = theta_from_parts(trees, reference.box_center, reference.box_size, rotation, center, size)
-    goal = Theta(**{**vars(goal), "state": clamp_state(trees, goal.state)})
-    start = mean_start(reference, observed.points, method.options.start)
+    truth = (views[name][own].to(method.device) for name in ("rotation", "center", "size"))
+    goal = theta_from_parts(trees, reference.box_center, reference.box_size, *truth)
+    goal = replace(goal, state=clamp_state(trees, goal.state))
+    starts = method.starts(reference, observed.points)
+    which = torch.randint(len(starts), (count,), generator=generator)[own].to(method.device)
+    start = starts[0]
+    for number, other in enumerate(starts[1:], 1):
+        start = other.where(which == number, start)
     return Fitting(reference, observed, start, method.options.fitting), goal
 
 
 def draw_references(
-    method: AgentMethod, views: Sequence[Sample], generator: torch.Generator, own: slice, count: int
+    method: AgentMethod, views: Rows, count: int, own: slice, generator: torch.Generator
 ) -> tuple[Shapes, Observed]:
     """For each of B views a reference among the nearest, by chance, and the cloud as the method segments it.
 
     They are the views ``own`` of ``count`` in all, for which chance is drawn.
     """
-    points = _stacked([view.points for view in views]).to(method.device)
+    points = views["points"][own].to(method.device)
     part = method.segment(points)
     nearest = method.retrieve(points, part, min(_CHOICES, len(method.base)))
     drawn = torch.randint(nearest.shape[1], (count, 1), generator=generator)[own].to(method.device)
@@ -210,17 +218,33 @@ def draw_references(
 
 @torch.no_grad()
 def agent_alone(policy: Policy, fitting: Fitting, goal: Theta) -> dict[str, float]:
-    """Mean reward of a step, chamfer distances, and the root's rotation from the goal, when nobody guides the agent."""
-    start, rewards = fitting.distance, []
+    """Mean reward of a step, chamfer distances, and the mean rotation of all parts from the goal, by itself."""
+    start, rewards, trees = fitting.distance, [], fitting.shapes.trees
     while not fitting.done:
-        rewards.append(fitting.step(expected_action(policy(fitting.view())[0])))
-    off = rotation_vector(goal.rotation @ fitting.theta.rotation.mT)
+        rewards.append(fitting.step(policy(fitting.view())[0].argmax(-1)))
+    wanted = pose_parts(trees, goal, fitting.shapes.box_center).rotation
+    off = torch.linalg.vector_norm(rotation_vector((wanted.mT @ fitting.posed.rotation).flatten(0, 1)), dim=-1)
     return {
         "reward": torch.stack(rewards).mean().item(),
         "chamfer_start": start.mean().item(),
         "chamfer_end": fitting.distance.mean().item(),
-        "rotation_deg": torch.linalg.vector_norm(off, dim=-1).rad2deg().median().item(),
+        "rotation_deg": off.view(trees.valid.shape)[trees.valid].rad2deg().mean().item(),
     }
+
+
+def agent_views(context: Context, count: int, first: int, seed: int) -> Iterator[Rows]:
+    """Batches of so many views from number ``first`` on, some of which come in several: points, and true 9D poses."""
+    return row_batches(
+        context.objects.data, context.objects.num_rows, POINTS, count, first, seed, context.workers,
+        partial(_true_poses, context.objects.num_rows), (context.ranks.rank, context.ranks.count),
+        context.ranks.in_turn, _VIEWS,
+    )  # fmt: skip
+
+
+def _true_poses(num_rows: int, source: Source, number: int, sample: Sample) -> dict[str, np.ndarray]:
+    """More rows for :func:`artperl.data.batches.row_batches`."""
+    _, rotation, center, size, _, _ = part_truth(sample, num_rows)
+    return {"rotation": rotation.numpy(), "center": center.numpy(), "size": size.numpy()}
 
 
 def view_source(context: Context, num_points: int, seed: int, views: int) -> Source:

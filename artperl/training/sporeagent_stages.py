@@ -10,15 +10,12 @@ from torch import nn
 from artperl.agent.registration import REGISTRATION, RigidFitting, part_goals, part_problems
 from artperl.agent.start import mean_start
 from artperl.core.pose import Theta
-from artperl.core.ranks import ALONE, Ranks
-from artperl.data.fitting_problems import part_truth
-from artperl.data.sources import Source
 from artperl.methods.retrieved import Sizes
 from artperl.methods.sporeagent import SporeAgent
 from artperl.retrieval.siamese import by_siamese
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
-from artperl.training.paper_stages import AgentStage, KeepStage, RetrievalStage, draw_references
+from artperl.training.paper_stages import AgentStage, KeepStage, RetrievalStage, Rows, draw_references
 from artperl.training.supervised import SupervisedStage, segmentation_loss
 from artsim.errors import ConfigError
 
@@ -46,34 +43,30 @@ def sporeagent_stages(options: TrainOptions) -> list[Any]:
 
 
 def registration_episodes(
-    method: SporeAgent, samples: Source, count: int, seed: int, n: int, ranks: Ranks = ALONE
+    method: SporeAgent, views: Rows, count: int, own: slice, generator: torch.Generator
 ) -> tuple[RigidFitting, Theta]:
-    """Episodes of one rollout, and their goals: the parts of fresh views, as the method segments and retrieves.
+    """Episodes of one rollout, and their goals: the parts of views, as the method segments and retrieves.
 
     Parameters
     ----------
     method : SporeAgent
-    samples : Source
+    views : Rows
+        Each has an episode for every part that shows.
     count : int
-        Views; each has an episode for every part that shows.
-    seed, n : int
-        Rollout ``n`` is a function of both.
-    ranks : Ranks
-        One process: how many parts show is known when all views are there.
+    own : slice
+    generator : torch.Generator
+        As of :func:`artperl.training.paper_stages.fitting_episodes`.
 
     Raises
     ------
     ConfigError
         When no part shows in any view.
     """
-    generator = torch.Generator().manual_seed((seed << 32) + n)
-    views = [samples[i] for i in range(n * count, (n + 1) * count)]
-    reference, observed = draw_references(method, views, generator, ranks.rows(count), count)
+    reference, observed = draw_references(method, views, count, own, generator)
     start = mean_start(reference, observed.points, method.options.start)
     problems = part_problems(reference, observed, start, generator)
     if problems is None:
         raise ConfigError("no part shows in a whole rollout", "num_points", "use more points")
-    truth = [part_truth(view, reference.trees.num_rows) for view in views]
-    rotation, center = (torch.stack([own[i] for own in truth]).to(method.device) for i in (1, 2))
+    rotation, center = (views[name][own].to(method.device) for name in ("rotation", "center"))
     fitting = RigidFitting(problems.shapes, problems.observed, problems.start, REGISTRATION)
     return fitting, part_goals(problems, rotation, center)
