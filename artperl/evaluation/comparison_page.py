@@ -86,13 +86,15 @@ def _cell(parts: Sequence[dict[str, Any]], k: int, name: str, factor: float, dig
 
 def _views(benchmark: str, category: str, methods: Mapping[str, dict[str, Any]]) -> list[str]:
     known = published_of(benchmark, category)
-    head = ["method", "views", "objects", "failures", "right, %", "seconds", "seconds, published"]
+    head = ["method", "views", "objects", "failures", "right, %", "trained, core-min", "seconds", "seconds, published"]
     lines = [_line(head), _line(["---"] * len(head))]
     for method, record in methods.items():
         told = known[method].seconds if method in known else None
+        trained = record["trained_core_minutes"]
         lines.append(_line([
             TITLES.get(method, method), str(record["views"]), str(record["objects"]), str(record["failures"]),
-            f"{100 * record['right']:.0f}", f"{record['seconds']:.2f}", "" if told is None else f"{told:.1f}",
+            f"{100 * record['right']:.0f}", "" if trained is None else f"{trained:.1f}", f"{record['seconds']:.2f}",
+            "" if told is None else f"{told:.1f}",
         ]))  # fmt: skip
     return lines
 
