@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artperl.evaluation.reliability import confidence_figures
 from artperl.evaluation.scoring import Scored
 from artsim.observing.sample import Sample
 
@@ -41,7 +42,8 @@ def row_record(
     dict
         ``parts``: for each part and metric, ``mean``, ``low``, ``high`` and ``median``; ``seconds``: the median of a
         view; ``visibility`` and ``azimuth``: the mean rotation error of parts by how much of them shows, and by the
-        view; ``views``, ``objects``, ``failures``, ``right`` and ``trained_core_minutes``.
+        view; ``views``, ``objects``, ``failures``, ``right``, ``trained_core_minutes``,
+        ``confidence_auroc`` and ``calibration_error``.
     """
     objects = np.unique([sample.object_sha256 for sample in samples], return_inverse=True)[1]
     shown = np.array([sample.visible_fraction for sample in samples])
@@ -62,6 +64,7 @@ def row_record(
         "failures": sum(s.failed for s in scored),
         "right": float(np.mean([s.right for s in scored])),
         "trained_core_minutes": core_minutes,
+        **confidence_figures([s.confidence for s in scored], [s.right for s in scored]),
     }
 
 

@@ -52,6 +52,7 @@ def markdown(benchmark: str, rows: Rows, notes: Sequence[str]) -> str:
             if name in _SHOWN[benchmark] and all(name in record["parts"][0] for record in methods.values()):
                 lines += [f"### {title}", "", *_table(benchmark, category, methods, name), ""]
         lines += ["### Views", "", *_views(benchmark, category, methods), ""]
+        lines += ["### Confidence", "", *_confidence(methods), ""]
         for where, unit in (("visibility", "share of the part that shows"), ("azimuth", "degrees from the front")):
             lines += [f"### Rotation error by {unit}", "", *_ranges(methods, where), ""]
     lines += ["## All categories", "", *_means(rows), ""]
@@ -96,6 +97,16 @@ def _views(benchmark: str, category: str, methods: Mapping[str, dict[str, Any]])
             f"{100 * record['right']:.0f}", "" if trained is None else f"{trained:.1f}", f"{record['seconds']:.2f}",
             "" if told is None else f"{told:.1f}",
         ]))  # fmt: skip
+    return lines
+
+
+def _confidence(methods: Mapping[str, dict[str, Any]]) -> list[str]:
+    """How well confidence tells right views from wrong ones, of this category and these objects alone."""
+    head = ["method", "AUROC", "expected calibration error, %"]
+    lines = [_line(head), _line(["---"] * len(head))]
+    for method, record in methods.items():
+        curve, error = record["confidence_auroc"], 100 * record["calibration_error"]
+        lines.append(_line([TITLES.get(method, method), "-" if curve is None else f"{curve:.2f}", f"{error:.1f}"]))
     return lines
 
 
