@@ -23,6 +23,8 @@ class Report:
 
     The tables of the paper, in hours on two cores: artperl report --benchmark artimage
 
+    The same with as much time for each method, one hour of one core: artperl report --minutes 60
+
     Of some methods and categories: artperl report --category laptop --methods full ancsh omad
 
     The same methods on real objects, without another training, in report-real.html: artperl report --row real
@@ -43,8 +45,9 @@ class Report:
     """By default all of the benchmark."""
     preset: Literal["quick", "full"] = "full"
     """Of the trainings: quick ones take some minutes each, full ones an hour and more."""
-    retrain_full: bool = False
-    """Train the method full, too, instead of taking the estimators that come with the package."""
+    minutes: float | None = None
+    """Train every method for so many minutes of one core: the stages of the preset get longer or shorter. By default
+    the preset says how long, and full of ArtImage has the weights that come with the package alone."""
     row: Literal["procedural", "real"] = "procedural"
     """Objects to test on: unseen procedural ones, or the half of PartNet-Mobility's that is for testing."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
@@ -60,11 +63,13 @@ class Report:
         from artsim.common.extras import needs
 
         with needs("training"):
+            import torch
+
             from artperl.training.comparison_run import ComparisonOptions, run_comparison
 
         options = ComparisonOptions(
             self.benchmark, self.category, "" if self.arm is None else str(self.arm), self.methods, self.preset,
-            self.objects, self.views, retrain_full=self.retrain_full, row=self.row,
+            self.objects, self.views, minutes=self.minutes, row=self.row,
             partnet="" if self.partnet is None else str(self.partnet),
         )  # fmt: skip
         if self.quick:
@@ -72,6 +77,8 @@ class Report:
 
             options = quick_comparison(options)
         out = self.out or Path("out") / f"report-{self.benchmark}{'-quick' if self.quick else ''}"
+        if self.minutes is not None:
+            torch.set_num_threads(1)
         try:
             run_comparison(options, out, self.workers, True, say)
         except KeyboardInterrupt:

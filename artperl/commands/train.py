@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -60,6 +60,10 @@ class Train:
     device: Literal["cpu", "cuda"] = "cpu"
     """Where the networks learn. A run may go on elsewhere than where it was begun."""
 
+    wandb: str | None = None
+    """Project of Weights & Biases that gets the curves, too. It takes pip install wandb; WANDB_MODE=offline needs no
+    account."""
+
     # From here on: fields of TrainOptions under their own names, then those of its parts.
     method: StoredMethod | None = None
     """full: the method that comes with trained weights; artperl: section 4 of the paper as printed; the others: the
@@ -114,6 +118,7 @@ class Train:
         import torch
 
         from artperl.training.recipes import Recipe, is_made
+        from artperl.training.report import WandbReport
         from artperl.training.run import Training
 
         if self.threads is not None:
@@ -126,7 +131,8 @@ class Train:
         out = self.out or Path("out/train") / f"{name}-{method}{preset}"
         if recipe is None or not is_made(out, recipe):
             try:
-                training = Training(options, out, self.workers, recipe=recipe, device=self.device)
+                report = None if self.wandb is None else WandbReport(self.wandb, out, asdict(options))
+                training = Training(options, out, self.workers, report=report, recipe=recipe, device=self.device)
                 training.run()
                 training.context.ranks.close()
                 if not training.context.ranks.first:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artperl.evaluation.reliability import confidence_figures
 from artperl.evaluation.scoring import Scored
 from artsim.observing.sample import Sample
 
@@ -24,15 +25,25 @@ _DRAWS = 1000
 """Draws of a bootstrap: bounds differ by some percent of the interval from draw to draw."""
 
 
-def row_record(scored: Sequence[Scored], samples: Sequence[Sample]) -> dict[str, Any]:
+def row_record(
+    scored: Sequence[Scored], samples: Sequence[Sample], core_minutes: float | None = None
+) -> dict[str, Any]:  # fmt: skip
     """Figures of one method on one category, in JSON's terms.
+
+    Parameters
+    ----------
+    scored : sequence of Scored
+    samples : sequence of Sample
+    core_minutes : float, optional
+        Processor minutes that the method has learnt for; by default nobody knows.
 
     Returns
     -------
     dict
         ``parts``: for each part and metric, ``mean``, ``low``, ``high`` and ``median``; ``seconds``: the median of a
         view; ``visibility`` and ``azimuth``: the mean rotation error of parts by how much of them shows, and by the
-        view; ``views``, ``objects``, ``failures`` and ``right``.
+        view; ``views``, ``objects``, ``failures``, ``right``, ``trained_core_minutes``,
+        ``confidence_auroc`` and ``calibration_error``.
     """
     objects = np.unique([sample.object_sha256 for sample in samples], return_inverse=True)[1]
     shown = np.array([sample.visible_fraction for sample in samples])
@@ -52,6 +63,8 @@ def row_record(scored: Sequence[Scored], samples: Sequence[Sample]) -> dict[str,
         "objects": int(objects.max()) + 1,
         "failures": sum(s.failed for s in scored),
         "right": float(np.mean([s.right for s in scored])),
+        "trained_core_minutes": core_minutes,
+        **confidence_figures([s.confidence for s in scored], [s.right for s in scored]),
     }
 
 

@@ -52,6 +52,7 @@ def markdown(benchmark: str, rows: Rows, notes: Sequence[str]) -> str:
             if name in _SHOWN[benchmark] and all(name in record["parts"][0] for record in methods.values()):
                 lines += [f"### {title}", "", *_table(benchmark, category, methods, name), ""]
         lines += ["### Views", "", *_views(benchmark, category, methods), ""]
+        lines += ["### Confidence", "", *_confidence(methods), ""]
         for where, unit in (("visibility", "share of the part that shows"), ("azimuth", "degrees from the front")):
             lines += [f"### Rotation error by {unit}", "", *_ranges(methods, where), ""]
     lines += ["## All categories", "", *_means(rows), ""]
@@ -86,14 +87,26 @@ def _cell(parts: Sequence[dict[str, Any]], k: int, name: str, factor: float, dig
 
 def _views(benchmark: str, category: str, methods: Mapping[str, dict[str, Any]]) -> list[str]:
     known = published_of(benchmark, category)
-    head = ["method", "views", "objects", "failures", "right, %", "seconds", "seconds, published"]
+    head = ["method", "views", "objects", "failures", "right, %", "trained, core-min", "seconds", "seconds, published"]
     lines = [_line(head), _line(["---"] * len(head))]
     for method, record in methods.items():
         told = known[method].seconds if method in known else None
+        trained = record["trained_core_minutes"]
         lines.append(_line([
             TITLES.get(method, method), str(record["views"]), str(record["objects"]), str(record["failures"]),
-            f"{100 * record['right']:.0f}", f"{record['seconds']:.2f}", "" if told is None else f"{told:.1f}",
+            f"{100 * record['right']:.0f}", "" if trained is None else f"{trained:.1f}", f"{record['seconds']:.2f}",
+            "" if told is None else f"{told:.1f}",
         ]))  # fmt: skip
+    return lines
+
+
+def _confidence(methods: Mapping[str, dict[str, Any]]) -> list[str]:
+    """How well confidence tells right views from wrong ones, of this category and these objects alone."""
+    head = ["method", "AUROC", "expected calibration error, %"]
+    lines = [_line(head), _line(["---"] * len(head))]
+    for method, record in methods.items():
+        curve, error = record["confidence_auroc"], 100 * record["calibration_error"]
+        lines.append(_line([TITLES.get(method, method), "-" if curve is None else f"{curve:.2f}", f"{error:.1f}"]))
     return lines
 
 

@@ -1,17 +1,22 @@
-"""Whether estimates with confidence p are right in a share p of cases."""
+"""Whether confidence tells right estimates from wrong ones, and is right in as many cases as it says."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-BINS = 10
+from artperl.evaluation.metrics import auroc
+
+_BINS = 10
 
 
-def reliability(confidence: NDArray[np.float64], right: NDArray[np.bool_], bins: int = BINS) -> dict[str, Any]:
-    """Reliability by bins of equal width (Guo et al., "On calibration of modern neural networks", ICML 2017).
+def confidence_figures(
+    confidence: Sequence[float] | NDArray[Any], right: Sequence[bool] | NDArray[Any]
+) -> dict[str, Any]:
+    """Figures of the confidence of estimates that are all of one row and one category.
 
     Parameters
     ----------
@@ -22,28 +27,24 @@ def reliability(confidence: NDArray[np.float64], right: NDArray[np.bool_], bins:
     Returns
     -------
     dict
-        ``count``, ``confidence`` and ``right`` of every bin, means, None where it is empty; and ``expected_error``, the
-        mean over all estimates of how far their bins' confidence is from the share that is right.
+        ``confidence_auroc``, None where all are right, or all wrong; ``calibration_error``.
     """
-    number = np.minimum((np.asarray(confidence) * bins).astype(int), bins - 1)
-    count = np.bincount(number, minlength=bins)
-    said, true = (np.bincount(number, weights=values, minlength=bins) for values in (confidence, right))
-    some = count > 0
-    return {
-        "count": count.tolist(),
-        "confidence": [float(x / n) if n else None for x, n in zip(said, count, strict=True)],
-        "right": [float(x / n) if n else None for x, n in zip(true, count, strict=True)],
-        "expected_error": float(np.abs(said - true)[some].sum() / max(len(number), 1)),
-    }
+    said, true = np.asarray(confidence, float), np.asarray(right, bool)
+    return {"confidence_auroc": auroc(said, true), "calibration_error": calibration_error(said, true)}
 
 
-def reliability_lines(figures: dict[str, Any]) -> list[str]:
-    """A table for people."""
-    bins = len(figures["count"])
-    lines = [f"{'confidence':>12s}{'estimates':>11s}{'mean':>7s}{'right':>7s}"]
-    for n, (count, said, true) in enumerate(
-        zip(figures["count"], figures["confidence"], figures["right"], strict=True)
-    ):
-        cells = "" if count == 0 else f"{100 * said:6.0f}%{100 * true:6.0f}%"
-        lines.append(f"{100 * n // bins:6d}-{100 * (n + 1) // bins:3d} %{count:11d}{cells}")
-    return [*lines, f"expected calibration error {100 * figures['expected_error']:.1f} %"]
+def calibration_error(confidence: NDArray[np.float64], right: NDArray[np.bool_]) -> float:
+    """Mean over estimates of how far the confidence of their bins is from the share that is right.
+
+    It is the expected calibration error, of bins of equal width (Guo et al., "On calibration of modern neural
+    networks", ICML 2017).
+    """
+    number = np.minimum((confidence * _BINS).astype(int), _BINS - 1)
+    said, true = (np.bincount(number, weights=values, minlength=_BINS) for values in (confidence, right))
+    return float(np.abs(said - true).sum() / len(number))
+
+
+def confidence_line(figures: dict[str, Any]) -> str:
+    """The figures for people."""
+    curve, error = figures["confidence_auroc"], 100 * figures["calibration_error"]
+    return f"AUROC {'-' if curve is None else f'{curve:.2f}'}, expected calibration error {error:.0f} %"

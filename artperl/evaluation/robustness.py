@@ -12,8 +12,7 @@ import numpy as np
 from artperl.evaluation.artimage import OBJECTS, real_objects, row_objects
 from artperl.evaluation.benchmark import find_estimator
 from artperl.evaluation.conditions import CONDITIONS, condition_samples, find_condition
-from artperl.evaluation.metrics import auroc
-from artperl.evaluation.reliability import reliability, reliability_lines
+from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored, evaluate, object_symmetries
 from artsim.common.files import read_json, write_atomic
 from artsim.errors import ConfigError
@@ -24,7 +23,8 @@ SOURCES = ("procedural", "real", "real_all")
 
 _MAX_BYTES = 64_000_000
 _HEAD = (
-    f"{'':13s}{'views':>6s}{'right':>7s}{'sym.':>6s}{'AUROC':>7s}{'conf.':>7s}{'move %':>8s}{'IoU %':>7s}  turn, deg"
+    f"{'':13s}{'views':>6s}{'right':>7s}{'sym.':>6s}{'AUROC':>7s}{'ECE':>6s}{'conf.':>7s}{'move %':>8s}{'IoU %':>7s}"
+    "  turn, deg"
 )
 
 
@@ -58,7 +58,8 @@ def run_robustness(
     Returns
     -------
     dict
-        ``{"options": {...}, "rows": {"source/category/condition": figures}}``
+        ``{"options": {...}, "rows": {"source/category/condition": figures}, "confidence": {"source/category":
+        figures}}``, the latter of all conditions.
 
     Raises
     ------
@@ -71,7 +72,7 @@ def run_robustness(
         if source not in SOURCES:
             raise ConfigError(f"there is no source {source!r}", "rows", f"use {', '.join(SOURCES)}")
     options = {"weights": None if weights is None else str(weights), "objects": objects, "views": views}
-    rows = _kept_rows(kept, options)
+    rows, sure = _kept_rows(kept, options), {}
     for source in sources:
         for category in categories:
             tested = _objects(source, category, partnet, objects)
@@ -89,13 +90,11 @@ def run_robustness(
                     if kept is not None:
                         write_atomic(kept, (json.dumps({"options": options, "rows": rows}) + "\n").encode())
                 say(row_line(condition, rows[key]))
-    asked = [rows[f"{s}/{c}/{n}"] for s in sources for c in categories for n in conditions if f"{s}/{c}/{n}" in rows]
-    if asked:
-        confidence, right = (np.concatenate([row[name] for row in asked]) for name in ("confidence", "is_right"))
-        whole = reliability(confidence, right.astype(bool))
-        say("\n".join(reliability_lines(whole)))
-        return {"options": options, "rows": rows, "reliability": whole, "auroc": auroc(confidence, right.astype(bool))}
-    return {"options": options, "rows": rows}
+            asked = [rows[f"{source}/{category}/{condition}"] for condition in conditions]
+            confidence, right = (np.concatenate([row[name] for row in asked]) for name in ("confidence", "is_right"))
+            sure[f"{source}/{category}"] = confidence_figures(confidence, right)
+            say(f"{source}, {category}, all conditions: {confidence_line(sure[f'{source}/{category}'])}")
+    return {"options": options, "rows": rows, "confidence": sure}
 
 
 def _objects(source: str, category: str, partnet: Path | None, objects: int) -> list[ArticulatedObject]:
@@ -125,7 +124,6 @@ def row_figures(scored: Sequence[Scored]) -> dict[str, Any]:
         "rotation_deg": np.mean([s.rotation for s in judged], axis=0).tolist(),
         "translation_percent_diagonal": float(np.mean([100.0 * s.translation.mean() for s in judged])),
         "iou_exact": float(np.mean([s.errors["iou_exact"].mean() for s in judged])),
-        "auroc": auroc(confidence, right),
         "confidence": confidence.round(4).tolist(),
         "is_right": right.tolist(),
     }
@@ -133,10 +131,12 @@ def row_figures(scored: Sequence[Scored]) -> dict[str, Any]:
 
 def row_line(name: str, row: dict[str, Any]) -> str:
     """One line of the table; errors are means."""
-    told = "-" if row["auroc"] is None else f"{row['auroc']:.2f}"
+    sure = confidence_figures(row["confidence"], row["is_right"])
+    curve = "-" if sure["confidence_auroc"] is None else f"{sure['confidence_auroc']:.2f}"
+    told = f"{curve:>7s}{100 * sure['calibration_error']:5.0f}%"
     turn = " ".join(f"{value:.1f}" for value in row["rotation_deg"])
     return (
-        f"{name:13s}{row['views']:6d}{100 * row['right']:6.0f}%{100 * row['right_up_to_symmetry']:5.0f}%{told:>7s}"
+        f"{name:13s}{row['views']:6d}{100 * row['right']:6.0f}%{100 * row['right_up_to_symmetry']:5.0f}%{told}"
         f"{100 * np.mean(row['confidence']):6.0f}%{row['translation_percent_diagonal']:8.1f}"
         f"{100 * row['iou_exact']:7.1f}  {turn}"
     )

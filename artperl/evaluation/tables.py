@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.evaluation.metrics import METRICS, auroc
+from artperl.evaluation.metrics import METRICS
 from artperl.evaluation.part_detection import part_figures, part_line
+from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]
         "segmentation": float(np.mean([s.segmentation for s in own])),
         "confidence_of_right": _median(confidence[right]),
         "confidence_of_wrong": _median(confidence[~right]),
-        "confidence_auroc": auroc(confidence, right),
+        **confidence_figures(confidence, right),
         "ms_per_instance": float(np.median([s.milliseconds for s in own])),
         "detection": part_figures(own),
         **_symmetric_summary(own),
@@ -126,11 +127,9 @@ def table(figures: dict[str, Any]) -> str:
 
 
 def _confidence_line(figure: dict[str, Any]) -> str:
-    """Where all are right, or all wrong, there is no AUROC."""
     medians = {"right": figure["confidence_of_right"], "wrong": figure["confidence_of_wrong"]}
     told = ", ".join(f"of {kind} ones {100 * value:.0f} %" for kind, value in medians.items() if value is not None)
-    curve = figure["confidence_auroc"]
-    return f"confidence {told} in the median" + ("" if curve is None else f", AUROC {curve:.2f}")
+    return f"confidence {told} in the median, {confidence_line(figure)}"
 
 
 def _symmetric_line(figure: dict[str, Any]) -> str:

@@ -14,8 +14,8 @@ from artperl.fitting.joint_votes import REACH
 from artperl.methods.ancsh import ANCSH, ANCSHSizes, ancsh_networks
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
-from artperl.training.paper_stages import KeepStage
 from artperl.training.supervised import SupervisedStage
+from artperl.training.validation import Validation
 
 NPCS, MIOU, NAOCS, PLACE, AXIS, ASSOCIATION = 10.0, 1.0, 1.0, 5.0, 0.2, 1.0
 """Weights of the losses, the paper's; PLACE is of the heat and of the offset."""
@@ -36,8 +36,8 @@ def ancsh_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     return [
         SupervisedStage("coordinates", "coordinates", coordinate_loss),
-        SupervisedStage("joints", "joints", joint_loss),
-        KeepStage(),
+        SupervisedStage("joints", "joints", joint_loss, validated=True),
+        Validation(),
     ]
 
 

@@ -32,8 +32,6 @@ from artsim.observing.sample import Sample
 
 _SAVE_VIEWS = 200
 """Views after which records are written down."""
-_FITS = 0.02
-"""Residual up to which an estimate is learnt from: of others there is no saying what their boxes show."""
 _BATCH = 32
 _RATE, _DECAY = 2e-3, 0.1
 
@@ -60,22 +58,22 @@ class Records(Batch):
 class _Examined(Dataset[list[Records]]):
     """Records by number of the sample."""
 
-    def __init__(self, estimator: Estimator, samples: Callable[[int], Sample]):
-        self.estimator, self.samples = estimator, samples
+    def __init__(self, estimator: Estimator, samples: Callable[[int], Sample], residual: float):
+        self.estimator, self.samples, self.residual = estimator, samples, residual
 
     def __getitem__(self, number: int) -> list[Records]:
-        return _examined(self.estimator, self.samples(number))
+        return _examined(self.estimator, self.samples(number), self.residual)
 
 
 def record(
     estimator: Estimator, samples: Callable[[int], Sample], views: int, file: Path, report: Report, stop: Stop,
-    workers: int, progress: bool, ranks: Ranks = ALONE,
+    workers: int, progress: bool, residual: float, ranks: Ranks = ALONE,
 ) -> Records | None:  # fmt: skip
     """Records of the first so many samples, in single precision; those that the file holds are taken from it.
 
-    None when no estimate fits. Several processes that learn together look at views in turn, and the first keeps the
-    records: the others get none. Each of the workers, processes of one thread, estimates other samples; without any,
-    this process does.
+    None when no estimate has so small a residual. Several processes that learn together look at views in turn, and the
+    first keeps the records: the others get none. Each of the workers, processes of one thread, estimates other samples;
+    without any, this process does.
 
     Raises
     ------
@@ -86,7 +84,7 @@ def record(
     first = ranks.same(first)
     bar = track("boxes", total=views, initial=first, unit="view", smoothing=0.02, shown=progress)
     loader = DataLoader(
-        _Examined(estimator, samples), batch_size=None, sampler=range(first + ranks.rank, views, ranks.count),
+        _Examined(estimator, samples, residual), batch_size=None, sampler=range(first + ranks.rank, views, ranks.count),
         num_workers=workers, worker_init_fn=ignore_interrupt,
     )  # fmt: skip
     for n, made in zip(range(first, views), ranks.in_turn(map(_own, loader)), strict=False):
@@ -109,7 +107,9 @@ def _own(made: list[Records]) -> list[Records]:
     return [each.map(torch.clone) for each in made]
 
 
-def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, progress: bool) -> Boxes:
+def learn(
+    records: Records, num_rows: int, width: int, steps: int, seed: int, progress: bool, report: Report
+) -> Boxes:  # fmt: skip
     """A network that has learnt from records: always the same one for the same arguments."""
     torch.manual_seed(seed)
     boxes = Boxes(num_rows, width).to(records.center.device)
@@ -128,15 +128,16 @@ def learn(records: Records, num_rows: int, width: int, steps: int, seed: int, pr
         loss.backward()
         nn.utils.clip_grad_norm_(boxes.parameters(), 1.0)
         optimizer.step()
+        report("box_faces", {"loss": loss.item()}, step)
         bar.set_postfix_str(f"loss {loss.item():.3f}")
     return boxes
 
 
-def _examined(estimator: Estimator, sample: Sample) -> list[Records]:
+def _examined(estimator: Estimator, sample: Sample, residual: float) -> list[Records]:
     """The record of one sample, in half precision as it is kept; none if the estimate does not fit."""
     estimate, evidence, unit = estimator.evidence(sample.points)
     K = len(sample.box_size)
-    if estimate.residual > _FITS or len(estimate.size) != K:
+    if estimate.residual > residual or len(estimate.size) != K:
         return []
     T, T_true = estimate.T_camera_part, sample.T_camera_part[0]
     center = points_at_rest(true_poses(sample)[1], T)

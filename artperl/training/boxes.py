@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class BoxStage:
     """The best estimator gets other boxes if they are better on unseen objects, and on given ones."""
 
     name: str = "boxes"
+    lengths: ClassVar[dict[str, str]] = {"boxes": "box_views", "box_faces": "box_steps"}
 
     def run(self, context: Context) -> None:
         """Record the estimates that are left, learn from them, and choose."""
@@ -50,7 +52,7 @@ class BoxStage:
         learner = best_without_own_references(best, context)
         records = record(
             learner, _samples(context), options.box_views, context.folder.path / "boxes.safetensors",
-            context.report, context.stop, context.workers, context.progress, context.ranks,
+            context.report, context.stop, context.workers, context.progress, options.box_residual, context.ranks,
         )  # fmt: skip
         learnt = None
         if not context.ranks.first:  # the first process learns from what all have seen
@@ -59,13 +61,16 @@ class BoxStage:
         if records is not None:
             rows = best.perception.num_rows
             records = records.to(context.device)
-            learnt = learn(records, rows, options.box_width, options.box_steps, options.seed, context.progress).cpu()
+            learnt = learn(
+                records, rows, options.box_width, options.box_steps, options.seed, context.progress, context.report
+            ).cpu()  # fmt: skip
         context.stop_if_asked()
         state.done[self.name] = options.box_views
         if learnt is None:
             say("boxes: no estimate fits its view; they stay as they are")
         else:
-            _choose(context, best, learner, learnt.half().float())  # as precise as files are
+            with context.counted("validation"):
+                _choose(context, best, learner, learnt.half().float())  # as precise as files are
         context.save()
         context.ranks.same(state.done[self.name])
 
@@ -118,4 +123,5 @@ def _choose(context: Context, best: Estimator, learner: Estimator, boxes: Boxes)
     if mean_iou(after) > mean_iou(before):
         save_estimator(replace(best, boxes=boxes), context.folder.best, context.about({"validation": figures}))
     context.report("validation", scalars(figures), context.state.step)
-    say(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
+    if context.progress:
+        say(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")

@@ -9,11 +9,12 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
 from artperl.data.categories import ARTIMAGE
-from artperl.estimator import WEIGHTS, load_estimator
+from artperl.estimator import load_estimator
 from artperl.evaluation.artimage import has_half, row_objects, row_samples
 from artperl.evaluation.comparison import row_record
 from artperl.evaluation.comparison_page import html_page, markdown
@@ -23,12 +24,13 @@ from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.methods import StoredMethod
 from artperl.methods.protocol import Method
-from artperl.training.options import PRESETS, TrainOptions, preset_of
+from artperl.training.options import LENGTHS, PRESETS, TrainOptions, preset_of
 from artperl.training.recipes import about_tested
 from artperl.training.run import Training
+from artperl.training.timing import filling, trained_minutes
 from artperl.viewer import page
 from artsim.common.files import read_json, write_atomic
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ArtsimError, ConfigError, DatasetError
 from artsim.export import export
 from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
@@ -42,7 +44,8 @@ METHODS: dict[Benchmark, tuple[StoredMethod, ...]] = {
     "robotarm": ("full", "artperl", "ancsh"),
 }
 """Methods of a benchmark, as in the paper."""
-_STAGES = ("perception_steps", "retrieval_steps", "prior_steps", "agent_rollouts")
+SHIPPED = ", shipped"
+"""Ends the name of the row of a method with the weights that come with the package."""
 _NOISY, _DEGRADED = 0.5, 0.6
 """Shares of the clouds that trainings for the arm see with a sensor's noise; cut, dirty or sparse, as by bad masks."""
 _ARM_STEPS = 6000
@@ -78,8 +81,9 @@ class ComparisonOptions:
     num_points: int = NUM_POINTS
     train: dict[str, Any] | None = None
     """Other values of fields of TrainOptions, for every training."""
-    retrain_full: bool = False
-    """The method full is trained, too; by default the estimators that come with the package are taken."""
+    minutes: float | None = None
+    """Every method learns for so many minutes of one core, with the stages of the preset longer or shorter; by default
+    as long as the preset has it, and the method full of ArtImage is not trained."""
     row: Literal["procedural", "real"] = "procedural"
     """Of ArtImage made anew: objects to test on. Trainings are the same, and need not be repeated."""
     partnet: str = ""
@@ -106,6 +110,8 @@ class ComparisonOptions:
                 raise ConfigError(f"there is no real {' or '.join(self.categories)}", "row", "use another category")
         if self.objects < 1 or self.views < 1:
             raise ConfigError("there is nothing to test", "objects, views", "use at least 1 of each")
+        if self.minutes is not None and not 0.0 < self.minutes < inf:
+            raise ConfigError(f"nothing is learnt in {self.minutes} minutes", "minutes", "use 10 or more")
 
     @property
     def of_categories(self) -> tuple[str, ...]:
@@ -148,7 +154,7 @@ def run_comparison(
     out : Path
         Folder of the report: ``train`` holds the trainings, ``rows`` the figures of each method on each category.
     workers : int
-        Processes that make training clouds.
+        Processes that make training clouds. Where methods learn for as many minutes, this process makes them itself.
     progress : bool
     say : callable
         Gets a line before and after each step, with the time that it took.
@@ -163,19 +169,19 @@ def run_comparison(
     ConfigError
         When the folder holds rows of other options.
     """
-    steps = [(category, method) for category in options.of_categories for method in options.of_methods]
+    steps = [(category, row) for category in options.of_categories for row in rows_of(options, category)]
     say(f"{len(steps)} rows: {', '.join(options.of_methods)} on {', '.join(options.of_categories)}")
     for category in set(replace(options, row="procedural").of_categories) - set(options.of_categories):
         say(f"{category}: no real object to test on")
     rows: dict[str, dict[str, Any]] = {category: {} for category in options.of_categories}
     tested: dict[str, tuple[list[ArticulatedObject], list[Sample]]] = {}
-    for number, (category, method) in enumerate(steps, 1):
-        kept = out / "rows" / f"{category}-{method}{options.suffix}.json"
-        asked = _asked(options, method)
+    for number, (category, name) in enumerate(steps, 1):
+        kept = out / "rows" / f"{category}-{name.replace(SHIPPED, '-shipped')}{options.suffix}.json"
+        asked = _asked(options, name)
         row = _kept_row(kept, asked)
         if row is None:
             begun = time.perf_counter()
-            estimator = trained(options, category, method, out, workers, progress, say)
+            estimator, core_minutes = row_estimator(options, category, name, out, workers, progress, say)
             learnt = time.perf_counter() - begun
             if category not in tested:
                 tested[category] = tested_views(options, category)
@@ -183,12 +189,13 @@ def run_comparison(
             scored = evaluate(estimator, samples, progress, object_symmetries(objects))
             row = {
                 "options": asked, "training_minutes": learnt / 60.0,
-                "testing_minutes": (time.perf_counter() - begun - learnt) / 60.0, "record": row_record(scored, samples),
+                "testing_minutes": (time.perf_counter() - begun - learnt) / 60.0,
+                "record": row_record(scored, samples, core_minutes),
             }  # fmt: skip
             write_atomic(kept, (json.dumps(row, indent=1) + "\n").encode())
-        rows[category][method] = row["record"]
+        rows[category][name] = row["record"]
         say(
-            f"{number} of {len(steps)}, {method} on {category}: training {row['training_minutes']:.1f} min, test "
+            f"{number} of {len(steps)}, {name} on {category}: training {row['training_minutes']:.1f} min, test "
             f"{row['testing_minutes']:.1f} min, {_told(row['record'])}"
         )
     told = asdict(options)
@@ -208,12 +215,12 @@ def _told(record: dict[str, Any]) -> str:
     return f"rotation {turns} deg, {record['seconds']:.2f} s"
 
 
-def _asked(options: ComparisonOptions, method: StoredMethod) -> dict[str, Any]:
+def _asked(options: ComparisonOptions, name: str) -> dict[str, Any]:
     """What a row depends on, in JSON's terms."""
     own = asdict(options)
-    for name in ("categories", "methods", "row", "partnet"):  # what the name of the file tells, or what is elsewhere
-        own.pop(name)
-    own["method"] = method
+    for left_out in ("categories", "methods", "row", "partnet"):  # told by the file's name, or of this machine
+        own.pop(left_out)
+    own["method"] = name
     own["arm"] = load(Path(options.arm)).sha256 if options.arm else ""
     return dict(json.loads(json.dumps(own)))
 
@@ -236,31 +243,64 @@ def training_options(options: ComparisonOptions, category: str, method: StoredMe
         arm = options.arm or str(arm_folder(out))
         preset = PRESETS["joint"] if method == "full" else preset_of(method, options.preset)
         own = replace(preset, categories=(), files=(arm,), parts="any", noisy=_NOISY, degraded=_DEGRADED)
-        if method == "full":
+        if method == "full" and options.minutes is None:
             own = replace(own, start_from="any", perception_steps=_ARM_STEPS)
-    # Stages that a method does not have stay without steps.
+    # The report tests each estimator itself. Stages that a method does not have stay without steps.
+    own = replace(own, validation_views=1, test_views=1)
     changes = {
-        name: value for name, value in (options.train or {}).items() if name not in _STAGES or getattr(own, name)
+        name: value for name, value in (options.train or {}).items() if name not in LENGTHS or getattr(own, name)
     }
     if own.start_from is not None:
         changes.pop("width", None)  # that of the estimator that it begins with
     return replace(own, **changes)
 
 
-def trained(
-    options: ComparisonOptions, category: str, method: StoredMethod, out: Path, workers: int, progress: bool,
+def shipped(category: str, method: StoredMethod) -> Method | None:
+    """A method with the weights that come with the package; None if there are none for the category."""
+    name: str = method
+    try:
+        return load_estimator(category, method=name)
+    except DatasetError:
+        return None
+
+
+def rows_of(options: ComparisonOptions, category: str) -> list[str]:
+    """Names of the rows of a category: each method as it is trained here, then as it comes with the package."""
+    rows: list[str] = []
+    for method in options.of_methods:
+        has_weights = options.benchmark == "artimage" and shipped(category, method) is not None
+        if options.minutes is not None or method != "full" or not has_weights:
+            rows.append(method)
+        if has_weights:
+            rows.append(f"{method}{SHIPPED}")
+    return rows
+
+
+def row_estimator(
+    options: ComparisonOptions, category: str, name: str, out: Path, workers: int, progress: bool,
     say: Callable[[str], None],
-) -> Method:  # fmt: skip
-    """A method for a category: one that comes with the package, or one that is trained here, or was before."""
-    if method == "full" and options.benchmark == "artimage" and not options.retrain_full:
-        return load_estimator(WEIGHTS / category)
-    folder = out / "train" / f"{category}-{method}"
-    training = Training(training_options(options, category, method, out), folder, workers, progress)
+) -> tuple[Method, float | None]:  # fmt: skip
+    """The method of a row: one that comes with the package, or one that is trained here, or was before.
+
+    Returns
+    -------
+    method : Method
+    core_minutes : float or None
+        That it has learnt for; None of weights that come with the package.
+    """
+    method: StoredMethod = next(own for own in METHODS[options.benchmark] if own == name.removesuffix(SHIPPED))
+    if name.endswith(SHIPPED):
+        found = shipped(category, method)
+        assert found is not None
+        return found, None
+    folder, learning = out / "train" / f"{category}-{method}", training_options(options, category, method, out)
+    if options.minutes is not None:  # processor time is counted in this process alone
+        workers, learning = 0, filling(learning, options.minutes, folder.with_name(f"{folder.name}-lengths.json"))
+    training = Training(learning, folder, workers, progress)
     if not about_tested(folder):
         say(f"training {method} on {category} in {folder}: it may be stopped, and goes on by the same command")
         training.run()
-    name: str = method
-    return load_estimator(folder / "best", method=name)
+    return load_estimator(folder / "best", method=name), trained_minutes(training)
 
 
 def tested_views(options: ComparisonOptions, category: str) -> tuple[list[ArticulatedObject], list[Sample]]:
@@ -287,16 +327,16 @@ def notes(options: ComparisonOptions) -> list[str]:
         "procedural": "Objects and views are made here.",
         "real": "Objects are real, of the half for testing; no method has learnt from a real one. Views are made here.",
     }[options.row]
+    length = "" if options.minutes is None else f", stages scaled to {options.minutes:g} minutes of one core each"
     lines = [
-        f"Trainings have the preset {options.preset}{train}.",
+        f"Trainings have the preset {options.preset}{train}{length}.",
         f"{objects} Published figures are of other images, in columns of their own.",
         "Brackets have the 95 % interval of the mean, by a bootstrap over objects.",
         *(["These trainings are far too short: no figure of them says anything of a method."] if options.train else []),
         "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",
     ]
     if options.benchmark == "artimage":
-        full = "is trained like the others" if options.retrain_full else "has the weights that come with the package"
-        lines.append(f"The method full {full}; it may have learnt longer than the others.")
+        lines.append("Shipped rows have the weights that come with the package: they have learnt for hours.")
     else:
         lines.append(
             "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435: the arm "
@@ -311,13 +351,12 @@ def drawn(options: ComparisonOptions, out: Path, say: Callable[[str], None]) -> 
     They show test objects in few views, so that a report that goes on does not make all of them again.
     """
     pictures, views = {}, {}
-    first, few = options.of_methods[0], min(_OVERLAYS, options.views)
+    few = min(_OVERLAYS, options.views)
     for category in options.of_categories:
+        first = rows_of(options, category)[0]
         shown = tested_views(replace(options, objects=min(options.objects, few), views=few), category)[1][:few]
         try:
-            estimator = trained(options, category, first, out, 0, False, say) if first == "full" and (
-                options.benchmark == "artimage" and not options.retrain_full
-            ) else load_estimator(out / "train" / f"{category}-{first}" / "best", method=f"{first}")  # fmt: skip
+            estimator, _ = row_estimator(options, category, first, out, 0, False, say)
             pictures[f"{category}: estimates of {first}, true boxes dashed"] = overlays(estimator, shown)
             estimate = estimator(shown[0].points)
             last = replace(estimate, trajectory=estimate.trajectory[-1:])

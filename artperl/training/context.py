@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol, cast
 
 import torch
@@ -70,10 +73,13 @@ class Context:
     report: Report
     ranks: Ranks = field(default_factory=Ranks)
     stop: Stop = field(default_factory=Stop)
+    _counting: str | None = None
+    _since: float = 0.0
 
     def estimator(self) -> Estimator | Stored:
-        """The estimator as it stands."""
-        return self.assemble(self)
+        """The estimator as it stands, on the processor. It has copies of the networks, which go on learning."""
+        copies = {name: deepcopy(network).cpu() for name, network in self.state.networks.items()}
+        return self.assemble(replace(self, state=replace(self.state, networks=copies), device=torch.device("cpu")))
 
     def best(self, device: torch.device | str = "cpu") -> Estimator | Stored:
         """The best estimator so far.
@@ -94,8 +100,26 @@ class Context:
         """What an estimator's file says about its training."""
         return {**self.provenance, "options": asdict(self.options), "done": dict(self.state.done), **rounded(figures)}
 
+    @contextmanager
+    def counted(self, name: str) -> Iterator[None]:
+        """Count the processor time of this block for a stage, or for the validation; that of a block in it apart."""
+        self._count()
+        outer, self._counting = self._counting, name
+        try:
+            yield
+        finally:
+            self._count()
+            self._counting = outer
+
+    def _count(self) -> None:
+        now = time.process_time()
+        if self._counting is not None:
+            self.state.seconds[self._counting] = self.state.seconds.get(self._counting, 0.0) + now - self._since
+        self._since = now
+
     def save(self) -> None:
         """Write where the run stands; of several processes the first one does."""
+        self._count()
         if self.ranks.first:
             self.state.save(self.folder, self.options)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -27,9 +27,9 @@ from artperl.perception.omad_networks import (
 )
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
-from artperl.training.paper_stages import KeepStage
 from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import Taken, descend, take_steps, told
+from artperl.training.validation import Validation
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
@@ -62,6 +62,7 @@ class PriorStage:
     """Keypoints and joints of the references at rest."""
 
     name: str = "prior"
+    lengths: ClassVar[dict[str, str]] = {"prior": "prior_steps"}
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
@@ -91,10 +92,11 @@ class CueStage:
     """Keypoints, pose, states and shape of fresh clouds."""
 
     name: str = "cues"
+    lengths: ClassVar[dict[str, str]] = {"cues": "perception_steps"}
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        take_steps(context, self.name, "cues", context.options.perception_steps, self._learn)
+        take_steps(context, self.name, "cues", context.options.perception_steps, self._learn, validated=True)
 
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
         options, total, device = context.options, context.options.perception_steps, context.device
@@ -120,7 +122,7 @@ class CueStage:
 
 def omad_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
-    return [PriorStage(), CueStage(), KeepStage()]
+    return [PriorStage(), CueStage(), Validation()]
 
 
 def prior_loss(prior: KeypointPrior, shapes: Shapes, generator: torch.Generator) -> tuple[Tensor, dict[str, float]]:

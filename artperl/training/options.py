@@ -19,6 +19,10 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 
 T = TypeVar("T")
+LENGTHS = (
+    "perception_steps", "dense_steps", "prior_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
+)  # fmt: skip
+"""Options that say how long the stages of a run are."""
 _WITH_AGENT = ("artperl", "sporeagent")
 """Methods that retrieve a reference by a network and fit it by an agent."""
 _MOST = 1_000_000_000
@@ -27,10 +31,7 @@ _AT_LEAST_ONE = (
     "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "episodes", "box_width",
     "validate_every", "test_objects", "validation_views", "test_views",
 )  # fmt: skip
-_AT_LEAST_ZERO = (
-    "perception_steps", "dense_steps", "prior_steps", "retrieval_steps", "agent_rollouts", "box_views", "box_steps",
-    "foreign_categories", "seed",
-)  # fmt: skip
+_AT_LEAST_ZERO = (*LENGTHS, "foreign_categories", "seed", "patience")
 
 
 @dataclass(frozen=True)
@@ -107,10 +108,14 @@ class TrainOptions:
     """Fresh views of the last stage, whose estimates tell where boxes end; 0 leaves boxes as references have them."""
     box_steps: int = 12000
     """Batches that boxes are learnt in."""
+    box_residual: float = 0.02
+    """Largest residual of estimates that boxes are learnt from: of others there is no saying what their boxes show."""
     box_width: int = 80
     """Channels of the network that they are learnt by."""
     validate_every: int = 1000
-    """Steps of perception between tests."""
+    """Steps between validations: of perception, and of the last stage of other methods."""
+    patience: int = 0
+    """Validations in a row without a gain after which a stage ends; 0 never ends one early."""
     test_objects: int = 40
     """Unseen objects of each category, others for validation than for the test at the end; files share so many."""
     foreign_categories: int = 12
@@ -200,6 +205,13 @@ def changed(options: T, changes: Mapping[str, Any]) -> T:
     return replace(options, **values)  # type: ignore[type-var]
 
 
+def scaled(options: TrainOptions, factor: float) -> TrainOptions:
+    """The same run with all stages, and what is between validations, as many times as long."""
+    names = [name for name in (*LENGTHS, "validate_every") if getattr(options, name)]
+    lengths: dict[str, Any] = {name: max(1, round(factor * getattr(options, name))) for name in names}
+    return replace(options, **lengths)
+
+
 PRESETS = {
     "quick": TrainOptions(
         base_objects=32, width=32, perception_steps=500, dense_steps=0, batch_size=24, num_points=768,
@@ -217,17 +229,17 @@ one estimator for many categories, with any parts."""
 PAPER_PRESETS = {
     "quick": TrainOptions(
         method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=400, batch_size=16,
-        num_points=768, retrieval_steps=30, agent_rollouts=40, cloning_share=0.7,
-        test_objects=20, test_views=2,
+        num_points=768, retrieval_steps=30, agent_rollouts=40, cloning_share=0.7, validate_every=10,
+        test_objects=20, validation_views=2, test_views=2,
     ),
-    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500),
+    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500, validate_every=125),
 }  # fmt: skip
 """Presets of the method artperl."""
 
 ANCSH_PRESETS = {
     "quick": TrainOptions(
         method="ancsh", base_objects=32, reference_points=32, width=32, perception_steps=1200, batch_size=16,
-        num_points=768, test_objects=20, test_views=2,
+        num_points=768, validate_every=300, test_objects=20, validation_views=2, test_views=2,
     ),
     "full": TrainOptions(method="ancsh", reference_points=32),
 }  # fmt: skip
@@ -236,7 +248,7 @@ ANCSH_PRESETS = {
 OMAD_PRESETS = {
     "quick": TrainOptions(
         method="omad", base_objects=32, reference_points=96, width=32, prior_steps=600, perception_steps=2000,
-        batch_size=16, num_points=768, test_objects=20, test_views=2,
+        batch_size=16, num_points=768, validate_every=500, test_objects=20, validation_views=2, test_views=2,
     ),
     "full": TrainOptions(method="omad", prior_steps=4000),
 }  # fmt: skip

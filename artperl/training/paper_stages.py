@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -25,7 +25,6 @@ from artperl.core.shapes import Observed, Shapes
 from artperl.data.batches import row_batches
 from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
-from artperl.estimator import save_estimator
 from artperl.methods.artperl import ArtPERL
 from artperl.methods.retrieved import AgentMethod, Sizes
 from artperl.retrieval.segmented import SegmentedRetrieval
@@ -34,6 +33,7 @@ from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps
+from artperl.training.validation import Validation
 from artsim.observing.sample import Sample
 
 Rows = dict[str, Tensor]
@@ -67,6 +67,7 @@ class RetrievalStage:
     """Equation 2: a cloud, with the parts that the segmentation tells, is to be near its own object at rest."""
 
     name: str = "retrieval"
+    lengths: ClassVar[dict[str, str]] = {"retrieval": "retrieval_steps"}
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
@@ -118,10 +119,13 @@ class AgentStage:
     episodes: Callable[[Any, Rows, int, slice, torch.Generator], tuple[Any, Theta]]
     alone: int
     name: str = "agent"
+    lengths: ClassVar[dict[str, str]] = {"agent": "agent_rollouts"}
 
     def run(self, context: Context) -> None:
         """Make the rollouts that are left."""
-        take_steps(context, self.name, "policy", context.options.agent_rollouts, self._learn, _SAVE_ROLLOUTS)
+        take_steps(
+            context, self.name, "policy", context.options.agent_rollouts, self._learn, _SAVE_ROLLOUTS, validated=True
+        )
 
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
         options, total, method = context.options, context.options.agent_rollouts, self.estimator(context)
@@ -149,23 +153,10 @@ class AgentStage:
             yield figures, line
 
 
-@dataclass(frozen=True)
-class KeepStage:
-    """The estimator is kept as the last stage leaves it: no validation chooses one."""
-
-    name: str = "keep"
-
-    def run(self, context: Context) -> None:
-        """Write the estimator."""
-        context.save()
-        if context.ranks.first:
-            save_estimator(context.estimator(), context.folder.best, context.about({}))
-
-
 def paper_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
-    return [segmentation, RetrievalStage(), AgentStage(paper_estimator, fitting_episodes, _ALONE), KeepStage()]
+    return [segmentation, RetrievalStage(), AgentStage(paper_estimator, fitting_episodes, _ALONE), Validation()]
 
 
 def fitting_episodes(

@@ -13,7 +13,7 @@ from artperl.data.batches import batches
 from artperl.training.context import Context
 from artperl.training.perception_losses import perception_figures, perception_losses
 from artperl.training.steps import one_cycle, set_rate
-from artperl.training.validation import step_taken
+from artperl.training.validation import goes_on, step_taken
 from artsim.common.progress import track
 
 _SAVE_STEPS = 100
@@ -42,12 +42,17 @@ class PerceptionStage:
     batch_size: int
     seed: int
 
+    @property
+    def lengths(self) -> dict[str, str]:
+        """See :class:`artperl.training.stages.Stage`."""
+        return {self.name: f"{self.name}_steps"}
+
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
         options, state, ranks = context.options, context.state, context.ranks
         perception, optimizer = state.networks["perception"], state.optimizers["perception"]
         first, before = state.done[self.name], state.step - state.done[self.name]
-        if first >= self.steps:
+        if not goes_on(context, self.name, self.steps):
             return
         data = batches(
             context.objects.data, context.objects.num_rows, self.num_points, self.batch_size, first, self.seed,
@@ -73,7 +78,8 @@ class PerceptionStage:
             context.report(self.name, figures, before + step)
             bar.set_postfix_str(f"parts {100 * figures['accuracy']:.1f} %, off {100 * figures['coordinates']:.1f} %")
             bar.update()
-            step_taken(context, self.name, step + 1, self.steps, options.validate_every, _SAVE_STEPS)
+            if not step_taken(context, self.name, step + 1, self.steps, _SAVE_STEPS):
+                break
         bar.close()
 
 

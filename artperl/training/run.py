@@ -135,7 +135,8 @@ class Training:
 
                 context.report = report
                 for stage in stages_of(context.options):
-                    stage.run(context)
+                    with context.counted(stage.name):
+                        stage.run(context)
             return context.ranks.same(test(context))
 
 

@@ -21,7 +21,7 @@ from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
 from artperl.core.tensor_files import read_tensors, write_tensors
-from artsim.common.files import parse_json, read_bounded, write_atomic, write_error
+from artsim.common.files import parse_json, read_bounded, read_json, write_atomic, write_error
 from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import DatasetError
 
@@ -46,6 +46,7 @@ class RunFolder:
         self.path, self.best = path, path / "best"
         self._json, self._tensors = path / "state.json", path / "state.safetensors"
         self._next = path / ".state.safetensors.next"
+        self._seconds = path / "seconds.json"
         self.fix = (
             "to start this run again from its beginning: rm "
             f"{shlex.quote(str(self._json))} {shlex.quote(str(self._tensors))}"
@@ -146,6 +147,32 @@ class RunFolder:
         if wanted != found:
             raise DatasetError("these are not the tensors that state.json names", self._tensors, self.fix)
         return state, tensors, digest
+
+    def write_seconds(self, seconds: Mapping[str, float]) -> None:
+        """Write down the processor time of each stage, in a file of its own: what a run learns does not depend on it.
+
+        Raises
+        ------
+        ConfigError
+            When the folder cannot be written to, or the disk is full.
+        """
+        write_atomic(self._seconds, (json.dumps(seconds, indent=1) + "\n").encode())
+
+    def read_seconds(self) -> dict[str, float]:
+        """The processor time of each stage; none of a run that has not written any down.
+
+        Raises
+        ------
+        DatasetError
+            When the file is damaged.
+        """
+        if not self._seconds.exists():
+            return {}
+        told = read_json(self._seconds, "the processor time of the run", DatasetError, _MAX_JSON)
+        try:
+            return {str(name): float(value) for name, value in told.items()}
+        except (AttributeError, TypeError, ValueError) as error:
+            raise DatasetError("the processor time of the run is damaged", self._seconds, "remove it") from error
 
     def _read_tensors(self, path: Path) -> tuple[dict[str, Tensor], str]:
         return read_tensors(path, "the state of the run", self.fix)

@@ -15,8 +15,9 @@ from artperl.methods.sporeagent import SporeAgent
 from artperl.retrieval.siamese import by_siamese
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
-from artperl.training.paper_stages import AgentStage, KeepStage, RetrievalStage, Rows, draw_references
+from artperl.training.paper_stages import AgentStage, RetrievalStage, Rows, draw_references
 from artperl.training.supervised import SupervisedStage, segmentation_loss
+from artperl.training.validation import Validation
 from artsim.errors import ConfigError
 
 _ALONE = 24
@@ -39,7 +40,7 @@ def sporeagent_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
     agent = AgentStage(sporeagent_estimator, registration_episodes, _ALONE)
-    return [segmentation, RetrievalStage(), agent, KeepStage()]
+    return [segmentation, RetrievalStage(), agent, Validation()]
 
 
 def registration_episodes(

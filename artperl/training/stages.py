@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from copy import deepcopy
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -31,6 +30,11 @@ class Stage(Protocol):
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def lengths(self) -> Mapping[str, str]:
+        """Options that say how many steps it learns in, by the groups of figures that it reports, one at each step."""
+        ...
 
     def run(self, context: Context) -> None: ...
 
@@ -91,10 +95,8 @@ def _full_stages(options: TrainOptions) -> list[Stage]:
 
 
 def _full_estimator(context: Context) -> Estimator:
-    """With the parent's boxes, if parts are found as the parent finds them; on the processor."""
+    """With the parent's boxes, if parts are found as the parent finds them."""
     perception, parent, options = context.state.networks["perception"], context.parent, context.options
-    if context.device.type != "cpu":
-        perception = deepcopy(perception).cpu()
     assert isinstance(parent, Estimator | None)
     assert isinstance(perception, Perception)
     alike = parent is not None and parent.perception.votes == perception.votes

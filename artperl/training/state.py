@@ -32,7 +32,9 @@ class RunState:
     best : float
         Lowest validation score so far.
     history : list of dict
-        Every validation: ``step``, ``score`` and ``done``.
+        Every validation: its ``stage``, ``step``, ``score`` and ``done``.
+    seconds : dict of str to float
+        Processor time of this process that each stage and the validation have taken, by name. Nothing depends on it.
     """
 
     networks: dict[str, nn.Module]
@@ -40,6 +42,7 @@ class RunState:
     done: Counter[str] = field(default_factory=Counter)
     best: float = float("inf")
     history: list[dict[str, Any]] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
     _digest: str = ""
 
     @property
@@ -62,6 +65,7 @@ class RunState:
                 tensors |= {f"{name}/{number}/{key}": value for key, value in moments.items()}
         state = {"options": asdict(options), "done": self.done, "best": self.best, "history": self.history}
         self._digest = folder.write(state, tensors)
+        folder.write_seconds(self.seconds)
 
     def load(self, folder: RunFolder, options: DataclassInstance) -> None:
         """Take up the state that a folder holds, if there is one; only while the folder is held.
@@ -88,6 +92,7 @@ class RunState:
                 f"the state of the run does not fit this version ({error})", folder.path, folder.fix
             ) from error
         self._digest = digest
+        self.seconds = folder.read_seconds()
 
     def _restore(self, state: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> None:
         for name, network in self.networks.items():

@@ -15,6 +15,7 @@ from artperl.data.batches import batches
 from artperl.data.truth import Truth
 from artperl.training.context import Context
 from artperl.training.steps import one_cycle, set_rate
+from artperl.training.validation import goes_on, step_taken
 from artsim.common.progress import track
 
 Loss = Callable[[nn.Module, Clouds, Truth], tuple[Tensor, dict[str, float]]]
@@ -38,15 +39,25 @@ class SupervisedStage:
     network : str
     loss : Loss
         A mean over clouds.
+    validated : bool
+        Whether the estimator is validated at intervals: where no later stage learns.
     """
 
     name: str
     network: str
     loss: Loss
+    validated: bool = False
+
+    @property
+    def lengths(self) -> dict[str, str]:
+        """See :class:`artperl.training.stages.Stage`."""
+        return {self.name: "perception_steps"}
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        take_steps(context, self.name, self.network, context.options.perception_steps, self._learn)
+        take_steps(
+            context, self.name, self.network, context.options.perception_steps, self._learn, validated=self.validated
+        )
 
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
         options = context.options
@@ -92,9 +103,9 @@ def descend(optimizer: torch.optim.Optimizer, network: nn.Module, loss: Tensor, 
 
 def take_steps(
     context: Context, stage: str, network: str, total: int, learn: Callable[[Context, int], Iterator[Taken]],
-    save_every: int = SAVE_STEPS,
+    save_every: int = SAVE_STEPS, validated: bool = False,
 ) -> None:  # fmt: skip
-    """Take the steps of a stage that are left: report each, save at intervals, and stop if somebody asks for it.
+    """Take the steps of a stage that are left: report each, save or validate at intervals, and stop if somebody asks.
 
     Parameters
     ----------
@@ -106,13 +117,15 @@ def take_steps(
     learn : callable
         Takes steps from a number on, one each time that it is asked for the next.
     save_every : int
+    validated : bool
+        Whether the estimator is validated at intervals: where no later stage learns.
 
     Raises
     ------
     KeyboardInterrupt
     """
     first, own = context.state.done[stage], context.state.networks[network]
-    if first >= total:
+    if not goes_on(context, stage, total):
         return
     bar = track(stage, total=total, initial=first, smoothing=0.02, shown=context.progress)
     own.train()
@@ -121,10 +134,8 @@ def take_steps(
         if line is not None:
             bar.set_postfix_str(line)
         bar.update()
-        context.state.done[stage] = step + 1
         context.stop.asked = context.ranks.add([context.stop.asked])[0] > 0
-        if (step + 1) % save_every == 0:
-            context.save()
-        context.stop_if_asked()
+        if not step_taken(context, stage, step + 1, total, save_every, validated):
+            break
     bar.close()
     own.eval()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from artperl.estimator import read_settings, save_estimator
 from artperl.evaluation.calibration import calibrated
@@ -21,6 +21,7 @@ from artperl.evaluation.samples import (
 from artperl.evaluation.scoring import Scored, evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
 from artperl.methods.full import Estimator
+from artperl.methods.protocol import Method
 from artperl.training.context import Context
 from artperl.training.report import rounded, scalars, write_report
 from artsim.common.files import write_atomic
@@ -38,11 +39,12 @@ class Validation:
     """Validates the estimator of a run that has no other stage to learn in."""
 
     name: str = "validation"
+    lengths: ClassVar[dict[str, str]] = {}
 
     def run(self, context: Context) -> None:
         """Validate, unless another stage has."""
         if not context.state.history:
-            validate(context)
+            validate(context, self.name)
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class Calibration:
     """Calibrates the confidence of the best estimator when it has learnt all: its boxes decide what is right, too."""
 
     name: str = "calibration"
+    lengths: ClassVar[dict[str, str]] = {}
 
     def run(self, context: Context) -> None:
         """Calibrate, unless that is done. Of several processes the first one does, while the others wait."""
@@ -65,50 +68,77 @@ class Calibration:
         context.save()
 
 
-def step_taken(context: Context, stage: str, done: int, total: int, validate_every: int, save_every: int) -> None:
-    """Count a step of a stage; validate or save at intervals and at the stage's end; stop if somebody asked for it.
+def goes_on(context: Context, stage: str, total: int) -> bool:
+    """Whether a stage has steps left, and one of its last validations, as many as patience says, has gained."""
+    scores = [each["score"] for each in context.state.history if each.get("stage") == stage]
+    without_gain = len(scores) - 1 - scores.index(min(scores)) if scores else 0
+    patience = context.options.patience
+    return context.state.done[stage] < total and not 0 < patience <= without_gain
+
+
+def step_taken(
+    context: Context, stage: str, done: int, total: int, save_every: int, validated: bool = True
+) -> bool:  # fmt: skip
+    """Count a step of a stage; save or validate at intervals and at the stage's end; stop if somebody asked for it.
+
+    Parameters
+    ----------
+    context : Context
+    stage : str
+        Its name.
+    done, total : int
+        Steps.
+    save_every : int
+    validated : bool
+        Whether the estimator is worth a validation while this stage learns.
+
+    Returns
+    -------
+    bool
+        Whether the stage goes on.
 
     Raises
     ------
     KeyboardInterrupt
     """
     context.state.done[stage] = done
-    if done % validate_every == 0 or done == total:
-        validate(context)
+    if validated and (done % context.options.validate_every == 0 or done == total):
+        validate(context, stage)
     elif done % save_every == 0:
         context.save()
     context.stop_if_asked()
+    return goes_on(context, stage, total)
 
 
-def validate(context: Context) -> None:
+def validate(context: Context, stage: str) -> None:
     """Score the estimator on unseen objects, keep it if it is the best so far, and write where the run stands.
 
     Of several processes the first one does, while the others wait.
     """
     state, ranks = context.state, context.ranks
     if ranks.first:
-        _validate(context)
+        with context.counted("validation"):
+            _validate(context, stage)
     state.best, state.history = ranks.same((state.best, state.history))
 
 
-def _validate(context: Context) -> None:
-    state, options = context.state, context.options
-    estimator = context.estimator()
-    assert isinstance(estimator, Estimator)  # the paper's method keeps what its last stage leaves
+def _validate(context: Context, stage: str) -> None:
+    state, options, estimator = context.state, context.options, context.estimator()
     samples = unseen_samples(context, options.validation_views, VALIDATION_SEEDS)
     scored = evaluate(estimator, samples, context.progress)
     degraded = _of_degraded(estimator, samples, context)
     figures, score = summary(scored), headline([*scored, *degraded])
-    state.history.append({"step": state.step, "score": score, "done": dict(state.done)})
+    state.history.append({"stage": stage, "step": state.step, "score": score, "done": dict(state.done)})
     context.report("validation", scalars(figures) | {"score": score}, state.step)
     if score < _AS_GOOD * state.best:
         state.best = min(score, state.best)
         save_estimator(estimator, context.folder.best, context.about({"validation": figures}))
     context.save()
-    say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
+    if context.progress:
+        say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
 
 
-def _of_degraded(estimator: Estimator, samples: Sequence[Sample], context: Context) -> list[Scored]:
+def _of_degraded(estimator: Method, samples: Sequence[Sample], context: Context) -> list[Scored]:
     """What becomes of the same samples cut and dirty, where a run learns from such clouds."""
     return evaluate(estimator, degraded_samples(samples), context.progress) if context.options.degraded else []
 

@@ -73,6 +73,7 @@ def test_no_published_figure_shares_a_column_with_a_measured_one(record) -> None
     assert rows["A-NCSH"][published[0]] == "5.30"
     assert rows["SporeAgent"][1] == ""  # not measured here
     assert rows["full"][published[0]] == ""
+    assert "| A-NCSH | - | " in text.split("### Confidence")[1]  # one view, three times: all are right, or none is
     assert rows["full"][1].startswith(f"{record['parts'][0]['rotation_deg']['mean']:.2f} [")
 
 

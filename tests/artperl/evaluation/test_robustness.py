@@ -10,7 +10,7 @@ import pytest
 
 import artsim
 from artperl.evaluation.conditions import CONDITIONS, condition_samples
-from artperl.evaluation.reliability import reliability, reliability_lines
+from artperl.evaluation.reliability import calibration_error
 from artperl.evaluation.robustness import run_robustness
 from artsim.errors import ConfigError
 from artsim.observing.interference import FOREIGN
@@ -38,15 +38,9 @@ def test_expected_calibration_error_is_that_of_its_definition() -> None:
     rng = np.random.default_rng(0)
     confidence = rng.random(200_000)
     right = rng.random(200_000) < confidence**2
-    figures = reliability(confidence, right)
-    assert figures["expected_error"] == pytest.approx(1 / 2 - 1 / 3, abs=0.005)  # of p - p^2 over 0 to 1
-    assert sum(figures["count"]) == 200_000
-    calibrated = reliability(confidence, rng.random(200_000) < confidence)
-    assert calibrated["expected_error"] < 0.01
-    alone = reliability(np.array([1.0, 0.05]), np.array([True, False]))
-    assert alone["count"][9] == alone["count"][0] == 1
-    assert alone["expected_error"] == pytest.approx(0.025)
-    assert len(reliability_lines(alone)) == 12
+    assert calibration_error(confidence, right) == pytest.approx(1 / 2 - 1 / 3, abs=0.005)  # of p - p^2 over 0 to 1
+    assert calibration_error(confidence, rng.random(200_000) < confidence) < 0.01
+    assert calibration_error(np.array([1.0, 0.05]), np.array([True, False])) == pytest.approx(0.025)
 
 
 def test_rows_are_kept_and_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,6 +49,8 @@ def test_rows_are_kept_and_not_measured_again(tmp_path: Path, monkeypatch: pytes
     first = run_robustness(("procedural",), ("laptop",), **asked)
     assert set(first["rows"]) == {"procedural/laptop/clean", "procedural/laptop/leak_10"}
     assert json.loads(file.read_text())["rows"] == first["rows"]
+    assert set(first["confidence"]) == {"procedural/laptop"}  # of all conditions, never of several categories
+    assert lines[-1].startswith("procedural, laptop, all conditions: AUROC ")
     monkeypatch.setattr("artperl.evaluation.robustness.evaluate", None)
     assert run_robustness(("procedural",), ("laptop",), **asked) == first
     with pytest.raises(ConfigError, match="other options"):

@@ -34,11 +34,14 @@ def test_a_summary_says_what_confidence_is_worth(estimator: Estimator, sample: S
     )
     told = summary([right, right, wrong])["laptop"]
     assert (told["confidence_of_right"], told["confidence_of_wrong"], told["confidence_auroc"]) == (0.9, 0.2, 1.0)
-    assert "confidence of right ones 90 %, of wrong ones 20 % in the median, AUROC 1.00" in table({"laptop": told})
+    assert (
+        "confidence of right ones 90 %, of wrong ones 20 % in the median, AUROC 1.00, expected calibration error 13 %"
+        in table({"laptop": told})
+    )
     told = summary([right])["laptop"]
     assert (told["confidence_of_wrong"], told["confidence_auroc"]) == (None, None)
-    assert table({"laptop": told}).count("confidence of right ones 90 % in the median\n") == 1  # no AUROC
-    assert "confidence of wrong ones 20 % in the median\n" in table(summary([wrong]))
+    assert table({"laptop": told}).count("confidence of right ones 90 % in the median, AUROC -, expected") == 1
+    assert "confidence of wrong ones 20 % in the median, AUROC -, expected" in table(summary([wrong]))
 
 
 def test_published_means_are_beaten_or_not() -> None:

@@ -175,11 +175,11 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
     true_size, true_center = torch.tensor([[[0.22, 0.4, 0.3]]]) / unit, torch.tensor([[[0.01, 0.0, 0.0]]]) / unit
     rest = true_center + torch.tensor([0.01, 0.0, 0.0]) / unit
     records = concatenate([box_records.Records(e, true_center, true_size, rest) for e in evidence])
-    boxes = box_records.learn(records, 1, 80, 150, 0, progress=False)
+    boxes = box_records.learn(records, 1, 80, 150, 0, False, lambda *_: None)
     center, size, farther = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
     assert iou_aligned(center, size, true_center, true_size).min() > 0.97
     assert float(farther[0, 0] * unit) == pytest.approx(0.01, abs=0.002)
-    again = box_records.learn(records, 1, 80, 150, 0, progress=False)
+    again = box_records.learn(records, 1, 80, 150, 0, False, lambda *_: None)
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
 
 

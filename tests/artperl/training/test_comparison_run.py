@@ -28,8 +28,8 @@ TINY = replace(
 def test_a_report_has_every_method_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
     said: list[str] = []
     report = run_comparison(TINY, tmp_path, 0, False, said.append)
-    assert set(report["rows"]["laptop"]) == {"full", "ancsh"}
-    assert report["rows"]["laptop"]["full"]["parts"][0]["rotation_deg"]["mean"] < 5.0
+    assert set(report["rows"]["laptop"]) == {"full, shipped", "ancsh"}
+    assert report["rows"]["laptop"]["full, shipped"]["parts"][0]["rotation_deg"]["mean"] < 5.0
     assert any("training 0.0 min" in line and "full" in line for line in said)
     text = (tmp_path / "report.md").read_text()
     assert "| A-NCSH |" in text
@@ -42,7 +42,7 @@ def test_a_report_has_every_method_and_goes_on_where_it_stopped(tmp_path: Path) 
     known = json.loads(row.read_text())
     known["record"]["seconds"] = 1234.5  # a row that is measured is not measured again
     row.write_text(json.dumps(known))
-    (tmp_path / "rows" / "laptop-full.json").unlink()
+    (tmp_path / "rows" / "laptop-full-shipped.json").unlink()
     again = run_comparison(TINY, tmp_path, 0, False, said.append)
     assert again["rows"]["laptop"]["ancsh"]["seconds"] == 1234.5
     row.unlink()  # a run that has come to its end is not run again
@@ -58,11 +58,11 @@ def test_real_objects_are_another_row_of_the_same_trainings(tmp_path: Path, part
     asked = replace(TINY, methods=("full",), categories=("laptop", "scissors"), row="real", partnet=str(partnet_dir))
     report = run_comparison(asked, tmp_path, 0, False, said.append)
     assert "scissors: no real object to test on" in said
-    assert report["rows"]["laptop"]["full"]["objects"] == 7
-    assert report["rows"]["laptop"]["full"]["parts"][0]["rotation_deg"]["mean"] < 5.0
+    assert report["rows"]["laptop"]["full, shipped"]["objects"] == 7
+    assert report["rows"]["laptop"]["full, shipped"]["parts"][0]["rotation_deg"]["mean"] < 5.0
     assert str(partnet_dir) not in (tmp_path / "report-real.json").read_text()
     assert "Objects are real" in (tmp_path / "report-real.md").read_text()
-    assert [path.name for path in (tmp_path / "rows").iterdir()] == ["laptop-full-real.json"]
+    assert [path.name for path in (tmp_path / "rows").iterdir()] == ["laptop-full-shipped-real.json"]
 
 
 def test_real_objects_are_asked_for_where_there_are_some() -> None:
