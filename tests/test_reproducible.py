@@ -24,7 +24,7 @@ from tests.reproduce import NUM_SAMPLES, RECORD, packages
 
 ROOT = Path(artsim.__file__).resolve().parent
 HERE = [name for name in PROCESSORS if can_run(name)]
-EXACT = ("objects", "compiled objects", "labels", "noise")
+EXACT = ("objects", "families", "compiled objects", "labels", "noise")
 SINGLE_PRECISION = 2e-6
 """Metres. Depths differ in their last bit, 2.4e-7 at 2 m; rays that graze a face differ in some bits more."""
 
@@ -66,7 +66,7 @@ def test_objects_labels_and_noise_are_those_of_the_record(processor: str, record
     found = made(processor)
     for section in EXACT:
         assert found[section] == record[section], f"{section}, {processor}"
-    assert len(record["objects"]) == 2 * len(CATEGORIES)
+    assert len(record["objects"]) == 2 * len(record["families"]) == 2 * len(CATEGORIES)
     assert len(record["compiled objects"]) >= 30
     assert len(record["labels"]) == NUM_SAMPLES
 
