@@ -208,7 +208,7 @@ one estimator for many categories, with any parts."""
 PAPER_PRESETS = {
     "quick": TrainOptions(
         method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=400, batch_size=16,
-        num_points=768, retrieval_steps=600, retrieval_objects=150, agent_rollouts=20,
+        num_points=768, retrieval_steps=600, agent_rollouts=20,
         agent_rate=3e-3, cloning_share=0.7, test_objects=20, test_views=2, ppo=PPOOptions(epochs=2),
     ),
     "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500),
