@@ -28,7 +28,7 @@ class Sizes:
 
     num_rows: int
     segmentation: int = 48
-    siamese: int = 24
+    siamese: int = 64
     policy: int = 64
 
     def __post_init__(self) -> None:

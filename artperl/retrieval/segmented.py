@@ -51,5 +51,5 @@ def check_embeddings(base: ShapeBase, siamese: Siamese) -> None:
     ------
     ValueError
     """
-    if base.embeddings is None or base.embeddings.shape[1] != siamese.num_rows * siamese.width:
+    if base.embeddings is None or base.embeddings.shape[1] != siamese.width:
         raise ValueError("the embeddings of its base are not of its objects")

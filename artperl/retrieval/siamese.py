@@ -1,7 +1,7 @@
 """The paper's retrieval: one vector for a cloud of parts, near for clouds of the same object (ArtPERL, section 4.2).
 
 Equation 1 as printed sums the features of all points over all parts, so that the parts' labels cancel out. Here
-features are averaged within each part, and the averages of all parts stand side by side.
+features are pooled within each part, stand side by side, and two layers read them.
 """
 
 from __future__ import annotations
@@ -10,14 +10,11 @@ import torch
 from torch import Tensor, nn
 
 from artperl.core.clouds import Clouds
-from artperl.core.pointnet2 import PointNet2
 from artperl.core.shapes import Shapes
 from artperl.retrieval.shape_base import ShapeBase
 
 POINTS = 1024
 """Points of a cloud that are embedded (section 4.2)."""
-_CENTRES = 4
-"""Of so many points, one is a centre of PointNet++'s first coarser level."""
 
 
 class Siamese(nn.Module):
@@ -28,43 +25,64 @@ class Siamese(nn.Module):
     num_rows : int
         K, rows for parts.
     width : int
-        Channels of the features of points.
+        Channels of the features of points, and of the vectors.
     """
 
-    def __init__(self, num_rows: int, width: int = 24):
+    def __init__(self, num_rows: int, width: int = 64):
         super().__init__()
         self.num_rows, self.width = num_rows, width
-        self.backbone = PointNet2(width)
+        self.points = nn.Sequential(
+            nn.Linear(9 + num_rows, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, width)
+        )
+        self.whole = nn.Sequential(nn.Linear(2 * width * num_rows, width), nn.ReLU(), nn.Linear(width, width))
 
     def forward(self, points: Tensor, part: Tensor) -> Tensor:
-        """(B, K * width), equation 1, from clouds (B, N, 3), centred and of unit size, and their parts (B, N).
+        """(B, width), equation 1, from clouds (B, N, 3), centred and of unit size, and their parts (B, N).
 
-        Parts that no point has count as 0.
+        A point is known by its place in the cloud and in its part, and by what does not depend on the view: its
+        distances from the planes through its part's principal axes, and from all parts' means. Parts that no point has
+        count as 0.
         """
-        order = spread_order(points, points.shape[1] // _CENTRES)
-        points, part = points.gather(1, order[..., None].expand_as(points)), part.gather(1, order)
-        features = self.backbone(points)[0]
-        member = nn.functional.one_hot(part, self.num_rows).to(features.dtype).transpose(1, 2)
-        return ((member @ features) / member.sum(2, keepdim=True).clamp(min=1.0)).flatten(1)
+        member = nn.functional.one_hot(part, self.num_rows).to(points.dtype)
+        share = (member / member.sum(1, keepdim=True).clamp(min=1.0)).mT
+        mean = share @ points
+        local = points - member @ mean
+        spread = share @ (local[..., :, None] * local[..., None, :]).flatten(2)
+        axes = torch.linalg.eigh(spread.unflatten(2, (3, 3)))[1]
+        own_axes = (member @ axes.flatten(2)).unflatten(2, (3, 3))
+        principal = (local[..., None, :] @ own_axes)[..., 0, :].abs()
+        features = self.points(torch.cat([points, local, principal, torch.cdist(points, mean)], dim=-1))
+        index, none = part[..., None].expand_as(features), features.new_zeros(*mean.shape[:2], self.width)
+        most = none.scatter_reduce(1, index, features, "amax", include_self=False)
+        return self.whole(torch.cat([share @ features, most], dim=-1).flatten(1))
 
 
-def contrastive_loss(vectors: Tensor, own: Tensor, margin: float = 1.0) -> Tensor:
-    """Equation 2: pairs of the same object are drawn together, others pushed apart up to a margin.
+def contrastive_loss(vectors: Tensor, own: Tensor, margin: Tensor) -> Tensor:
+    """Equation 2: pairs of the same object are drawn together, others are brought as far apart as the margin.
 
-    The paper draws pairs at random; here all pairs of a batch count, those of the same object half.
+    The paper draws pairs at random, its margin is 1, and pairs beyond it are left alone. Here all pairs of a batch
+    count, those of the same object half. The margin of a pair is how much its objects differ, so that near vectors
+    are those of like objects.
 
     Parameters
     ----------
     vectors : (B, E) float
         Of observed clouds.
     own : (B, E) float
-        Of their objects, all different, at rest.
-    margin : float
+        Of their objects at rest.
+    margin : (B, B) float
+        Of each cloud and object.
     """
     distance = torch.linalg.vector_norm(vectors[:, None] - own + 1e-9, dim=-1)
     same = torch.eye(len(own), dtype=torch.bool, device=own.device)
-    apart = (margin - distance).clamp(min=0.0)
+    apart = margin - distance
     return 0.25 * distance[same].square().mean() + 0.25 * apart[~same].square().mean()
+
+
+def margins(boxes: Tensor) -> Tensor:
+    """(B, B) how much objects differ, by their embeddings (B, E) of boxes: 1 for the mean of all pairs."""
+    apart = torch.cdist(boxes, boxes)
+    return apart / (apart.sum() / max(1, len(apart) * (len(apart) - 1))).clamp(min=1e-9)
 
 
 def canonical_clouds(shapes: Shapes, generator: torch.Generator, count: int = POINTS) -> tuple[Tensor, Tensor]:
@@ -84,22 +102,3 @@ def by_siamese(base: ShapeBase, siamese: Siamese) -> ShapeBase:
     """The base, to be searched by the vectors of its objects."""
     points, part = canonical_clouds(base.shapes, torch.Generator().manual_seed(0))
     return base.with_embeddings(siamese(points, part))
-
-
-@torch.no_grad()
-def spread_order(points: Tensor, count: int) -> Tensor:
-    """(B, N) int64 order of points (B, N, 3) whose first ``count`` are the farthest from each other.
-
-    It begins with the point farthest from the mean, so that it does not depend on the order that points come in.
-    """
-    B, N, _ = points.shape
-    rows, order = torch.arange(B, device=points.device), torch.empty(B, N, dtype=torch.int64, device=points.device)
-    left = torch.ones(B, N, dtype=torch.bool, device=points.device)
-    distance = (points - points.mean(1, keepdim=True)).square().sum(-1)
-    apart = torch.full_like(distance, torch.inf)
-    for i in range(count):
-        order[:, i] = chosen = (distance if i == 0 else apart).masked_fill(~left, -1.0).argmax(1)
-        left[rows, chosen] = False
-        apart = torch.minimum(apart, (points - points[rows, chosen][:, None]).square().sum(-1))
-    order[:, count:] = left.nonzero()[:, 1].reshape(B, N - count)
-    return order

@@ -136,9 +136,9 @@ def quick_comparison(options: ComparisonOptions) -> ComparisonOptions:
         options, categories=options.of_categories[:1], preset="quick", objects=2, views=4, num_points=2048,
         train={
             "base_objects": 4, "reference_points": 48, "width": 16, "perception_steps": 8, "batch_size": 4,
-            "num_points": 256, "retrieval_steps": 4, "prior_steps": 20, "agent_rollouts": 2, "episodes": 4,
-            "dense_steps": 0, "box_views": 0, "test_objects": 2, "test_views": 1, "validation_views": 1,
-            "foreign_categories": 1,
+            "num_points": 256, "retrieval_steps": 4, "retrieval_objects": 3, "prior_steps": 20,
+            "agent_rollouts": 2, "episodes": 4, "dense_steps": 0, "box_views": 0, "test_objects": 2,
+            "test_views": 1, "validation_views": 1, "foreign_categories": 1,
         },
     )  # fmt: skip
 

@@ -28,10 +28,11 @@ _WITH_AGENT = ("artperl", "sporeagent")
 _MOST = 1_000_000_000
 _SHARES = ("stretched", "noisy", "degraded", "cloning_share")
 _AT_LEAST_ONE = (
-    "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "episodes", "box_width",
-    "validate_every", "test_objects", "validation_views", "test_views",
+    "base_objects", "reference_points", "width", "denser", "batch_size", "num_points", "retrieval_points",
+    "episodes", "box_width", "validate_every", "test_objects", "validation_views", "test_views",
 )  # fmt: skip
 _AT_LEAST_ZERO = (*LENGTHS, "foreign_categories", "seed", "patience")
+_AT_LEAST_TWO = ("retrieval_objects", "retrieval_batch")
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,13 @@ class TrainOptions:
     """Batches that the keypoints of the method omad learn from."""
     retrieval_steps: int = 0
     """Batches that the Siamese network of the method artperl learns from."""
+    retrieval_objects: int = 400
+    """Fresh objects, four views of each, that these batches are drawn from."""
+    retrieval_batch: int = 48
+    """Objects in such a batch: a view of each is compared with all of them."""
+    retrieval_points: int = 256
+    """Points of each view that are embedded, drawn anew each time."""
+    retrieval_rate: float = 1e-2
     perception_rate: float = 2e-3
     mixed_precision: bool = True
     """Networks multiply in bfloat16 while they learn, where the processor can."""
@@ -128,14 +136,14 @@ class TrainOptions:
     ppo: PPOOptions = field(default_factory=PPOOptions)
 
     def __post_init__(self) -> None:
-        for names, least in ((_AT_LEAST_ONE, 1), (_AT_LEAST_ZERO, 0)):
+        for names, least in ((_AT_LEAST_ONE, 1), (_AT_LEAST_TWO, 2), (_AT_LEAST_ZERO, 0)):
             for name in names:
                 if not least <= getattr(self, name) <= _MOST:
                     raise ConfigError(f"{getattr(self, name)} is not possible", name, f"use {least} or more")
         for name in _SHARES:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ConfigError(f"{getattr(self, name)} is no share", name, "use 0 to 1")
-        for name in ("perception_rate", "agent_rate", "reinforcement_rate"):
+        for name in ("perception_rate", "retrieval_rate", "agent_rate", "reinforcement_rate"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ConfigError(f"{getattr(self, name)} is no learning rate", name, "use 1e-4 to 1e-2")
         if self.noisy and (self.dataset is not None or self.sample.noise != "none"):
@@ -229,7 +237,7 @@ one estimator for many categories, with any parts."""
 PAPER_PRESETS = {
     "quick": TrainOptions(
         method="artperl", base_objects=32, reference_points=128, width=32, perception_steps=400, batch_size=16,
-        num_points=768, retrieval_steps=30, agent_rollouts=40, cloning_share=0.7, validate_every=10,
+        num_points=768, retrieval_steps=600, agent_rollouts=40, cloning_share=0.7, validate_every=10,
         test_objects=20, validation_views=2, test_views=2,
     ),
     "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500, validate_every=125),

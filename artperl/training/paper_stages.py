@@ -5,9 +5,10 @@ Each goes on where it stopped: its batches, rates and actions are functions of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
+from itertools import islice
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,19 +28,23 @@ from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
 from artperl.methods.artperl import ArtPERL
 from artperl.methods.retrieved import AgentMethod, Sizes
-from artperl.retrieval.segmented import SegmentedRetrieval
-from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss
+from artperl.retrieval.box_embedding import box_embedding
+from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss, margins
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps
 from artperl.training.validation import Validation
+from artsim.common.progress import track
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
 Rows = dict[str, Tensor]
 
 _VIEWS = 4
 """Views in a row of one object: an object takes longer to make than a view of it."""
+_SEGMENTED = 32
+"""Clouds that are segmented at once."""
 _SAVE_ROLLOUTS = 2
 """Rollouts after which a run is saved, against a stop that nobody asked for."""
 _ALONE_EVERY = 2
@@ -74,31 +79,48 @@ class RetrievalStage:
         take_steps(context, self.name, "siamese", context.options.retrieval_steps, self._learn)
 
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
-        options, base = context.options, context.objects.base.shapes
+        options, ranks, device = context.options, context.ranks, context.device
+        network, optimizer = context.state.networks["siamese"], context.state.optimizers["siamese"]
+        shapes, points = self._pool(context)
+        boxes = box_embedding(shapes.trees.valid, shapes.box_center, shapes.box_size)
         segmentation: Any = context.state.networks["segmentation"]
-        network: Any = context.state.networks["siamese"]
-        method = SegmentedRetrieval(segmentation, network, context.objects.base)
-        network.train()  # the method has it evaluate
-        samples, ranks = view_source(context, POINTS, options.seed + 1, 1), context.ranks
+        with torch.no_grad():
+            part = torch.cat([segmentation(Clouds.of(few).points).argmax(-1) for few in points.split(_SEGMENTED)])
         for step in range(first, options.retrieval_steps):
-            set_rate(
-                context.state.optimizers["siamese"], options.perception_rate * one_cycle(step, options.retrieval_steps)
-            )
-            numbers = range(step * options.batch_size, (step + 1) * options.batch_size)
-            mine = numbers[ranks.rows(len(numbers))]
-            objects = [samples.object(i).with_diagonal(1.0) for i in mine]
-            made = ranks.every((
-                Shapes.from_objects(objects, base.points.shape[2], base.trees.num_rows) if objects else None,
-                [samples[i].points for i in mine],
-            ))  # fmt: skip
-            own = concatenate([shapes for shapes, _ in made if shapes is not None]).to(context.device)
-            points = _stacked([cloud for _, clouds in made for cloud in clouds]).to(context.device)
+            set_rate(optimizer, options.retrieval_rate * one_cycle(step, options.retrieval_steps))
             generator = torch.Generator().manual_seed((options.seed << 32) + step)
-            vectors = network(Clouds.of(points).points, method.segment(points))
-            loss = contrastive_loss(vectors, network(*canonical_clouds(own, generator)))
+            obj, seen = (
+                torch.randperm(size, generator=generator)[:count]
+                for size, count in (
+                    (options.retrieval_objects, options.retrieval_batch), (points.shape[1], options.retrieval_points)
+                )
+            )  # fmt: skip
+            row = (obj * _VIEWS + torch.randint(_VIEWS, obj.shape, generator=generator)).to(device)
+            vectors = network(Clouds.of(points[row][:, seen]).points, part[row][:, seen])
+            own = network(*canonical_clouds(shapes[row], generator, len(seen)))
             # Every pair counts, so that each process learns from all: gradients are summed for all to stay the same.
-            descend(context.state.optimizers["siamese"], network, loss / ranks.count, ranks)
+            loss = contrastive_loss(vectors, own, margins(boxes[row]))
+            descend(optimizer, network, loss / ranks.count, ranks)
             yield {"loss": loss.item()}, f"loss {loss.item():.4f}"
+
+    def _pool(self, context: Context) -> tuple[Shapes, Tensor]:
+        """Views that batches are drawn from, (V, N, 3), and their objects: they take longer to make than to learn."""
+        options, base, ranks = context.options, context.objects.base.shapes, context.ranks
+        samples = view_source(context, options.num_points, options.seed + 1, _VIEWS)
+        views = _VIEWS * options.retrieval_objects
+
+        @lru_cache(maxsize=1)
+        def shape(obj: ArticulatedObject) -> Shapes:
+            return Shapes.from_objects([obj.with_diagonal(1.0)], base.points.shape[2], base.trees.num_rows)
+
+        made = (
+            (shape(samples.object(i)), samples[i].points[: options.num_points])
+            for i in range(ranks.rank, views, ranks.count)
+        )
+        every = islice(ranks.in_turn(made), views)
+        bar = track("views", every, total=views, leave=False, shown=context.progress)
+        shapes, clouds = zip(*bar, strict=True)
+        return concatenate(shapes).to(context.device), _stacked(clouds).to(context.device)
 
 
 @dataclass(frozen=True)
@@ -243,5 +265,5 @@ def view_source(context: Context, num_points: int, seed: int, views: int) -> Sou
     return context.objects.data.source(context.objects.num_rows, num_points, seed, views)
 
 
-def _stacked(clouds: list[np.ndarray]) -> Tensor:
+def _stacked(clouds: Sequence[np.ndarray]) -> Tensor:
     return torch.from_numpy(np.stack(clouds)).float()

@@ -83,6 +83,8 @@ def test_its_own_object_is_fitted_from_a_near_start() -> None:
 
 def test_the_root_scales_and_its_scale_reaches_the_boxes(base: ShapeBase) -> None:
     method = untrained(base)
+    for parameter in method.policy.heads.parameters():
+        torch.nn.init.zeros_(parameter)  # no step along any other axis
     with torch.no_grad():  # of a free joint, the first scale axis, one step of 0.09 in each of 12 rounds
         method.policy.heads.bias.view(-1, NUM_AXES, NUM_BINS)[0, SCALE.start, NOTHING + 4] = 50.0
     estimate = method(view(artsim.make("laptop", 7), 1).points)
@@ -140,7 +142,7 @@ def test_every_method_of_the_registry_is_found_by_its_name() -> None:
 def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path) -> None:
     options = replace(
         PAPER_PRESETS["quick"], base_objects=3, reference_points=48, width=16, perception_steps=3, retrieval_steps=2,
-        batch_size=4, num_points=96, agent_rollouts=2, episodes=2, test_objects=1, test_views=1,
+        retrieval_objects=3, batch_size=4, num_points=96, agent_rollouts=2, episodes=2, test_objects=1, test_views=1,
     )  # fmt: skip
     heard: dict[str, list[dict[str, float]]] = {}
 

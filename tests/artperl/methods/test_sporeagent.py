@@ -72,7 +72,8 @@ def test_a_saved_estimator_loads_to_the_same_estimates(method: SporeAgent, tmp_p
 def test_training_learns_all_networks(tmp_path: Path) -> None:
     options = replace(
         SPOREAGENT_PRESETS["quick"], base_objects=3, reference_points=48, width=8, perception_steps=2,
-        retrieval_steps=2, batch_size=4, num_points=96, agent_rollouts=2, episodes=2, test_objects=1, test_views=1,
+        retrieval_steps=2, retrieval_objects=3, batch_size=4, num_points=96, agent_rollouts=2, episodes=2,
+        test_objects=1, test_views=1,
     )  # fmt: skip
     training = Training(options, tmp_path, workers=0, progress=False)
     networks = training.context.state.networks
