@@ -11,7 +11,7 @@ import pytest
 from artperl.training.options import METHOD_PRESETS, TrainOptions, preset_of, scaled
 from artperl.training.run import Training
 from artperl.training.stages import stages_of
-from artperl.training.timing import expected_seconds, filling, trained_minutes
+from artperl.training.timing import expected_seconds, filling, seconds_per_step, trained_minutes
 from artsim.errors import ConfigError
 
 TINY = TrainOptions(
@@ -50,6 +50,14 @@ def test_a_run_takes_the_minutes_that_it_is_given_and_the_same_steps_again(tmp_p
         filling(TINY, 0.2, kept)
     with pytest.raises(ConfigError, match="lengths of another run"):
         filling(replace(TINY, seed=1), 0.1, kept)
+
+
+@pytest.mark.slow
+def test_what_a_stage_reports_between_its_steps_takes_time_too(tmp_path: Path) -> None:
+    options = replace(TINY, method="artperl", perception_steps=2, retrieval_steps=1, agent_rollouts=6, episodes=4)
+    training = Training(options, tmp_path, workers=0, progress=False)
+    training.run()
+    assert 6 * seconds_per_step(options)["agent"] == pytest.approx(training.context.state.seconds["agent"], rel=0.5)
 
 
 @pytest.mark.slow
