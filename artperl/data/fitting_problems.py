@@ -21,7 +21,7 @@ from artsim.observing.sample import Sample
 _CHOICES = 4
 """Nearest references among which one is drawn: in use, too, the nearest is seldom the best."""
 
-_VIEWS = 2
+_VIEWS = 4
 """Problems in a row of the same object: an object takes longer to make than a view of it."""
 _TURN, _MOVE, _SCALE = 1.0, 0.3, 0.15
 """Half-widths of what starts are off by: radians about a random axis, radii of the cloud, logarithm along each axis."""
