@@ -156,7 +156,7 @@ def learning_to_fit(problems: Problems, options: Options) -> tuple[float, Shares
         fitting.shares = shares
         reward = shares.seconds["reward"]
         with shares("network"):
-            buffer, _ = rollout(agent, fitting, problem.goal, JOINT, ppo, generator)
+            buffer, _ = rollout(agent, fitting, problem.goal, ppo, generator)
             update(agent, optimizer, buffer, JOINT, ppo, generator)
         shares.seconds["network"] -= shares.seconds["reward"] - reward
         done += 1

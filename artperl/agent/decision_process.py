@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from artperl.agent.actions import NOTHING, action_mask, apply, expert, move, residual
+from artperl.agent.actions import MOVE, NOTHING, TURN, action_mask, apply, expert, move, residual
 from artperl.agent.part_neighbours import nearest_of_part
 from artperl.core.batch import Batch
 from artperl.core.pose import Theta, parent_pose, pose_parts
-from artperl.core.rotations import rotate
+from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes, faces_camera
 
 _FARTHEST = 2.0
@@ -218,6 +218,8 @@ class Fitting:
     def place(self, goal: Theta, missing: Tensor) -> None:
         """Take a step to where steps (B, P, 9) would lead to a goal at once, as far as limits of joints allow."""
         away = -missing * action_mask(self.shapes.trees)
+        # Steps are along the axes of the place that is looked for; the goal's are turned against these.
+        away[:, 0, MOVE] = rotate(rotation_from_vector(away[:, 0, TURN]), away[:, 0, MOVE])
         self.theta = move(self.shapes, replace(goal, stretch=self.theta.stretch), away, self.radius)
         self._look()
         self.steps_taken += 1

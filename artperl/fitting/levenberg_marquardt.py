@@ -2,7 +2,6 @@
 
 Results obey the joints by construction, since Theta has no other. The energy is the mean robust squared distance of
 :mod:`artperl.fitting.correspondence`, and the cost of :class:`artperl.fitting.shape_prior.ShapePrior`.
-:mod:`artperl.fitting.paper_energy` minimises the paper's own energy.
 """
 
 from __future__ import annotations

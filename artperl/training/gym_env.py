@@ -39,7 +39,8 @@ class PoseFittingEnv(gym.Env[Any, NDArray[np.int64]]):
 
     Observations are the fields of :class:`artperl.agent.decision_process.View` of one object. An action names a bin for
     each of 9 axes of each part. Only parts of the tree's level whose turn it is act, along the axes that they have. The
-    reward is that of equation 3; episodes are truncated when each level has had its turn ``options.steps`` times.
+    reward is that of equation 3; episodes are truncated when each level has had its turn ``options.steps`` times. Whose
+    turn it is and the share of steps that are left are observed, so that the process is Markov's.
     ``info`` holds the chamfer distance and the action of the expert, for imitation.
 
     Parameters
@@ -102,18 +103,28 @@ def action_space(rows: int) -> spaces.MultiDiscrete:
 
 def observation_space(rows: int, options: FittingOptions) -> spaces.Dict:
     """Fields of :class:`artperl.agent.decision_process.View`, of P rows for parts."""
-    N, M = options.observed_points, options.reference_points
+    N = min(options.observed_points, options.seen_points)
+    M = min(options.reference_points, options.seen_reference)
     return spaces.Dict(
         {
             "observed": _anything(N, 3),
             "part": spaces.MultiDiscrete(np.full(N, rows), dtype=np.int64),
+            "gap": _anything(N, 3),
+            "gap_normal": _anything(N, 3),
             "reference": _anything(rows, M, 3),
+            "normal": _anything(rows, M, 3),
             "shown": spaces.MultiBinary((rows, M)),
-            "joint": _anything(rows, 6),
+            "reference_gap": _anything(rows, M, 3),
+            "frame": _anything(rows, 3, 3),
+            "axis": _anything(rows, 3),
+            "anchor": _anything(rows, 3),
+            "sight": _anything(3),
             "kind": spaces.MultiDiscrete(np.full(rows, len(KINDS)), dtype=np.int64),
             "parent": spaces.MultiDiscrete(np.full(rows, rows), dtype=np.int64),
             "valid": spaces.MultiBinary(rows),
             "state": _anything(rows, 2),
+            "turn": spaces.MultiBinary(rows),
+            "left": _anything(1),
         }
     )
 
@@ -122,7 +133,7 @@ def observations(fitting: Fitting) -> dict[str, NDArray[Any]]:
     """What is seen of each environment, as :func:`observation_space` has it; the arrays are the caller's."""
     fields: dict[str, NDArray[Any]] = {name: tensor.numpy().copy() for name, tensor in vars(fitting.view()).items()}
     fields = {k: np.clip(v, -_FAR, _FAR) if v.dtype == np.float32 else v for k, v in fields.items()}
-    return fields | {name: fields[name].astype(np.int8) for name in ("valid", "shown")}
+    return fields | {name: fields[name].astype(np.int8) for name in ("valid", "shown", "turn")}
 
 
 def nothing(env: PoseFittingEnv) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 import artsim
 from artperl.agent.actions import (
@@ -13,15 +14,16 @@ from artperl.agent.actions import (
     MOVE,
     NOTHING,
     NUM_AXES,
-    NUM_BINS,
     SCALE,
     STATE,
+    STEPS,
     TURN,
     action_mask,
     apply,
-    expected_action,
+    compressed,
     expert,
     move,
+    nearest_bin,
     residual,
     rotation_vector,
 )
@@ -72,6 +74,16 @@ def test_the_residual_leads_to_the_goal_at_once(shapes: Shapes, radius: torch.Te
     torch.testing.assert_close(posed.scale[valid], wanted.scale[valid], atol=1e-9, rtol=0)
 
 
+def test_a_move_of_any_size_is_what_the_residual_to_its_end_says(shapes: Shapes, radius: torch.Tensor) -> None:
+    generator = torch.Generator().manual_seed(11)
+    here = some_theta(shapes, 10)
+    step = 0.3 * torch.randn(*shapes.trees.valid.shape, NUM_AXES, generator=generator, dtype=torch.float64)
+    limited = torch.isfinite(shapes.trees.lower) & torch.isfinite(shapes.trees.upper)
+    step[..., STATE] = torch.where(limited & (shapes.trees.depth > 0), 0.0, step[..., STATE])  # or limits may stop it
+    found = residual(shapes, here, move(shapes, here, step, radius), radius)
+    torch.testing.assert_close(found, step * action_mask(shapes.trees), atol=1e-9, rtol=0)
+
+
 def test_the_root_turns_and_grows_about_the_centre_of_its_box(shapes: Shapes, radius: torch.Tensor) -> None:
     theta = some_theta(shapes, 2)
     step = torch.zeros(*shapes.trees.valid.shape, NUM_AXES, dtype=torch.float64)
@@ -113,15 +125,16 @@ def test_the_expert_comes_within_the_smallest_step_of_the_goal(shapes: Shapes, r
     assert left.max() < MAGNITUDES[0]
 
 
-def test_the_expert_never_oversteps(shapes: Shapes, radius: torch.Tensor) -> None:
+def test_the_expert_never_ends_farther_away_on_any_axis(shapes: Shapes, radius: torch.Tensor) -> None:
     theta, goal = some_theta(shapes, 7), some_theta(shapes, 8)
-    theta = replace(theta, log_scale=goal.log_scale)  # a slide's lengths change with the scale
+    # A slide's lengths change with the scale, and turns about several axes at once do not add up.
+    theta = replace(theta, log_scale=goal.log_scale, rotation=goal.rotation)
     before = residual(shapes, theta, goal, radius)
     after = residual(shapes, apply(shapes, theta, expert(shapes, theta, goal, radius), radius), goal, radius)
-    straight = torch.ones_like(before, dtype=torch.bool)
-    straight[:, 0, TURN] = False  # turns about several axes at once do not add up
-    assert (after * before >= -1e-9)[straight].all()
-    assert (after.abs() <= before.abs() + 1e-9)[straight].all()
+    assert (after.abs() <= before.abs() + 1e-9).all()
+    far = before.abs() > 2 * MAGNITUDES[-1]
+    assert far.any()
+    torch.testing.assert_close((before - after)[far].abs(), torch.full_like(before[far], MAGNITUDES[-1]))
 
 
 def test_rotation_vectors_of_all_angles() -> None:
@@ -134,26 +147,37 @@ def test_rotation_vectors_of_all_angles() -> None:
     torch.testing.assert_close(torch.linalg.vector_norm(found, dim=-1), angle.double(), atol=1e-6, rtol=0)
 
 
-def test_moves_are_along_the_cameras_axes(shapes: Shapes, radius: torch.Tensor) -> None:
+@pytest.mark.parametrize("axis", range(3))
+def test_turns_and_moves_are_along_the_axes_of_the_rest_frame(shapes: Shapes, radius: torch.Tensor, axis: int) -> None:
+    """Done to the posed points by hand: turned about the line through the middle of the root's box, and moved."""
     theta = some_theta(shapes, 9)
-    step = torch.zeros(*shapes.trees.valid.shape, NUM_AXES, dtype=torch.float64)
-    step[:, 0, MOVE] = torch.tensor([0.0, 0.0, 0.5], dtype=torch.float64)
-    before, after = (
-        pose_parts(shapes.trees, t, shapes.box_center).center for t in (theta, move(shapes, theta, step, radius))
-    )
-    away = (after - before)[shapes.trees.valid]
-    depth = (0.5 * radius)[:, None].expand_as(shapes.trees.valid)[shapes.trees.valid]
-    torch.testing.assert_close(away, torch.stack([torch.zeros_like(depth), torch.zeros_like(depth), depth], dim=-1))
+    posed = pose_parts(shapes.trees, theta, shapes.box_center)
+    line = posed.rotation[:, 0, :, axis]  # where the rest frame's axis points in the camera's
+    points, middle = posed.points(shapes.points, shapes.box_center), posed.center[:, 0, None, None]
+    turn = torch.from_numpy(Rotation.from_rotvec(0.2 * line.numpy()).as_matrix())[:, None, None]
+    turned = (turn @ (points - middle)[..., None])[..., 0] + middle
+    moved = points + (0.5 * radius[:, None] * line)[:, None, None]
+    for where, size, wanted in ((TURN, 0.2, turned), (MOVE, 0.5, moved)):
+        step = torch.zeros(*shapes.trees.valid.shape, NUM_AXES, dtype=torch.float64)
+        step[:, 0, where.start + axis] = size
+        after = pose_parts(shapes.trees, move(shapes, theta, step, radius), shapes.box_center)
+        found = after.points(shapes.points, shapes.box_center)
+        torch.testing.assert_close(found[shapes.has_surface], wanted[shapes.has_surface], atol=1e-9, rtol=0)
 
 
-def test_the_expected_action_weighs_small_steps_against_none() -> None:
-    sure = torch.full((NUM_BINS,), -20.0)
-    for bin_of in range(NUM_BINS):
-        logits = sure.clone()
-        logits[bin_of] = 20.0
-        assert expected_action(logits) == bin_of
-    torn = torch.zeros(NUM_BINS)
-    assert expected_action(torn) == NOTHING  # any direction is as likely as its opposite
-    torn[NUM_BINS - 2 :] = 2.0
-    torn[NOTHING] = 2.1  # nothing is the most likely one of all
-    assert expected_action(torn) > NOTHING + 2
+def test_the_expert_does_the_same_wherever_the_scene_is_seen_from(shapes: Shapes, radius: torch.Tensor) -> None:
+    theta, goal = some_theta(shapes, 12), some_theta(shapes, 13)
+    turn = rotation_from_vector(torch.tensor([[0.4, -1.1, 0.7]], dtype=torch.float64))
+    away = torch.tensor([0.3, 0.1, -2.0], dtype=torch.float64)
+    seen = [replace(t, rotation=turn @ t.rotation, translation=t.translation @ turn[0].T + away) for t in (theta, goal)]
+    torch.testing.assert_close(residual(shapes, *seen, radius), residual(shapes, theta, goal, radius))
+
+
+def test_the_nearest_bin_is_that_of_all_bins_by_the_scale_of_errors() -> None:
+    step = torch.linspace(-0.6, 0.6, 4001, dtype=torch.float64)
+    apart = (compressed(step)[:, None] - compressed(STEPS.double())).abs()
+    two = apart.topk(2, largest=False).values
+    clear = two[:, 1] - two[:, 0] > 1e-6
+    assert clear.double().mean() > 0.99
+    assert torch.equal(nearest_bin(step)[clear], apart.argmin(1)[clear])
+    assert torch.equal(nearest_bin(STEPS), torch.arange(len(STEPS)))

@@ -101,6 +101,16 @@ def test_real_categories_agree_with_forward_kinematics_to_a_micrometre() -> None
         np.testing.assert_allclose(posed.translation[b, : len(obj)], T[:, :3, 3], atol=1e-6)
 
 
+def test_both_parts_of_a_joint_carry_its_axis_to_the_same_direction() -> None:
+    """Equation 7: its energy is 0 of all poses that come from Theta, for any state of any joint."""
+    _, trees, theta, _, center = random_batch(5)
+    rotation = pose_parts(trees, theta, center).rotation
+    parent = rotation.gather(1, trees.parent[..., None, None].expand_as(rotation))
+    apart = ((parent - rotation) @ trees.axis[..., None])[..., 0][trees.valid & (trees.depth > 0)]
+    assert len(apart) == 1 + 4 + 8 + 3
+    torch.testing.assert_close(apart, torch.zeros_like(apart), atol=1e-12, rtol=0)
+
+
 def test_padding_never_moves_and_does_not_change_an_object() -> None:
     trees, batch, theta, center, _ = random_batch(3)
     posed = pose_parts(batch, theta, center)
