@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from artperl.core.confidence import PartSymptoms, Symptoms
+from artperl.core.confidence import Calibration, PartCalibration, PartSymptoms, Symptoms
 from artperl.core.kd_tree import KDTree
 from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
@@ -114,6 +114,13 @@ class Estimate(Showable):
         """What the estimate says about itself."""
         least = float(self.visibility.min())
         return Symptoms(self.residual, self.disagreement, least, self.doubt, self.foreign)
+
+    def judged(self, calibration: Calibration, part_calibration: PartCalibration, parts: PartSymptoms) -> Estimate:
+        """The estimate with its confidence, and that of its parts, which say this about themselves."""
+        return replace(
+            self, part_symptoms=parts, confidence=calibration(self.symptoms),
+            part_confidence=part_calibration(calibration.log_odds(self.symptoms), parts),
+        )  # fmt: skip
 
     @property
     def state_unit(self) -> tuple[str, ...]:
