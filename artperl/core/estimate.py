@@ -58,9 +58,11 @@ class Estimate(Showable):
         Root of the mean robust squared distance of the cloud from the fitted reference, over the diagonal; parts count
         by the root of how many points they have.
     disagreement : float
-        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
+        Median distance between where perception and the fit place the points in the rest frame, over the diagonal; of
+        the method artperl, between where the two best ends of the agent do.
     doubt : float
-        Median error that perception expects of where it places the points in the rest frame, over the diagonal.
+        Median error that perception expects of where it places the points in the rest frame, over the diagonal; of the
+        method artperl, the mean probability that a point's label is wrong.
     foreign : float
         Share of the points that are taken for something else, such as the table.
     visibility : (K,) float
