@@ -53,10 +53,11 @@ audit: $(VENV)/.ready-dev  ## test 10,000 procedural objects, and those in ARTSI
 	$(PY) -m benchmarks.audit
 
 # Stop it at any moment: the same command goes on. To try one: make weights CATEGORY=laptop PRESET=quick
-CATEGORY ?= $(basename $(notdir $(wildcard artperl/recipes/*.json)))
+# METHOD=artperl makes those of the paper's method.
+CATEGORY ?= $(basename $(notdir $(wildcard artperl/recipes/$(METHOD)/*.json)))
 weights: $(VENV)/.ready-dev  ## make the shipped estimators again, each from its recipe
 	for recipe in $(CATEGORY); do \
-		$(VENV)/bin/artperl train --recipe $$recipe $(if $(PRESET),--preset $(PRESET)) --workers 2 --threads 1 || exit; \
+		$(VENV)/bin/artperl train --recipe $(METHOD:%=%/)$$recipe $(if $(PRESET),--preset $(PRESET)) --workers 2 --threads 1 || exit; \
 	done
 
 gpu: $(VENV)/.ready-dev  ## on a machine with a GPU: tests marked gpu, speed; results in out/gpu

@@ -176,12 +176,12 @@ def load_estimator(
 def _load_stored(
     kind: type[Stored], name: str | Path, device: torch.device | str, changes: Mapping[str, Any]
 ) -> Stored:
-    """A method of :data:`artperl.methods.STORED_METHODS`, from a folder; only full comes with the package."""
-    folder = folder_of(name)
+    """A method of :data:`artperl.methods.STORED_METHODS`, from a folder, or one that comes with the package."""
+    folder = folder_of(name, kind.name)
     if changes:
         raise ConfigError(f"the method {kind.name} has no such option", ", ".join(changes), "leave it out")
-    if folder.parent == WEIGHTS or not (folder / _SETTINGS).exists():
-        category = folder.name if folder.parent == WEIGHTS else "laptop"
+    if not (folder / _SETTINGS).exists():
+        category = str(name) if folder_of(name).parent == WEIGHTS else "laptop"
         raise DatasetError(
             f"there is no estimator of the method {kind.name}", name,
             f"train it: python train.py --category {category} --method {kind.name} --preset full",
@@ -304,10 +304,10 @@ def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor],
         raise DatasetError(f"the estimator does not load: {problem}", folder, _AGAIN)
 
 
-def folder_of(name: str | Path) -> Path:
+def folder_of(name: str | Path, method: str = "full") -> Path:
     """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
-    own = Path(name)
-    return WEIGHTS / name if (WEIGHTS / name).is_dir() and not (own / _SETTINGS).is_file() else own
+    own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / name
+    return shipped if shipped.is_dir() and not (own / _SETTINGS).is_file() else own
 
 
 def read_settings(folder: Path) -> dict[str, Any]:

@@ -94,6 +94,8 @@ class Train:
     """Share of all of perception's training clouds that are cut, dirty or sparse, as detectors' masks are."""
     perception_rate: float | None = None
     """Highest learning rate of perception; a lower one changes less of what --start-from brings along."""
+    patience: int | None = None
+    """Validations in a row without a gain after which a stage ends early; by default none does."""
     agent_rollouts: int | None = None
     """Batches of episodes that the agent of the method artperl learns from."""
     box_views: int | None = None

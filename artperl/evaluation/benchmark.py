@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from artperl.data.categories import ARTIMAGE
-from artperl.estimator import WEIGHTS, load_estimator
+from artperl.estimator import folder_of, load_estimator
 from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_half, row_objects, row_samples
 from artperl.evaluation.artimage_files import ArtImageFiles
 from artperl.evaluation.samples import NUM_POINTS
@@ -28,7 +28,9 @@ def category_folder(folder: Path | None, category: str, method: str = "full") ->
 
     A run's folder has the name of the category, or that which ``artperl train`` gives it, with method and preset.
     """
-    folder, named = folder or WEIGHTS, category if method == "full" else f"{category}-{method}"
+    if folder is None:
+        return folder_of(category, method)
+    named = category if method == "full" else f"{category}-{method}"
     runs = (folder / name / "best" for name in (category, f"{named}-full", f"{named}-quick"))
     return next((run for run in runs if run.is_dir()), folder / category)
 

@@ -288,7 +288,7 @@ def preset_of(method: StoredMethod, name: str) -> TrainOptions:
     ConfigError
         When the method has no such preset.
     """
-    presets = METHOD_PRESETS[method]
+    presets = METHOD_PRESETS.get(method, {})
     if name not in presets:
         raise ConfigError(f"the method {method} has no preset {name!r}", "preset", f"use {' or '.join(presets)}")
     return presets[name]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from artperl.estimator import WEIGHTS, folder_of, read_settings, weights_sha256
-from artperl.training.options import PRESETS, TrainOptions, changed
+from artperl.training.options import TrainOptions, changed, preset_of
 from artsim.common.files import parse_json, read_bounded
 from artsim.errors import ConfigError, DatasetError
 
@@ -45,7 +45,7 @@ class Recipe:
 
     @classmethod
     def read(cls, name: str) -> Recipe:
-        """A recipe that comes with the package by its name, or one of a JSON file by its path.
+        """A recipe that comes with the package by its name, such as laptop or artperl/laptop, or one of a JSON file.
 
         Raises
         ------
@@ -53,7 +53,7 @@ class Recipe:
             When there is none, or it is not one.
         """
         path = Path(name) if name.endswith(".json") else RECIPES / f"{name}.json"
-        known = ", ".join(sorted(recipe.stem for recipe in RECIPES.glob("*.json")))
+        known = ", ".join(sorted(str(own.relative_to(RECIPES).with_suffix("")) for own in RECIPES.rglob("*.json")))
         if not path.is_file():
             raise ConfigError(f"there is no recipe {name!r:.80}", "recipe", f"use one of {known}, or a JSON file")
         data = read_bounded(path, _MAX_BYTES, "the recipe", ConfigError)
@@ -63,17 +63,15 @@ class Recipe:
             raise ConfigError(f"the recipe is not JSON ({error})", path) from error
         if not isinstance(recipe, dict) or recipe.keys() != {"preset", "options", "lengths"}:
             raise ConfigError("a recipe has a preset, options and lengths", path, f"write it like {known}")
-        if recipe["preset"] not in PRESETS:
-            raise ConfigError(f"there is no preset {recipe['preset']!r:.80}", path, f"use {', '.join(PRESETS)}")
         made = cls(path.stem, sha256=hashlib.sha256(data).hexdigest(), **recipe)
         made.train_options()
         return made
 
     def train_options(self, preset: str | None = None) -> TrainOptions:
         """Options of the run that makes the estimator; with another preset it learns as long as that preset has it."""
-        if preset in (None, self.preset):
-            return changed(PRESETS[self.preset], self.options | self.lengths)
-        return changed(PRESETS[str(preset)], self.options)
+        method = self.options.get("method", "full")
+        lengths = self.lengths if preset in (None, self.preset) else {}
+        return changed(preset_of(method, preset or self.preset), self.options | lengths)
 
 
 def provenance(options: TrainOptions, recipe: Recipe | None) -> dict[str, Any]:

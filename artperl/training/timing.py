@@ -33,9 +33,12 @@ def seconds_per_step(options: TrainOptions) -> dict[str, float]:
         box_residual=inf,
     )  # fmt: skip
     taken, last = defaultdict(list), 0.0
+    timed = {group for stage in stages_of(brief) for group in stage.lengths}
 
     def report(group: str, figures: dict[str, float], step: int) -> None:
         nonlocal last
+        if group not in timed:  # a test between steps is part of the next step
+            return
         now = time.process_time()
         taken[group].append(now - last)
         last = now
@@ -47,8 +50,7 @@ def seconds_per_step(options: TrainOptions) -> dict[str, float]:
             if stage.lengths:
                 last = time.process_time()
                 stage.run(context)
-    known = {group for stage in stages_of(brief) for group in stage.lengths}
-    steady = {group: taken[group][len(taken[group]) // _WARM_UP :] for group in known & taken.keys()}
+    steady = {group: steps[len(steps) // _WARM_UP :] for group, steps in taken.items()}
     return {group: sum(steps) / len(steps) for group, steps in steady.items()}
 
 

@@ -53,6 +53,26 @@ def test_a_report_has_every_method_and_goes_on_where_it_stopped(tmp_path: Path) 
 
 
 @pytest.mark.slow
+def test_in_equal_minutes_full_learns_like_the_others_beside_its_shipped_weights(tmp_path: Path) -> None:
+    said: list[str] = []
+    asked = replace(TINY, minutes=0.05)
+    rows = run_comparison(asked, tmp_path, 1, False, said.append)["rows"]["laptop"]
+    assert list(rows) == ["full", "full, shipped", "ancsh"]
+    assert rows["full, shipped"]["trained_core_minutes"] is None
+    for method in ("full", "ancsh"):
+        assert rows[method]["trained_core_minutes"] == pytest.approx(0.05, rel=0.6)
+        assert (tmp_path / "train" / f"laptop-{method}-lengths.json").is_file()
+    shipped, trained = (rows[name]["parts"][0]["rotation_deg"]["mean"] for name in ("full, shipped", "full"))
+    assert shipped < 5.0 < trained  # three seconds are too few
+    (tmp_path / "rows" / "laptop-full.json").unlink()
+    again = run_comparison(asked, tmp_path, 1, False, said.append)["rows"]["laptop"]
+    assert again["full"]["trained_core_minutes"] == pytest.approx(rows["full"]["trained_core_minutes"])
+    assert again["full"]["parts"] == rows["full"]["parts"]
+    with pytest.raises(ConfigError, match="nothing is learnt"):
+        replace(TINY, minutes=0.0)
+
+
+@pytest.mark.slow
 def test_real_objects_are_another_row_of_the_same_trainings(tmp_path: Path, partnet_dir: Path) -> None:
     said: list[str] = []
     asked = replace(TINY, methods=("full",), categories=("laptop", "scissors"), row="real", partnet=str(partnet_dir))
