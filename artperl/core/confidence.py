@@ -36,9 +36,11 @@ class PartSymptoms:
     Attributes
     ----------
     disagreement : (K,) float
-        Median distance between where perception and the fit place the part's points in the rest frame, in diagonals.
+        Median distance between where perception and the fit place the part's points in the rest frame, in diagonals; of
+        the method artperl, between where the two best ends do.
     doubt : (K,) float
-        Median error that perception expects of these places, in diagonals.
+        Median error that perception expects of these places, in diagonals; of the method artperl, median probability
+        that their label is wrong.
     certainty : (K,) float
         Mean probability, by perception, that the part's points are of it.
     visibility : (K,) float

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from artperl.core.confidence import PartSymptoms, Symptoms
+from artperl.core.confidence import Calibration, PartCalibration, PartSymptoms, Symptoms
 from artperl.core.kd_tree import KDTree
 from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
@@ -58,9 +58,11 @@ class Estimate(Showable):
         Root of the mean robust squared distance of the cloud from the fitted reference, over the diagonal; parts count
         by the root of how many points they have.
     disagreement : float
-        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
+        Median distance between where perception and the fit place the points in the rest frame, over the diagonal; of
+        the method artperl, between where the two best ends of the agent do.
     doubt : float
-        Median error that perception expects of where it places the points in the rest frame, over the diagonal.
+        Median error that perception expects of where it places the points in the rest frame, over the diagonal; of the
+        method artperl, the mean probability that a point's label is wrong.
     foreign : float
         Share of the points that are taken for something else, such as the table.
     visibility : (K,) float
@@ -114,6 +116,13 @@ class Estimate(Showable):
         """What the estimate says about itself."""
         least = float(self.visibility.min())
         return Symptoms(self.residual, self.disagreement, least, self.doubt, self.foreign)
+
+    def judged(self, calibration: Calibration, part_calibration: PartCalibration, parts: PartSymptoms) -> Estimate:
+        """The estimate with its confidence, and that of its parts, which say this about themselves."""
+        return replace(
+            self, part_symptoms=parts, confidence=calibration(self.symptoms),
+            part_confidence=part_calibration(calibration.log_odds(self.symptoms), parts),
+        )  # fmt: skip
 
     @property
     def state_unit(self) -> tuple[str, ...]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from typing_extensions import Self
 
 from artperl.core.confidence import Calibration, PartCalibration, Symptoms, logistic
 from artperl.evaluation.scoring import Scored
-from artperl.methods.full import Estimator
 
 Array = NDArray[np.float64]
 
@@ -46,10 +47,21 @@ def calibrate(scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Calib
     return Calibration(*weights)
 
 
-def calibrated(estimator: Estimator, scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> Estimator:
-    """The estimator with the confidence, of the whole and of parts, that its scores say."""
+class Calibrated(Protocol):
+    """A method with a confidence that is fitted to its scores."""
+
+    def with_confidence(self, calibration: Calibration, part_calibration: PartCalibration) -> Self:
+        """The method with another confidence of the whole, and of parts."""
+        ...
+
+
+M = TypeVar("M", bound=Calibrated)
+
+
+def calibrated(method: M, scored: Sequence[Scored], foreign: Sequence[Scored] = ()) -> M:
+    """The method with the confidence, of the whole and of parts, that its scores say."""
     calibration = calibrate(scored, foreign)
-    return replace(estimator, calibration=calibration, part_calibration=calibrate_parts(scored, calibration))
+    return method.with_confidence(calibration, calibrate_parts(scored, calibration))
 
 
 def calibrate_parts(scored: Sequence[Scored], calibration: Calibration) -> PartCalibration:

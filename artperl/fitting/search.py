@@ -172,12 +172,17 @@ def disagreement(shapes: Shapes, observed: Observed, theta: Theta, perceived: Pe
 
 def apart(shapes: Shapes, observed: Observed, theta: Theta, perceived: Perceived) -> Tensor:
     """(N,) distance between where perception and the fit place each point in the rest frame, over the diagonal."""
-    posed = pose_parts(shapes.trees, theta, shapes.box_center)
-    part = observed.part[0]
-    fitted = ((observed.points[0] - posed.translation[0, part])[:, None] @ posed.rotation[0, part])[:, 0]
-    unit = shapes.diagonal[0] * theta.log_scale[0].mean().exp()
-    off: Tensor = torch.linalg.vector_norm(fitted / unit - perceived.canonical[0, : len(part)], dim=-1)
-    return off
+    off = rest_places(shapes, observed, theta)[0] - perceived.canonical[0, : observed.part.shape[1]]
+    return torch.linalg.vector_norm(off, dim=-1)
+
+
+def rest_places(shapes: Shapes, observed: Observed, theta: Theta) -> Tensor:
+    """(B, N, 3) where fits place the points in the rest frame, over the diagonal."""
+    posed, rows = pose_parts(shapes.trees, theta, shapes.box_center), observed.part[..., None]
+    rotation = posed.rotation.gather(1, rows[..., None].expand(-1, -1, 3, 3))
+    moved = observed.points - posed.translation.gather(1, rows.expand(-1, -1, 3))
+    unit = shapes.diagonal * theta.log_scale.mean(-1).exp()
+    return rotate(rotation.mT, moved) / unit[:, None, None]
 
 
 def outside(theta: Theta, seen_from: tuple[float, float] | None) -> Tensor:

@@ -7,26 +7,29 @@ constraints (4.4). The 9D poses of the parts follow from the joint states (4.1).
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from torch import Tensor
+from typing_extensions import Self
 
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.batch import concatenate
 from artperl.core.clock import Clock
-from artperl.core.confidence import Calibration, Symptoms
+from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.estimate import Estimate, estimate_of_fit
-from artperl.core.pose import Theta, pose_parts
+from artperl.core.pose import Theta
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.hypotheses import part_weights
 from artperl.fitting.levenberg_marquardt import Refined, refine
+from artperl.fitting.part_symptoms import symptoms_by_part
 from artperl.fitting.refine_options import RefineOptions
+from artperl.fitting.search import rest_places
 from artperl.methods.retrieved import AgentMethod
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import Cloud
@@ -49,6 +52,9 @@ class ArtPERLOptions:
     """The decision process of the agent."""
     refine: RefineOptions = field(default_factory=RefineOptions)
     """The last refinement."""
+    calibration: Calibration = field(default_factory=Calibration)
+    part_calibration: PartCalibration = field(default_factory=PartCalibration)
+    """Confidence of the whole, and of parts: a training fits them in its end."""
 
 
 class ArtPERL(AgentMethod):
@@ -76,7 +82,7 @@ class ArtPERL(AgentMethod):
         cloud = Cloud.of(points, self.options.num_points)
         warnings, sampled = cloud_warnings(cloud.points, cloud.good), cloud.tensor(self.device)
         with clock("segmentation"):
-            part = self.segment(sampled)
+            part, certainty = self.parts(sampled)
         with clock("retrieval"):
             row = int(self.retrieve(sampled, part)[0, 0])
             reference = self.base.shapes[[row]]
@@ -84,11 +90,26 @@ class ArtPERL(AgentMethod):
         with clock("agent"):
             paths = self.fit(reference, observed)
         with clock("refinement"):
-            path, refined = self.refined(reference, observed, paths)
-        observed, reference = observed.to("cpu"), reference.to("cpu")
-        labels = cloud.for_every_point(observed.part[0].numpy(), -1)
-        steps = [theta.to("cpu") for theta in (*path, refined.theta)]
-        return self._report(row, reference, observed, steps, labels, warnings, clock.milliseconds)
+            early = self.early(reference, observed, paths[-1])
+            best = early.energy.argsort()[:2].tolist()
+            refined = refine(reference, observed, early.theta[best[:1]], self.options.refine)
+        observed, reference, ends = observed.to("cpu"), reference.to("cpu"), early.theta[best].to("cpu")
+        steps = [theta[best[:1]].to("cpu") for theta in paths] + [refined.theta.to("cpu")]
+        one, other = (rest_places(reference, observed, ends[[row]])[0] for row in (0, -1))
+        apart = torch.linalg.vector_norm(one - other, dim=-1)
+        doubt = 1.0 - certainty[0].cpu()
+        estimate = replace(
+            estimate_of_fit(reference, observed, steps, cloud.for_every_point(observed.part[0].numpy(), -1)),
+            reference=self.base.name(row),
+            residual=float(refined.energy.clamp(min=0.0).sqrt()),
+            disagreement=float(apart.median()),
+            doubt=float(doubt.mean()),
+            milliseconds=clock.milliseconds,
+            part_names=part_names(self.base, row, reference),
+            warnings=warnings,
+        )
+        own = symptoms_by_part(observed.part[0], apart, doubt, 1.0 - doubt, estimate.visibility)
+        return estimate.judged(self.options.calibration, self.options.part_calibration, own)
 
     def starts(self, reference: Shapes, points: Tensor) -> list[Theta]:
         """Where episodes begin: references at clouds (B, N, 3) as they are seen in each of the views of the options."""
@@ -110,36 +131,17 @@ class ArtPERL(AgentMethod):
             path.append(fitting.theta)
         return path
 
-    def refined(self, reference: Shapes, observed: Observed, paths: list[Theta]) -> tuple[list[Theta], Refined]:
-        """The path from the best start, and its end refined, section 4.4.
-
-        Every end is refined on few points with its shape as it is; the one with the least energy is refined on all.
+    def early(self, reference: Shapes, observed: Observed, ends: Theta) -> Refined:
+        """Every end, S rows, after a few iterations on few points, its shape as it is; the one with the least energy
+        is worth all iterations on all points, section 4.4.
         """
-        options, ends = self.options, paths[-1]
+        options = self.options
         few = observed.map(lambda values: values[:, : options.early_points]).repeat(len(ends))
         early = replace(options.refine, iterations=min(options.early_iterations, options.refine.iterations))
-        first = refine(reference.repeat(len(ends)), few, ends, early, rigid=True)
-        best = [int(first.energy.argmin())]
-        refined = refine(reference, observed, first.theta[best], options.refine)
-        return [theta[best] for theta in paths], refined
+        return refine(reference.repeat(len(ends)), few, ends, early, rigid=True)
 
-    def _report(
-        self, row: int, reference: Shapes, observed: Observed, path: list[Theta], labels: NDArray[np.int64],
-        warnings: tuple[str, ...], milliseconds: dict[str, float],
-    ) -> Estimate:  # fmt: skip
-        """The 9D poses that Theta stands for, section 4.1, and what goes with them."""
-        theta = path[-1]
-        posed = pose_parts(reference.trees, theta, reference.box_center)
-        surface = posed.points(reference.points, reference.box_center)[0][reference.has_surface[0]].flatten(0, 1)
-        unit = float(reference.diagonal[0] * theta.log_scale[0].mean().exp())
-        residual = float(torch.cdist(observed.points[0], surface).amin(1).square().mean().sqrt()) / unit
-        return replace(
-            estimate_of_fit(reference, observed, path, labels),
-            reference=self.base.name(row),
-            residual=residual,
-            disagreement=0.0,
-            confidence=Calibration()(Symptoms(residual, 0.0, 0.0, 0.0)),
-            milliseconds=milliseconds,
-            part_names=part_names(self.base, row, reference),
-            warnings=warnings,
-        )
+    def with_confidence(self, calibration: Calibration, part_calibration: PartCalibration) -> Self:
+        """The method with another confidence of the whole, and of parts."""
+        other = copy(self)
+        other.options = replace(self.options, calibration=calibration, part_calibration=part_calibration)
+        return other

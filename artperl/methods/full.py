@@ -127,6 +127,10 @@ class Estimator:
             estimate, known, _ = self._fit(points, Clock())
             return estimate, *known.evidence(estimate, self.perception.num_rows)
 
+    def with_confidence(self, calibration: Calibration, part_calibration: PartCalibration) -> Estimator:
+        """The estimator with another confidence of the whole, and of parts."""
+        return replace(self, calibration=calibration, part_calibration=part_calibration)
+
     def _fit(self, points: ArrayLike, clock: Clock) -> tuple[Estimate, BoxContext, Fit]:
         """The estimate with the boxes of the reference, what is known for better ones, and the fit."""
         options = self.options
@@ -165,13 +169,7 @@ class Estimator:
                 warnings=warnings,
             )
             symptoms = part_symptoms(fit.shapes, fit.observed, fit.theta, perceived.to("cpu"), estimate.visibility)
-            odds = self.calibration.log_odds(estimate.symptoms)
-            estimate = replace(
-                estimate,
-                confidence=self.calibration(estimate.symptoms),
-                part_confidence=self.part_calibration(odds, symptoms),
-                part_symptoms=symptoms,
-            )
+            estimate = estimate.judged(self.calibration, self.part_calibration, symptoms)
             return estimate, BoxContext.of(cloud, clouds, perceived), fit
 
     def _perceive_own(self, cloud: Cloud, clock: Clock) -> tuple[Cloud, Clouds, Perceived, float]:

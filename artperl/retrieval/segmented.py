@@ -32,10 +32,15 @@ class SegmentedRetrieval:
         """Categories of the references."""
         return tuple(dict.fromkeys(self.base.categories))
 
-    @torch.no_grad()
     def segment(self, points: Tensor) -> Tensor:
         """(B, N) parts of points (B, N, 3), camera frame, metres."""
-        return self.segmentation(Clouds.of(points).points).argmax(-1)
+        return self.parts(points)[0]
+
+    @torch.no_grad()
+    def parts(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, N) parts of points (B, N, 3), camera frame, metres, and their probabilities."""
+        certainty, part = self.segmentation(Clouds.of(points).points).softmax(-1).max(-1)
+        return part, certainty
 
     @torch.no_grad()
     def retrieve(self, points: Tensor, part: Tensor, count: int = 1) -> Tensor:

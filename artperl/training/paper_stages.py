@@ -34,7 +34,7 @@ from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps
-from artperl.training.validation import Validation
+from artperl.training.validation import Calibration, Validation
 from artsim.common.progress import track
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
@@ -178,7 +178,8 @@ class AgentStage:
 def paper_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
-    return [segmentation, RetrievalStage(), AgentStage(paper_estimator, fitting_episodes, _ALONE), Validation()]
+    agent = AgentStage(paper_estimator, fitting_episodes, _ALONE)
+    return [segmentation, RetrievalStage(), agent, Validation(), Calibration()]
 
 
 def fitting_episodes(

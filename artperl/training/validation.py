@@ -20,6 +20,7 @@ from artperl.evaluation.samples import (
 )
 from artperl.evaluation.scoring import Scored, evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
+from artperl.methods.artperl import ArtPERL
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Method
 from artperl.training.context import Context
@@ -49,7 +50,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Calibrates the confidence of the best estimator when it has learnt all: its boxes decide what is right, too."""
+    """Calibrates the confidence of the best estimator when it has learnt all: boxes decide what is right, too."""
 
     name: str = "calibration"
     lengths: ClassVar[dict[str, str]] = {}
@@ -61,7 +62,7 @@ class Calibration:
             return
         if context.ranks.first:
             best = context.best()
-            assert isinstance(best, Estimator)
+            assert isinstance(best, Estimator | ArtPERL)
             samples = unseen_samples(context, context.options.validation_views, VALIDATION_SEEDS)
             save_estimator(_calibrated(best, samples, context), context.folder.best, context.about({}))
         state.done[self.name] = context.ranks.same(1)
@@ -143,7 +144,9 @@ def _of_degraded(estimator: Method, samples: Sequence[Sample], context: Context)
     return evaluate(estimator, degraded_samples(samples), context.progress) if context.options.degraded else []
 
 
-def _calibrated(estimator: Estimator, samples: Sequence[Sample], context: Context) -> Estimator:
+def _calibrated(
+    estimator: Estimator | ArtPERL, samples: Sequence[Sample], context: Context
+) -> Estimator | ArtPERL:  # fmt: skip
     """The estimator with its confidence by how it does on samples, degraded ones, and objects of other categories."""
     options = context.options
     scored = evaluate(estimator, samples, context.progress) + _of_degraded(estimator, samples, context)
