@@ -1,12 +1,13 @@
 """What PPO brings the agent beside cloning: ``python -m benchmarks.agents``.
 
-An agent learns by cloning alone, and by Algorithm 1: cloning, then cloning and PPO. Both take as many rollouts on the
-same problems, and begin with the same random weights, several times with others. A problem is a fresh object
-with its true labels, one of the four references most like it, and a start that is off. Each agent is then tested alone,
-without refinement, on unseen objects: on clean clouds, with the noise of a Kinect v1, with 40 % of the points hidden,
-and from starts that are twice as far off. Every run is written down when it is done: the same command goes on.
-Prints mean and standard error over the runs of the parts' mean rotation error, in degrees, and how much less it is
-with PPO, over pairs of runs; the last line is one JSON object.
+An agent learns by cloning on states that are drawn at random; by cloning on these and on its own states in turn; and by
+Algorithm 1, whose last rollouts have PPO beside cloning. All take as many rollouts on the same problems, and begin
+with the same random weights, several times with others. A problem is a fresh object with its true labels, one of the
+four references most like it, and a start that is off. Each agent is then tested alone, without refinement, on unseen
+objects: on clean clouds, with the noise of a Kinect v1, with 40 % of the points hidden, and from starts that are twice
+as far off. Every run is written down when it is done: the same command goes on. Prints mean and standard error over
+the runs of the parts' mean rotation error, in degrees, and how much less it is with PPO, over pairs of runs; the last
+line is one JSON object.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import tyro
 
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
-from artperl.agent.ppo import CLONING, JOINT, OWN_STATES, Phase, PPOOptions, algorithm_1
+from artperl.agent.ppo import CLONING, Phase, PPOOptions, algorithm_1
 from artperl.core.batch import concatenate
 from artperl.core.pose import Theta, pose_parts
 from artperl.data.categories import objects_of
@@ -32,7 +33,8 @@ from artperl.data.sources import DataOptions
 from artperl.evaluation.samples import TEST_SEEDS
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
-from artperl.training.steps import one_cycle, set_rate
+from artperl.training.options import TrainOptions
+from artperl.training.steps import set_rate
 from artsim.common.files import read_bounded
 from artsim.common.progress import say, track
 from artsim.datasets.plan import SampleOptions
@@ -40,7 +42,7 @@ from artsim.observing.interference import interfere
 from artsim.observing.sample import Sample
 
 _MAX_RECORD = 10_000_000
-_WAYS = ("cloning", "cloning and PPO")
+_WAYS = ("drawn states", "own states too", "Algorithm 1")
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Options:
     categories: tuple[str, ...] = ("laptop", "eyeglasses", "dishwasher", "scissors", "drawer")
     seeds: int = 3
     """Runs of each way in each category."""
-    rollouts: int = 40
+    rollouts: int = 60
     episodes: int = 64
     """Of a rollout."""
     problems: int = 640
@@ -59,9 +61,7 @@ class Options:
     """Of the policy: less than trainings have, so that a run takes a minute."""
     seen_points: int = 128
     """Points of the cloud that the agent sees: half of what it sees in trainings."""
-    rate: float = 2e-3
-    reinforcement_rate: float = 2e-4
-    cloning_share: float = 0.6
+    cloning_share: float = 0.7
     """Of the rollouts of Algorithm 1, those by cloning alone."""
     tests: int = 128
     """Problems of each test."""
@@ -121,19 +121,20 @@ def learnt(problems: Problem, way: str, seed: int, options: Options, name: str) 
     """An agent after all its rollouts, and the mean reward of a step in those of its own actions."""
     torch.manual_seed(seed)
     policy = Policy(options.width).train()
-    optimizer = torch.optim.Adam(policy.parameters(), options.rate)
-    cloning = options.rollouts if way == "cloning" else round(options.cloning_share * options.rollouts)
+    asked = TrainOptions(
+        method="artperl", agent_rollouts=options.rollouts,
+        cloning_share=options.cloning_share if way == "Algorithm 1" else 1.0,
+    )  # fmt: skip
+    optimizer = torch.optim.Adam(policy.parameters())
 
     def episodes(n: int) -> tuple[Fitting, Theta]:
-        clones = n < cloning
-        cycle = one_cycle(n, cloning) if clones else one_cycle(n - cloning, options.rollouts - cloning)
-        set_rate(optimizer, cycle * (options.rate if clones else options.reinforcement_rate))
+        set_rate(optimizer, asked.rate_of_agent(n))
         generator = torch.Generator().manual_seed((seed << 32) + n)
         problem = problems[torch.randperm(len(problems), generator=generator)[: options.episodes]]
         return Fitting(problem.shapes, problem.observed, problem.start, options.fitting), problem.goal
 
     def phase(n: int) -> Phase:
-        return JOINT if n >= cloning else OWN_STATES if n % 2 else CLONING
+        return CLONING if way == "drawn states" else asked.phase(n)
 
     rounds = algorithm_1(policy, optimizer, episodes, phase, PPOOptions(), seed, 0, options.rollouts)
     figures = list(track(name, rounds, total=options.rollouts, leave=False))
@@ -190,7 +191,7 @@ def _print(
     print(f"{category:<12} {'start':<18}" + "".join(f"{name:>8} {start[name]:5.1f}         " for name in TESTS))
     every = np.array([[[rows[category, way, seed][name] for seed in range(options.seeds)] for name in TESTS]
                       for way in _WAYS])  # fmt: skip
-    for name, own in zip((*_WAYS, "less by PPO"), (*every, every[0] - every[1]), strict=True):
+    for name, own in zip((*_WAYS, "less by PPO"), (*every, every[1] - every[2]), strict=True):
         error = own.std(1, ddof=1) / options.seeds**0.5
         cells = [
             f"{test:>8} {mean:5.1f} +- {off:4.2f} " for test, mean, off in zip(TESTS, own.mean(1), error, strict=True)
