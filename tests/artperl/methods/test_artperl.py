@@ -10,12 +10,16 @@ import pytest
 import torch
 
 import artsim
-from artperl.agent.actions import NOTHING, NUM_AXES, NUM_BINS, SCALE
+from artperl.agent.actions import BINS, NOTHING, NUM_AXES, SCALE, nearest_bin, residual
+from artperl.agent.decision_process import Fitting, FittingOptions
+from artperl.agent.ppo import PPOOptions, rollout
 from artperl.agent.start import MeanView
+from artperl.core.shapes import Observed
 from artperl.data.fitting_problems import part_truth
 from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.metrics import rotation_error
 from artperl.evaluation.scoring import evaluate
+from artperl.fitting.refine_options import RefineOptions
 from artperl.methods import METHODS, method_of
 from artperl.methods.artperl import ArtPERL, ArtPERLOptions
 from artperl.methods.retrieved import Sizes
@@ -59,39 +63,69 @@ def base() -> ShapeBase:
 
 
 def test_its_own_object_is_fitted_from_a_near_start() -> None:
-    """True labels, the object itself as reference, and a policy that does nothing: equations 6 and 7 do the rest."""
+    """True labels, the object itself as reference, and a policy that does nothing: the refinement does the rest.
+
+    Of three starts the one nearest to the truth is kept.
+    """
     obj = artsim.make("laptop", 11)
     sample = view(obj, 3)
     method = untrained(ShapeBase.of([obj], 256))
     method.segmentation = Truth(sample)
     for parameter in method.policy.heads.parameters():
-        torch.nn.init.zeros_(parameter)  # every bin is as likely, so that the mean step is none
+        torch.nn.init.zeros_(parameter)  # the mean step is none
     _, rotation, _, _, _, _ = part_truth(sample, 2)
     # The start is the true view but for ten degrees, and the joint is where the start has it: half-way.
     seen = rotation[0].T.numpy() @ np.array([0.0, 0.0, -1.0])  # towards the camera, in the rest frame
     azimuth, elevation = np.rad2deg(np.arctan2(-seen[1], -seen[0])), np.rad2deg(np.arcsin(seen[2]))
-    method.options = replace(
-        method.options, start=MeanView(azimuth + 8.0, elevation + 6.0), refine_iterations=200, refine_rate=0.02
-    )
+    views = tuple(MeanView(azimuth + 8.0 + aside, elevation + 6.0) for aside in (-70.0, 0.0, 70.0))
+    method.options = replace(method.options, starts=views)
     estimate = method(sample.points)
-    assert rotation_error(estimate.rotation, rotation.numpy()).max() < 6.0
+    assert rotation_error(estimate.rotation, rotation.numpy()).max() < 3.0
     assert (estimate.part == sample.part).mean() > 0.99
     assert len(estimate.trajectory) == 1 + 12 * 2 + 1  # start, the agent's steps of both levels, refinement
     start = rotation_error(estimate.trajectory[0][:, :3, :3], rotation.numpy())
     assert start.max() > 8.0
+    assert start[0] < 15.0
 
 
 def test_the_root_scales_and_its_scale_reaches_the_boxes(base: ShapeBase) -> None:
-    method = untrained(base)
+    method = untrained(base, ArtPERLOptions(starts=(MeanView(),), refine=RefineOptions(iterations=0)))
     for parameter in method.policy.heads.parameters():
         torch.nn.init.zeros_(parameter)  # no step along any other axis
     with torch.no_grad():  # of a free joint, the first scale axis, one step of 0.09 in each of 12 rounds
-        method.policy.heads.bias.view(-1, NUM_AXES, NUM_BINS)[0, SCALE.start, NOTHING + 4] = 50.0
+        method.policy.heads.bias.view(-1, NUM_AXES)[0, SCALE.start] = BINS[NOTHING + 4]
     estimate = method(view(artsim.make("laptop", 7), 1).points)
     row = method.base.object_ids.index(estimate.reference.split(":")[1])
     ratio = estimate.size / base.shapes.box_size[row, :2].numpy()
     np.testing.assert_allclose(ratio[0], ratio[1], rtol=1e-4)  # one scale of all parts, by Theta
     np.testing.assert_allclose(ratio[0, 0] / ratio[0, 1:], np.exp(12 * 0.09), rtol=1e-3)
+
+
+def test_the_deployed_policy_is_the_learnt_one(base: ShapeBase) -> None:
+    """On every axis the method takes the action that rollouts draw most often, as often as the policy says."""
+    times, options = 400, FittingOptions(steps=1, observed_points=64, reference_points=24)
+    method = untrained(base, ArtPERLOptions(fitting=options))
+    torch.nn.init.normal_(method.policy.heads.weight, std=6.0, generator=torch.Generator().manual_seed(0))
+    sample = view(artsim.make("laptop", 5), 2, 256)
+    points, part = torch.from_numpy(sample.points)[None].float(), torch.from_numpy(sample.part.astype(np.int64))[None]
+    reference, observed = base.shapes[[0]], Observed.of(points, part)
+    before, after, *_ = method.fit(reference, observed)
+    S = len(before)
+    episodes = Fitting(reference.repeat(S * times), observed.repeat(S * times), before.repeat(times), options)
+    with torch.no_grad():
+        probability = method.policy(episodes.view()[::times])[0][:, 0].softmax(-1)
+    step = residual(reference.repeat(S), before, after, episodes.radius[::times])
+    taken = nearest_bin(step)[:, 0]  # the root begins
+    buffer, _ = rollout(method.policy, episodes, before.repeat(times), PPOOptions(), torch.Generator().manual_seed(0))
+    drawn = buffer.action[: S * times, 0].unflatten(0, (S, times))
+    often = torch.nn.functional.one_hot(drawn, len(BINS)).double().mean(1)
+    error = (probability * (1.0 - probability) / times).sqrt()
+    assert ((often - probability).abs() <= 4.5 * error + 3.0 / times).all()
+    first, second = probability.topk(2, -1).values.unbind(-1)
+    clear = first - second > 0.2
+    assert clear.sum() > 10
+    assert len(taken[clear].unique()) > 2
+    assert torch.equal(often.argmax(-1)[clear], taken[clear])
 
 
 def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path: Path) -> None:
@@ -103,9 +137,13 @@ def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path
     loaded = load_estimator(tmp_path, method="artperl")
     assert loaded.options == method.options
     one, other = method(sample.points), loaded(sample.points)
-    np.testing.assert_allclose(one.T_camera_part, other.T_camera_part, atol=2e-3)
-    assert (one.part == other.part).all()
     assert one.reference == other.reference
+    assert (one.part == other.part).all()
+    # Files round the base. The labels of a new network tell the refinement little, so that its end may differ.
+    np.testing.assert_allclose(one.trajectory[:-1], other.trajectory[:-1], atol=1e-3)
+    save_estimator(loaded, tmp_path / "again", {"options": {"categories": ["laptop"]}})
+    again = load_estimator(tmp_path / "again", method="artperl")(sample.points)
+    np.testing.assert_array_equal(again.T_camera_part, other.T_camera_part)
     with pytest.raises(DatasetError, match=r"method 'artperl', not full.*--method artperl"):
         load_estimator(tmp_path)
 
@@ -139,6 +177,7 @@ def test_every_method_of_the_registry_is_found_by_its_name() -> None:
         assert method_of(name).name == name
 
 
+@pytest.mark.slow
 def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path) -> None:
     options = replace(
         PAPER_PRESETS["quick"], base_objects=3, reference_points=48, width=16, perception_steps=3, retrieval_steps=2,

@@ -73,10 +73,10 @@ def test_two_processes_end_what_one_has_begun_though_one_of_them_dies(alone: Pat
 
 
 def test_two_processes_make_the_rollouts_of_one(tmp_path: Path) -> None:
-    """Segmentation, retrieval and the agent of the paper's method: five episodes of unequal length, four updates."""
+    """Segmentation, retrieval and the agent of the paper's method: five episodes, each phase once."""
     changes = {
         "method": "artperl", "perception_steps": 2, "dense_steps": 0, "retrieval_steps": 2, "retrieval_objects": 3,
-        "agent_rollouts": 2, "episodes": 5, "cloning_share": 0.5, "box_views": 0,
+        "agent_rollouts": 3, "episodes": 5, "cloning_share": 0.7, "box_views": 0,
     }  # fmt: skip
     for count in (1, 2):
         done = learn(tmp_path / str(count) / "run", count, **changes)

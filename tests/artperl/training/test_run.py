@@ -39,6 +39,11 @@ TINY = TrainOptions(
     test_views=1,
 )  # fmt: skip
 
+PAPER = replace(
+    TINY, method="artperl", perception_steps=2, dense_steps=0, stretched=0.0, retrieval_steps=3, retrieval_objects=3,
+    retrieval_batch=3, agent_rollouts=4, cloning_share=0.5, episodes=3, test_objects=1,
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -77,6 +82,28 @@ def test_a_stopped_run_ends_as_if_it_had_not_been(whole: Path, tmp_path: Path, s
     assert again.context.state.done[stage] == after
     again.run()
     ends_alike(whole, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the paper's method from beginning to end."""
+    out = tmp_path_factory.mktemp("paper")
+    Training(PAPER, out, workers=0, progress=False).run()
+    return out
+
+
+@pytest.mark.parametrize("stop", [("segmentation", 1), ("retrieval", 2), ("agent", 1), ("agent", 3)], ids=str)
+def test_a_stopped_run_of_the_papers_method_ends_as_if_it_had_not_been(
+    paper: Path, tmp_path: Path, stop: tuple[str, int]
+) -> None:
+    """In every stage, and of the agent while it clones and while it learns from rewards."""
+    stage, after = stop
+    with pytest.raises(KeyboardInterrupt):
+        Training(PAPER, tmp_path, workers=0, progress=False, report=_interrupt(stage, after)).run()
+    again = Training(PAPER, tmp_path, workers=0, progress=False)
+    assert again.context.state.done[stage] == after
+    again.run()
+    ends_alike(paper, tmp_path)
 
 
 def ends_alike(*runs: Path) -> None:
