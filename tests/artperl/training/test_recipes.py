@@ -21,6 +21,11 @@ from tests.artperl.training.test_run import TINY
 def test_every_estimator_that_comes_with_the_package_has_a_recipe_that_begins_at_random() -> None:
     shipped_names = {path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
     assert {path.stem for path in RECIPES.glob("*.json")} == shipped_names >= {*ARTIMAGE, "any"}
+    for path in (RECIPES / "artperl").glob("*.json"):
+        made = read_settings(WEIGHTS / "artperl" / path.stem)["about"]
+        assert made["recipe"]["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+        assert Recipe.read(f"artperl/{path.stem}").train_options().categories == (path.stem,)
+    assert {path.stem for path in (RECIPES / "artperl").glob("*.json")} == set(ARTIMAGE)
     for path in RECIPES.glob("*.json"):
         options = Recipe.read(path.stem).train_options()
         assert options.start_from is None
