@@ -63,7 +63,7 @@ def test_starts_are_off_by_as_much_as_is_said() -> None:
     problem = problems[0]
     points = problem.observed.points
     radius = torch.linalg.vector_norm(points - points.mean(1, keepdim=True), dim=-1).amax(1)
-    steps = residual(problem.shapes, problem.start, problem.goal, radius)
+    steps = residual(problem.shapes, problem.goal, problem.start, radius)
     angle = torch.linalg.vector_norm(steps[:, 0, :3], dim=-1)
     assert 0.5 < angle.max() <= 1.0 + 1e-3
     assert 0.15 < steps[:, 0, 3:6].abs().max() <= 0.3 + 1e-3
