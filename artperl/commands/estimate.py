@@ -120,7 +120,8 @@ class Estimate:
     """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
     method: StoredMethod = "full"
-    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; or a
+    """Method of the estimator: full, which comes with the package; artperl, the paper's, with weights for laptop,
+    eyeglasses, dishwasher, scissors and drawer; or a
     baseline that you trained."""
     workers: int = 1
     """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""

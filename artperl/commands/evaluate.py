@@ -30,7 +30,8 @@ class Evaluate:
     """Folder of the estimator, or the name of one that comes with the package. For a benchmark and the
     ablation, folder of the estimators by category; by default those that come with the package."""
     method: str = "full"
-    """Method of the estimator: full, which comes with the package; artperl, section 4 of the paper as printed; a
+    """Method of the estimator: full, which comes with the package; artperl, the paper's, with weights for laptop,
+    eyeglasses, dishwasher, scissors and drawer; a
     baseline that you trained (ancsh, omad, sporeagent); or one that you add (CONTRIBUTING.md). A benchmark and the
     ablation are of the method full."""
     benchmark: Literal["artimage", "robustness", "reartmix"] | None = None

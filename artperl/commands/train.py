@@ -66,7 +66,7 @@ class Train:
 
     # From here on: fields of TrainOptions under their own names, then those of its parts.
     method: StoredMethod | None = None
-    """full: the method that comes with trained weights; artperl: section 4 of the paper as printed; the others: the
+    """full: the default method; artperl: the paper's, section 4; the others: the
     baselines that the paper compares with."""
     categories: Annotated[tuple[str, ...] | None, tyro.conf.arg(name="category")] = None
     """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By
