@@ -25,8 +25,7 @@ def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Me
     name : str or Path
     method : str
         full, which comes with the package; artperl (the paper's), which does for the categories of ArtImage; or ancsh,
-        omad or sporeagent,
-        which you train yourself: a folder of your own.
+        omad or sporeagent, which you train yourself: a folder of your own.
     **changes
         Of its options, such as ``seen_from=(-75.0, 75.0)``, degrees, where the camera is known to be in front of the
         object. :class:`artperl.fitting.options.EstimatorOptions` has them all.

@@ -121,8 +121,7 @@ class Estimate:
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
     method: StoredMethod = "full"
     """Method of the estimator: full, which comes with the package; artperl, the paper's, with weights for laptop,
-    eyeglasses, dishwasher, scissors and drawer; or a
-    baseline that you trained."""
+    eyeglasses, dishwasher, scissors and drawer; or a baseline that you trained."""
     workers: int = 1
     """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""
     ray: str | None = None
