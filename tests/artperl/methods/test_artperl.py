@@ -150,9 +150,9 @@ def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path
 
 def test_the_method_without_shipped_weights_says_how_to_train_it() -> None:
     with pytest.raises(
-        DatasetError, match=r"train it: python train.py --category laptop --method artperl --preset full"
+        DatasetError, match=r"train it: python train.py --category stapler --method artperl --preset full"
     ):
-        load_estimator("laptop", method="artperl")
+        load_estimator("stapler", method="artperl")
 
 
 def test_an_estimator_of_the_method_full_is_not_taken_for_one(base: ShapeBase, tmp_path: Path) -> None:
