@@ -198,8 +198,8 @@ def scatter(fitting: Fitting, goal: Theta, generator: torch.Generator, ranks: Ra
         other = torch.randint(total, (total,), generator=generator, device=device)
         share = torch.rand((*starts.shape[:2], 3), generator=generator, device=device)
         left = share.repeat_interleave(3, dim=2) * starts[other]
-        masks.append(fitting.mask)
         fitting.place(goal, left[own])
+        masks.append(fitting.mask)
         views.append(fitting.view())
         experts.append(fitting.missing(goal))
     none = torch.zeros(sum(map(len, masks)), device=device)

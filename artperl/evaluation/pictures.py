@@ -34,8 +34,6 @@ _EDGES = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
 _CURVES = (
     ("agent/reward", "reward of a step"),
     ("agent/chamfer_end", "chamfer distance at the end of an episode, radii"),
-    ("agent_alone/reward", "reward of a step, agent alone on unseen objects"),
-    ("agent_alone/chamfer_end", "chamfer distance at the end, agent alone"),
     ("agent/accuracy", "actions as the expert's"),
     ("perception/accuracy", "points with the right part"),
     ("segmentation/accuracy", "points with the right part"),

@@ -15,13 +15,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from artperl.agent.actions import rotation_vector
 from artperl.agent.decision_process import Fitting
-from artperl.agent.policy import Policy
 from artperl.agent.ppo import algorithm_1
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
-from artperl.core.pose import Theta, clamp_state, pose_parts, theta_from_parts
+from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.data.batches import row_batches
 from artperl.data.fitting_problems import part_truth
@@ -33,7 +31,7 @@ from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, cont
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
-from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps
+from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps, told
 from artperl.training.validation import Calibration, Validation
 from artsim.common.progress import track
 from artsim.model.objects import ArticulatedObject
@@ -47,10 +45,6 @@ _SEGMENTED = 32
 """Clouds that are segmented at once."""
 _SAVE_ROLLOUTS = 2
 """Rollouts after which a run is saved, against a stop that nobody asked for."""
-_ALONE_EVERY = 2
-"""Rollouts between tests of the agent without an expert."""
-_ALONE = 48
-"""Views of such a test."""
 _CHOICES = 4
 """Nearest references among which the agent's is drawn: at test time, too, it is seldom the best one."""
 
@@ -133,13 +127,10 @@ class AgentStage:
         The method of a context.
     episodes : callable
         Episodes and goals of a rollout, by the method, views, their number, the rows of this process, and chance.
-    alone : int
-        Views of a test of the agent without an expert, always the same ones.
     """
 
     estimator: Callable[[Context], Any]
     episodes: Callable[[Any, Rows, int, slice, torch.Generator], tuple[Any, Theta]]
-    alone: int
     name: str = "agent"
     lengths: ClassVar[dict[str, str]] = {"agent": "agent_rollouts"}
 
@@ -153,7 +144,6 @@ class AgentStage:
         options, total, method = context.options, context.options.agent_rollouts, self.estimator(context)
         policy, optimizer, ranks = method.policy.train(), context.state.optimizers["policy"], context.ranks
         views = agent_views(context, options.episodes, first, options.seed + 2)
-        unseen = next(agent_views(replace(context, workers=0), self.alone, 0, options.seed + 3))
 
         def episodes(n: int) -> tuple[Any, Theta]:
             set_rate(optimizer, options.rate_of_agent(n))
@@ -164,21 +154,14 @@ class AgentStage:
             policy, optimizer, episodes, options.phase, options.ppo, options.seed, first, total, ranks,
             options.mixed_precision,
         )  # fmt: skip
-        for n, figures in enumerate(rounds, first):
-            line = None
-            if ranks.first and (n % _ALONE_EVERY == 0 or n + 1 == total):
-                generator = torch.Generator().manual_seed(options.seed)
-                problems = self.episodes(method, unseen, self.alone, slice(0, self.alone), generator)
-                alone = agent_alone(policy, *problems)
-                context.report("agent_alone", alone, n)
-                line = f"alone: reward {alone['reward']:.3f}, {alone['rotation_deg']:.1f} deg"
-            yield figures, line
+        for figures in rounds:
+            yield figures, told({name: figures[name] for name in ("cloning", "reward") if name in figures})
 
 
 def paper_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
-    agent = AgentStage(paper_estimator, fitting_episodes, _ALONE)
+    agent = AgentStage(paper_estimator, fitting_episodes)
     return [segmentation, RetrievalStage(), agent, Validation(), Calibration()]
 
 
@@ -228,22 +211,6 @@ def draw_references(
     nearest = method.retrieve(points, part, min(_CHOICES, len(method.base)))
     drawn = torch.randint(nearest.shape[1], (count, 1), generator=generator)[own].to(method.device)
     return method.base.shapes[nearest.gather(1, drawn)[:, 0]], Observed.of(points, part)
-
-
-@torch.no_grad()
-def agent_alone(policy: Policy, fitting: Fitting, goal: Theta) -> dict[str, float]:
-    """Mean reward of a step, chamfer distances, and the mean rotation of all parts from the goal, by itself."""
-    start, rewards, trees = fitting.distance, [], fitting.shapes.trees
-    while not fitting.done:
-        rewards.append(fitting.step(policy(fitting.view())[0].argmax(-1)))
-    wanted = pose_parts(trees, goal, fitting.shapes.box_center).rotation
-    off = torch.linalg.vector_norm(rotation_vector((wanted.mT @ fitting.posed.rotation).flatten(0, 1)), dim=-1)
-    return {
-        "reward": torch.stack(rewards).mean().item(),
-        "chamfer_start": start.mean().item(),
-        "chamfer_end": fitting.distance.mean().item(),
-        "rotation_deg": off.view(trees.valid.shape)[trees.valid].rad2deg().mean().item(),
-    }
 
 
 def agent_views(context: Context, count: int, first: int, seed: int) -> Iterator[Rows]:

@@ -20,9 +20,6 @@ from artperl.training.supervised import SupervisedStage, segmentation_loss
 from artperl.training.validation import Validation
 from artsim.errors import ConfigError
 
-_ALONE = 24
-"""Views of a test of the agent without an expert: each has an episode for every part that shows."""
-
 
 def sporeagent_run_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     """New networks of the method, by name."""
@@ -39,7 +36,7 @@ def sporeagent_estimator(context: Context) -> SporeAgent:
 def sporeagent_stages(options: TrainOptions) -> list[Any]:
     """The stages, in their order."""
     segmentation = SupervisedStage("segmentation", "segmentation", segmentation_loss)
-    agent = AgentStage(sporeagent_estimator, registration_episodes, _ALONE)
+    agent = AgentStage(sporeagent_estimator, registration_episodes)
     return [segmentation, RetrievalStage(), agent, Validation()]
 
 

@@ -195,6 +195,13 @@ def test_values_are_learnt_beside_the_policy() -> None:
     assert learnt == {name for name, _ in agent.named_parameters() if name.startswith("value.")}
 
 
+@pytest.mark.parametrize("phase", [CLONING, JOINT])
+def test_the_agent_sees_whose_turn_it_is_whatever_it_learns_by(phase: Phase) -> None:
+    buffer = a_buffer(an_agent(), phase, kinds=("laptop", "eyeglasses"))
+    assert torch.equal(buffer.mask.any(-1), buffer.view.turn & buffer.view.valid)
+    assert len(buffer.view.left.unique()) > 2
+
+
 def test_scattered_states_are_all_along_the_way_of_every_start() -> None:
     """The expert of every object takes long steps in some, short ones in others, in either direction."""
     problem = small_problem("laptop")

@@ -193,7 +193,7 @@ def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path
     before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
     training.run()
     assert {name: len(figures) for name, figures in heard.items()} == {
-        "segmentation": 3, "retrieval": 2, "agent": 2, "agent_alone": 2, "validation": 1,
+        "segmentation": 3, "retrieval": 2, "agent": 2, "validation": 1,
     }  # fmt: skip
     for name, network in networks.items():
         assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
