@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from artperl.data.categories import ARTIMAGE
-from artperl.estimator import load_estimator
+from artperl.estimator import WEIGHTS, folder_of, load_estimator
 from artperl.evaluation.artimage import has_half, row_objects, row_samples
 from artperl.evaluation.comparison import row_record
 from artperl.evaluation.comparison_page import html_page, markdown
@@ -30,7 +30,7 @@ from artperl.training.run import Training
 from artperl.training.timing import filling, trained_minutes
 from artperl.viewer import page
 from artsim.common.files import read_json, write_atomic
-from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artsim.errors import ArtsimError, ConfigError
 from artsim.export import export
 from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
@@ -255,20 +255,11 @@ def training_options(options: ComparisonOptions, category: str, method: StoredMe
     return replace(own, **changes)
 
 
-def shipped(category: str, method: StoredMethod) -> Method | None:
-    """A method with the weights that come with the package; None if there are none for the category."""
-    name: str = method
-    try:
-        return load_estimator(category, method=name)
-    except DatasetError:
-        return None
-
-
 def rows_of(options: ComparisonOptions, category: str) -> list[str]:
     """Names of the rows of a category: each method as it is trained here, then as it comes with the package."""
     rows: list[str] = []
     for method in options.of_methods:
-        has_weights = options.benchmark == "artimage" and shipped(category, method) is not None
+        has_weights = options.benchmark == "artimage" and folder_of(category, method).is_relative_to(WEIGHTS)
         if options.minutes is not None or method != "full" or not has_weights:
             rows.append(method)
         if has_weights:
@@ -289,10 +280,9 @@ def row_estimator(
         That it has learnt for; None of weights that come with the package.
     """
     method: StoredMethod = next(own for own in METHODS[options.benchmark] if own == name.removesuffix(SHIPPED))
+    known: str = method
     if name.endswith(SHIPPED):
-        found = shipped(category, method)
-        assert found is not None
-        return found, None
+        return load_estimator(category, method=known), None
     folder, learning = out / "train" / f"{category}-{method}", training_options(options, category, method, out)
     if options.minutes is not None:  # processor time is counted in this process alone
         workers, learning = 0, filling(learning, options.minutes, folder.with_name(f"{folder.name}-lengths.json"))
@@ -300,7 +290,7 @@ def row_estimator(
     if not about_tested(folder):
         say(f"training {method} on {category} in {folder}: it may be stopped, and goes on by the same command")
         training.run()
-    return load_estimator(folder / "best", method=name), trained_minutes(training)
+    return load_estimator(folder / "best", method=known), trained_minutes(training)
 
 
 def tested_views(options: ComparisonOptions, category: str) -> tuple[list[ArticulatedObject], list[Sample]]:
@@ -336,7 +326,9 @@ def notes(options: ComparisonOptions) -> list[str]:
         "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",
     ]
     if options.benchmark == "artimage":
-        lines.append("Shipped rows have the weights that come with the package: they have learnt for hours.")
+        lines.append(
+            "Shipped rows have the weights that come with the package. They have learnt for as long as their recipes say."
+        )
     else:
         lines.append(
             "One arm, learnt and tested in other states. Test clouds are of RGB-D images of an Intel D435: the arm "
