@@ -327,7 +327,7 @@ def notes(options: ComparisonOptions) -> list[str]:
     ]
     if options.benchmark == "artimage":
         lines.append(
-            "Shipped rows have the weights that come with the package. They have learnt for as long as their recipes say."
+            "Shipped rows have the weights that come with the package, learnt for as long as their recipes say."
         )
     else:
         lines.append(
