@@ -18,6 +18,7 @@ from functools import partial
 from artsim.common.extras import import_failure, install_command
 from artsim.errors import ArtsimError, ConfigError, RenderError
 from artsim.renderers import RENDERERS
+from artsim.renderers.ray_scenes import RAY_LIBRARY
 
 SIZE = 128
 """Width and height of the pictures that rates are measured with, pixels."""
@@ -30,7 +31,7 @@ pybullet.connect(pybullet.DIRECT)
 pybullet.loadPlugin(importlib.util.find_spec("eglRenderer").origin, "_eglRendererPlugin")
 """  # the only way to learn the device is from what PyBullet prints
 _FIXES = {
-    "raycast": "pip install --force-reinstall embreex",
+    "raycast": f"pip install --force-reinstall {RAY_LIBRARY}",
     "pybullet": install_command("pybullet"),
     "pybullet-egl": f"{install_command('pybullet')}, then scripts/install-system.sh as root",
     "sapien": f"{install_command('sapien')}, then scripts/install-vulkan.sh as root",

@@ -225,7 +225,7 @@ def embree(code: str) -> Iterator[None]:
     assert held.value, f"Embree has no code {code}"
     raycast._surfaces.clear()
     try:
-        with patch.object(raycast, "EmbreeScene", partial(EmbreeScene, device)):
+        with patch("embreex.rtcore_scene.EmbreeScene", partial(EmbreeScene, device)):
             yield
     finally:
         raycast._surfaces.clear()

@@ -1,3 +1,5 @@
 """Packages that the bytes of a dataset follow from, besides its plan."""
 
-VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", "embreex")
+from artsim.renderers.ray_scenes import RAY_LIBRARY
+
+VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", RAY_LIBRARY)

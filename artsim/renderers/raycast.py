@@ -1,4 +1,4 @@
-"""The embedded renderer: Embree rays against one static acceleration structure per part.
+"""The embedded renderer: rays against one static acceleration structure per part.
 
 Joints move, geometry does not: rays are carried into each part's rest frame instead of moving triangles, so
 nothing is rebuilt when the state changes. Only the pixels of a part's projected box are cast. Ray directions
@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.products import apply, matmul
@@ -24,6 +22,7 @@ from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers.compiled import kernels
 from artsim.renderers.outlines import bounding_corners, outline_spans
+from artsim.renderers.ray_scenes import RayScene, ray_scene
 
 _MISS = np.float32(1e30)
 
@@ -34,13 +33,13 @@ class RaySurface:
 
     Attributes
     ----------
-    scene : EmbreeScene
+    scene : RayScene
         Acceleration structure, native units.
     corners : (C, 3) float
         Corners of a convex body around the part, native units.
     """
 
-    scene: EmbreeScene
+    scene: RayScene
     corners: Array
 
 
@@ -51,9 +50,7 @@ def ray_surface(part: Part) -> RaySurface:
     """The surface of a part that has one."""
     made = _surfaces.get(part)
     if made is None:
-        # Embree's `robust` mode costs a third more and changed no pixel in ten million on real objects.
-        scene = EmbreeScene()
-        TriangleMesh(scene, part.vertices.astype(np.float32), part.faces)
+        scene = ray_scene(part.vertices, part.faces)
         made = _surfaces[part] = RaySurface(scene, bounding_corners(part.vertices[np.unique(part.faces)]))
     return made
 

@@ -1,0 +1,87 @@
+"""Rays where Embree has no wheel: Warp's find what Embree's find, and the whole generator works by them."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from packaging.requirements import Requirement
+
+from artsim import Dataset, make
+from artsim.renderers.ray_scenes import WarpScene, embree_scene
+from tests.conftest import absent, installed
+from tests.without import environment
+
+ROOT = Path(__file__).parents[3]
+PLATFORMS = {
+    "Linux on ARM": ("Linux", "aarch64", [f"manylinux_2_{n}_aarch64" for n in (17, 28, 34)]),
+    "macOS on ARM": ("Darwin", "arm64", [f"macosx_{n}_0_arm64" for n in (11, 13, 14)]),
+    "Windows": ("Windows", "AMD64", ["win_amd64"]),
+}  # fmt: skip
+
+
+def rays_at(vertices: NDArray[np.float64], count: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Rays from all round at and beside a mesh, their directions of any length."""
+    rng = np.random.default_rng(0)
+    middle, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
+    outward = rng.normal(size=(count, 3))
+    origins = middle + 2.0 * size * outward / np.linalg.norm(outward, axis=1, keepdims=True)
+    aims = middle + size * rng.uniform(-0.7, 0.7, (count, 3))
+    directions = (aims - origins) * rng.uniform(0.2, 2.0, (count, 1))
+    return origins.astype(np.float32), directions.astype(np.float32)
+
+
+@pytest.mark.parametrize("category", ["laptop", "scissors", "faucet"])
+def test_both_libraries_meet_the_same_faces_equally_far_away(category: str) -> None:
+    installed("warp")
+    for part in make(category, seed=2).parts:
+        if not len(part.faces):
+            continue
+        origins, directions = rays_at(part.vertices, 4000)
+        one, other = (scene(part.vertices, part.faces) for scene in (embree_scene, WarpScene))
+        near, found = (scene.run(origins, directions, query="DISTANCE") for scene in (one, other))
+        met, hit = near < 1e30, found < 1e30
+        assert met.mean() > 0.02  # thin parts are hard to meet
+        assert (met == hit).mean() > 0.999
+        assert np.quantile(np.abs(near - found)[met & hit], 0.999) < 1e-5
+        near_face, found_face = (scene.run(origins, directions, query="INTERSECT") for scene in (one, other))
+        assert ((near_face == -1) == ~met).all()
+        assert ((found_face == -1) == ~hit).all()
+        assert (near_face == found_face).mean() > 0.99  # at an edge, and where faces coincide, either is right
+
+
+def test_without_embreex_the_generator_makes_the_same_clouds_by_several_workers(tmp_path: Path) -> None:
+    installed("warp")
+    (tmp_path / "hide").mkdir()
+    clouds = {}
+    for name, env in (("embree", None), ("warp", environment(tmp_path / "hide", {"embreex"}))):
+        out = tmp_path / name
+        command = [sys.executable, "-m", "artsim", "generate", "--categories", "laptop", "--num-samples", "4",
+                   "--workers", "2", "--out", str(out)]  # fmt: skip
+        done = subprocess.run(command, env=env, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+        assert ("warp-lang" in json.loads((out / "dataset.json").read_text())["versions"]) == (name == "warp")
+        clouds[name] = np.array([sample.points.mean(axis=0) for sample in Dataset(out)])
+    # Points are drawn from the pixels that are met: one more or less, and others are drawn.
+    assert np.abs(clouds["embree"] - clouds["warp"]).max() < 0.02
+
+
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_the_core_has_wheels_for_other_systems(name: str, tmp_path: Path) -> None:
+    system, machine, tags = PLATFORMS[name]
+    there = {"platform_system": system, "platform_machine": machine, "python_version": "3.11", "extra": ""}
+    listed = (ROOT / "pyproject.toml").read_text().partition("\ndependencies = [")[2].partition("\n]")[0]
+    needs = [Requirement(line) for line in re.findall(r'^    "([^"]+)"', listed, re.MULTILINE)]
+    assert len(needs) > 8
+    wanted = [f"{need.name}{need.specifier}" for need in needs if not need.marker or need.marker.evaluate(there)]
+    command = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-deps", "--only-binary=:all:",
+               "--python-version=3.11", f"--target={tmp_path}", *(f"--platform={tag}" for tag in tags)]  # fmt: skip
+    known = subprocess.run([*command, "numpy"], capture_output=True, text=True, timeout=300, check=False)
+    if known.returncode:
+        absent(f"pip finds not even numpy for {name}: that the rest has wheels is not tested ({known.stderr[-300:]})")
+    done = subprocess.run([*command, *wanted], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
