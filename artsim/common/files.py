@@ -69,6 +69,21 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
+def append(path: Path, data: bytes) -> None:
+    """Add to the end of a file, which is made if missing.
+
+    Raises
+    ------
+    ConfigError
+        When it cannot be written.
+    """
+    try:
+        with path.open("ab") as file:
+            file.write(data)
+    except OSError as error:
+        raise write_error(error, path) from error
+
+
 def write_error(error: OSError, path: Path) -> ArtsimError:
     """The readable form of an operating-system error on writing ``path``."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artsim.common.files import write_error
+from artsim.common.files import append, file_sha256, parse_json, read_bounded, write_error
+from artsim.common.json_records import from_json_values
 from artsim.common.progress import track
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
-from artsim.datasets.state import STAGED
+from artsim.datasets.state import PREPARED_JOURNAL, STAGED
 from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source
 from artsim.datasets.worker_pool import Team, WorkerLost
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
 
+_MAX_JOURNAL = 1_000_000_000
 _LISTED = 6
 """Reasons that an error gives; the others are counted."""
 
@@ -33,6 +38,8 @@ def new_plan(
     progress: bool,
 ) -> dict[str, Any]:
     """Load every source, keep it compiled in the folder, and describe the dataset that they make.
+
+    What is loaded stays in the folder when the run is stopped: the next one loads what is left.
 
     Parameters
     ----------
@@ -62,18 +69,48 @@ def new_plan(
         staging.mkdir(exist_ok=True)
     except OSError as error:
         raise write_error(error, staging) from error
-    answers: dict[int, CompiledSource | RefusedSource] = {}
+    recipes = {f"{STAGED}{i}.npz": preparation(asked, [source]) for i, source in enumerate(sources)}
+    names = list(recipes)
+    known = _prepared(folder, recipes)
+    answers: dict[int, CompiledSource | RefusedSource] = {i: known[n] for i, n in enumerate(names) if n in known}
     tasks = (
-        (i, (source, f"{STAGED}{i}.npz", asked.seed, asked.sample, asked.strict)) for i, source in enumerate(sources)
-    )
-    with track("objects", total=len(sources), unit="object", shown=progress) as bar:
+        (i, (source, names[i], asked.seed, asked.sample, asked.strict))
+        for i, source in enumerate(sources) if i not in answers
+    )  # fmt: skip
+    with track("objects", total=len(sources), initial=len(answers), unit="object", shown=progress) as bar:
         for i, answer in team.run(compile_source, tasks, load_limit):
             answers[i] = RefusedSource(f"{sources[i].name}: {answer.why}") if isinstance(answer, WorkerLost) else answer
+            if isinstance(answer, CompiledSource):
+                line = json.dumps({"recipe": recipes[names[i]], "answer": asdict(answer)})
+                append(folder / PREPARED_JOURNAL, f"\n{line}".encode())  # behind what a killed run left of a line
             bar.update()
     document, files = plan_document(asked, sources, [answers[i] for i in range(len(sources))], skip_broken)
     for staged, file in files:
         (staging / staged).replace(folder / file)
     return document
+
+
+def preparation(asked: Plan, sources: Sequence[Source]) -> str:
+    """Digest of all that the loading of some sources follows from."""
+    named = [(source.name, source.sha256) for source in sources]
+    made_of = [asked.artsim_version, asked.seed, asked.strict, asdict(asked.sample), named]
+    return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+
+
+def _prepared(folder: Path, recipes: Mapping[str, str]) -> dict[str, CompiledSource]:
+    """Objects that a stopped run has loaded, by their files; damaged lines and files count for nothing."""
+    found: dict[str, CompiledSource] = {}
+    journal = folder / PREPARED_JOURNAL
+    if not journal.is_file():
+        return found
+    for line in read_bounded(journal, _MAX_JOURNAL, "journal").splitlines():
+        with contextlib.suppress(ValueError, KeyError, TypeError, OSError):
+            entry = parse_json(line)
+            answer = from_json_values(CompiledSource, entry["answer"])
+            file = folder / "objects" / answer.staged
+            if recipes.get(answer.staged) == entry["recipe"] and file_sha256(file) == answer.file_sha256:
+                found[answer.staged] = answer
+    return found
 
 
 def plan_document(

@@ -12,7 +12,6 @@ storage can do none of it. Until the dataset is merged, its folder ``parts`` hol
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 import time
@@ -34,7 +33,7 @@ from artsim.datasets.description import (
     read_description,
     read_plan_document,
 )
-from artsim.datasets.new_plan import plan_document, unusable
+from artsim.datasets.new_plan import plan_document, preparation, unusable
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.same_plan import check_same_plan
 from artsim.datasets.worker import (
@@ -236,10 +235,7 @@ class PartRun:
         self.storage.write_new(f"{PREPARED}/{number:06d}.json", json.dumps(content).encode())
 
     def _recipe(self, number: int) -> str:
-        """Digest of all that a block's record follows from."""
-        asked, named = self.asked, [(self.sources[i].name, self.sources[i].sha256) for i in self._blocks[number]]
-        made_of = [asked.artsim_version, asked.seed, asked.strict, asdict(asked.sample), named]
-        return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+        return preparation(self.asked, [self.sources[i] for i in self._blocks[number]])
 
     def _answers(self, number: int) -> list[_Answer]:
         """What became of the sources of a block.

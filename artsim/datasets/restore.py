@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from artsim.common.files import write_atomic, write_error
+from artsim.common.files import append, write_atomic, write_error
 from artsim.common.progress import track
 from artsim.datasets.description import (
     DESCRIPTION,
@@ -203,7 +203,7 @@ def _make_shards(
             if isinstance(answer, ShardRecord):
                 made[shard.name] = answer
                 if not begun.complete:
-                    _append(folder / JOURNAL, journal_line(answer))
+                    append(folder / JOURNAL, journal_line(answer))
             elif answer is not None:
                 what = f"cannot be restored: made again, it has another checksum ({_OTHER_MAKER})"
                 restored.failed.append(Problem(shard.name, what, "generate the dataset again, into another folder"))
@@ -215,14 +215,6 @@ def _make_shards(
 def journal_line(record: ShardRecord) -> bytes:
     """What the journal says of a finished shard."""
     return json.dumps(asdict(record)).encode() + b"\n"
-
-
-def _append(path: Path, data: bytes) -> None:
-    try:
-        with path.open("ab") as file:
-            file.write(data)
-    except OSError as error:
-        raise write_error(error, path) from error
 
 
 def _complete(folder: Path, begun: StartedDataset, records: Mapping[str, ShardRecord]) -> bool:

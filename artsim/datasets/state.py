@@ -11,11 +11,13 @@ from pathlib import Path
 
 from artsim.common.files import file_sha256
 from artsim.common.progress import track
-from artsim.datasets.description import JOURNAL, StartedDataset
+from artsim.datasets.description import DESCRIPTION, JOURNAL, PLAN, StartedDataset
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 
 STAGED = "_staged_"
+PREPARED_JOURNAL = "objects/.prepared.jsonl"
+"""A line for each object that is loaded, until there is a plan."""
 """What the names of objects begin with that are not yet part of a plan."""
 
 _MOVE = "move it out of the folder, or delete it"
@@ -141,8 +143,10 @@ def strangers(folder: Path, begun: StartedDataset) -> list[Problem]:
 
 
 def leftovers(folder: Path) -> list[Path]:
-    """Files that killed runs did not finish."""
-    found = [*folder.glob(".*.part"), *folder.glob("objects/.*.part"), *folder.glob(f"objects/{STAGED}*.npz")]
+    """Files that killed runs did not finish; what they have prepared is none as long as there is no plan."""
+    found = [*folder.glob(".*.part"), *folder.glob("objects/.*.part")]
+    if (folder / PLAN).exists() or (folder / DESCRIPTION).exists():
+        found += [*folder.glob(f"objects/{STAGED}*.npz"), *folder.glob(PREPARED_JOURNAL)]
     return [path for path in found if path.is_symlink() or not path.is_dir()]
 
 

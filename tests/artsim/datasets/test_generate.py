@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import signal
 import subprocess
@@ -367,3 +368,23 @@ def test_folders_are_searched_for_objects(sources: list[Source], tmp_path: Path)
     (tmp_path / "linked" / "circle").symlink_to(tmp_path / "linked")
     assert [s.name for s in find_sources([tmp_path / "linked"])] == ["linked/one/mobility.urdf"]
     assert find_sources([sources[0].path])[0].name == "laptop_0/mobility.urdf"
+
+
+def test_objects_that_a_killed_run_has_prepared_are_not_loaded_again(sources: list[Source], tmp_path: Path) -> None:
+    """A run of real files is killed after some objects; the next one loads the others, and makes the same bytes."""
+    straight, out = tmp_path / "straight", tmp_path / "out"
+    make(sources, straight)
+    (out / "objects" / "_staged_2.npz").mkdir(parents=True)  # the last object cannot be written
+    with pytest.raises(ConfigError, match=r"_staged_2\.npz: cannot write"):
+        make(sources, out, workers=1)
+    (out / "objects" / "_staged_2.npz").rmdir()
+    journal = out / "objects" / ".prepared.jsonl"
+    lines = journal.read_bytes().split(b"\n")[1:]
+    assert [json.loads(line)["answer"]["staged"] for line in lines] == ["_staged_0.npz", "_staged_1.npz"]
+    journal.write_bytes(b"\n" + lines[0] + b"\n" + lines[1][:50])  # killed within the second line
+    times = {path.name: path.stat().st_mtime_ns for path in (out / "objects").glob("*.npz")}
+    for planned in make(sources, out).objects:
+        compiled = (out / planned.file).stat().st_mtime_ns
+        assert (compiled == times["_staged_0.npz"]) == (planned.source == sources[0].name)
+    assert not journal.exists()
+    assert digests(out) == digests(straight)
