@@ -36,7 +36,7 @@ bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
 	$(PY) -m benchmarks.generation
 	$(PY) -m benchmarks.growth
 	$(PY) -m benchmarks.peers
-	$(PY) -m benchmarks.resume
+	$(PY) -m benchmarks.kills
 	$(PY) -m benchmarks.objects
 	$(PY) -m benchmarks.simulators
 	$(PY) -m benchmarks.efforts

@@ -1,14 +1,13 @@
 """What PPO brings the agent beside cloning: ``python -m benchmarks.agents``.
 
-An agent learns by cloning on states that are drawn at random; by cloning on these and on its own states in turn; by
-these in turn with PPO beside cloning on its own states; and by cloning first and PPO beside it in the last rollouts.
-All take as many rollouts on the same problems, and begin with the same random weights, several times with others. A
-problem is a fresh object with its true labels, one of the four references most like it, and a start that is off. Each
-agent is then tested alone, without refinement, on unseen objects: on clean clouds, with the noise of a Kinect v1, with
-40 % of the points hidden, and from starts that are twice as far off. Every run is written down when it is done: the
-same command goes on. Prints mean and standard error over the runs of the parts' mean rotation error, in degrees, and
-how much less it is with PPO in turn than by either way of cloning, over pairs of runs; the last line is one JSON
-object.
+An agent learns by cloning on states that are drawn at random; by cloning on these and on its own states in turn; and by
+the same with PPO beside cloning on its own states. All take as many rollouts on the same problems, and begin with the
+same random weights, several times with others. A problem is a fresh object with its true labels, one of the four
+references most like it, and a start that is off. Each agent is then tested alone, without refinement, on unseen
+objects: on clean clouds, with the noise of a Kinect v1, with 40 % of the points hidden, and from starts that are twice
+as far off. Every run is written down when it is done: the same command goes on. Prints mean and standard error over the
+runs of the parts' mean rotation error, in degrees, and how much less it is with PPO than by either way of cloning, over
+pairs of runs; the last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from artsim.observing.interference import interfere
 from artsim.observing.sample import Sample
 
 _MAX_RECORD = 10_000_000
-_WAYS = ("drawn states", "own states too", "PPO in turn", "PPO last")
+_WAYS = ("drawn states", "own states too", "PPO on these")
 
 
 @dataclass(frozen=True)
@@ -62,8 +61,6 @@ class Options:
     """Of the policy: less than trainings have, so that a run takes a minute."""
     seen_points: int = 128
     """Points of the cloud that the agent sees: half of what it sees in trainings."""
-    cloning_share: float = 0.7
-    """Of the rollouts with PPO last, those by cloning alone."""
     tests: int = 128
     """Problems of each test."""
     out: Path = Path("out/agents.jsonl")
@@ -122,10 +119,7 @@ def learnt(problems: Problem, way: str, seed: int, options: Options, name: str) 
     """An agent after all its rollouts, and the mean reward of a step in those of its own actions."""
     torch.manual_seed(seed)
     policy = Policy(options.width).train()
-    asked = TrainOptions(
-        method="artperl", agent_rollouts=options.rollouts,
-        cloning_share=options.cloning_share if way == "PPO last" else 1.0,
-    )  # fmt: skip
+    asked = TrainOptions(method="artperl", agent_rollouts=options.rollouts, cloning_share=1.0)
     optimizer = torch.optim.Adam(policy.parameters())
 
     def episodes(n: int) -> tuple[Fitting, Theta]:
@@ -135,10 +129,8 @@ def learnt(problems: Problem, way: str, seed: int, options: Options, name: str) 
         return Fitting(problem.shapes, problem.observed, problem.start, options.fitting), problem.goal
 
     def phase(n: int) -> Phase:
-        if way == "drawn states":
-            return CLONING
-        own = asked.phase(n)
-        return JOINT if way == "PPO in turn" and own is OWN_STATES else own
+        own = JOINT if way == "PPO on these" else OWN_STATES
+        return own if n % 2 and way != "drawn states" else CLONING
 
     rounds = algorithm_1(policy, optimizer, episodes, phase, PPOOptions(), seed, 0, options.rollouts)
     figures = list(track(name, rounds, total=options.rollouts, leave=False))
@@ -195,7 +187,7 @@ def _print(
     print(f"{category:<12} {'start':<18}" + "".join(f"{name:>8} {start[name]:5.1f}         " for name in TESTS))
     every = np.array([[[rows[category, way, seed][name] for seed in range(options.seeds)] for name in TESTS]
                       for way in _WAYS])  # fmt: skip
-    drawn, same, ppo, _ = every
+    drawn, same, ppo = every
     for name, own in zip((*_WAYS, "drawn - PPO", "own - PPO"), (*every, drawn - ppo, same - ppo), strict=True):
         error = own.std(1, ddof=1) / options.seeds**0.5
         cells = [

@@ -34,6 +34,9 @@ class PPOOptions:
     lambda_scale: float = 0.1
     """Weights of the expert's rotation, translation and scale actions (equation 4). Joint states count as what they
     are: turns as rotation, slides and anchors as translation."""
+    lambda_policy: float = 0.1
+    """Weight of the clipped surrogate. Its gradient is a sum over the axes of an action, equation 4 a mean of them: as
+    loud as that, its noise drowns the expert."""
     lambda_value: float = 0.3
     lambda_entropy: float = 0.001
     gamma: float = 0.99
@@ -282,7 +285,7 @@ def update(
                 losses = {name: share * own_loss for name, own_loss in losses.items()}
                 loss = loss + options.lambda_value * losses["value"]
             if phase.reinforcement:
-                loss = loss + losses["policy"] - options.lambda_entropy * losses["entropy"]
+                loss = loss + options.lambda_policy * losses["policy"] - options.lambda_entropy * losses["entropy"]
             optimizer.zero_grad()
             loss.backward()
             ranks.add_gradients(policy)
