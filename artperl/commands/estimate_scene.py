@@ -8,20 +8,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from artperl.detection import SHIPPED
 from artsim.common.files import write_atomic
 from artsim.errors import ConfigError
 
-_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
-
 if TYPE_CHECKING:
     from artperl.commands.estimate import Estimate
     from artperl.inputs.detections import Detections
     from artperl.scene.estimator import SceneEstimate
+
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
 
 
 def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:
@@ -54,9 +52,11 @@ def is_image_pair(files: Sequence[Path]) -> bool:
     """Whether these are two files, the first a picture in colour, which no depth image is."""
     if len(files) != 2 or files[0].suffix.lower() not in _PICTURES or not files[0].is_file():
         return False
+    from artperl.inputs.images import IN_COLOUR
+
     try:
         with Image.open(files[0]) as image:
-            return image.mode in ("RGB", "RGBA")
+            return image.mode in IN_COLOUR
     except (OSError, ValueError, Image.DecompressionBombError):
         return False  # what is wrong with it is told where it is read
 
@@ -71,7 +71,7 @@ def estimate_scene(options: Estimate) -> None:
     """
     from artperl.commands.estimate import STDOUT
     from artperl.inputs.detections import Detections
-    from artperl.inputs.images import read_picture
+    from artperl.inputs.images import read_image
     from artperl.inputs.reading import read_depth_image
     from artperl.scene.drawing import draw_scene
     from artperl.scene.estimator import SceneEstimator
@@ -79,7 +79,7 @@ def estimate_scene(options: Estimate) -> None:
     _check(options)
     image, depth_file = options.clouds
     depth = read_depth_image(depth_file, options.input_options())
-    rgb = _colour(read_picture(image, "image").values, image)
+    rgb = read_image(image)
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
     estimator = SceneEstimator(
         named_estimators(options.estimators), options.detector or SHIPPED, apart=options.apart, **told
@@ -124,19 +124,6 @@ def _check(options: Estimate) -> None:
     if given or options.method != "full" or options.camera != "opencv":
         names = ", ".join([*given, *(["method"] if options.method != "full" else [])]) or "camera"
         raise ConfigError("these do not go with several objects", names, "leave them out")
-
-
-def _colour(values: NDArray[Any], path: Path) -> NDArray[np.uint8]:
-    """(H, W, 3) of a picture in colour or grey."""
-    if values.dtype != np.uint8 or values.ndim not in (2, 3):
-        raise ConfigError(
-            f"a picture of {values.dtype} is no image in colour", path,
-            "name the image in colour first, then the depth image",
-        )  # fmt: skip
-    if values.ndim == 3 and values.shape[2] >= 3:
-        return np.ascontiguousarray(values[..., :3])
-    grey = values if values.ndim == 2 else values[..., 0]
-    return np.repeat(grey[..., None], 3, axis=2)
 
 
 def _read_detections(options: Estimate, image: Path, size: tuple[int, int]) -> Detections:

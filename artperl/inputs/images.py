@@ -19,6 +19,10 @@ FORMATS = ("PNG", "TIFF", "PPM", "JPEG", "BMP", "WEBP", "GIF")
 """Everything else that Pillow opens is neither a depth image nor a mask."""
 
 
+IN_COLOUR = ("RGB", "RGBA", "P", "PA")
+"""Modes of pictures, as Pillow names them, that are no depth images."""
+
+
 @dataclass(frozen=True)
 class Picture:
     """A decoded picture.
@@ -53,6 +57,26 @@ def read_picture(path: Path, what: str) -> Picture:
         When it is missing, too large, damaged, or of another format.
     """
     return guard(lambda: _read(path, what), path, what, f"save the {what} again, as PNG or .npy")
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """(H, W, 3) of an image in colour or grey, whatever alpha says.
+
+    Raises
+    ------
+    ConfigError
+        As :func:`read_picture`; or when it is neither.
+    """
+    picture = read_picture(path, "image")
+    values = picture.values
+    if picture.palette is not None:
+        return picture.palette[np.minimum(values, 255)]
+    if picture.mode not in ("L", "LA", *IN_COLOUR):
+        raise ConfigError(
+            f"a picture of mode {picture.mode} is no image in colour", path,
+            "name the image in colour first, as RGB, then the depth image",
+        )  # fmt: skip
+    return np.ascontiguousarray(values[..., :3] if "RGB" in picture.mode else np.atleast_3d(values)[..., [0, 0, 0]])
 
 
 def _read(path: Path, what: str) -> Picture:

@@ -11,8 +11,9 @@ from PIL import Image
 
 from artperl.commands.detections import MakeDetections
 from artperl.commands.estimate import Estimate
-from artperl.commands.estimate_scene import named_estimators
+from artperl.commands.estimate_scene import is_image_pair, named_estimators
 from artperl.commands.evaluate import Evaluate
+from artperl.inputs.images import read_image
 from artsim.errors import ConfigError
 from artsim.scenes import SceneCameraOptions, SceneOptions, SceneRun, generate_scenes
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
@@ -55,6 +56,21 @@ def test_all_objects_are_written_with_a_picture(
             assert np.shape(obj["T_camera_part"])[1:] == (4, 4)
     assert Image.open(tmp_path / "out.png").size == (320, 180)
     assert "laptop" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "PA", "L", "LA", "I;16", "CMYK"])
+def test_an_image_in_colour_is_one_in_any_mode(mode: str, tmp_path: Path) -> None:
+    grey = np.repeat(np.random.default_rng(0).integers(0, 6, (30, 40, 1), dtype=np.uint8) * 51, 3, axis=2)
+    file = tmp_path / ("image.tif" if mode in ("PA", "CMYK") else "image.png")
+    (Image.fromarray(grey[..., 0].astype(np.uint16)) if mode == "I;16" else Image.fromarray(grey).convert(mode)).save(
+        file
+    )
+    assert is_image_pair([file, tmp_path / "depth.npy"]) == (mode in ("RGB", "RGBA", "P", "PA"))
+    if mode in ("I;16", "CMYK"):
+        with pytest.raises(ConfigError, match="no image in colour"):
+            read_image(file)
+    else:
+        assert np.array_equal(read_image(file), grey)
 
 
 @pytest.mark.slow
