@@ -25,10 +25,14 @@ from artsim.loading.urdf_document import Geometry, MeshFile
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import Repair
 
-__all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merge_shapes", "triangles"]
+__all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_range", "check_shapes", "merge_shapes", "triangles"]
 
 _TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
 """Of each primitive: round ones have 64 sides, a sphere is an icosahedron whose faces are divided four times."""
+
+
+_LARGEST = 1e6
+"""Metres, or units of a file in millimetres: squares and products of much larger coordinates overflow."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,19 @@ def check_shapes(data: bytes, where: Path, limits: LoadLimits) -> None:
             f"{count} shapes are over the limit of {limits.max_shapes}",
             where,
             "raise it with artsim.load(..., limits=LoadLimits(max_shapes=...)) if you trust the file",
+        )
+
+
+def check_range(vertices: Array, where: str) -> None:
+    """Refuse coordinates that nothing can be computed with.
+
+    Raises
+    ------
+    AssetError
+    """
+    if not (np.abs(vertices) <= _LARGEST).all():
+        raise AssetError(
+            f"a coordinate is not finite, or over {_LARGEST:g}", where, "write sizes, origins and meshes in metres"
         )
 
 

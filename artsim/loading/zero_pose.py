@@ -16,6 +16,7 @@ import numpy as np
 from artsim.common.products import matmul
 from artsim.errors import AssetError
 from artsim.loading.joint_xml import settle_limits
+from artsim.loading.scene_objects import chosen
 from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
@@ -78,7 +79,7 @@ class WorldLink:
     inertia: Inertia | None = None
 
 
-def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -> UrdfRobot:
+def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> UrdfRobot:
     """Links and joints of an object.
 
     Parameters
@@ -90,12 +91,16 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -
         For messages.
     repairs : list of Repair
         Added to.
+    body : str, optional
+        Which object of a scene: see :func:`artsim.loading.scene_objects.chosen`.
 
     Raises
     ------
     AssetError
-        When two links or two joints have the same name, or a number is not finite.
+        When it holds several objects of which none is chosen, two links or two joints have the same name, or a number
+        is not finite.
     """
+    links = chosen(links, file, repairs, body)
     root = _root(links)
     if root > 0:
         links = [replace(links[root], parent=-1, joint=None), *_without(links, root)]
