@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from artsim.loading.zero_pose import unused_name
 from artsim.model.kinematics import Array, invert_transform
@@ -79,14 +80,17 @@ def mujoco_poses(file: Path) -> Poses:
         raise NoOracleError(f"MuJoCo does not compile it: {' '.join(str(error).split())}") from error
     data = mujoco.MjData(model)
     bodies, joints = _names_of_mujoco(model)
-    slides_and_hinges = {
-        name: int(model.jnt_qposadr[j]) for j, name in enumerate(joints) if int(model.jnt_type[j]) in (2, 3)
-    }
+    kinds = mujoco.mjtJoint
+    address = {name: (int(model.jnt_type[j]), int(model.jnt_qposadr[j])) for j, name in enumerate(joints)}
 
     def poses(values: Mapping[str, float]) -> dict[str, Array]:
         data.qpos[:] = model.qpos0
-        for name, address in slides_and_hinges.items():
-            data.qpos[address] = values.get(name, 0.0)
+        for name, (kind, at) in address.items():
+            if kind in (int(kinds.mjJNT_SLIDE), int(kinds.mjJNT_HINGE)):
+                data.qpos[at] = values.get(name, 0.0)
+            elif kind == int(kinds.mjJNT_BALL):
+                turn = Rotation.from_euler("XYZ", [values.get(f"{name}_{letter}", 0.0) for letter in "xyz"])
+                data.qpos[at : at + 4] = np.roll(turn.as_quat(), 1)  # the real part first
         mujoco.mj_forward(model, data)
         found = {}
         for b, name in enumerate(bodies):

@@ -12,7 +12,7 @@ equalities                                mimic, or held; see ``mjcf_equalities`
 geoms that nothing collides with          shown; where they have no group of their own, everything in groups 0 to 2 is
 geoms of alpha 0                          not shown
 geoms that collide                        collision geometry; meshes as their convex hull, as MuJoCo takes them
-ball joints                               an error
+ball joints                               three hinges about x, y and z
 ========================================  =============================================================================
 """
 
@@ -182,12 +182,12 @@ class _ModelReader:
         for b in range(1, model.nbody):
             parent = index[model.body_parentid[b]]
             start = int(model.body_jntadr[b])
-            joints = range(start, start + int(model.body_jntnum[b]))
-            for j in joints[:-1]:
-                helper = unused_name(f"{self._bodies[b]}_{self._joints[j]}", self._used)
-                links.append(WorldLink(helper, parent, self._joint(j)))
+            joints = [joint for j in range(start, start + int(model.body_jntnum[b])) for joint in self._joints_of(j)]
+            *further, joint = joints or [self._fixed(b)]
+            for other in further:
+                helper = unused_name(f"{self._bodies[b]}_{other.name}", self._used)
+                links.append(WorldLink(helper, parent, other))
                 parent = len(links) - 1
-            joint = self._joint(joints[-1]) if joints else self._fixed(b)
             index.append(len(links))
             shapes, collision = shown.get(b, []), solid.get(b, [])
             links.append(WorldLink(self._bodies[b], parent, joint, shapes, collision, self._inertia(b)))
@@ -197,15 +197,29 @@ class _ModelReader:
         name = unused_name(f"{self._bodies[b]}_fixed", self._joint_names)
         return WorldJoint(name, "fixed", self._state.xpos[b].copy(), np.array([1.0, 0.0, 0.0]))
 
+    def _joints_of(self, j: int) -> list[WorldJoint]:
+        """A joint; a ball joint as three hinges about the axes of its body, x first."""
+        if self._model.jnt_type[j] != self._joint_types.mjJNT_BALL:
+            return [self._joint(j)]
+        model, name = self._model, self._joints[j]
+        largest = float(model.jnt_range[j, 1]) if model.jnt_limited[j] else np.inf
+        said = "a ball joint: read as three hinges about the x, y and z of its body"
+        if np.isfinite(largest):
+            said += f", each up to {np.degrees(largest):.4g} deg either way, which the whole turn may not exceed there"
+        self._repairs.append(Repair(f"joint {name!r}", said))
+        axes = self._state.xmat[model.jnt_bodyid[j]].reshape(3, 3).T
+        kind, dynamics = "continuous" if largest == np.inf else "revolute", self._dynamics(j)
+        return [
+            WorldJoint(unused_name(f"{name}_{letter}", self._joint_names), kind, self._state.xanchor[j].copy(),
+                       axis.copy(), -largest, largest, None, dynamics)
+            for letter, axis in zip("xyz", axes, strict=True)
+        ]  # fmt: skip
+
     def _joint(self, j: int) -> WorldJoint:
         model, name, kind = self._model, self._joints[j], self._model.jnt_type[j]
         anchor = self._state.xanchor[j].copy()
         if kind == self._joint_types.mjJNT_FREE:
             return WorldJoint(name, "floating", self._state.xpos[model.jnt_bodyid[j]].copy(), np.array([1.0, 0.0, 0.0]))
-        if kind == self._joint_types.mjJNT_BALL:
-            raise AssetError(
-                "a ball joint is not supported", f"{self._file}: joint {name!r}", "write three hinges in its place"
-            )
         slides = kind == self._joint_types.mjJNT_SLIDE
         lower, upper = -np.inf, np.inf
         if j in self._equalities.held:
@@ -213,13 +227,16 @@ class _ModelReader:
         elif model.jnt_limited[j]:
             lower, upper = model.jnt_range[j].tolist()
         kind = "prismatic" if slides else "revolute" if np.isfinite(lower) else "continuous"
-        dof, mimic = int(model.jnt_dofadr[j]), self._equalities.mimics.get(j)
-        dynamics = JointDynamics(
+        mimic = self._equalities.mimics.get(j)
+        return WorldJoint(name, kind, anchor, self._state.xaxis[j].copy(), lower, upper, mimic, self._dynamics(j))
+
+    def _dynamics(self, j: int) -> JointDynamics:
+        model, dof = self._model, int(self._model.jnt_dofadr[j])
+        return JointDynamics(
             effort=float(np.abs(model.jnt_actfrcrange[j]).max()) if model.jnt_actfrclimited[j] else None,
             damping=float(np.ravel(model.dof_damping[dof])[0]),
             friction=float(model.dof_frictionloss[dof]),
         )
-        return WorldJoint(name, kind, anchor, self._state.xaxis[j].copy(), lower, upper, mimic, dynamics)
 
     def _inertia(self, b: int) -> Inertia | None:
         mass = float(self._model.body_mass[b])

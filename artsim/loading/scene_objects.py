@@ -53,11 +53,13 @@ def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: 
     if len(objects) > 1:
         candidates = [name for name in objects if scene.is_articulated(name)] or [n for n in objects if n != _WORLD]
     if len(candidates) > 1:
+        first = shlex.quote(printable(candidates[0], 100))
         kind = "articulated objects" if scene.is_articulated(candidates[0]) else "objects"
         raise SceneError(
             f"it holds {len(candidates)} {kind}: {_list(candidates)}",
             file,
-            f"choose one: --body {shlex.quote(printable(candidates[0], 100))}, in Python body={candidates[0]!r}",
+            f"choose one: --body {first}, in Python body={candidates[0]!r}; for programs without this option: "
+            f"artsim export {shlex.quote(str(file))} --body {first} --out FOLDER",
             tuple(candidates),
         )
     (name,) = candidates

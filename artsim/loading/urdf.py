@@ -117,11 +117,11 @@ def load(
     repairs += reasons
     repairs += _far_slides(tree, parts)
     return ArticulatedObject(
-        object_id=object_id(file, side.object_id),
+        object_id=object_id(file, side.object_id) + ("" if body is None else f"_{body}"),
         category=category,
         parts=tuple(parts),
         native_tree=tree,
-        sha256=content_sha256([data, *contents, *side.contents, *reader.contents]),
+        sha256=content_sha256([data, *contents, *side.contents, *reader.contents, *([body.encode()] if body else [])]),
         T_base_rest=T_base_rest,
         repairs=tuple(repairs),
         source=str(file),
