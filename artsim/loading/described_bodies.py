@@ -64,11 +64,11 @@ def with_described_bodies(
             for shape in link.collision:
                 vertices, faces = reader.shape(shape.geometry)
                 vertices = transform_points(matmul(T_rest_link, shape.origin), vertices)
-                check_range(vertices, f"{file}: link {name!r}")
+                check_range(vertices, f"{file}: body {name!r}")
                 pieces.append((vertices, faces))
             if link.inertia is not None:
                 inertias.append(link.inertia.transformed(T_rest_link))
-                check_range(inertias[-1].center, f"{file}: link {name!r}")
+                check_range(inertias[-1].center, f"{file}: body {name!r}")
         joint = UNKNOWN_DYNAMICS if body.joint is None else body.joint.dynamics
         found.append(replace(part, body=_body(part, pieces, combined(inertias), joint)))
     return found

@@ -17,7 +17,7 @@ import numpy as np
 
 from artsim.common.products import apply
 from artsim.errors import AssetError
-from artsim.loading.meshes import LoadLimits, check_range
+from artsim.loading.meshes import LoadLimits, check_copies, check_range
 from artsim.loading.primitives import ellipsoid
 from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, InlineMesh, Shape, Sphere
 from artsim.model.convex_bodies import convex_hull, is_convex
@@ -79,6 +79,9 @@ class ShapeReader:
                 skipped[reason] = None
         for reason in sorted(skipped):
             self._repairs.append(Repair("geoms", reason))
+        if not found:
+            why = f": those {'; '.join(skipped)}" if skipped else ""
+            raise AssetError(f"it has no geom that is a surface{why}", self._file, "give a body a geom to be seen")
         shown = self._shown(found)
         shapes = {b: [Shape(self._geometry(g), self._pose(g)) for g in geoms] for b, geoms in shown.items()}
         collision = {
@@ -148,7 +151,9 @@ class ShapeReader:
         """Refuse what is too large before anything is made of it."""
         model = self._model
         is_mesh = model.geom_type == self._types.mjGEOM_MESH
-        faces = int(model.mesh_facenum[model.geom_dataid[is_mesh]].astype(np.int64).sum())
+        used = model.geom_dataid[is_mesh]
+        faces = int(model.mesh_facenum[used].astype(np.int64).sum())
+        check_copies(faces - int(model.mesh_facenum[np.unique(used)].sum()), self._file, self._limits)
         if faces > self._limits.max_faces:
             raise AssetError(
                 f"the object has more than {self._limits.max_faces} triangles",

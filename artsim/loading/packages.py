@@ -203,7 +203,7 @@ class AssetPaths:
         raise AssetError(
             f"{what} {filename!r} is not a file",
             self.folder,
-            "download it, and write its path from the URDF's folder on",
+            "download it, and write its path from the file's folder on",
         )
 
     def _candidates(self, package: str | None, name: str) -> Iterator[_Candidate]:

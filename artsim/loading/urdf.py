@@ -98,7 +98,9 @@ def load(
     _read_geometry(bodies, robot, reader, file, repairs)
     repairs += reader.paths.repairs
     helpers = (*side.helpers, *robot.helpers)
-    bodies = join_screws(without_empty_leaves(bodies, repairs), helpers, repairs, guessed=not robot.explicit)
+    bodies = join_screws(
+        without_empty_leaves(bodies, repairs, robot.noun), helpers, repairs, guessed=not robot.explicit
+    )
     bodies, exported = in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
     parts = [body.part({**robot.labels, **side.labels}) for body in bodies]
@@ -162,23 +164,23 @@ def _read_geometry(
         surfaces = []
         unusable = []
         for name in body.links:
-            found, problems = _surfaces(links[name], body.T_base_link[name], reader, file)
+            found, problems = _surfaces(links[name], body.T_base_link[name], reader, file, robot.noun)
             surfaces += found
-            unusable += [f"link {name!r}: {problem}" for problem in problems]
-            repairs += [Repair(f"link {name!r}", f"{problem}: left out") for problem in problems]
+            unusable += [f"{robot.noun} {name!r}: {problem}" for problem in problems]
+            repairs += [Repair(f"{robot.noun} {name!r}", f"{problem}: left out") for problem in problems]
         if unusable and not surfaces:
             raise AssetError(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
         body.vertices, body.faces = merge_shapes(surfaces)
-        check_range(body.vertices, f"{file}: link {body.links[0]!r}")
+        check_range(body.vertices, f"{file}: {robot.noun} {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
-        raise AssetError("no link has any geometry", file, "give a link a visible shape")
+        raise AssetError(f"no {robot.noun} has any geometry", file, f"give a {robot.noun} a visible shape")
 
 
 def _surfaces(
-    link: UrdfLink, T_base_link: Array, reader: MeshReader, file: Path
+    link: UrdfLink, T_base_link: Array, reader: MeshReader, file: Path, noun: str
 ) -> tuple[list[tuple[Array, NDArray[np.int32], Array]], list[str]]:
     """Vertices, triangles and transform into the base frame of each shape of a link, and why others are left out.
 
@@ -193,7 +195,7 @@ def _surfaces(
     for shape in link.shapes:
         try:
             vertices, faces = reader.shape(shape.geometry)
-            check_range(vertices, f"{file}: link {link.name!r}")
+            check_range(vertices, f"{file}: {noun} {link.name!r}")
             if _is_thin(vertices, faces):
                 raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line or in a point")
         except UnusableMeshError as problem:
@@ -205,7 +207,7 @@ def _surfaces(
     if problems and not surfaces:
         count = len(problems)
         raise AssetError(
-            f"none of the {count} meshes of link {link.name!r} can be used: {problems[0]}",
+            f"none of the {count} meshes of {noun} {link.name!r} can be used: {problems[0]}",
             file,
             fix or "restore the mesh files; an object with an invisible part would give wrong data",
         )

@@ -104,8 +104,8 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], b
     root = _root(links)
     if root > 0:
         links = [replace(links[root], parent=-1, joint=None), *_without(links, root)]
-    _check_names([link.name for link in links], "link", file)
-    _check_names([link.joint.name for link in links if link.joint is not None], "joint", file)
+    _check_names([link.name for link in links], "bodies", file)
+    _check_names([link.joint.name for link in links if link.joint is not None], "joints", file)
     origins = [np.zeros(3) if link.joint is None else link.joint.anchor for link in links]
     found, joints = [], []
     for k, link in enumerate(links):
@@ -120,7 +120,7 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], b
         found.append(UrdfLink(link.name, shapes, collision=collision, inertia=inertia))
         if link.joint is not None:
             joints.append(_joint(link, links[link.parent].name, origins[k] - origins[link.parent], file, repairs))
-    return UrdfRobot(tuple(found), tuple(joints), explicit=True)
+    return UrdfRobot(tuple(found), tuple(joints), explicit=True, noun="body")
 
 
 def _root(links: Sequence[WorldLink]) -> int:
@@ -154,11 +154,11 @@ def _joint(link: WorldLink, parent: str, offset: Array, file: Path, repairs: lis
     return UrdfJoint(joint.name, kind, parent, link.name, origin, joint.axis, lower, upper, joint.mimic, joint.dynamics)
 
 
-def _check_names(names: Sequence[str], what: str, file: Path) -> None:
+def _check_names(names: Sequence[str], plural: str, file: Path) -> None:
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise AssetError(f"two {what}s are called {name!r}", file, "give each its own name")
+            raise AssetError(f"two {plural} are called {name!r}", file, "give each its own name")
         seen.add(name)
 
 
@@ -167,7 +167,7 @@ def _check_finite(link: WorldLink, arrays: Sequence[Array], file: Path) -> None:
     more = [] if inertia is None else [np.array(inertia.mass), inertia.center, inertia.tensor]
     if not all(np.isfinite(array).all() for array in (*arrays, *more)):
         raise AssetError(
-            "a position, size or mass is not finite", f"{file}: link {link.name!r}", "write finite numbers"
+            "a position, size or mass is not finite", f"{file}: body {link.name!r}", "write finite numbers"
         )
 
 
