@@ -117,8 +117,8 @@ class EqualityReader:
         bodies = [self._body(int(ends[e]), int(model.eq_objtype[e])) for ends in (model.eq_obj1id, model.eq_obj2id)]
         first, second = (self._bodies[b] for b in bodies)
         lost = "a closed chain is no tree, so joints move as if it were open, and what it holds together may part"
-        if any(model.body_weldid[b] == 0 for b in bodies):
-            lost = "a body is held by the world through joints alone"
+        if any(model.body_mocapid[b] >= 0 for b in bodies):
+            lost = "a program moves one of them (mocap), and the object is free of it"
         self._say(f"<{kind}> of {first!r} and {second!r}", f"left out: {lost}")
 
     def _body(self, number: int, kind: int) -> int:

@@ -57,6 +57,12 @@ _COMPILER = (
 _OWN_SETTINGS = ("meshdir", "assetdir", "strippath", "settotalmass")
 """Settings of the compiler that the loader follows itself."""
 _UNREAD = ("texture", "user", "fluidshape", "fluidcoef", "hfield")
+_NUMBERS = (
+    "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "size", "fromto", "mass", "density", "diaginertia",
+    "fullinertia", "axis", "range", "ref", "scale", "refpos", "refquat", "vertex", "coef", "polycoef",
+    "offset", "damping", "frictionloss", "rgba",
+)  # fmt: skip
+"""Attributes in which MuJoCo takes ``nan`` for a value, or for none."""
 _MESH_NAME = re.compile(r"[^\0]{1,1000}")
 _MOST_SIDES = 100.0
 """Parameters of meshes that MuJoCo builds itself: they say into how many pieces a round one is cut."""
@@ -178,6 +184,13 @@ def _strip(element: etree._Element, without: dict[str, None], soft: dict[str, No
             (soft if tag in _SOFT else without)[tag if tag in _SOFT else f"<{tag}>"] = None
             continue
         read = _ATTRIBUTES.get(tag)
+        for key in _NUMBERS:
+            if "nan" in str(child.get(key, "")).lower():
+                raise AssetError(
+                    f"{key} of <{tag}> is not a number",
+                    f"{file}: line {child.sourceline}",
+                    "write numbers, or leave it out",
+                )
         for key in list(child.attrib):
             if (key in _UNREAD and (key != "hfield" or child.get("type") != "hfield")) or (read and key not in read):
                 del child.attrib[key]

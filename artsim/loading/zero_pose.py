@@ -20,7 +20,7 @@ from artsim.loading.scene_objects import chosen
 from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
-from artsim.model.kinematics import Array
+from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics, Repair
 
 WORLD = "world"
@@ -164,10 +164,12 @@ def _check_names(names: Sequence[str], plural: str, file: Path) -> None:
 
 def _check_finite(link: WorldLink, arrays: Sequence[Array], file: Path) -> None:
     inertia = link.inertia
-    more = [] if inertia is None else [np.array(inertia.mass), inertia.center, inertia.tensor]
-    if not all(np.isfinite(array).all() for array in (*arrays, *more)):
+    more = [] if inertia is None else [np.array(inertia.mass), inertia.center, inertia.tensor / LARGEST]
+    if not all((np.abs(array) <= LARGEST).all() for array in (*arrays, *more)):
         raise AssetError(
-            "a position, size or mass is not finite", f"{file}: body {link.name!r}", "write finite numbers"
+            f"a position, size or mass is not finite, or over {LARGEST:g}",
+            f"{file}: body {link.name!r}",
+            "write metres and kilograms",
         )
 
 

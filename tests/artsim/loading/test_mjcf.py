@@ -268,7 +268,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     ),
     "no mass": ('<body name="a"><joint/></body>', "", "", "MuJoCo refuses it"),
     "nothing to see": ('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>', "", "", "no geom that is"),
-    "not a number": ('<body name="a" pos="nan 0 0"><geom size="1"/></body>', "", "", "MuJoCo refuses|not finite"),
+    "not a number": ('<body name="a" pos="nan 0 0"><geom size="1"/></body>', "", "", "pos of <body> is not a number"),
 }  # fmt: skip
 
 

@@ -387,3 +387,10 @@ def test_a_mesh_that_a_plugin_makes_is_left_out_in_a_word(tmp_path: Path) -> Non
     )
     obj = object_with_lid(tmp_path, '<geom type="sdf" mesh="torus"><plugin instance="t"/></geom>', before)
     assert "of meshes that a plugin makes left out" in repairs_of(obj)
+
+
+def test_what_a_program_moves_ties_nothing(tmp_path: Path) -> None:
+    body = f'<body name="hand" mocap="true"><geom size="0.1" {SEEN}/></body>{free("a", LID)}'
+    obj = load(written(tmp_path, body, after='<equality><weld body1="hand" body2="a"/></equality>'))
+    assert "<weld> of 'hand' and 'a': left out: a program moves one of them (mocap)" in repairs_of(obj)
+    assert [part.name for part in obj.parts] == ["a", "lid"]
