@@ -80,7 +80,7 @@ class ShapeReader:
         for reason in sorted(skipped):
             self._repairs.append(Repair("geoms", reason))
         if not found:
-            why = f": those {'; '.join(skipped)}" if skipped else ""
+            why = f": those {'; those '.join(sorted(skipped))}" if skipped else ""
             raise AssetError(f"it has no geom that is a surface{why}", self._file, "give a body a geom to be seen")
         shown = self._shown(found)
         shapes = {b: [Shape(self._geometry(g), self._pose(g)) for g in geoms] for b, geoms in shown.items()}

@@ -222,7 +222,7 @@ def msh() -> bytes:
 
 def files(obj: bytes) -> dict[str, dict[str, bytes]]:
     """Files of each object by their names, ``mobility.xml`` among them; ``obj`` is a mesh for those that have one."""
-    found = {
+    found: dict[str, dict[str, str | bytes]] = {
         "microwave": {"mobility.xml": MICROWAVE},
         "arm": {"mobility.xml": ARM, "assets/m.obj": obj},
         "gripper": {"mobility.xml": GRIPPER},
