@@ -78,7 +78,11 @@ class Generate:
     shard_size: int = 256
     """Samples of each tar file."""
     package_root: PackageRoots = field(default_factory=dict)
-    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
+    below these folders, too. Repeatable."""
+    body: str | None = None
+    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
+    on the world."""
     skip_broken: bool = False
     """Leave out objects that do not load, or that no view sees, and say which, instead of stopping."""
     strict: bool = False
@@ -103,7 +107,7 @@ class Generate:
             if is_url(self.out) or part is not None:
                 raise ConfigError("a whole dataset in a folder is converted", "format", "leave --format out")
             FORMATS[self.format].check(self.sample, Path(self.out))
-        sources: list[Source] = [*find_sources(self.objects, self.package_root)]
+        sources: list[Source] = [*find_sources(self.objects, self.package_root, self.body)]
         sources += family_sources(
             _categories(self.categories), self.objects_per_category, self.first_object, _constraints(self.having)
         )
@@ -254,19 +258,23 @@ class View:
     html: Path | None = None
     """Page to write, such as laptop.html; it needs no network and no other file."""
     package_root: PackageRoots = field(default_factory=dict)
-    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
+    below these folders, too. Repeatable."""
+    body: str | None = None
+    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
+    on the world."""
 
     def run(self) -> None:
         from artsim.drawing.contact_sheet import write_contact_sheet
         from artsim.drawing.page import write_page
 
         if self.html is not None:
-            write_page(self.path, self.html, self.samples, self.split, self.package_root)
+            write_page(self.path, self.html, self.samples, self.split, self.package_root, self.body)
             print(f"wrote {self.html}")
             if self.out is None and self.rerun is None:
                 return
         for written in write_contact_sheet(
-            self.path, self.out, self.samples, self.split, self.rerun, self.package_root
+            self.path, self.out, self.samples, self.split, self.rerun, self.package_root, self.body
         ):
             print(f"wrote {written}")
 
@@ -329,13 +337,17 @@ class Inspect:
     gates: bool = False
     """Also pass the object through the sim-readiness gates, and list what each finds."""
     package_root: PackageRoots = field(default_factory=dict)
-    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
+    below these folders, too. Repeatable."""
+    body: str | None = None
+    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
+    on the world."""
 
     def run(self) -> None:
         from artsim.drawing.inspect import describe
         from artsim.loading.urdf import load
 
-        obj = load(self.path, package_roots=self.package_root)
+        obj = load(self.path, package_roots=self.package_root, body=self.body)
         print(describe(obj))
         if self.gates:
             from artsim.checks.validity import check_file

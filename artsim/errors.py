@@ -5,11 +5,12 @@ Every message says *what* went wrong, *where*, and *how to fix it*.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from artsim.common.names import printable
 
-__all__ = ["ArtsimError", "AssetError", "ConfigError", "DatasetError", "KinematicsError", "RenderError"]
+__all__ = ["ArtsimError", "AssetError", "ConfigError", "DatasetError", "KinematicsError", "RenderError", "SceneError"]
 
 _MAX_TEXT = 1200
 """Characters of each part of a message: names out of files may be of any length."""
@@ -48,6 +49,23 @@ class ArtsimError(Exception):
 
 class AssetError(ArtsimError):
     """An object file (URDF, mesh, side file) cannot be used."""
+
+
+class SceneError(AssetError):
+    """A file holds several objects, and it is not said which is meant.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What may be chosen.
+    """
+
+    def __init__(self, what: str, where: str | Path | None = None, fix: str | None = None, names: Sequence[str] = ()):
+        self.names = tuple(names)
+        super().__init__(what, where, fix)
+
+    def __reduce__(self) -> tuple[type, tuple[str, str | None, str | None, tuple[str, ...]]]:  # type: ignore[override]
+        return type(self), (self.what, self.where, self.fix, self.names)
 
 
 class KinematicsError(ArtsimError):

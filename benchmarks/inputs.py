@@ -1,55 +1,97 @@
 """Load rate over other people's files: ``python -m benchmarks.inputs FOLDER...``.
 
-Every ``*.urdf`` below the folders is loaded as given, with no package root declared, each in a worker process under a
-time limit. One line for each failure says why, then failures are counted by kind. The last line is one JSON object:
-``{"files", "loaded", "reasons"}``.
+Every file below the folders is loaded as given, each in a worker process under a time limit:
+
+- URDF: ``*.urdf``;
+- MJCF: ``*.xml`` whose top element is ``<mujoco>``, and that MuJoCo itself compiles;
+- USD: ``*.usd``, ``.usda``, ``.usdc`` and ``.usdz`` with a joint of UsdPhysics that moves.
+
+Loaded MJCF and USD files are posed at random, and every part is compared with what MuJoCo, or usd-core's own frames
+of the joints, make of the file. A scene of several objects counts as loaded where each of them loads by its name.
+One line for each failure says why, then failures are counted by kind. The last line is one JSON object: ``{"files",
+"loaded", "reasons"}`` of all files, and under ``"formats"`` the same of each format.
 """
 
 from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import re
+import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import tyro
 
 from artsim import load
 from artsim.common.progress import track
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ArtsimError, ConfigError, SceneError
+from artsim.loading.roots import PackageRoots
+from artsim.model.objects import ArticulatedObject
+from benchmarks.oracles import NoOracleError, deviation, poses_of
+
+FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".usd": "usd", ".usda": "usd", ".usdc": "usd", ".usdz": "usd"}
+"""Format of each ending."""
+_OBJECTS = 8
+"""Objects of one scene that are loaded."""
+_HEAD = 20_000
+"""Bytes in which the top element of an MJCF file stands."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """Load every URDF file below some folders, and say what does not load and why."""
+    """Load every URDF, MJCF and USD file below some folders, and say what does not load and why."""
 
     folders: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders to look through, or URDF files."""
+    """Folders to look through, or files."""
     seconds: float = 60.0
     """Time limit of each file."""
+    states: int = 3
+    """Random states in which an MJCF or USD file is compared with the format's own library; 0 compares none."""
     repairs: bool = False
     """Also list what was assumed or left out while loading, by file."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folder of each package name, as in package://NAME/; files outside an object's folder open below it, too."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a file: the error it ended with (None when it loaded), and the repairs made."""
+    """What came of a file.
+
+    Attributes
+    ----------
+    file : Path
+    error : str or None
+        None when it loaded.
+    repairs : tuple of str
+    skipped : str
+        Why it does not count: the format's own library refuses it.
+    parts : int
+        How many were compared with that library.
+    deviation : float
+        Largest difference of an entry of their motions, radians and metres.
+    """
 
     file: Path
     error: str | None
     repairs: tuple[str, ...] = ()
+    skipped: str = ""
+    parts: int = 0
+    deviation: float = 0.0
 
 
 def main(options: Options) -> None:
     """Load and print."""
-    files = urdf_files(options.folders)
-    outcomes = []
-    for outcome in track("files", load_all(files, options.seconds), total=len(files), unit="file"):
-        outcomes.append(outcome)
+    files = object_files(options.folders)
+    work = (options.states, {name: root.absolute() for name, root in options.package_root.items()})
+    every = list(track("files", load_all(files, options.seconds, *work), total=len(files), unit="file"))
+    outcomes = [outcome for outcome in every if not outcome.skipped]
     failed = [outcome for outcome in outcomes if outcome.error is not None]
     for outcome in failed:
         print(f"does not load: {outcome.error}")
@@ -57,17 +99,51 @@ def main(options: Options) -> None:
         for outcome in outcomes:
             for repair in outcome.repairs:
                 print(f"{outcome.file}: {repair}")
-    reasons = Counter(kind_of(outcome) for outcome in failed)
-    for reason, count in reasons.most_common():
+    for reason, count in _reasons(failed).items():
         print(f"{count:6d}  {reason}")
-    loaded, repaired = len(files) - len(failed), sum(bool(outcome.repairs) for outcome in outcomes)
-    share = 100.0 * loaded / len(files)
-    print(f"{loaded} of {len(files)} files load as given ({share:.1f} %), {repaired} of them with repairs")
-    print(json.dumps({"files": len(files), "loaded": loaded, "reasons": dict(reasons.most_common())}))
+    for name in dict.fromkeys(FORMATS.values()):
+        of_format = [outcome for outcome in every if FORMATS[outcome.file.suffix.lower()] == name]
+        skipped = Counter(outcome.skipped.partition(":")[0] for outcome in of_format if outcome.skipped)
+        for reason, count in skipped.items():
+            print(f"{name}: {count} files do not count: {reason}")
+        compared = [outcome for outcome in of_format if outcome.parts]
+        if compared:
+            worst = max(compared, key=lambda outcome: outcome.deviation)
+            print(
+                f"{name}: {sum(outcome.parts for outcome in compared)} parts of {len(compared)} files move as in the "
+                f"format's own library, to {worst.deviation:.2g} at most ({worst.file})"
+            )
+    loaded, repaired = len(outcomes) - len(failed), sum(bool(outcome.repairs) for outcome in outcomes)
+    share = 100.0 * loaded / max(len(outcomes), 1)
+    print(f"{loaded} of {len(outcomes)} files load as given ({share:.1f} %), {repaired} of them with repairs")
+    print(json.dumps(_summary(outcomes) | {"formats": _by_format(outcomes)}))
 
 
-def urdf_files(folders: Sequence[Path]) -> list[Path]:
-    """Every ``*.urdf`` below some folders, each once, in a stable order.
+def _summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    failed = [outcome for outcome in outcomes if outcome.error is not None]
+    return {"files": len(outcomes), "loaded": len(outcomes) - len(failed), "reasons": _reasons(failed)}
+
+
+def _by_format(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
+    found = {}
+    for name in dict.fromkeys(FORMATS.values()):
+        of_format = [outcome for outcome in outcomes if FORMATS[outcome.file.suffix.lower()] == name]
+        if not of_format:
+            continue
+        found[name] = _summary(of_format)
+        compared = [outcome for outcome in of_format if outcome.parts]
+        if compared:
+            largest = max(outcome.deviation for outcome in compared)
+            found[name] |= {"compared": len(compared), "max_deviation": largest}
+    return found
+
+
+def _reasons(failed: Sequence[Outcome]) -> dict[str, int]:
+    return dict(Counter(kind_of(outcome) for outcome in failed).most_common())
+
+
+def object_files(folders: Sequence[Path]) -> list[Path]:
+    """Every URDF, MJCF and USD file below some folders, each once, in a stable order.
 
     Raises
     ------
@@ -77,20 +153,29 @@ def urdf_files(folders: Sequence[Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for folder in folders:
         if not folder.exists():
-            raise ConfigError("no such folder", folder, "name a folder that holds URDF files")
-        for file in [folder] if folder.is_file() else sorted(folder.rglob("*.urdf")):
-            if file.is_file():
+            raise ConfigError("no such folder", folder, "name a folder that holds files of objects")
+        for file in [folder] if folder.is_file() else sorted(folder.rglob("*")):
+            if file.suffix.lower() in FORMATS and file.is_file() and (file.suffix.lower() != ".xml" or _is_mjcf(file)):
                 found[file.resolve()] = None
     if not found:
-        raise ConfigError("no URDF file below these folders", " ".join(map(str, folders)), "name others")
+        where = " ".join(map(str, folders))
+        raise ConfigError("no URDF, MJCF or USD file below these folders", where, "name others")
     return list(found)
 
 
-def load_all(files: Sequence[Path], seconds: float) -> Iterator[Outcome]:
+def _is_mjcf(file: Path) -> bool:
+    with file.open("rb") as stream:
+        text = re.sub(rb"<!--.*?-->|<\?.*?\?>", b"", stream.read(_HEAD), flags=re.DOTALL)
+    return re.match(rb"(\xef\xbb\xbf)?\s*<mujoco[\s/>]", text) is not None
+
+
+def load_all(
+    files: Sequence[Path], seconds: float, states: int = 0, package_roots: Mapping[str, Path] | None = None
+) -> Iterator[Outcome]:
     """Outcomes in the order of the files, from one worker process that a new one replaces when a file kills it."""
     worker, ours = _start()
     for file in files:
-        ours.send(file)
+        ours.send((file, states, dict(package_roots or {})))
         answer: Outcome | None = None
         try:
             if ours.poll(seconds):
@@ -120,18 +205,42 @@ def _start() -> tuple[multiprocessing.process.BaseProcess, Connection]:
 
 
 def _work(connection: Connection) -> None:
-    while (file := connection.recv()) is not None:
-        connection.send(_outcome(file))
+    with tempfile.TemporaryDirectory() as folder:  # MuJoCo and usd-core may write their warnings there
+        os.chdir(folder)
+        while (task := connection.recv()) is not None:
+            connection.send(_outcome(*task))
 
 
-def _outcome(file: Path) -> Outcome:
+def _outcome(file: Path, states: int, package_roots: Mapping[str, Path]) -> Outcome:
+    poses = None
+    if FORMATS[file.suffix.lower()] != "urdf":
+        try:
+            poses = poses_of(file)
+        except NoOracleError as error:
+            return Outcome(file, None, skipped=str(error))
     try:
-        obj = load(file)
+        parts, largest = 0, 0.0
+        objects = _objects(file, package_roots)
+        if poses is not None and states:
+            for obj in objects:
+                compared, found = deviation(obj, poses, states, np.random.default_rng(0))
+                parts, largest = parts + compared, max(largest, found)
     except ArtsimError as error:
         return Outcome(file, str(error))
     except Exception as error:  # a raw exception is a finding of its own, and must not stop the rest
         return Outcome(file, f"{file}: raw {type(error).__name__}: {error}")
-    return Outcome(file, None, tuple(map(str, obj.repairs)))
+    repairs = dict.fromkeys(str(repair) for obj in objects for repair in obj.repairs)
+    return Outcome(file, None, tuple(repairs), parts=parts, deviation=largest)
+
+
+def _objects(file: Path, package_roots: Mapping[str, Path]) -> list[ArticulatedObject]:
+    """The object of a file; of a scene of several, each by its name, the first ones of very many."""
+    try:
+        return [load(file, package_roots=package_roots)]
+    except SceneError as error:
+        if not error.names:
+            raise
+        return [load(file, package_roots=package_roots, body=name) for name in error.names[:_OBJECTS]]
 
 
 def kind_of(outcome: Outcome) -> str:

@@ -28,6 +28,7 @@ def write_origins(folder: Path, sources: Sequence[Source]) -> None:
             "path": str(source.path),
             "sha256": source.sha256,
             "package_roots": {name: str(Path(root).absolute()) for name, root in source.package_roots.items()},
+            "body": source.body,
         }
         for source in sources
         if isinstance(source, FileSource)
@@ -72,14 +73,16 @@ def _read_origins(folder: Path) -> list[FileSource]:
             own = json_values.mapping(entry, "file")
             roots = json_values.mapping(own["package_roots"], "package_roots")
             path, sha256 = Path(json_values.text(own["path"], "path")), json_values.text(own["sha256"], "sha256")
-            files.append((path, sha256, {name: Path(json_values.text(root, name)) for name, root in roots.items()}))
+            body = None if own.get("body") is None else json_values.text(own["body"], "body")
+            roots = {name: Path(json_values.text(root, name)) for name, root in roots.items()}
+            files.append((path, sha256, roots, body))
     except (ArtsimError, ValueError, KeyError):
         return []  # a note that helps, no more
     found = []
-    for path, sha256, roots in files:
+    for path, sha256, roots, body in files:
         try:
             if path.suffix.lower() in (".urdf", ".xml", ".npz"):
-                found += [source for source in find_sources([path], roots) if source.sha256 == sha256]
+                found += [source for source in find_sources([path], roots, body) if source.sha256 == sha256]
         except (AssetError, OSError, ValueError):
             continue
     return found

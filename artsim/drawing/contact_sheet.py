@@ -38,6 +38,7 @@ def write_contact_sheet(
     split: str | None = None,
     rerun: Path | None = None,
     package_roots: Mapping[str, Path] | None = None,
+    body: str | None = None,
 ) -> list[Path]:
     """Draw a dataset or an object; see :class:`artsim.cli.View`.
 
@@ -52,7 +53,7 @@ def write_contact_sheet(
         shown = [show_sample(sample, dataset.object_of(sample)) for sample in (dataset[i] for i in chosen)]
         out = out or path / "contact_sheet.png"
     else:
-        obj = load(path, package_roots=package_roots)
+        obj = load(path, package_roots=package_roots, body=body)
         shown = list(show_states(obj, samples))
         out = out or Path(f"{safe_name(f'{obj.category}-{obj.object_id}')}.png")
     if not shown:

@@ -120,6 +120,7 @@ def write_page(
     samples: int = 12,
     split: str | None = None,
     package_roots: Mapping[str, Path] | None = None,
+    body: str | None = None,
 ) -> None:
     """Write the page of a dataset or an object; see :class:`artsim.cli.View`.
 
@@ -133,7 +134,7 @@ def write_page(
         chosen = [dataset[i] for i in spread(len(dataset), samples)]
         page = sample_page(chosen, f"{path.resolve().name}: {len(chosen)} of {len(dataset)} samples")
     else:
-        page = object_page(load(path, package_roots=package_roots))
+        page = object_page(load(path, package_roots=package_roots, body=body))
     write_atomic(out, page.encode())
 
 

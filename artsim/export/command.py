@@ -39,7 +39,11 @@ class Export:
     """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
     control is where the joint shall be."""
     package_root: PackageRoots = field(default_factory=dict)
-    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
+    below these folders, too. Repeatable."""
+    body: str | None = None
+    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
+    on the world."""
 
     def run(self) -> None:
         from artsim.export import check_formats, export
@@ -51,7 +55,7 @@ class Export:
         options = ExportOptions(self.base, self.actuators)
         if self.out.exists():
             raise ConfigError("it exists already", self.out, "name a folder that does not, or remove it")
-        obj = prepare(load(self.path, package_roots=self.package_root), self.collision)
+        obj = prepare(load(self.path, package_roots=self.package_root, body=self.body), self.collision)
         self.out.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f".{self.out.name}.", dir=self.out.parent) as place:
             made = Path(place) / "made"

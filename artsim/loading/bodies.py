@@ -119,7 +119,7 @@ def _places_root(
     return True
 
 
-def without_empty_leaves(bodies: list[RigidBody], repairs: list[Repair]) -> list[RigidBody]:
+def without_empty_leaves(bodies: list[RigidBody], repairs: list[Repair], noun: str = "link") -> list[RigidBody]:
     """Bodies without those that show nothing, carry nothing and drive nothing (tool frames, sensor frames)."""
     drivers = {body.joint.mimic.joint for body in bodies if body.joint is not None and body.joint.mimic is not None}
     kept = list(bodies)
@@ -128,7 +128,7 @@ def without_empty_leaves(bodies: list[RigidBody], repairs: list[Repair]) -> list
             continue
         if not any(other.parent is body for other in kept):
             kept.remove(body)
-            repairs.append(Repair(f"link {body.links[0]!r}", "left out: it moves, but shows and carries nothing"))
+            repairs.append(Repair(f"{noun} {body.links[0]!r}", "left out: it moves, but shows and carries nothing"))
     return kept
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from artsim.common.products import matmul
 from artsim.loading.bodies import RigidBody
-from artsim.loading.meshes import MeshReader
+from artsim.loading.meshes import MeshReader, check_range
 from artsim.loading.urdf_document import UrdfRobot
 from artsim.loading.zero_pose import combined
 from artsim.model.convex_bodies import DEFAULT_DENSITY, convex_hull
@@ -24,7 +25,12 @@ _SPECK = 1e-4
 
 
 def with_described_bodies(
-    parts: Sequence[Part], bodies: Sequence[RigidBody], robot: UrdfRobot, reader: MeshReader, T_rest_part: Array
+    parts: Sequence[Part],
+    bodies: Sequence[RigidBody],
+    robot: UrdfRobot,
+    reader: MeshReader,
+    T_rest_part: Array,
+    file: Path,
 ) -> list[Part]:
     """Parts with the bodies that the document gives them; without, where it says nothing of one.
 
@@ -38,6 +44,13 @@ def with_described_bodies(
     reader : MeshReader
     T_rest_part : (K, 4, 4) float
         Maps the base link's frame, as each part carries it from the file's zero to rest, to the rest frame.
+    file : Path
+        For messages.
+
+    Raises
+    ------
+    AssetError
+        When something lies too far away to compute with.
     """
     links = {link.name: link for link in robot.links}
     if not any(link.collision or link.inertia is not None for link in links.values()):
@@ -50,9 +63,12 @@ def with_described_bodies(
             link, T_rest_link = links[name], matmul(T, body.T_base_link[name])
             for shape in link.collision:
                 vertices, faces = reader.shape(shape.geometry)
-                pieces.append((transform_points(matmul(T_rest_link, shape.origin), vertices), faces))
+                vertices = transform_points(matmul(T_rest_link, shape.origin), vertices)
+                check_range(vertices, f"{file}: body {name!r}")
+                pieces.append((vertices, faces))
             if link.inertia is not None:
                 inertias.append(link.inertia.transformed(T_rest_link))
+                check_range(inertias[-1].center, f"{file}: body {name!r}")
         joint = UNKNOWN_DYNAMICS if body.joint is None else body.joint.dynamics
         found.append(replace(part, body=_body(part, pieces, combined(inertias), joint)))
     return found

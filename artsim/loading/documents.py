@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from artsim.common.files import parse_json
-from artsim.errors import AssetError
+from artsim.errors import AssetError, ConfigError
 from artsim.loading.akb48 import with_meshes_of_unity
 from artsim.loading.meshes import MeshReader, check_shapes
 from artsim.loading.mjcf_xml import is_mjcf
@@ -20,7 +20,7 @@ from artsim.model.objects import Repair
 
 
 def read_document(
-    data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str]
+    data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str], body: str | None = None
 ) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
     """Links and joints of a file of any format.
 
@@ -33,6 +33,8 @@ def read_document(
         Reads its meshes.
     helpers : sequence of str
         Links that are known to be without a shape.
+    body : str, optional
+        Which object of an MJCF or USD scene: see :func:`artsim.loading.scene_objects.chosen`.
 
     Returns
     -------
@@ -52,13 +54,15 @@ def read_document(
     if file.suffix.lower() in SUFFIXES:
         from artsim.loading.usd import read_usd
 
-        return read_usd(file, limits)
-    if file.suffix.lower() == ".json":
-        return _read_json(data, file, reader)
-    if is_mjcf(data, file):
+        return read_usd(file, limits, body)
+    if file.suffix.lower() != ".json" and is_mjcf(data, file):
         from artsim.loading.mjcf import read_mjcf
 
-        return read_mjcf(data, file, reader, limits)
+        return read_mjcf(data, file, reader, body)
+    if body is not None:
+        raise ConfigError(f"body {body!r} is chosen of {file.name}, which holds one object", "body", "leave it out")
+    if file.suffix.lower() == ".json":
+        return _read_json(data, file, reader)
     check_shapes(data, file, limits)
     robot, repairs = parse_robot(data, file, limits.max_links, helpers)
     if file.name == UNITY:

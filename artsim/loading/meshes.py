@@ -25,10 +25,23 @@ from artsim.loading.urdf_document import Geometry, MeshFile
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import Repair
 
-__all__ = ["LoadLimits", "MeshReader", "UnusableMeshError", "check_shapes", "merge_shapes", "triangles"]
+__all__ = [
+    "LoadLimits",
+    "MeshReader",
+    "UnusableMeshError",
+    "check_copies",
+    "check_range",
+    "check_shapes",
+    "merge_shapes",
+    "triangles",
+]
 
 _TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
 """Of each primitive: round ones have 64 sides, a sphere is an icosahedron whose faces are divided four times."""
+
+
+_LARGEST = 1e6
+"""Metres, or units of a file in millimetres: squares and products of much larger coordinates overflow."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +54,8 @@ class LoadLimits:
     """Of all mesh files, each counted as often as the URDF names it."""
     max_faces: int = 5_000_000
     """Triangles over the whole object."""
+    max_copied_faces: int = 500_000
+    """Triangles of meshes that are used again: a small file with many copies would take as long as a large one."""
     max_links: int = 1_000
     max_shapes: int = 5_000
     """Primitives and mesh references in a URDF file."""
@@ -59,6 +74,34 @@ def check_shapes(data: bytes, where: Path, limits: LoadLimits) -> None:
             f"{count} shapes are over the limit of {limits.max_shapes}",
             where,
             "raise it with artsim.load(..., limits=LoadLimits(max_shapes=...)) if you trust the file",
+        )
+
+
+def check_range(vertices: Array, where: str) -> None:
+    """Refuse coordinates that nothing can be computed with.
+
+    Raises
+    ------
+    AssetError
+    """
+    if not (np.abs(vertices) <= _LARGEST).all():
+        raise AssetError(
+            f"a coordinate is not finite, or over {_LARGEST:g}", where, "write sizes, origins and meshes in metres"
+        )
+
+
+def check_copies(faces: int, where: Path, limits: LoadLimits) -> None:
+    """Refuse more triangles of meshes that are used again than are allowed.
+
+    Raises
+    ------
+    AssetError
+    """
+    if faces > limits.max_copied_faces:
+        raise AssetError(
+            f"copies of its meshes have more than {limits.max_copied_faces} triangles",
+            where,
+            "decimate the meshes that are used many times, or raise LoadLimits.max_copied_faces if you trust the file",
         )
 
 
@@ -86,6 +129,8 @@ class MeshReader:
     notes: list[Repair] = field(default_factory=list)
     num_faces: int = 0
     _num_bytes: int = 0
+    _num_copied: int = 0
+    _used: set[Path | int] = field(default_factory=set)
     _paths: dict[str, Path] = field(default_factory=dict)
     _read: dict[Path, tuple[Surface, list[bytes]]] = field(default_factory=dict)
 
@@ -102,7 +147,7 @@ class MeshReader:
         if geometry.mesh is not None:
             return self._file(geometry.mesh)
         if geometry.inline is not None:
-            self._count(len(geometry.inline.faces))
+            self._count(len(geometry.inline.faces), id(geometry.inline.vertices))
             return geometry.inline.vertices, geometry.inline.faces
         self._count(_TRIANGLES[str(geometry)])
         if geometry.box is not None:
@@ -114,9 +159,14 @@ class MeshReader:
         assert geometry.capsule is not None
         return capsule(geometry.capsule.radius, geometry.capsule.length)
 
-    def _count(self, faces: int) -> None:
-        """Count triangles before they are made."""
+    def _count(self, faces: int, mesh: Path | int | None = None) -> None:
+        """Count triangles before they are made, and those of a mesh that is used again."""
         self.num_faces += faces
+        if mesh in self._used:
+            self._num_copied += faces
+            check_copies(self._num_copied, self.folder, self.limits)
+        elif mesh is not None:
+            self._used.add(mesh)
         if self.num_faces > self.limits.max_faces:
             raise AssetError(
                 f"the object has more than {self.limits.max_faces} triangles",
@@ -152,7 +202,7 @@ class MeshReader:
         self._take(contents, path)
         if len(surface.faces) == 0:
             raise UnusableMeshError(f"mesh {reference.filename!r} has no faces")
-        self._count(len(surface.faces))
+        self._count(len(surface.faces), path)
         vertices, faces = surface.vertices, surface.faces
         if reference.scale is not None:
             vertices = vertices * np.asarray(reference.scale, dtype=np.float64)

@@ -8,41 +8,66 @@ are handed over as vertices and triangles.
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from lxml import etree
 
-from artsim.common.files import read_bounded
 from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits
+from artsim.loading.mjcf_includes import put_included
+from artsim.loading.packages import AssetPaths
 from artsim.loading.urdf_xml import safe_xml
 from artsim.loading.xml_repair import readable_xml
 from artsim.model.objects import Repair
 
-_MAX_INCLUDES = 100
-_SECTIONS = ("compiler", "default", "asset", "worldbody", "equality")
+_SECTIONS = ("compiler", "default", "asset", "worldbody", "tendon", "equality")
 """Sections that say what the object is; others are about simulators, cameras and control."""
+_IN_BODY = ("body", "frame", "replicate", "joint", "freejoint", "geom", "site")
 _KEPT = {
-    "default": ("default", "mesh", "geom", "joint", "equality"),
-    "asset": ("mesh", "hfield"),
-    "worldbody": ("body", "frame", "replicate", "inertial", "joint", "freejoint", "geom"),
-    "body": ("body", "frame", "replicate", "inertial", "joint", "freejoint", "geom"),
-    "frame": ("body", "frame", "replicate", "joint", "freejoint", "geom"),
-    "replicate": ("body", "frame", "replicate", "geom"),
-    "equality": ("joint", "connect", "weld"),
+    "default": ("default", "mesh", "material", "geom", "joint", "site", "equality"),
+    "asset": ("mesh", "hfield", "material"),
+    "worldbody": _IN_BODY,
+    "body": (*_IN_BODY, "inertial"),
+    "frame": _IN_BODY,
+    "replicate": _IN_BODY,
+    "tendon": ("fixed",),
+    "fixed": ("joint",),
+    "equality": ("joint", "connect", "weld", "tendon"),
 }
 """Elements that are read in each other; all others are left out."""
-_GROWING = ("composite", "flexcomp", "attach", "model", "flex", "skin")
-"""Elements that make bodies or shapes of their own, or read another model."""
+_ATTRIBUTES = {
+    "material": ("name", "class", "rgba"),
+    "site": ("name", "class", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
+    "fixed": ("name",),
+}
+"""Attributes that are read of elements of which the rest is about looks and forces."""
+_SOFT = {
+    "composite": "bodies that MuJoCo makes of it", "flexcomp": "a soft body", "flex": "a soft body",
+    "skin": "a surface that bends over several bodies",
+}  # fmt: skip
+"""Elements that show something, or make bodies, which is not read."""
+_OTHER_MODELS = ("attach", "model")
 _COMPILER = (
     "angle", "autolimits", "eulerseq", "inertiafromgeom", "balanceinertia", "boundmass", "boundinertia",
-    "inertiagrouprange",
+    "inertiagrouprange", "fitaabb", "alignfree",
 )  # fmt: skip
 _OWN_SETTINGS = ("meshdir", "assetdir", "strippath", "settotalmass")
 """Settings of the compiler that the loader follows itself."""
-_UNREAD = ("material", "texture", "user", "fluidshape", "fluidcoef", "hfield")
+_UNREAD = ("texture", "user", "fluidshape", "fluidcoef", "hfield")
+_NUMBERS = (
+    "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "size", "fromto", "mass", "density", "diaginertia",
+    "fullinertia", "axis", "range", "ref", "scale", "refpos", "refquat", "vertex", "coef", "polycoef",
+    "offset", "damping", "frictionloss", "rgba",
+)  # fmt: skip
+"""Attributes in which MuJoCo takes ``nan`` for a value, or for none."""
 _MESH_NAME = re.compile(r"[^\0]{1,1000}")
+_MOST_SIDES = 100.0
+"""Parameters of meshes that MuJoCo builds itself: they say into how many pieces a round one is cut."""
+_NO_MESH = "0 0 0 1e-3 0 0 0 1e-3 0 0 0 1e-3"
+"""Vertices that stand for a mesh that only a plugin makes."""
 
 
 @dataclass
@@ -54,6 +79,10 @@ class SafeMjcf:
     text : str
     meshes : dict
         Name of each mesh that is a file: the file's name, from the document's folder on.
+    unread : set of str
+        Names of meshes that only a plugin makes: a speck stands for each.
+    left_out : tuple of str
+        Elements that show something or make bodies, and are not read.
     total_mass : str or None
         What all bodies together weigh, kg, where the document says so.
     contents : list of bytes
@@ -62,6 +91,8 @@ class SafeMjcf:
 
     text: str
     meshes: dict[str, str]
+    unread: set[str] = field(default_factory=set)
+    left_out: tuple[str, ...] = ()
     total_mass: str | None = None
     contents: list[bytes] = field(default_factory=list)
 
@@ -71,7 +102,7 @@ def is_mjcf(data: bytes, where: Path) -> bool:
     return b"mujoco" in data and re.match(rb"\s*<mujoco[\s/>]", readable_xml(data, where)[0]) is not None
 
 
-def safe_mjcf(data: bytes, file: Path, limits: LoadLimits, repairs: list[Repair]) -> SafeMjcf:
+def safe_mjcf(data: bytes, file: Path, paths: AssetPaths, limits: LoadLimits, repairs: list[Repair]) -> SafeMjcf:
     """Make a document safe.
 
     Parameters
@@ -79,7 +110,8 @@ def safe_mjcf(data: bytes, file: Path, limits: LoadLimits, repairs: list[Repair]
     data : bytes
         Content of the file.
     file : Path
-        Its path: included files lie in its folder.
+    paths : AssetPaths
+        Says where included files may be.
     limits : LoadLimits
     repairs : list of Repair
         Added to.
@@ -87,62 +119,25 @@ def safe_mjcf(data: bytes, file: Path, limits: LoadLimits, repairs: list[Repair]
     Raises
     ------
     AssetError
-        When it is not well formed, names a file outside its folder, or is over a limit.
+        When it is not well formed, names a file outside the allowed folders, or is over a limit.
     """
     data, found = readable_xml(data, file)
     repairs += found
     root = safe_xml(data, file)
-    contents: list[bytes] = []
-    _include(root, file, limits, contents, {file.resolve()})
+    contents = put_included(root, file, paths, limits.max_urdf_bytes)
     settings = _compiler_settings(root)
-    left_out: dict[str, None] = {}
-    for section in list(root):
-        if section.tag not in _SECTIONS:
-            root.remove(section)
-        elif section.tag != "compiler":
-            _strip(section, left_out, file)
-    if left_out:
-        repairs.append(Repair("file", f"left out, which says nothing of the object: {', '.join(left_out)}", note=True))
+    without, soft = _strip_sections(root, file)
+    if without:
+        repairs.append(Repair("file", f"left out, which says nothing of the object: {', '.join(without)}", note=True))
+    repairs += [Repair(f"<{tag}>", f"left out: {_SOFT[tag]} is not read") for tag in soft]
+    _join_sections(root)
+    _take_couplings(root, repairs)
     _check_size(root, file, limits)
-    meshes = _take_meshes(root, settings, file)
+    meshes, unread = _take_meshes(root, settings, file)
+    _name_height_fields(root)
     text = etree.tostring(root, encoding="unicode")
-    return SafeMjcf(text, meshes, settings.get("settotalmass"), contents)
-
-
-def _include(root: etree._Element, file: Path, limits: LoadLimits, contents: list[bytes], seen: set[Path]) -> None:
-    """Put the elements of included files in place of each ``<include>``; each file once, as MuJoCo has it."""
-    room = limits.max_urdf_bytes
-    while (include := next(root.iter("include"), None)) is not None:
-        name = include.get("file") or ""
-        path = _inside(name, file)
-        if path.resolve() in seen or len(contents) >= _MAX_INCLUDES:
-            raise AssetError(
-                f"includes {name[:100]!r} twice, or over {_MAX_INCLUDES} files",
-                file,
-                "include each file once, in one place",
-            )
-        seen.add(path.resolve())
-        data = read_bounded(path, room, "included file", inside=file.parent)
-        contents.append(data)
-        room -= len(data)
-        parent = include.getparent()
-        assert parent is not None  # the top element is <mujoco>
-        at = parent.index(include)
-        parent.remove(include)
-        for i, element in enumerate(list(safe_xml(readable_xml(data, path)[0], path))):
-            parent.insert(at + i, element)
-
-
-def _inside(name: str, file: Path) -> Path:
-    """A file of the document's folder by its name."""
-    path = file.parent / name.replace("\\", "/")
-    try:
-        inside = bool(name) and path.resolve().is_relative_to(file.parent.resolve())
-    except (OSError, ValueError, RuntimeError):  # a name that no file can have
-        inside = False
-    if not inside:
-        raise AssetError(f"includes {name[:100]!r}, which lies outside its folder", file, "move the file inside")
-    return path
+    left_out = tuple(f"<{tag}>" for tag in soft)
+    return SafeMjcf(text, meshes, unread, left_out, settings.get("settotalmass"), contents)
 
 
 def _compiler_settings(root: etree._Element) -> dict[str, str]:
@@ -161,36 +156,103 @@ def _compiler_settings(root: etree._Element) -> dict[str, str]:
     return own
 
 
-def _strip(element: etree._Element, left_out: dict[str, None], file: Path) -> None:
-    """Leave out elements and attributes that are not read."""
+def _strip_sections(root: etree._Element, file: Path) -> tuple[list[str], list[str]]:
+    """Leave out what is not read; returns what says nothing of the object, and the tags of what shows something."""
+    without: dict[str, None] = {}
+    soft: dict[str, None] = {}
+    for section in list(root):
+        if section.tag not in _SECTIONS:
+            soft |= dict.fromkeys(str(e.tag) for e in section.iter(*_SOFT))
+            root.remove(section)
+        elif section.tag != "compiler":
+            _strip(section, without, soft, file)
+    return [*without], [*soft]
+
+
+def _strip(element: etree._Element, without: dict[str, None], soft: dict[str, None], file: Path) -> None:
     kept = _KEPT.get(str(element.tag), ())
     for child in list(element):
-        if child.tag in _GROWING:
+        tag = str(child.tag)
+        if tag in _OTHER_MODELS:
             raise AssetError(
-                f"<{child.tag}> is not read",
+                f"<{tag}> is not read",
                 f"{file}: line {child.sourceline}",
-                "write the bodies and shapes that it stands for, or remove it",
+                "let MuJoCo write it into one file: mujoco.MjSpec.from_file(path).to_xml() after compile()",
             )
-        if child.tag not in kept:
+        if tag not in kept:
             element.remove(child)
-            left_out[f"<{child.tag}>"] = None
+            (soft if tag in _SOFT else without)[tag if tag in _SOFT else f"<{tag}>"] = None
             continue
-        for key in _UNREAD:
-            if key != "hfield" or child.get("type") != "hfield":
-                child.attrib.pop(key, None)
-        if child.tag == "hfield":
-            for key in ("file", "content_type", "elevation"):
-                child.attrib.pop(key, None)
-            child.set("nrow", "2")
-            child.set("ncol", "2")
-        _strip(child, left_out, file)
+        read = _ATTRIBUTES.get(tag)
+        for key in _NUMBERS:
+            if "nan" in str(child.get(key, "")).lower():
+                raise AssetError(
+                    f"{key} of <{tag}> is not a number",
+                    f"{file}: line {child.sourceline}",
+                    "write numbers, or leave it out",
+                )
+        for key in list(child.attrib):
+            if (key in _UNREAD and (key != "hfield" or child.get("type") != "hfield")) or (read and key not in read):
+                del child.attrib[key]
+        if tag == "mesh" and child.find("plugin") is not None:
+            child.attrib.pop("file", None)
+        _strip(child, without, soft, file)
+
+
+def _join_sections(root: etree._Element) -> None:
+    """One section of each kind, but for defaults, whose order among each other counts: MuJoCo joins them, too."""
+    first: dict[str, etree._Element] = {}
+    for section in list(root):
+        tag = str(section.tag)
+        if tag in ("default", "compiler"):
+            continue
+        if tag == "worldbody" and section.attrib:
+            continue
+        if tag not in first:
+            first[tag] = section
+            continue
+        first[tag].extend(list(section))
+        root.remove(section)
+
+
+def _take_couplings(root: etree._Element, repairs: list[Repair]) -> None:
+    """Leave out sites that close no chain, and couplings of tendons that run through space."""
+    fixed = {tendon.get("name") for tendon in root.iterfind("tendon/fixed")}
+    for equality in list(root.iterfind("equality/tendon")):
+        ends = [equality.get(key) for key in ("tendon1", "tendon2") if equality.get(key) is not None]
+        if not fixed.issuperset(ends):
+            repairs.append(Repair(f"tendon {ends[0]!r}", "couples joints through space: the coupling is left out"))
+            parent = equality.getparent()
+            assert parent is not None
+            parent.remove(equality)
+    used = {e.get(key) for e in root.iterfind("equality/*") for key in ("site1", "site2")}
+    for site in list(root.iter("site")):
+        parent = site.getparent()
+        assert parent is not None
+        if parent.tag != "default" and site.get("name") not in used:
+            parent.remove(site)
 
 
 def _check_size(root: etree._Element, file: Path, limits: LoadLimits) -> None:
-    """Refuse documents that expand into too many bodies or shapes."""
-    totals = {"body": 0, "geom": 0}
-    bounds = {"body": limits.max_links, "geom": limits.max_shapes}
-    stack = [(section, 1) for section in root.findall("worldbody")]
+    """Refuse documents that expand into too many bodies or other elements."""
+    bounds = {"body": limits.max_links}
+    totals: Counter[str] = Counter()
+    for element, copies in _counted(root, file):
+        tag = str(element.tag)
+        totals[tag] += copies
+        # Even without a body or shape inside, every copy costs time.
+        bound = bounds.get(tag, limits.max_shapes)
+        if max(totals[tag], copies) > bound:
+            raise AssetError(
+                f"it has more than {bound} <{tag}> elements, copies included",
+                file,
+                "raise LoadLimits.max_links and max_shapes if you trust the file",
+            )
+
+
+def _counted(root: etree._Element, file: Path) -> Iterator[tuple[etree._Element, int]]:
+    """Every element below the top one, and how many copies of it there will be."""
+    stack = [(section, 1) for section in root]
     while stack:
         element, copies = stack.pop()
         if element.tag == "replicate":
@@ -200,32 +262,24 @@ def _check_size(root: etree._Element, file: Path, limits: LoadLimits) -> None:
                 raise AssetError(
                     f"count={element.get('count')!r} of <replicate> is no number", file, "write a whole number"
                 ) from error
-        if element.tag in totals:
-            totals[element.tag] += copies
+        yield element, copies
         stack += [(child, copies) for child in element]
-        # Even without a body or shape inside, every copy costs time.
-        over = next((tag for tag in totals if max(totals[tag], copies) > bounds[tag]), None)
-        if over is not None:
-            raise AssetError(
-                f"it has more than {bounds[over]} <{over}> elements, copies included",
-                file,
-                "raise LoadLimits.max_links and max_shapes if you trust the file",
-            )
-    if sum(1 for _ in root.iter("mesh")) > limits.max_shapes:
-        raise AssetError(f"it has more than {limits.max_shapes} meshes", file, "raise LoadLimits.max_shapes")
 
 
-def _take_meshes(root: etree._Element, settings: dict[str, str], file: Path) -> dict[str, str]:
-    """Name of each mesh that is a file, and that file; the document names it no more."""
+def _take_meshes(root: etree._Element, settings: dict[str, str], file: Path) -> tuple[dict[str, str], set[str]]:
+    """Name of each mesh that is a file, and that file, which the document names no more; and what is no file's."""
     folder = settings.get("meshdir") or settings.get("assetdir") or ""
     strips = settings.get("strippath") == "true"
     meshes: dict[str, str] = {}
+    unread: set[str] = set()
     for mesh in root.iterfind("asset/mesh"):
-        if mesh.get("builtin"):
-            raise AssetError("a mesh that MuJoCo builds itself is not read", f"{file}: <mesh>", "save it as a file")
         mesh.attrib.pop("content_type", None)
         name = mesh.attrib.pop("file", None)
         if name is None:
+            _check_built(mesh, file)
+            if not (mesh.get("vertex") or mesh.get("builtin")):
+                mesh.set("vertex", _NO_MESH)
+                unread.add(str(mesh.get("name")))
             continue
         name = str(name).replace("\\", "/")
         if not _MESH_NAME.fullmatch(name):
@@ -237,6 +291,31 @@ def _take_meshes(root: etree._Element, settings: dict[str, str], file: Path) -> 
         if own in meshes:
             raise AssetError(f"two meshes are called {own!r}", file, "give each its own name")
         meshes[own] = str(PurePosixPath(folder.replace("\\", "/")) / name)
-    for element in root.iter("hfield", "mesh"):
+    for element in root.iter("mesh"):
         element.attrib.pop("file", None)  # in defaults, too
-    return meshes
+    return meshes, unread
+
+
+def _check_built(mesh: etree._Element, file: Path) -> None:
+    """Refuse a mesh that MuJoCo would build out of very many pieces."""
+    try:
+        sides = [abs(float(word)) for word in (mesh.get("params") or "").split()]
+    except ValueError as error:
+        raise AssetError("params of a mesh are not numbers", f"{file}: <mesh>", "write numbers") from error
+    if not all(side <= _MOST_SIDES for side in sides):
+        raise AssetError(
+            f"a mesh is to be built of over {_MOST_SIDES:g} sides",
+            f"{file}: <mesh>",
+            "write less, or save it as a file",
+        )
+
+
+def _name_height_fields(root: etree._Element) -> None:
+    """Height fields without their files: flat, and called as MuJoCo calls them."""
+    for field_ in root.iterfind("asset/hfield"):
+        if not field_.get("name"):
+            field_.set("name", PurePosixPath(str(field_.get("file") or "").replace("\\", "/")).stem)
+        for key in ("file", "content_type", "elevation"):
+            field_.attrib.pop(key, None)
+        field_.set("nrow", "2")
+        field_.set("ncol", "2")

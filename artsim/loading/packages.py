@@ -1,4 +1,6 @@
-"""Where the meshes are that a URDF names: ``package://``, ``../`` and the like become paths, none of them outside.
+"""Where the files are that an object's file names: ``package://``, ``../`` and the like, none of them outside.
+
+They are the meshes of a URDF or MJCF file, and what an MJCF file includes; "the URDF" below stands for either.
 
 A file may be read below an *allowed* folder only:
 
@@ -51,7 +53,7 @@ class MissingFileError(Exception):
 
 @dataclass
 class AssetPaths:
-    """Resolves the file names of one URDF.
+    """Resolves the file names of one URDF or MJCF file.
 
     Attributes
     ----------
@@ -71,8 +73,8 @@ class AssetPaths:
     _first: dict[str, Path] = field(default_factory=dict)
     """Where names that start alike are looked for first, of those that were found there."""
 
-    def resolve(self, filename: str) -> Path:
-        """Path of an existing file, confined to the allowed folders.
+    def resolve(self, filename: str, what: str = "mesh") -> Path:
+        """Path of an existing file, confined to the allowed folders; ``what`` it is, for messages.
 
         Raises
         ------
@@ -85,7 +87,7 @@ class AssetPaths:
         plain = "\\" not in filename and filename == filename.strip()
         if plain and start in self._first and _is_own_file(self._first[start] / name):
             return self._first[start] / name
-        package, rest = self._split(filename)
+        package, rest = self._split(filename, what)
         names = dict.fromkeys((rest, unquote(rest)))
         candidates = (candidate for name in names for candidate in self._candidates(package, name))
         tried: list[_Candidate] = []
@@ -105,11 +107,11 @@ class AssetPaths:
         found_outside = next((c.path for c in tried if c not in inside and _is_file(c.path)), None)
         if found_outside is not None or not inside:
             raise AssetError(
-                f"mesh {filename!r} lies outside the asset's folder",
+                f"{what} {filename!r} lies outside the asset's folder",
                 self.folder,
                 self._fix_outside(package, rest, found_outside),
             )
-        raise MissingFileError(f"mesh {filename!r} is missing", self._fix_missing(package, rest))
+        raise MissingFileError(f"{what} {filename!r} is missing", self._fix_missing(package, rest))
 
     @cached_property
     def root(self) -> Path:
@@ -185,7 +187,7 @@ class AssetPaths:
         file = self._folders[path.parent] / path.name
         return file.resolve() if file.is_symlink() else file
 
-    def _split(self, filename: str) -> tuple[str | None, str]:
+    def _split(self, filename: str, what: str) -> tuple[str | None, str]:
         """Package (None for a plain path) and the rest of a name."""
         name = filename.strip().replace("\\", "/")
         scheme = _SCHEME.fullmatch(name)
@@ -199,7 +201,9 @@ class AssetPaths:
             absolute = name[len("file:") :].startswith(("///", "//localhost/")) and not _DRIVE.match(rest)
             return None, f"/{rest.removeprefix('localhost/')}" if absolute else rest
         raise AssetError(
-            f"mesh {filename!r} is not a file", self.folder, "download it, and write its path from the URDF's folder on"
+            f"{what} {filename!r} is not a file",
+            self.folder,
+            "download it, and write its path from the file's folder on",
         )
 
     def _candidates(self, package: str | None, name: str) -> Iterator[_Candidate]:
@@ -272,7 +276,7 @@ class AssetPaths:
         path = Path(os.path.normpath(self.folder / rest)) if found is None else found.resolve()
         common = Path(os.path.commonpath([self._own, path]))
         folder = path.parent if _is_shared(common) or len(common.parts) <= 2 else common
-        return f"move it inside, or allow its folder if you trust the URDF: {option(folder.name, folder)}"
+        return f"move it inside, or allow its folder if you trust the file: {option(folder.name, folder)}"
 
 
 @dataclass(frozen=True)

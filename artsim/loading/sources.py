@@ -31,18 +31,21 @@ class FileSource:
         Digest of the file.
     package_roots : mapping of str to Path
         For ``package://`` meshes.
+    body : str or None
+        Which object of a scene; see :func:`artsim.load`.
     """
 
     path: Path
     name: str
     sha256: str
     package_roots: Mapping[str, Path] = field(default_factory=dict)
+    body: str | None = None
 
     def load(self) -> ArticulatedObject:
         """The object."""
         from artsim.loading.urdf import load
 
-        return load(self.path, package_roots=self.package_roots)
+        return load(self.path, package_roots=self.package_roots, body=self.body)
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,9 @@ def family_sources(
     return [FamilySource(category, seed, constraints) for category in dict.fromkeys(categories) for seed in seeds]
 
 
-def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None) -> list[FileSource]:
+def find_sources(
+    paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None, body: str | None = None
+) -> list[FileSource]:
     """Every object below some paths, in a stable order.
 
     Parameters
@@ -134,6 +139,8 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         ``mobility.xml`` (MJCF), ``mobility.usda`` (USD), ``mobility_v3.json``, ``mobility_v2.json`` or
         ``motion_attributes.json``.
     package_roots : mapping, optional
+    body : str, optional
+        Of scenes of several objects; see :func:`artsim.load`.
 
     Raises
     ------
@@ -156,7 +163,7 @@ def find_sources(paths: Sequence[str | Path], package_roots: Mapping[str, Path] 
         for file in found:
             name = (file.relative_to(given.parent) if given.is_dir() else Path(file.parent.name, file.name)).as_posix()
             data = read_urdf(file, max_bytes(file, LoadLimits()))
-            sources.append(FileSource(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {})))
+            sources.append(FileSource(file, name, hashlib.sha256(data).hexdigest(), dict(package_roots or {}), body))
     return sources
 
 

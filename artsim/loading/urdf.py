@@ -25,7 +25,7 @@ from artsim.loading.bodies import (
 )
 from artsim.loading.described_bodies import with_described_bodies
 from artsim.loading.documents import read_document
-from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, merge_shapes
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_range, merge_shapes
 from artsim.loading.object_files import category_of_folder, find_urdf, max_bytes, object_id, read_urdf
 from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
@@ -49,6 +49,7 @@ def load(
     category: str | None = None,
     package_roots: Mapping[str, str | Path] | None = None,
     limits: LoadLimits | None = None,
+    body: str | None = None,
 ) -> ArticulatedObject:
     """Load an articulated object.
 
@@ -61,9 +62,12 @@ def load(
         Category whose rest state and rest frame are wanted; by default what the side files say, else "unknown", for
         which both are as the file has them.
     package_roots : mapping, optional
-        Folders of ``package://`` names. Meshes outside these and the asset's own folder are refused.
+        Folders of ``package://`` names. Meshes and included files outside these and the asset's own folder are refused.
     limits : LoadLimits, optional
         Bounds on the size of the files.
+    body : str, optional
+        Which object of an MJCF or USD scene: a body, with all that it carries, or ``world``. The error about a scene of
+        several objects names them.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def load(
     side = read_side_files(file)
     roots = _roots(package_roots or {})
     reader = MeshReader(file.parent, roots, limits)
-    robot, repairs, contents = read_document(data, file, reader, side.helpers)
+    robot, repairs, contents = read_document(data, file, reader, side.helpers, body)
 
     repairs += side.repairs
     category = canonical_category(category or side.category or category_of_folder(file) or "unknown")
@@ -94,7 +98,9 @@ def load(
     _read_geometry(bodies, robot, reader, file, repairs)
     repairs += reader.paths.repairs
     helpers = (*side.helpers, *robot.helpers)
-    bodies = join_screws(without_empty_leaves(bodies, repairs), helpers, repairs, guessed=not robot.explicit)
+    bodies = join_screws(
+        without_empty_leaves(bodies, repairs, robot.noun), helpers, repairs, guessed=not robot.explicit
+    )
     bodies, exported = in_order(bodies, side.parts, repairs)
     tree, source_joints = _tree(bodies, file)
     parts = [body.part({**robot.labels, **side.labels}) for body in bodies]
@@ -108,15 +114,16 @@ def load(
     repairs += reasons
     T_base_part = tree.forward_kinematics(rest)
     tree, parts, T_base_rest, reasons = _to_rest_frame(tree, parts, rest, known)
-    parts = with_described_bodies(parts, bodies, robot, reader, matmul(np.linalg.inv(T_base_rest), T_base_part))
+    T_rest_part = matmul(np.linalg.inv(T_base_rest), T_base_part)
+    parts = with_described_bodies(parts, bodies, robot, reader, T_rest_part, file)
     repairs += reasons
     repairs += _far_slides(tree, parts)
     return ArticulatedObject(
-        object_id=object_id(file, side.object_id),
+        object_id=object_id(file, side.object_id) + ("" if body is None else f"_{body}"),
         category=category,
         parts=tuple(parts),
         native_tree=tree,
-        sha256=content_sha256([data, *contents, *side.contents, *reader.contents]),
+        sha256=content_sha256([data, *contents, *side.contents, *reader.contents, *([body.encode()] if body else [])]),
         T_base_rest=T_base_rest,
         repairs=tuple(repairs),
         source=str(file),
@@ -157,23 +164,23 @@ def _read_geometry(
         surfaces = []
         unusable = []
         for name in body.links:
-            found, problems = _surfaces(links[name], body.T_base_link[name], reader, file)
+            found, problems = _surfaces(links[name], body.T_base_link[name], reader, file, robot.noun)
             surfaces += found
-            unusable += [f"link {name!r}: {problem}" for problem in problems]
-            repairs += [Repair(f"link {name!r}", f"{problem}: left out") for problem in problems]
+            unusable += [f"{robot.noun} {name!r}: {problem}" for problem in problems]
+            repairs += [Repair(f"{robot.noun} {name!r}", f"{problem}: left out") for problem in problems]
         if unusable and not surfaces:
             raise AssetError(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
         body.vertices, body.faces = merge_shapes(surfaces)
-        _check_range(body.vertices, f"{file}: link {body.links[0]!r}")
+        check_range(body.vertices, f"{file}: {robot.noun} {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
-        raise AssetError("no link has any geometry", file, "give a link a visible shape")
+        raise AssetError(f"no {robot.noun} has any geometry", file, f"give a {robot.noun} a visible shape")
 
 
 def _surfaces(
-    link: UrdfLink, T_base_link: Array, reader: MeshReader, file: Path
+    link: UrdfLink, T_base_link: Array, reader: MeshReader, file: Path, noun: str
 ) -> tuple[list[tuple[Array, NDArray[np.int32], Array]], list[str]]:
     """Vertices, triangles and transform into the base frame of each shape of a link, and why others are left out.
 
@@ -188,7 +195,7 @@ def _surfaces(
     for shape in link.shapes:
         try:
             vertices, faces = reader.shape(shape.geometry)
-            _check_range(vertices, f"{file}: link {link.name!r}")
+            check_range(vertices, f"{file}: {noun} {link.name!r}")
             if _is_thin(vertices, faces):
                 raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line or in a point")
         except UnusableMeshError as problem:
@@ -200,28 +207,11 @@ def _surfaces(
     if problems and not surfaces:
         count = len(problems)
         raise AssetError(
-            f"none of the {count} meshes of link {link.name!r} can be used: {problems[0]}",
+            f"none of the {count} meshes of {noun} {link.name!r} can be used: {problems[0]}",
             file,
             fix or "restore the mesh files; an object with an invisible part would give wrong data",
         )
     return surfaces, [*problems, *link.empty]
-
-
-_LARGEST = 1e6
-"""Metres, or units of a file in millimetres: squares and products of much larger coordinates overflow."""
-
-
-def _check_range(vertices: Array, where: str) -> None:
-    """Refuse coordinates that nothing can be computed with.
-
-    Raises
-    ------
-    AssetError
-    """
-    if not (np.abs(vertices) <= _LARGEST).all():
-        raise AssetError(
-            f"a coordinate is not finite, or over {_LARGEST:g}", where, "write sizes, origins and meshes in metres"
-        )
 
 
 def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:

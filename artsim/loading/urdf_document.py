@@ -179,6 +179,8 @@ class UrdfRobot:
         What links are, where the document says so.
     helpers : tuple of str
         Links without a shape between the two joints of a screw.
+    noun : str
+        What the document calls a link, for messages.
     """
 
     links: tuple[UrdfLink, ...]
@@ -186,3 +188,4 @@ class UrdfRobot:
     explicit: bool = False
     labels: Mapping[str, str] = field(default_factory=dict)
     helpers: tuple[str, ...] = ()
+    noun: str = "link"

@@ -49,13 +49,15 @@ _HULL = "convexHull"
 _UNREAD = ("PointInstancer", "Plane", "BasisCurves", "NurbsPatch", "Points", "TetMesh")
 
 
-def read_usd(file: Path, limits: LoadLimits) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
+def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
     """Links and joints of a USD file.
 
     Parameters
     ----------
     file : Path
     limits : LoadLimits
+    body : str, optional
+        Which object of a scene: see :func:`artsim.loading.scene_objects.chosen`.
 
     Returns
     -------
@@ -80,7 +82,7 @@ def read_usd(file: Path, limits: LoadLimits) -> tuple[UrdfRobot, list[Repair], l
         links = _StageReader(stage, file, limits, repairs).links()
     except Tf.ErrorException as error:  # values are read when they are asked for
         raise unreadable(file, error) from error
-    return as_document(links, file, repairs), repairs, contents
+    return as_document(links, file, repairs, body), repairs, contents
 
 
 @dataclass(eq=False)

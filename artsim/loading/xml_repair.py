@@ -1,7 +1,8 @@
 """XML as people write it becomes XML that a parser accepts, and elements get the names that URDF gives them.
 
 Tools built on TinyXML read files that are not XML: with blank lines before the declaration, with a version 0.0, with
-prefixes that nothing declares. Such files are mended as text before they are parsed, and every mend is recorded.
+prefixes that nothing declares, with attributes that touch each other. Such files are mended as text before they are
+parsed, and every mend is recorded.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ _ENCODINGS = re.compile(
 _DECLARATION = re.compile(r"<\?xml\b([^>]*?)\?>", re.IGNORECASE)
 _OPENING = re.compile(r"""(<[^\s/>]+)(?:\s+[^\s=>/]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
 _DECLARED = re.compile(r"\sxmlns:([\w.-]+)\s*=")
+_TOUCHING = re.compile(r"""["'](?<=[^=\s].)(?=[A-Za-z_][\w.:-]{0,100}\s{0,9}=\s{0,9}["'])""")
+_BARE_AND = re.compile(r"&(?!#?\w{1,20};)")
 _MAX_PREFIXES = 100
 _NOT_EXPANDED = "is a xacro file that is not expanded yet: it has "
 UNDECLARED = "urn:undeclared:"
@@ -70,7 +73,7 @@ def readable_xml(data: bytes, where: Path) -> tuple[bytes, list[Repair]]:
     if start < 0:
         return data, []
     _judge_prolog(text[:start], stray, repairs)
-    body = _without_tail(text[start:], repairs)
+    body = _as_tinyxml_reads(_without_tail(text[start:], repairs), repairs)
     return ("\n" * text.count("\n", 0, start) + _with_prefixes(body, repairs)).encode(), repairs
 
 
@@ -140,6 +143,29 @@ def _without_tail(body: str, repairs: list[Repair]) -> str:
     if tail:
         repairs.append(Repair(WHERE, f"text after its top element left out: {tail[:40]!r}"))
     return body[:end]
+
+
+def _as_tinyxml_reads(body: str, repairs: list[Repair]) -> str:
+    """The document with blanks between attributes that touch, ``&`` written out, and comments that hold no ``--``."""
+    if "--" in body.replace("<!--", "").replace("-->", ""):
+        body = _without_comments(body)
+    for pattern, by, said in (
+        (_TOUCHING, r"\g<0> ", "attributes that touch each other read as if a blank stood between them"),
+        (_BARE_AND, "&amp;", "& read as a character of its own"),
+    ):
+        body, count = pattern.subn(by, body)
+        if count:
+            repairs.append(Repair(WHERE, said))
+    return body
+
+
+def _without_comments(body: str) -> str:
+    """The document without comments, on the same lines; one that does not end stays."""
+    kept, at = [], 0
+    while (begin := body.find("<!--", at)) >= 0 and (end := body.find("-->", begin + 4)) >= 0:
+        kept += [body[at:begin], "\n" * body.count("\n", begin, end)]
+        at = end + 3
+    return "".join([*kept, body[at:]])
 
 
 def _with_prefixes(body: str, repairs: list[Repair]) -> str:

@@ -16,10 +16,11 @@ import numpy as np
 from artsim.common.products import matmul
 from artsim.errors import AssetError
 from artsim.loading.joint_xml import settle_limits
+from artsim.loading.scene_objects import chosen
 from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
-from artsim.model.kinematics import Array
+from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics, Repair
 
 WORLD = "world"
@@ -78,7 +79,7 @@ class WorldLink:
     inertia: Inertia | None = None
 
 
-def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -> UrdfRobot:
+def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> UrdfRobot:
     """Links and joints of an object.
 
     Parameters
@@ -90,17 +91,21 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -
         For messages.
     repairs : list of Repair
         Added to.
+    body : str, optional
+        Which object of a scene: see :func:`artsim.loading.scene_objects.chosen`.
 
     Raises
     ------
     AssetError
-        When two links or two joints have the same name, or a number is not finite.
+        When it holds several objects of which none is chosen, two links or two joints have the same name, or a number
+        is not finite.
     """
+    links = chosen(links, file, repairs, body)
     root = _root(links)
     if root > 0:
         links = [replace(links[root], parent=-1, joint=None), *_without(links, root)]
-    _check_names([link.name for link in links], "link", file)
-    _check_names([link.joint.name for link in links if link.joint is not None], "joint", file)
+    _check_names([link.name for link in links], "bodies", file)
+    _check_names([link.joint.name for link in links if link.joint is not None], "joints", file)
     origins = [np.zeros(3) if link.joint is None else link.joint.anchor for link in links]
     found, joints = [], []
     for k, link in enumerate(links):
@@ -115,7 +120,7 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair]) -
         found.append(UrdfLink(link.name, shapes, collision=collision, inertia=inertia))
         if link.joint is not None:
             joints.append(_joint(link, links[link.parent].name, origins[k] - origins[link.parent], file, repairs))
-    return UrdfRobot(tuple(found), tuple(joints), explicit=True)
+    return UrdfRobot(tuple(found), tuple(joints), explicit=True, noun="body")
 
 
 def _root(links: Sequence[WorldLink]) -> int:
@@ -149,20 +154,22 @@ def _joint(link: WorldLink, parent: str, offset: Array, file: Path, repairs: lis
     return UrdfJoint(joint.name, kind, parent, link.name, origin, joint.axis, lower, upper, joint.mimic, joint.dynamics)
 
 
-def _check_names(names: Sequence[str], what: str, file: Path) -> None:
+def _check_names(names: Sequence[str], plural: str, file: Path) -> None:
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise AssetError(f"two {what}s are called {name!r}", file, "give each its own name")
+            raise AssetError(f"two {plural} are called {name!r}", file, "give each its own name")
         seen.add(name)
 
 
 def _check_finite(link: WorldLink, arrays: Sequence[Array], file: Path) -> None:
     inertia = link.inertia
-    more = [] if inertia is None else [np.array(inertia.mass), inertia.center, inertia.tensor]
-    if not all(np.isfinite(array).all() for array in (*arrays, *more)):
+    more = [] if inertia is None else [np.array(inertia.mass), inertia.center, inertia.tensor / LARGEST]
+    if not all((np.abs(array) <= LARGEST).all() for array in (*arrays, *more)):
         raise AssetError(
-            "a position, size or mass is not finite", f"{file}: link {link.name!r}", "write finite numbers"
+            f"a position, size or mass is not finite, or over {LARGEST:g}",
+            f"{file}: body {link.name!r}",
+            "write metres and kilograms",
         )
 
 

@@ -124,7 +124,7 @@ def convex_hull(points: Array, thickness: float) -> Mesh:
 def is_flat(points: Array) -> bool:
     """Whether points lie in a plane, as near as a file in single precision can tell."""
     from_middle = points - points.mean(axis=0)
-    extents = np.ptp(from_middle @ np.linalg.svd(from_middle, full_matrices=True)[2].T, axis=0)
+    extents = np.ptp(from_middle @ _principal_axes(from_middle).T, axis=0)
     return bool(extents.min() <= _PLANE * extents.max())
 
 
@@ -141,12 +141,18 @@ def _hull(points: Array) -> trimesh.Trimesh | None:
 
 def _thickened(points: Array, thickness: float) -> Array:
     """Points, moved both ways along each of their principal axes along which they take up less than a thickness."""
-    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)
-    for axis in axes:
+    for axis in _principal_axes(points - points.mean(axis=0)):
         lacking = thickness - float(np.ptp(points @ axis))
         if lacking > 0:
             points = np.concatenate([points - 0.5 * lacking * axis, points + 0.5 * lacking * axis])
     return points
+
+
+def _principal_axes(from_middle: Array) -> Array:
+    """(3, 3) principal axes of (N, 3) points about their middle, as rows."""
+    # The full matrices of N points hold N x N numbers, and are needed for three axes of fewer than three points alone.
+    axes: Array = np.linalg.svd(from_middle, full_matrices=len(from_middle) < 3)[2]
+    return axes
 
 
 def is_convex(vertices: Array, faces: NDArray[np.int32]) -> bool:

@@ -38,7 +38,8 @@ class Vary:
     formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
     """File formats: mobility.urdf, mobility.xml, mobility.usda."""
     package_root: PackageRoots = field(default_factory=dict)
-    """Folders that package:// names stand for, where they are not found as they are; repeatable."""
+    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
+    below these folders, too. Repeatable."""
 
     def run(self) -> None:
         from artsim.variation.folder import write_variations

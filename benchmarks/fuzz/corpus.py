@@ -19,7 +19,7 @@ from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import box
 from artsim.model.object_file import save_object
 from artsim.model.objects import ArticulatedObject
-from benchmarks.fuzz import texts
+from benchmarks.fuzz import mjcf_texts, texts
 from benchmarks.fuzz.mutations import npy_bytes
 
 
@@ -89,6 +89,8 @@ def _robots() -> Iterator[Seed]:
     yield Seed("urdf", "pair", pair, "mobility.urdf", "xml")
     yield Seed("urdf", "chain", {"mobility.urdf": texts.CHAIN.encode(), "m.obj": texts.OBJ}, "mobility.urdf", "xml")
     yield Seed("urdf", "mjcf", {"mobility.xml": texts.MJCF.encode(), "m.obj": texts.OBJ}, "mobility.xml", "xml")
+    for name, files in mjcf_texts.files(texts.OBJ).items():
+        yield Seed("urdf", f"mjcf_{name}", files, "mobility.xml", "xml")
     yield Seed("urdf", "usd", {"mobility.usda": texts.USD.encode()}, "mobility.usda", "text")
     for member, form in (("meta.json", "json"), ("semantics.txt", "text"), ("mobility_v2.json", "json")):
         yield Seed("side", member.partition(".")[0], pair, member, form)
@@ -108,6 +110,7 @@ def _meshes() -> Iterator[Seed]:
         "dae": ("dae", texts.DAE, "xml"),
         "glb": ("glb", block.export(file_type="glb"), "glb"),
         "gltf": ("gltf", buffer, "json"),
+        "msh": ("msh", mjcf_texts.msh(), "binary"),
     }
     for name, (suffix, content, form) in contents.items():
         files = {"mobility.urdf": texts.MESH_ROBOT.format(suffix).encode(), f"m.{suffix}": content}

@@ -12,6 +12,7 @@ import numpy as np
 
 from artsim.loading.mesh_files.dae import read_dae
 from artsim.loading.mesh_files.gltf import read_gltf
+from artsim.loading.mesh_files.msh import read_msh
 from artsim.loading.mesh_files.obj import read_obj
 from artsim.loading.mesh_files.ply import read_ply
 from artsim.loading.mesh_files.stl import read_stl
@@ -19,7 +20,7 @@ from artsim.loading.mesh_files.surface import Bounds, Surface, UnusableMeshError
 
 __all__ = ["FORMATS", "Bounds", "Surface", "UnusableMeshError", "read_mesh"]
 
-FORMATS = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
+FORMATS = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply", ".msh")
 """What mesh files may be called."""
 
 
@@ -60,4 +61,6 @@ def read_mesh(data: bytes, kind: str, bounds: Bounds, neighbour: Callable[[str],
             return read_dae(data, bounds)
         if kind == ".ply":
             return read_ply(data, bounds)
+        if kind == ".msh":
+            return read_msh(data, bounds)
         return read_gltf(data, bounds, neighbour)

@@ -104,5 +104,5 @@ def test_the_triangles_that_are_counted_are_those_of_a_primitive(geometry: Geome
 def test_kinds_that_are_not_read_are_listed(tmp_path: Path) -> None:
     (tmp_path / "m.fbx").write_bytes(b"x")
     (tmp_path / "r.urdf").write_text(urdf("m.fbx"))
-    with pytest.raises(AssetError, match=re.escape("(.obj, .stl, .dae, .glb, .gltf, .ply)")):
+    with pytest.raises(AssetError, match=re.escape("(.obj, .stl, .dae, .glb, .gltf, .ply, .msh)")):
         load(tmp_path)

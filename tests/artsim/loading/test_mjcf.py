@@ -253,27 +253,22 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         MESH, '<compiler meshdir=".."/>' + asset('<mesh name="m" file="secret.obj"/>'), "", "outside the asset's folder"
     ),
     "missing mesh": (MESH, asset('<mesh name="m" file="gone.obj"/>'), "", "gone.obj' is missing"),
-    "include outside": ('<include file="../secret.xml"/>', "", "", "outside its folder"),
+    "include outside": ('<include file="../secret.xml"/>', "", "", "outside the asset's folder.*--package-root"),
     "circular include": ('<include file="object.xml"/>', "", "", "twice"),
     "another model": (BOX, asset('<model name="m" file="m.xml"/>'), "", "<model> is not read"),
     "many copies": (
-        f'<replicate count="100000"><body>{BOX}</body></replicate>', "", "", "more than 1000 <body> elements"
+        f'<replicate count="100000"><body>{BOX}</body></replicate>', "", "", "more than [0-9]+ <"
     ),
     "copies of copies": (
         "<replicate count='100'>" * 4 + BOX + "</replicate>" * 4, "", "", "more than [0-9]+ <"
     ),
-    "built mesh": (MESH, asset('<mesh name="m" builtin="sphere" params="9"/>'), "", "builds itself"),
-    "ball joint": (f'<body name="a">{BOX}<body name="b"><joint type="ball"/>{BOX}</body></body>', "", "", "ball joint"),
-    "loop": (
-        f'<body name="a">{BOX}<body name="b"><joint/>{BOX}</body></body>',
-        "", '<equality><connect body1="a" body2="b" anchor="0 0 0"/></equality>', "closed chains are not trees",
-    ),
+    "mesh of many sides": (MESH, asset('<mesh name="m" builtin="cone" params="1e6 1"/>'), "", "over 100 sides"),
     "two objects": (
-        f"<body><freejoint/>{BOX}</body><body><freejoint/>{BOX}</body>", "", "", "floating joint inside"
+        f"<body><freejoint/>{BOX}</body><body><freejoint/>{BOX}</body>", "", "", "holds 2 objects: body1, body2"
     ),
     "no mass": ('<body name="a"><joint/></body>', "", "", "MuJoCo refuses it"),
-    "nothing to see": ('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>', "", "", "geometry"),
-    "not a number": ('<body name="a" pos="nan 0 0"><geom size="1"/></body>', "", "", "MuJoCo refuses|not finite"),
+    "nothing to see": ('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>', "", "", "no geom that is"),
+    "not a number": ('<body name="a" pos="nan 0 0"><geom size="1"/></body>', "", "", "pos of <body> is not a number"),
 }  # fmt: skip
 
 

@@ -113,7 +113,7 @@ def test_joints_have_their_types_and_limits(
 ) -> None:
     path = written(tmp_path, PAIR + joint(kind, "base", "lid", more))
     if types is None:  # two bodies that nothing joins are two objects
-        with pytest.raises(AssetError, match="floating joint"):
+        with pytest.raises(AssetError, match="holds 2 objects: base, lid"):
             load(path)
         return
     obj = load(path)
@@ -235,7 +235,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "loop": (LOOP, "closes a chain"),
     "no such body": (PAIR + joint("Revolute", "base", "nobody"), "does not exist"),
     "itself": (PAIR + joint("Revolute", "base", "base"), "joins a body to itself"),
-    "nothing to see": ('def Xform "a" {}', "no link has any geometry"),
+    "nothing to see": ('def Xform "a" {}', "no body has any geometry"),
     "flat": (
         f'def Xform "a" ({BODY}) {{ float3 xformOp:scale = (1, 0, 1)\n'
         'uniform token[] xformOpOrder = ["xformOp:scale"] }',
