@@ -53,8 +53,7 @@ class Estimate:
     axis: see --depth-kind.
 
     Masks: .png .bmp .gif .tif .pgm .jpg .webp in any mode, .npy, .npz. The object is what is not black, whatever alpha
-    says; of a JPEG what is lighter than 127; of a soft mask what is over half; of artsim's own part_mask.png what is not
-    255.
+    says; of a JPEG, or a soft mask, what is over half; of artsim's own part_mask.png what is not 255.
 
     Intrinsics: .json of artsim (fx, fy, cx, cy, or K), BOP (camera.json, scene_camera.json), Open3D, RealSense, ROS
     CameraInfo, NeRF (transforms.json); .yaml of ROS and OpenCV; a 3 x 3 matrix as .txt, .npy or .npz. The centre of the

@@ -148,6 +148,8 @@ def points_of_depth(
     ArtsimError
         When shapes do not fit, or there is no depth within the mask.
     """
+    if isinstance(depth, np.ma.MaskedArray):  # what is masked was not measured
+        depth = np.ma.filled(depth.astype(np.float64), np.nan)
     depth, K = np.asarray(depth, dtype=np.float64), np.asarray(K, dtype=np.float64)
     if depth.ndim != 2:
         raise ArtsimError(f"an array of shape {depth.shape} is no depth image", "depth", "pass (H, W) metres")

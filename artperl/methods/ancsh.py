@@ -19,7 +19,7 @@ from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.core.part_estimate import estimate_of_parts
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.fitting.inferred_parts import place_inferred, turn_inferred
 from artperl.fitting.joint_votes import vote_axis, vote_pivot
 from artperl.fitting.kinematic_pairs import couple_rotations
@@ -108,9 +108,9 @@ class ANCSH:
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
         clock, rng = Clock(), np.random.default_rng(0)
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             cloud = Cloud.of(points, self.options.num_points)
-            warnings = cloud_warnings(cloud.points, cloud.good)
+            warnings = cloud_warnings(cloud)
             clouds = Clouds.of(cloud.tensor(next(self.joints.parameters()).device))
             with clock("coordinates"):
                 places = self._places(cloud, clouds)

@@ -25,6 +25,7 @@ from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.estimate import Estimate, estimate_of_fit
 from artperl.core.pose import Theta
 from artperl.core.shapes import Observed, Shapes
+from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import part_weights
 from artperl.fitting.levenberg_marquardt import Refined, refine
 from artperl.fitting.part_symptoms import symptoms_by_part
@@ -65,6 +66,7 @@ class ArtPERL(AgentMethod):
     policy: Policy
     options: ArtPERLOptions
 
+    @steady_torch()
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.
 
@@ -80,7 +82,7 @@ class ArtPERL(AgentMethod):
         """
         clock = Clock()
         cloud = Cloud.of(points, self.options.num_points)
-        warnings, sampled = cloud_warnings(cloud.points, cloud.good), cloud.tensor(self.device)
+        warnings, sampled = cloud_warnings(cloud), cloud.tensor(self.device)
         with clock("segmentation"):
             part, certainty = self.parts(sampled)
         with clock("retrieval"):

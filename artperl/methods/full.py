@@ -20,7 +20,7 @@ from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.estimate import Estimate, estimate_of_fit, widen
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import Context
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.occluded_parts import pose_occluded_parts
@@ -105,7 +105,7 @@ class Estimator:
 
     def with_fit(self, points: ArrayLike) -> tuple[Estimate, Fit]:
         """An estimate, and the fitted reference that it is of."""
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             clock = Clock()
             estimate, known, fit = self._fit(points, clock)
             if self.boxes is None:
@@ -123,7 +123,7 @@ class Estimator:
 
     def evidence(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             estimate, known, _ = self._fit(points, Clock())
             return estimate, *known.evidence(estimate, self.perception.num_rows)
 
@@ -136,7 +136,7 @@ class Estimator:
         options = self.options
         with clock("clean"):
             cloud = Cloud.of(points, options.num_points)
-            warnings = cloud_warnings(cloud.points, cloud.good)
+            warnings = cloud_warnings(cloud)
         cloud, clouds, perceived, foreign = self._perceive_own(cloud, clock)
         seen = cloud.tensor(self.perception.device)
         with clock("retrieval"):

@@ -20,7 +20,7 @@ from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.core.part_estimate import estimate_of_parts
 from artperl.core.pose import Theta
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.core.trees import Trees
 from artperl.fitting.keypoint_fit import KeypointFit, fit_keypoints, posed_keypoints, snap_keypoints
 from artperl.perception.cloud_checks import cloud_warnings
@@ -89,9 +89,9 @@ class OMAD:
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
         clock, device = Clock(), next(self.cues.parameters()).device
-        with one_thread(), torch.no_grad():
+        with steady_torch(), torch.no_grad():
             cloud = Cloud.of(points, self.options.num_points)
-            warnings = cloud_warnings(cloud.points, cloud.good)
+            warnings = cloud_warnings(cloud)
             clouds = Clouds.of(cloud.tensor(device))
             with clock("cues"):
                 cues = self.cues(clouds.points)

@@ -21,7 +21,7 @@ from artperl.core.estimate import Estimate, visibility
 from artperl.core.part_estimate import estimate_of_parts
 from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.core.trees import KINDS
 from artperl.methods.retrieved import AgentMethod
 from artperl.perception.cloud_checks import cloud_warnings
@@ -50,9 +50,9 @@ class SporeAgent(AgentMethod):
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
         clock = Clock()
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             cloud = Cloud.of(points, self.options.num_points)
-            warnings, sampled = cloud_warnings(cloud.points, cloud.good), cloud.tensor(self.device)
+            warnings, sampled = cloud_warnings(cloud), cloud.tensor(self.device)
             with clock("segmentation"):
                 part = self.segment(sampled)
             with clock("retrieval"):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.perception.preprocess import is_measured
+from artperl.perception.preprocess import Cloud, is_measured
 
 Array = NDArray[np.float64]
 
@@ -26,18 +26,10 @@ _FEW = 128
 """Points below which estimates are guesses; estimators look at 1,024 and more."""
 
 
-def cloud_warnings(points: Array, good: NDArray[np.int64]) -> tuple[str, ...]:
-    """One line for each thing that looks wrong, with its fix for the command line and for Python.
-
-    Parameters
-    ----------
-    points : (N, 3) float
-        Camera frame, metres.
-    good : (M,) int64
-        Those that show the object, see :func:`artperl.perception.preprocess.clean`.
-    """
-    shown = points[good]
-    return (*_unit(shown), *_axes(shown), *_missing(points), *_few(shown))
+def cloud_warnings(cloud: Cloud) -> tuple[str, ...]:
+    """One line for each thing that looks wrong, with its fix for the command line and for Python."""
+    shown = cloud.points[cloud.good]
+    return (*_unit(shown), *_axes(shown), *_missing(cloud.points, cloud.masked), *_few(shown))
 
 
 def _unit(shown: Array) -> list[str]:
@@ -76,10 +68,10 @@ def _axes(shown: Array) -> list[str]:
     return []
 
 
-def _missing(points: Array) -> list[str]:
+def _missing(points: Array, masked: int) -> list[str]:
     origin = float((points == 0).all(axis=1).mean())
-    lost = float((~is_measured(points)).mean()) - origin
-    warnings = []
+    lost = float((~is_measured(points)).mean()) - origin - masked / len(points)
+    warnings = [f"{masked} rows of the masked array are left out. Fix: none is needed"] if masked else []
     if origin > _MANY:
         warnings.append(
             f"{100 * origin:.0f} % of the points are at exactly 0 0 0, where sensors put what they did not measure:"

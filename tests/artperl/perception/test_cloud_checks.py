@@ -9,7 +9,7 @@ import pytest
 
 from artperl.methods.full import Estimator
 from artperl.perception.cloud_checks import cloud_warnings
-from artperl.perception.preprocess import clean
+from artperl.perception.preprocess import Cloud
 from artsim.observing.sample import Sample
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -17,7 +17,7 @@ CLOUD = np.load(CASES / "E00" / "c.npy").astype(np.float64)
 
 
 def _said(points: np.ndarray) -> tuple[str, ...]:
-    return cloud_warnings(points, clean(points))
+    return cloud_warnings(Cloud.of(points, 1024))
 
 
 def _with(value: float, share: float) -> np.ndarray:
