@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import tyro
 
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 from artsim.common.progress import say
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
@@ -117,7 +117,7 @@ class Evaluate:
             raise ConfigError("conditions are of a benchmark", "conditions", "use --benchmark robustness")
         figures = self._single() if self.benchmark is None else self._benchmark()
         if self.json is not None:
-            write_atomic(self.json, _json(figures))
+            write_output(self.json, _json(figures))
 
     def _ablation(self) -> None:
         from artperl.data.categories import ARTIMAGE

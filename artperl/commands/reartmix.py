@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from artperl.detection import SHIPPED
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 from artsim.common.program import cores
 from artsim.common.progress import say
 from artsim.errors import ConfigError
@@ -59,4 +59,4 @@ def evaluate_reartmix(options: Evaluate) -> None:
     estimator = SceneEstimator(named, options.detector or SHIPPED, apart=options.apart, **told)
     figures = run_reartmix(images, detections, estimator, True, say, options.picture, options.json)
     if options.json is not None:
-        write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())
+        write_output(options.json, (json.dumps(figures, indent=1) + "\n").encode())

@@ -23,8 +23,8 @@ _OUTLIER = 6.0
 """A point with fewer neighbours than that within so many times the usual distance is an outlier: thin legs are not."""
 _CELLS = 65536
 """Cells to either side of the middle, in each direction, within which points are looked for in cells."""
-_ALONG = (0.8270306, 0.4870741, 0.2806093)
-"""Direction along which hardly two points of an image, or of a grid, are level."""
+_LEVEL = 2e-5
+"""Slope by which rows of an image differ more, and rounding differs less."""
 _CLEANED = 4096
 """Points that are looked at for outliers."""
 _FEWEST = 8
@@ -141,8 +141,8 @@ def is_measured(points: Array) -> NDArray[np.bool_]:
 def clean(points: Array) -> NDArray[np.int64]:
     """Indices of the points that show the object: measured, and not on their own.
 
-    They are ordered by where the points are, since some of them are drawn by their places in this order: so an estimate
-    is of the set of points, whatever their order.
+    They are ordered as a camera sees them, row by row, since some of them are drawn by their places in this order: an
+    estimate is of the set of points, however they are ordered.
 
     Raises
     ------
@@ -151,8 +151,7 @@ def clean(points: Array) -> NDArray[np.int64]:
     """
     points = as_cloud(points)
     good = np.flatnonzero(is_measured(points))
-    x, y, z = points[good].T
-    good = good[np.argsort(_ALONG[0] * x + _ALONG[1] * y + _ALONG[2] * z, kind="stable")]
+    good = good[_as_seen(points[good])]
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = KDTree.of(points[known])
@@ -167,6 +166,16 @@ def clean(points: Array) -> NDArray[np.int64]:
             f"{len(good)} of {len(points)} points show an object", "points", "pass a cloud of the object, in metres"
         )
     return good
+
+
+def _as_seen(points: Array) -> NDArray[np.int64]:
+    """(N,) order of points by the row, then the column, in which a camera sees them; the nearest first."""
+    x, y, z = points.T
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        row, column = np.rint(y / z / _LEVEL), x / z
+    if ((np.diff(row) > 0) | ((np.diff(row) == 0) & (np.diff(column) > 0))).all():  # as of an image
+        return np.arange(len(points))
+    return np.lexsort((z, column, row))
 
 
 def _is_crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]:
