@@ -25,7 +25,7 @@ from artperl.fitting.joint_votes import vote_axis, vote_pivot
 from artperl.fitting.kinematic_pairs import couple_rotations
 from artperl.fitting.umeyama import Similarity, ransac_umeyama
 from artperl.perception.ancsh_networks import CoordinateNetwork, JointNetwork
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.category_prior import CategoryPrior
 from artperl.retrieval.part_names import part_names
@@ -121,7 +121,8 @@ class ANCSH:
             with clock("kinematics"):
                 estimate = self._couple(places, fits, axis, origin)
         return replace(
-            estimate, part=cloud.for_every_point(places.part, -1), milliseconds=clock.milliseconds, warnings=warnings,
+            estimate, part=cloud.for_every_point(places.part, -1), milliseconds=clock.milliseconds,
+            warnings=with_size(warnings, estimate.size, self.categories),
             part_names=part_names(self.base, 0, self.base.shapes[[0]]),
         )  # fmt: skip
 

@@ -29,7 +29,7 @@ from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import Fit, find_fit
 from artperl.methods.many import estimate_many
 from artperl.methods.tracking import track
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.perception.part_grouping import group_votes
@@ -166,7 +166,7 @@ class Estimator:
                 foreign=foreign,
                 milliseconds=clock.milliseconds,
                 part_names=part_names(self.base, fit.row, fit.shapes),
-                warnings=warnings,
+                warnings=with_size(warnings, estimate.size, self.categories),
             )
             symptoms = part_symptoms(fit.shapes, fit.observed, fit.theta, perceived.to("cpu"), estimate.visibility)
             estimate = estimate.judged(self.calibration, self.part_calibration, symptoms)

@@ -23,7 +23,7 @@ from artperl.core.pose import Theta
 from artperl.core.threads import steady_torch
 from artperl.core.trees import Trees
 from artperl.fitting.keypoint_fit import KeypointFit, fit_keypoints, posed_keypoints, snap_keypoints
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.omad_networks import CueNetwork, Cues, KeypointPrior, rotation_of_quaternion
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.category_prior import CategoryPrior
@@ -105,7 +105,8 @@ class OMAD:
             estimate = self._report(clouds, fit, part, target, weight)
         return replace(
             estimate, part=cloud.for_every_point(part[0].cpu().numpy(), -1), milliseconds=clock.milliseconds,
-            warnings=warnings, part_names=part_names(self.base, 0, self.base.shapes[[0]]),
+            warnings=with_size(warnings, estimate.size, self.categories),
+            part_names=part_names(self.base, 0, self.base.shapes[[0]]),
         )  # fmt: skip
 
     def trees(self, device: torch.device, count: int = 1) -> Trees:

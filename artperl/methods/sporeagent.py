@@ -24,7 +24,7 @@ from artperl.core.shapes import Observed, Shapes
 from artperl.core.threads import steady_torch
 from artperl.core.trees import KINDS
 from artperl.methods.retrieved import AgentMethod
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 
@@ -67,7 +67,8 @@ class SporeAgent(AgentMethod):
             estimate = self._report(reference, observed, posed, start)
         return replace(
             estimate, part=cloud.for_every_point(observed.part[0].cpu().numpy(), -1), reference=self.base.name(row),
-            milliseconds=clock.milliseconds, warnings=warnings, part_names=part_names(self.base, row, reference),
+            milliseconds=clock.milliseconds, warnings=with_size(warnings, estimate.size, self.categories),
+            part_names=part_names(self.base, row, reference),
         )  # fmt: skip
 
     @torch.no_grad()

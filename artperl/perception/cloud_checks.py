@@ -5,9 +5,12 @@ A fit has no scale of its own: a laptop of 180 m fits as well as one of 0.3 m. S
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from artperl.core.usual_sizes import size_warning
 from artperl.perception.preprocess import Cloud, is_measured
 
 Array = NDArray[np.float64]
@@ -16,6 +19,7 @@ _LARGEST, _SMALLEST = 5.0, 0.005
 """Metres. Garage doors and earrings are beyond what the estimators know, and files in millimetres are, too."""
 _LIKELY = (0.05, 3.0)
 """Metres that most articulated objects measure, for a guess at the unit."""
+_UNIT = "hardly is in metres"
 _OUTERMOST = 1.0
 """Percent of the points on each side that are left out of an extent."""
 _MANY = 0.1
@@ -32,6 +36,14 @@ def cloud_warnings(cloud: Cloud) -> tuple[str, ...]:
     return (*_unit(shown), *_axes(shown), *_missing(cloud.points, cloud.masked), *_few(shown))
 
 
+def with_size(warnings: tuple[str, ...], size: Array, categories: Sequence[str]) -> tuple[str, ...]:
+    """Warnings, with one of an object's size if its boxes (K, 3) are not of its category and nothing is said yet."""
+    if any(_UNIT in text for text in warnings):
+        return warnings
+    said = size_warning(float(np.linalg.norm(size, axis=1).max()), categories)
+    return warnings if said is None else (*warnings, said)
+
+
 def _unit(shown: Array) -> list[str]:
     low, high = np.percentile(shown, [_OUTERMOST, 100.0 - _OUTERMOST], axis=0)
     extent = float((high - low).max())
@@ -42,12 +54,12 @@ def _unit(shown: Array) -> list[str]:
             f"--unit {name} ({extent * factor:.2g} m; in Python: points * {factor:g})" for name, factor in likely
         )
         return [
-            f"the object is {extent:.3g} m across, so that the cloud hardly is in metres. Fix: add"
+            f"the object is {extent:.3g} m across, so that the cloud {_UNIT}. Fix: add"
             f" {fixes or '--unit mm'}; or crop the cloud to the object"
         ]
     if extent < _SMALLEST:
         return [
-            f"the object is {1000 * extent:.2g} mm across, so that the cloud hardly is in metres. Fix: leave out --unit"
+            f"the object is {1000 * extent:.2g} mm across, so that the cloud {_UNIT}. Fix: leave out --unit"
             " and --depth-scale, or correct them; in Python: points * 1000 if they were divided by 1000 twice"
         ]
     return []
