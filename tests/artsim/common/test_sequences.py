@@ -35,6 +35,13 @@ def test_a_path_is_one_path(tmp_path: Path) -> None:
             artsim.find_sources(missing)
 
 
+def test_a_link_that_leads_to_itself_is_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "loop.urdf").symlink_to("loop.urdf")
+    for path in (tmp_path, tmp_path / "loop.urdf"):
+        with pytest.raises(ArtsimError, match=r"loop\.urdf"):
+            artsim.find_sources(path)
+
+
 def test_one_image_is_kept() -> None:
     obj = artsim.make("laptop", seed=0)
     camera = artsim.sample_view(obj, obj.tree.rest, ViewOptions(width=32, height=24), np.random.default_rng(0))
