@@ -17,7 +17,9 @@ from torch import Tensor, nn
 
 from artperl.boxes.network import Boxes
 from artperl.core.confidence import Calibration, PartCalibration
+from artperl.core.device import find_device
 from artperl.core.tensor_files import MAX_BYTES, read_tensors, write_tensors
+from artperl.core.threads import single_precision
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods import STORED_METHODS, method_of
 from artperl.methods.full import Estimator
@@ -111,6 +113,7 @@ def load_estimator(
 ) -> Estimator | Stored | Untrained: ...
 
 
+@single_precision()
 def load_estimator(
     name: str | Path, device: torch.device | str = "cpu", method: str = "full", **changes: Any
 ) -> Estimator | Stored | Untrained:
@@ -130,11 +133,11 @@ def load_estimator(
     Raises
     ------
     ConfigError
-        When there is no such option.
+        When there is no such option, or no such device.
     DatasetError
         When there is no such estimator, or its files are damaged.
     """
-    kind = method_of(method)
+    kind, device = method_of(method), find_device(device)
     if method in STORED_METHODS and kind is not Estimator:
         return _load_stored(cast(type[Stored], kind), name, device, changes)
     if kind is not Estimator:

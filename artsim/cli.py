@@ -296,14 +296,14 @@ class Gallery:
     """PNG to write."""
 
     def run(self) -> None:
-        from artsim.common.files import write_atomic
+        from artsim.common.outputs import write_output
         from artsim.drawing.gallery import draw_gallery
         from artsim.loading.sources import family_sources
 
         sources = family_sources(
             _categories(self.categories), self.objects, self.first_object, _constraints(self.having)
         )
-        write_atomic(self.out, draw_gallery([source.load() for source in sources], self.states))
+        write_output(self.out, draw_gallery([source.load() for source in sources], self.states))
         print(f"wrote {self.out}")
 
 

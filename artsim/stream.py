@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from artsim.common.sequences import listed
 from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
 from artsim.datasets.padding import PaddedStream
 from artsim.datasets.plan import SampleOptions, draw_sample
@@ -50,13 +51,14 @@ class FamilyStream:
 
     def __init__(
         self,
-        categories: Sequence[str],
+        categories: Sequence[str] | str,
         options: SampleOptions | None = None,
         seed: int = 0,
         views_per_object: int = 4,
         start: int = 0,
         step: int = 1,
     ):
+        categories = listed(categories)
         if not categories:
             raise ConfigError("a stream needs categories", fix="name at least one")
         if min(seed, start) < 0 or min(views_per_object, step) < 1:
@@ -65,7 +67,7 @@ class FamilyStream:
                 fix="count from 0 upwards; views and step from 1",
             )
         family_sources(categories, 1)  # raises where there is none
-        self.categories = list(categories)
+        self.categories = categories
         self.options, self.seed = options or SampleOptions(), seed
         self.views_per_object, self.start, self.step = views_per_object, start, step
         self._renderer: Renderer | None = None

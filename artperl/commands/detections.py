@@ -10,7 +10,7 @@ from typing import Annotated
 import tyro
 
 from artperl.evaluation.realistic_detections import Flaws
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 from artsim.errors import ConfigError
 
 
@@ -51,7 +51,7 @@ class MakeDetections:
             if (self.flaws, self.seed) != (Flaws(), 0):
                 raise ConfigError("a detector has its own flaws, and no chance", "flaws, seed", "leave them out")
             found = detect(scenes, load_detector(self.detector))
-        write_atomic(self.out, json_bytes(found))
+        write_output(self.out, json_bytes(found))
         if self.detector is not None:
             for line in precision_lines(scenes, found):
                 print(line)

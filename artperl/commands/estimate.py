@@ -18,7 +18,7 @@ import tyro
 from artperl.commands.estimate_record import arrays_of, record_of
 from artperl.commands.resumed_lines import line_name
 from artperl.methods import StoredMethod
-from artsim.common.files import atomic_file, write_atomic
+from artsim.common.outputs import check_output, output_file, write_output
 from artsim.common.progress import track
 from artsim.errors import ConfigError
 
@@ -53,7 +53,7 @@ class Estimate:
     axis: see --depth-kind.
 
     Masks: .png .bmp .gif .tif .pgm .jpg .webp in any mode, .npy, .npz. The object is what is not black, whatever alpha
-    says; of a JPEG what is lighter than 127; of artsim's own part_mask.png what is not 255.
+    says; of a JPEG, or a soft mask, what is over half; of artsim's own part_mask.png what is not 255.
 
     Intrinsics: .json of artsim (fx, fy, cx, cy, or K), BOP (camera.json, scene_camera.json), Open3D, RealSense, ROS
     CameraInfo, NeRF (transforms.json); .yaml of ROS and OpenCV; a 3 x 3 matrix as .txt, .npy or .npz. The centre of the
@@ -132,6 +132,10 @@ class Estimate:
         from artperl.commands.estimate_scene import estimate_scene, is_image_pair
         from artperl.estimator import load_estimator
 
+        inputs = (*self.clouds, self.intrinsics, self.mask, self.detections)
+        for path in (self.out, self.view, self.picture):
+            if path not in (None, STDOUT):
+                check_output(path, inputs)
         if self.detections is not None or self.detector is not None or is_image_pair(self.clouds):
             estimate_scene(self)
             return
@@ -184,7 +188,7 @@ class Estimate:
         result = estimator(cloud.points)
         record = record_of(result, cloud)
         if self.view is not None:
-            write_atomic(self.view, page(result, cloud.points, f"{file.name}: {self.category}").encode())
+            write_output(self.view, page(result, cloud.points, f"{file.name}: {self.category}").encode())
         if self.out == STDOUT:
             _warn(record["warnings"])
             print(json.dumps(record, indent=1))
@@ -192,10 +196,10 @@ class Estimate:
         _warn(cloud.warnings)
         print(full_text(result))
         if self.out is not None and self.out.suffix == ".npz":
-            with atomic_file(self.out) as out:
+            with output_file(self.out) as out:
                 np.savez(out, allow_pickle=False, **arrays_of(result, cloud))
         elif self.out is not None:
-            write_atomic(self.out, (json.dumps(record, indent=1) + "\n").encode())
+            write_output(self.out, (json.dumps(record, indent=1) + "\n").encode())
 
     def _estimate_all(self, load: Callable[[], Method]) -> None:
         """A line of JSON for each cloud, written as soon as it is known, so that Ctrl-C loses nothing."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -74,7 +75,8 @@ class Clouds:
         """
         from artperl.inputs.reading import is_readable
 
-        other = {path.resolve() for path in apart if path is not None}
+        # Unlike Path.resolve(), this follows links in a circle no further.
+        other = {os.path.realpath(path) for path in apart if path is not None}
         files, shards, skipped = list[Path](), list[Path](), list[Path]()
         for path in paths:
             if (path / DESCRIPTION).is_file():
@@ -82,7 +84,7 @@ class Clouds:
                 continue
             inside = sorted(path.iterdir()) if path.is_dir() else [path]
             for file in inside:
-                if path.is_dir() and (file.resolve() in other or file.name.startswith(".")):
+                if path.is_dir() and (os.path.realpath(file) in other or file.name.startswith(".")):
                     continue
                 if file.suffix == ".tar":
                     shards.append(file)

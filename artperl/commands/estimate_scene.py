@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 
 from artperl.detection import SHIPPED
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 from artsim.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def estimate_scene(options: Estimate) -> None:
         print(f"warning: {text}", file=sys.stderr)
     result = estimator(rgb, depth.values, depth.K, None if given is None else given.all)
     if options.picture is not None:
-        write_atomic(options.picture, draw_scene(rgb, depth.K, result))
+        write_output(options.picture, draw_scene(rgb, depth.K, result))
     record = scene_record(result, detections)
     if options.out == STDOUT:
         print(json.dumps(record, indent=1))
@@ -104,7 +104,7 @@ def estimate_scene(options: Estimate) -> None:
         f"\n{len(result.objects)} detections, {sum(o.estimate is not None for o in result.objects)} estimates; {stages}"
     )
     if options.out is not None:
-        write_atomic(options.out, (json.dumps(record, indent=1) + "\n").encode())
+        write_output(options.out, (json.dumps(record, indent=1) + "\n").encode())
 
 
 def _check(options: Estimate) -> None:

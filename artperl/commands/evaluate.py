@@ -11,6 +11,7 @@ from typing import Any, Literal
 import tyro
 
 from artsim.common.files import write_atomic
+from artsim.common.outputs import check_output
 from artsim.common.progress import say
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
@@ -110,13 +111,15 @@ class Evaluate:
             raise ConfigError("the original images are those of a benchmark", "root", "use --benchmark artimage alone")
         if self.method != "full" and self.root is None and (self.ablation or self.benchmark):
             raise ConfigError("a benchmark and the ablation are of the method full", "method", "leave it out")
+        if self.json is not None:
+            check_output(self.json)
         if self.ablation:
             self._ablation()
             return
         if self.conditions and self.benchmark != "robustness":
             raise ConfigError("conditions are of a benchmark", "conditions", "use --benchmark robustness")
         figures = self._single() if self.benchmark is None else self._benchmark()
-        if self.json is not None:
+        if self.json is not None:  # it may have been read: a stopped run goes on from it
             write_atomic(self.json, _json(figures))
 
     def _ablation(self) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from artperl.detection import SHIPPED
 from artsim.common.files import write_atomic
+from artsim.common.outputs import check_output
 from artsim.common.program import cores
 from artsim.common.progress import say
 from artsim.errors import ConfigError
@@ -42,6 +43,8 @@ def evaluate_reartmix(options: Evaluate) -> None:
         raise ConfigError(
             "reartmix has images of its own", ", ".join(given), "leave it out; name estimators with --estimators"
         )
+    if options.json is not None:
+        check_output(options.json, [options.detections])
     root = options.root
     if root is None:
         root = _FOLDER
@@ -58,5 +61,5 @@ def evaluate_reartmix(options: Evaluate) -> None:
     named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
     estimator = SceneEstimator(named, options.detector or SHIPPED, apart=options.apart, **told)
     figures = run_reartmix(images, detections, estimator, True, say, options.picture, options.json)
-    if options.json is not None:
+    if options.json is not None:  # it may have been read: a stopped run goes on from it
         write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())

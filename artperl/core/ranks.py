@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import torch
 from torch import distributed, nn
 
-from artsim.errors import ConfigError
+from artperl.core.device import find_device
 
 T = TypeVar("T")
 
@@ -48,11 +48,9 @@ class Ranks:
         ConfigError
             When the device is not there.
         """
-        if device.startswith("cuda") and not torch.cuda.is_available():
-            raise ConfigError("torch finds no GPU here", "device", "use --device cpu, or a build of torch with CUDA")
+        own = find_device(device)
         if not several_started():
-            return Ranks(), torch.device(device)
-        own = torch.device(device)
+            return Ranks(), own
         if own.type == "cuda":
             own = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
             torch.cuda.set_device(own)

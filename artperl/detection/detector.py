@@ -19,6 +19,7 @@ with needs("the detector"):
     from torch.nn import functional
 
 from artperl.core.tensor_files import read_tensors, write_tensors
+from artperl.core.threads import single_precision
 from artperl.detection import SHIPPED
 from artperl.detection.grouping import assign, find_middles
 from artperl.detection.images import Look, cell_pixels, fill, look_at
@@ -62,6 +63,7 @@ class Detector:
         return f"<Detector of {', '.join(self.categories)}>"
 
     @torch.no_grad()
+    @single_precision()
     def __call__(
         self, rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, image: int | str = 0
     ) -> list[Detection]:
@@ -160,6 +162,7 @@ def save_detector(detector: Detector, folder: Path, about: Mapping[str, Any]) ->
     write_atomic(folder / _SETTINGS, (json.dumps(told, indent=1) + "\n").encode())
 
 
+@single_precision()
 def load_detector(name: str | Path = SHIPPED) -> Detector:
     """A detector by its folder, or the one that comes with the package by its name.
 

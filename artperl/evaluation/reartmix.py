@@ -24,7 +24,7 @@ from artperl.evaluation.reartmix_record import ImageRecord, Kept, setup_of
 from artperl.inputs.detections import Detection, Detections
 from artperl.scene.drawing import draw_scene, scene_gallery
 from artperl.scene.estimator import SceneEstimator
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 from artsim.common.progress import track
 from artsim.families import FAMILIES, make
 from artsim.formats.images import grey_depth
@@ -213,7 +213,7 @@ def run_reartmix(
         text = f"no estimator for {', '.join(lacking)}: none of their parts can be found."
         figures["notes"].append(f"{text} Fix: --estimators {lacking[0]}=FOLDER")
     if gallery is not None:
-        write_atomic(gallery, scene_gallery(pictures))
+        write_output(gallery, scene_gallery(pictures))
     for line in _lines(figures):
         say(line)
     return figures

@@ -24,6 +24,12 @@ PICTURES = (".png", ".tif", ".tiff", ".pgm", ".pnm", ".pfm")
 """Endings of names of pictures that may hold depth."""
 ARRAYS = (".npy", ".npz")
 _FIX = "give a PNG or TIFF of whole numbers or floats, or .npy of (H, W) numbers"
+_FAR, _NEAR_FAR = 0.9995, 0.9
+"""Of a depth buffer, whose far end is 1: its largest number where anything is far; else, the median is above this."""
+_BUFFER = (
+    "all depth lies within 0 to 1, as in a depth buffer of OpenGL, or in a picture of depth, and not in metres. Fix:"
+    " give depth in metres; of a buffer b: near * far / (far - b * (far - near)); ignore this if it is right"
+)
 _EXR = """python -c "import imageio.v3 as i, numpy as n; n.save('depth.npy', i.imread('depth.exr')[..., 0])\""""
 
 
@@ -87,7 +93,8 @@ def _of_array(array: NDArray[Any], path: Path) -> DepthImage:
     if values.ndim != 2 or values.dtype.kind not in "fiu" or values.size == 0:
         raise ConfigError(f"an array of shape {array.shape} and type {array.dtype} is no depth image", path, _FIX)
     if values.dtype.kind == "f":
-        return DepthImage(values.astype(np.float64), False)
+        metres = values.astype(np.float64)
+        return DepthImage(metres, False, (), (_BUFFER,) if _is_buffer(metres) else ())
     notes, warnings = list[str](), list[str]()
     most = np.iinfo(values.dtype).max
     depth = values.astype(np.float64)
@@ -103,6 +110,14 @@ def _of_array(array: NDArray[Any], path: Path) -> DepthImage:
             notes.append(f"{count} pixels of {value}, the largest number, are no measurement")
             depth[saturated] = 0.0
     return DepthImage(depth, True, tuple(notes), tuple(warnings))
+
+
+def _is_buffer(values: Array) -> bool:
+    """Whether floats end at 1, or all are just below it: no depth in metres does, and a buffer does nothing else."""
+    known = values[np.isfinite(values)]
+    if known.size == 0 or known.max() > 1.0 or known.min() < 0.0:
+        return False
+    return bool(known.max() >= _FAR or (known.min() > 0.0 and np.median(known) > _NEAR_FAR))
 
 
 def points_of_depth(
@@ -133,6 +148,8 @@ def points_of_depth(
     ArtsimError
         When shapes do not fit, or there is no depth within the mask.
     """
+    if isinstance(depth, np.ma.MaskedArray):  # what is masked was not measured
+        depth = np.ma.filled(depth.astype(np.float64), np.nan)
     depth, K = np.asarray(depth, dtype=np.float64), np.asarray(K, dtype=np.float64)
     if depth.ndim != 2:
         raise ArtsimError(f"an array of shape {depth.shape} is no depth image", "depth", "pass (H, W) metres")

@@ -7,6 +7,7 @@ OpenCV, BOP, Open3D, RealSense and ROS. Half a pixel is 0.7 mm at 0.8 m. Matrice
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,6 +33,8 @@ _MAX_BYTES = 8_000_000
 """Of a JSON file: scene_camera.json of a thousand images has 0.3 MB, transforms.json 2 MB."""
 _MAX_YAML_BYTES = 50_000
 """PyYAML takes a second for so many brackets, and a ROS CameraInfo has a thousand bytes."""
+_SMALL = 32
+"""Values of an array that may say something beside a matrix, and arrays that are looked at."""
 _NORMALISED = 10.0
 """Focal lengths below, in pixels, are of a matrix that is divided by the image's size."""
 _TINY = 20
@@ -96,7 +99,7 @@ def read_camera(path: Path, hints: Hints | None = None, pixel_center: PixelCente
             f"{path.name} states lens distortion ({', '.join(f'{v:.3g}' for v in stated.distortion[:5])}), which is not"
             " undone. Fix: give the undistorted (rectified) depth image and its intrinsics",
         )
-    return Intrinsics(K, stated.size, stated.depth_scale, (note, *stated.notes), warnings)
+    return Intrinsics(K, stated.size, stated.depth_scale, (note, *stated.notes), (*warnings, *stated.warnings))
 
 
 def read_intrinsics(path: Path, pixel_center: PixelCenter | None = None) -> Array:
@@ -178,12 +181,24 @@ def _content(path: Path) -> Any:
     if ending == ".npy":
         return read_npy(path, "intrinsics", FIX)
     if ending == ".npz":
-        choice = read_npz(path, "intrinsics", FIX, lambda s, t: s in ((3, 3), (4, 4), (3, 4)) and t.kind in "fiu")
-        return choice.one_of(("k", "cam_k", "intrinsics", "intrinsic", "intrinsic_matrix", "camera_matrix"))[1]
+        return _arrays(path)
     data = read_file(path, "intrinsics", _MAX_BYTES)
     if ending == ".txt" and not data.lstrip().startswith(b"{"):
         return _numbers(data, path)
     return parse_json(data.removeprefix(b"\xef\xbb\xbf"))
+
+
+def _arrays(path: Path) -> dict[str, Any]:
+    """The matrix of an archive as OpenCV has it, beside its other small arrays; or these alone."""
+    small = read_npz(path, "intrinsics", FIX, lambda shape, dtype: math.prod(shape) <= _SMALL and dtype.kind in "fiuU")
+    values = {name: small.one_of((name.lower(),))[1].tolist() for name in list(small.fitting)[:_SMALL]}
+    if all(name in values for name in ("fx", "fy", "cx", "cy")):
+        return values
+    choice = read_npz(path, "intrinsics", FIX, lambda s, t: s in ((3, 3), (4, 4), (3, 4)) and t.kind in "fiu")
+    name, matrix = choice.one_of(
+        ("k", "cam_k", "intrinsics", "intrinsic", "intrinsic_matrix", "camera_matrix", "cameramatrix", "mtx")
+    )
+    return {n: value for n, value in values.items() if n != name} | {"camera_matrix": matrix.tolist()}
 
 
 def _numbers(data: bytes, path: Path) -> Array:

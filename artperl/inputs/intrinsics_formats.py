@@ -9,24 +9,29 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from artperl.inputs.intrinsics_beside import Size, beside, plain, stated_size
 from artsim.errors import ConfigError
 
 Array = NDArray[np.float64]
 
 _OURS, _THEIRS = 0.5, 0.0
 _NESTED = (
-    "camera", "cam", "depth", "depth_camera", "depth_intrinsics", "intrinsics", "intrinsic", "color", "colour", "rgb",
-    "camera_info", "calibration", "cameras",
+    "camera", "cam", "depth", "depthcamera", "depthintrinsics", "intrinsics", "intrinsic", "color", "colour", "rgb",
+    "camerainfo", "calibration", "cameras", "cameraparams",
 )  # fmt: skip
-"""Names under which files keep a camera, that of the depth image first."""
+"""Names under which files keep a camera, that of the depth image first, as :func:`plain` has them."""
 _DEEPEST = 4
+_MOST_CAMERAS = 100
+"""Mappings with names of their own that are looked through at each level."""
+_NERF = "a NeRF transforms.json"
+_BARE = "a bare matrix, as OpenCV has it"
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ class Stated:
     depth_scale : float or None
         Metres.
     distortion : tuple of float
-    notes : tuple of str
+    notes, warnings : tuple of str
     """
 
     K: Array
@@ -73,6 +78,16 @@ class Stated:
     depth_scale: float | None = None
     distortion: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A matrix, the mappings around it, its own first, and cameras in them that are not taken."""
+
+    stated: Stated
+    around: tuple[Mapping[str, Any], ...]
+    others: tuple[Any, ...] = ()
 
 
 def stated_camera(content: Any, hints: Hints, path: Path) -> Stated:
@@ -81,7 +96,7 @@ def stated_camera(content: Any, hints: Hints, path: Path) -> Stated:
     Parameters
     ----------
     content : object
-        Of JSON or YAML; or a matrix.
+        Of JSON or YAML; or a matrix; or arrays by their names.
     hints : Hints
     path : Path
         For messages.
@@ -92,44 +107,104 @@ def stated_camera(content: Any, hints: Hints, path: Path) -> Stated:
         When it states none.
     """
     if isinstance(content, np.ndarray) or (isinstance(content, list) and content and not isinstance(content[0], dict)):
-        return Stated(_matrix(content), "a bare matrix, as OpenCV has it", _THEIRS)
-    found = _find(content, hints, path, _DEEPEST)
+        return Stated(_matrix(content), _BARE, _THEIRS)
+    found = _find(_opened(content), hints, path, _DEEPEST)
     if found is None:
         raise ValueError("nothing in it is known")
-    return found
+    stated = found.stated
+    said = beside(found.around, found.others, stated.format, hints.size, path)
+    if stated.center == _OURS and stated.format != _NERF and said.foreign:
+        stated = replace(stated, format="OpenCV's kind, which artsim does not write", center=_THEIRS)
+    K, size, notes = _windowed(stated, said.size, found.around[0] if found.around else {}, hints)
+    return replace(
+        stated, K=K, size=size, depth_scale=said.depth_scale, distortion=said.distortion,
+        notes=(*stated.notes, *notes, *said.notes), warnings=said.warnings,
+    )  # fmt: skip
 
 
-def _find(content: Any, hints: Hints, path: Path, deeper: int) -> Stated | None:
+def _opened(content: Any) -> Any:
+    """``{"Camera.fx": 1}``, as ORB-SLAM has it, is ``{"Camera": {"fx": 1}}``."""
+    if not isinstance(content, Mapping):
+        return content
+    opened: dict[str, Any] = {}
+    for name, value in content.items():
+        first, _, last = str(name).partition(".")
+        if last and isinstance(inner := opened.setdefault(first, {}), dict) and inner is not content.get(first):
+            inner[last] = value
+        else:
+            opened[str(name)] = value
+    return opened
+
+
+def _find(content: Any, hints: Hints, path: Path, deeper: int) -> _Found | None:
     if not isinstance(content, Mapping):
         return None
     data = {str(name): value for name, value in content.items()}
+    scene = _bop_scene(data, hints, path)
+    if scene is not None:
+        return scene
     for read in _FORMATS:
-        found = read(data, hints, path)
-        if found is not None:
-            return found
+        stated = read(data, hints, path)
+        if stated is not None:
+            return _Found(stated, (content,))
     if not deeper:
         return None
-    inner = [(name, _inner(data[name], hints, path, deeper - 1)) for name in _NESTED if name in data]
-    cameras = [(name, camera) for name, camera in inner if camera is not None]
-    fitting = [pair for pair in cameras if hints.size is None or pair[1].size in (None, hints.size)]
+    known = sorted((n for n in data if plain(n) in _NESTED), key=lambda name: _NESTED.index(plain(name)))
+    cameras = [(n, found) for n in known if (found := _inner(data[n], hints, path, deeper - 1)) is not None]
+    if not cameras:  # under a name of the user's own, where it is the only one
+        inside = [n for n, value in data.items() if isinstance(value, Mapping) and n not in known][:_MOST_CAMERAS]
+        cameras = [(n, found) for n in inside if (found := _inner(data[n], hints, path, deeper - 1)) is not None]
+        if len(cameras) > 1:
+            raise ValueError(f"it has several cameras: {', '.join(n[:40] for n, _ in cameras[:8])}")
     if not cameras:
         return None
-    name, camera = (fitting or cameras)[0]
-    scale = camera.depth_scale if camera.depth_scale is not None else _metres(data, path)
+    sizes = [stated_size(found.around, hints.size) for _, found in cameras]
+    fitting = [i for i, size in enumerate(sizes) if hints.size is None or size in (None, hints.size)]
+    name, found = cameras[fitting[0] if fitting else 0]
     notes = (f"'{name}' is taken of {', '.join(n for n, _ in cameras)}",) if len(cameras) > 1 else ()
-    return Stated(camera.K, camera.format, camera.center, camera.size, scale, camera.distortion, notes + camera.notes)
+    others = [one.around[-1] for _, one in cameras if one is not found and one.around]
+    stated = replace(found.stated, notes=notes + found.stated.notes)
+    return _Found(stated, (*found.around, content), (*found.others, *others))
 
 
-def _inner(value: Any, hints: Hints, path: Path, deeper: int) -> Stated | None:
+def _inner(value: Any, hints: Hints, path: Path, deeper: int) -> _Found | None:
     if isinstance(value, list):
         if len(value) == 1:
             return _inner(value[0], hints, path, deeper)
         if _is_matrix(value):
-            return Stated(_matrix(value), "a bare matrix, as OpenCV has it", _THEIRS)
+            return _Found(Stated(_matrix(value), _BARE, _THEIRS), ())
     return _find(value, hints, path, deeper)
 
 
-def _bop_scene(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
+def _windowed(
+    stated: Stated, size: Size | None, own: Mapping[str, Any], hints: Hints
+) -> tuple[Array, Size | None, tuple[str, ...]]:
+    """The matrix and size of the image that a ROS camera sends: its roi, in pixels of the whole, then binned."""
+    roi = own.get("roi") if isinstance(own.get("roi"), Mapping) else {}
+    assert isinstance(roi, Mapping)
+    left, top, width, height = (int(_number(roi.get(n, 0))) for n in ("x_offset", "y_offset", "width", "height"))
+    across, down = (max(1, int(_number(own.get(name, 0)))) for name in ("binning_x", "binning_y"))
+    whole = size is not None and (width or size[0], height or size[1], across, down) == (*size, 1, 1)
+    if size is None or whole or not (width or height or across > 1 or down > 1):
+        return stated.K, size, ()
+    sent = (width or size[0]) // across, (height or size[1]) // down
+    if hints.size == size:
+        return (
+            stated.K,
+            size,
+            (f"the image is of the whole sensor: roi and binning, {sent[0]} x {sent[1]}, do not hold",),
+        )
+    K, shift = stated.K.copy(), 0.5 - stated.center
+    K[:2, 2] += shift - np.array([left, top])  # from the corner of the first pixel
+    K[:2] /= [[across], [down]]
+    K[:2, 2] -= shift
+    note = (
+        f"roi and binning: the image is {sent[0]} x {sent[1]} of {size[0]} x {size[1]} pixels, from ({left}, {top}) on"
+    )
+    return K, sent, (note,)
+
+
+def _bop_scene(data: Mapping[str, Any], hints: Hints, path: Path) -> _Found | None:
     """BOP's scene_camera.json: a camera for each image, by its number."""
     numbers = {int(name): name for name in data if name.isdigit() and len(name) < 12}
     if not numbers or len(numbers) != len(data) or not all(isinstance(v, Mapping) for v in data.values()):
@@ -151,86 +226,76 @@ def _bop_scene(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | No
             )  # fmt: skip
         number = named[0] if named else next(iter(numbers))
     found = _bop(data[numbers[number]], hints, path)
-    return None if found is None else Stated(
-        found.K, "BOP", found.center, found.size, found.depth_scale, (), (f"the camera of image {number}",)
+    return None if found is None else _Found(
+        replace(found, notes=(f"the camera of image {number}",)), (data[numbers[number]],)
     )  # fmt: skip
 
 
 def _bop(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     """BOP: cam_K, or fx, fy, cx, cy with depth_scale in millimetres, as in camera.json."""
     if "cam_K" in data:
-        return Stated(_matrix(data["cam_K"]), "BOP", _THEIRS, _size(data), _millimetres(data, path))
+        return Stated(_matrix(data["cam_K"]), "BOP", _THEIRS)
     if "depth_scale" in data and _has(data, "fx", "fy", "cx", "cy"):
-        return Stated(_pinhole(data, "cx", "cy"), "BOP", _THEIRS, _size(data), _millimetres(data, path))
+        return Stated(_pinhole(data, "cx", "cy"), "BOP", _THEIRS)
     return None
 
 
 def _ros(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     """ROS: sensor_msgs/CameraInfo of ROS 1 and 2, and files of camera_calibration; OpenCV's own files are alike."""
     name = next((n for n in ("camera_matrix", "cameraMatrix", "Camera_Matrix", "cam_matrix", "mtx") if n in data), None)
-    coefficients = next(
-        (data[n] for n in ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "distCoeffs", "dist",
-                           "distortion", "D", "d") if n in data), None,
-    )  # fmt: skip
     if name is not None:
-        return Stated(_matrix(data[name]), "OpenCV and ROS", _THEIRS, _size(data), None, _numbers(coefficients))
+        return Stated(_matrix(data[name]), "OpenCV and ROS", _THEIRS)
     of_ros = any(n in data for n in ("distortion_model", "header", "D", "d", "R", "P", "p", "binning_x", "roi"))
     name = next((n for n in ("K", "k") if n in data and (of_ros or n == "k")), None)
     if name is not None:
-        return Stated(_matrix(data[name]), "a ROS CameraInfo", _THEIRS, _size(data), None, _numbers(coefficients))
+        return Stated(_matrix(data[name]), "a ROS CameraInfo", _THEIRS)
     name = next((n for n in ("P", "p", "projection_matrix") if n in data), None)
     if name is not None and _is_matrix(data[name]):
-        return Stated(_matrix(data[name]), "a ROS CameraInfo", _THEIRS, _size(data), None, _numbers(coefficients))
+        return Stated(_matrix(data[name]), "a ROS CameraInfo", _THEIRS)
     return None
 
 
 def _open3d(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     """Open3D: PinholeCameraIntrinsic, whose matrix stands column by column."""
-    if "intrinsic_matrix" not in data:
-        return None
-    return Stated(_matrix(data["intrinsic_matrix"]), "Open3D", _THEIRS, _size(data))
+    return Stated(_matrix(data["intrinsic_matrix"]), "Open3D", _THEIRS) if "intrinsic_matrix" in data else None
 
 
 def _realsense(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     """RealSense: rs2_intrinsics."""
-    if not _has(data, "fx", "fy", "ppx", "ppy"):
-        return None
-    coefficients = _numbers(data.get("coeffs", data.get("distortion_coeffs")))
-    K = _pinhole(data, "ppx", "ppy")
-    return Stated(K, "RealSense", _THEIRS, _size(data), _metres(data, path), coefficients)
+    return Stated(_pinhole(data, "ppx", "ppy"), "RealSense", _THEIRS) if _has(data, "fx", "fy", "ppx", "ppy") else None
 
 
 def _nerf(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     """transforms.json of NeRF, instant-ngp and nerfstudio."""
-    size, name = _size(data), "a NeRF transforms.json"
-    coefficients = tuple(_number(data[n]) for n in ("k1", "k2", "k3", "k4", "p1", "p2") if n in data)
+    size = stated_size([data], hints.size) or hints.size
     if "fl_x" in data:
         fx = _number(data["fl_x"])
         fy = _number(data.get("fl_y", fx))
-        size = size or hints.size
-    elif "camera_angle_x" in data and (size or hints.size):
-        size = size or hints.size
-        assert size is not None
+    elif "camera_angle_x" in data and size:
         fx = 0.5 * size[0] / math.tan(0.5 * _number(data["camera_angle_x"]))
         fy = 0.5 * size[1] / math.tan(0.5 * _number(data["camera_angle_y"])) if "camera_angle_y" in data else fx
     else:
         return None
     middle = (0.5 * size[0], 0.5 * size[1]) if size else (data["cx"], data["cy"])
     cx, cy = (_number(data.get(n, value)) for n, value in zip(("cx", "cy"), middle, strict=True))
-    return Stated(_of_four(fx, fy, cx, cy), name, _OURS, _size(data), None, coefficients)
+    return Stated(_of_four(fx, fy, cx, cy), _NERF, _OURS)
+
+
+def _kalibr(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
+    """Kalibr: a pinhole's fx, fy, cx, cy in a list."""
+    four = _flat(data.get("intrinsics"))
+    return Stated(_of_four(*map(_number, four)), "Kalibr", _THEIRS) if len(four) == 4 else None
 
 
 def _ours(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     """artsim's own samples and scenes, and what is not of any other tool: fx, fy, cx, cy, or K."""
     if _has(data, "fx", "fy", "cx", "cy"):
-        return Stated(_pinhole(data, "cx", "cy"), "artsim (fx, fy, cx, cy)", _OURS, _size(data))
-    if "K" in data:
-        return Stated(_matrix(data["K"]), "artsim (K)", _OURS, _size(data))
-    return None
+        return Stated(_pinhole(data, "cx", "cy"), "artsim (fx, fy, cx, cy)", _OURS)
+    return Stated(_matrix(data["K"]), "artsim (K)", _OURS) if "K" in data else None
 
 
 _FORMATS: tuple[Callable[[Mapping[str, Any], Hints, Path], Stated | None], ...] = (
-    _bop_scene, _bop, _realsense, _open3d, _nerf, _ros, _ours,
+    _bop, _realsense, _open3d, _kalibr, _nerf, _ros, _ours,
 )  # fmt: skip
 
 
@@ -278,41 +343,3 @@ def _pinhole(data: Mapping[str, Any], cx: str, cy: str) -> Array:
 
 def _of_four(fx: float, fy: float, cx: float, cy: float) -> Array:
     return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-
-
-def _size(data: Mapping[str, Any]) -> tuple[int, int] | None:
-    for across, down in (("width", "height"), ("w", "h"), ("image_width", "image_height"), ("W", "H")):
-        if _has(data, across, down):
-            width, height = _number(data[across]), _number(data[down])
-            if not (width > 0 and height > 0 and math.isfinite(width) and math.isfinite(height)):
-                continue  # a CameraInfo that nobody filled in has 0
-            return round(width), round(height)
-    return None
-
-
-def _millimetres(data: Mapping[str, Any], path: Path) -> float | None:
-    """BOP's depth_scale, in metres."""
-    if "depth_scale" not in data:
-        return None
-    scale = _number(data["depth_scale"])
-    if not 0.005 <= scale <= 20.0:  # a number that is metres, or units in a metre
-        raise ConfigError(
-            f"depth_scale {scale:g} cannot be BOP's, which is millimetres of one unit", path,
-            "add --depth-scale METRES, of one unit of the depth image, such as 0.001; and leave depth_scale out of the"
-            " file, or write it in millimetres",
-        )  # fmt: skip
-    return 0.001 * scale
-
-
-def _metres(data: Mapping[str, Any], path: Path) -> float | None:
-    """RealSense's depth_units or depth_scale."""
-    value = data.get("depth_units", data.get("depth_scale"))
-    if value is None:
-        return None
-    scale = _number(value)
-    if not 1e-6 <= scale <= 0.02:
-        raise ConfigError(
-            f"depth_scale {scale:g} cannot be RealSense's, which is metres of one unit", path,
-            "add --depth-scale METRES, such as 0.001, and leave it out of the file, or write it in metres",
-        )  # fmt: skip
-    return scale

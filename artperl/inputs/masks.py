@@ -30,6 +30,12 @@ _OURS = ("part_mask", "part_ids")
 _INSTANCES = "instance_ids"
 """Name of artsim's own mask of the objects in a scene."""
 _LISTED = 12
+_MOST_LOGIT = 100.0
+"""Numbers below 0 beside larger ones are greys that a resize has overshot."""
+_END, _SAME = 0.125, 0.5
+"""Share of the range at each end where a soft mask is all but sure; share of equal neighbours between, at most."""
+_NEARLY_GREY = 24
+"""Difference of channels in a grey picture that was compressed."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +91,13 @@ def read_mask(path: Path, mask_id: str | None = None, kind: MaskKind = "auto") -
 def _read_array(path: Path) -> NDArray[Any]:
     if path.suffix.lower() == ".npy":
         return read_npy(path, "mask", _FIX)
-    choice = read_npz(path, "mask", _FIX, lambda shape, dtype: len(shape) in (2, 3) and dtype.kind in "bfiu")
+    choice = read_npz(path, "mask", _FIX, lambda shape, dtype: len(shape) in (2, 3, 4) and dtype.kind in "bfiu")
     return choice.one_of(("mask", "masks", "segmentation", "part_mask"))[1]
 
 
 def _of_array(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
+    while values.ndim > 3 and values.shape[0] == 1:  # a batch of one
+        values = values[0]
     if values.dtype.kind not in "bfiu" or values.size == 0 or values.ndim not in (2, 3):
         raise ConfigError(f"an array of shape {values.shape} and type {values.dtype} is no mask", path, _FIX)
     if values.ndim == 2:
@@ -106,7 +114,7 @@ def _of_array(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskK
         raise ConfigError(
             f"it is a stack of {len(values)} masks", path, f"choose one: --mask-id 0 to {len(values) - 1}"
         )
-    return _of_numbers(values[int(mask_id)], path, None, "binary")
+    return _of_numbers(values[int(mask_id)], path, None, kind)
 
 
 def _of_numbers(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
@@ -115,9 +123,10 @@ def _of_numbers(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
         values = values.astype(np.uint8)
     if values.dtype.kind == "f":
         values = np.nan_to_num(values.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
-        if mask_id is None and values.min() >= 0.0 and values.max() <= 1.0 and ((values > 0.0) & (values < 1.0)).any():
-            return Mask(values > 0.5, ("the mask holds probabilities: the object is where they are over 0.5",))
     found = np.unique(values)
+    soft = _soft(values, found) if mask_id is None and kind == "auto" else None
+    if soft is not None and not _is_of_parts(values, found, path):
+        return soft
     if mask_id is not None:
         number = _number(mask_id, path)
         shown: NDArray[np.bool_] = values == number
@@ -147,6 +156,27 @@ def _of_numbers(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
     return Mask(shown, (), warnings)
 
 
+def _soft(values: NDArray[Any], found: NDArray[Any]) -> Mask | None:
+    """A mask of how sure its maker is of each pixel, read where that is over half; None of one of numbers."""
+    least, most = float(found[0]), float(found[-1])
+    whole = bool((found == np.round(found)).all())
+    if not whole and least >= -0.5 and most <= 1.5:  # a resize overshoots
+        return Mask(values > 0.5, ("the mask holds probabilities: the object is where they are over 0.5",))
+    if not whole and least < 0.0 and most <= _MOST_LOGIT:
+        return Mask(values > 0.0, ("the mask holds logits: the object is where they are over 0, which is over half",))
+    full = next((full for full in (255.0, 65535.0) if 0.5 * full < most <= 1.1 * full), None)
+    if full is None or least < -0.1 * full:
+        return None
+    middle = (values > _END * full) & (values < (1.0 - _END) * full)
+    low = int((found <= 0.5 * full).sum())
+    if not middle.any():
+        soft = low > 0 and (least > 0 or min(low, len(found) - low) > 1)
+    else:  # numbers of objects are those of their neighbours, too, but for edges; a slope's are not
+        soft = bool((values[:, 1:] == values[:, :-1])[middle[:, 1:]].mean() < _SAME) if middle[:, 1:].any() else False
+    note = f"the mask holds greys from {least:g} to {most:g}: the object is where they are over {0.5 * full:g}"
+    return Mask(values > 0.5 * full, (note,)) if soft else None
+
+
 def _is_of_parts(values: NDArray[Any], found: NDArray[Any], path: Path) -> bool:
     """Whether it is a mask of parts as artsim writes it: 255 where there is none, as along most of the border."""
     if values.dtype.kind == "f" or found[-1] != _NONE:
@@ -173,6 +203,11 @@ def _of_colours(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
     """A mask of three channels."""
     if (values == values[..., :1]).all():  # grey
         return _of_numbers(values[..., 0], path, mask_id, kind)
+    if mask_id is None and kind == "auto" and values.dtype == np.uint8 and _differ(values) <= _NEARLY_GREY:
+        grey = values[..., 1]  # green is most of the light
+        soft = _soft(grey, np.unique(grey))
+        if soft is not None:
+            return soft
     if mask_id is not None:
         shown: NDArray[np.bool_] = (values == np.array(_colour(mask_id, path))).all(axis=2)
         if not shown.any():
@@ -186,7 +221,8 @@ def _of_colours(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
 
 def _with_alpha(colour: NDArray[Any], alpha: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
     """Alpha is no colour: what is black is not the object. But what is transparent is not there either."""
-    opaque = alpha != 0
+    soft = _soft(alpha, np.unique(alpha)) if kind == "auto" else None
+    opaque = alpha != 0 if soft is None else soft.shown
     if mask_id is None and not (colour != 0).any() and not opaque.all():
         return Mask(opaque, ("the mask has no colour: the object is what is not transparent",))
     mask = _of_colours(np.repeat(colour, 3, axis=2) if colour.shape[2] == 1 else colour, path, mask_id, kind)
@@ -205,6 +241,11 @@ def _of_palette(picture: Picture, path: Path, mask_id: str | None) -> Mask:
     colours = np.vstack([palette, np.zeros((1, 3), dtype=np.uint8)])
     if mask_id is not None:
         return _of_colours(colours[indices], path, mask_id, "binary")
+    grey = palette[found[found < 256]]
+    if len(grey) > 1 and _differ(grey[None]) == 0 and not picture.transparent:
+        soft = _soft(palette[indices, 0], np.unique(grey))
+        if soft is not None:
+            return soft
     back = {index for index in range(256) if not palette[index].any()} | picture.transparent
     note = ""
     if not back & set(found.tolist()):
@@ -231,6 +272,11 @@ def _of_lossy(picture: Picture, path: Path, mask_id: str | None) -> Mask:
     if picture.mode == "CMYK":
         raise ConfigError("a mask in CMYK is not read", path, _FIX)
     return Mask(light > 127, (f"a {picture.format} mask: the object is what is lighter than 127 of 255",))
+
+
+def _differ(values: NDArray[np.uint8]) -> int:
+    """Largest difference of channels (H, W, 3)."""
+    return int((values.max(axis=2) - values.min(axis=2)).max())
 
 
 def _on_border(chosen: NDArray[np.bool_]) -> float:

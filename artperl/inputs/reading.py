@@ -213,7 +213,10 @@ def _metres_of(whole: bool, stated: float | None, options: InputOptions) -> tupl
         return METRES[options.unit], f"depth is in {options.unit}, as asked for"
     if whole and stated is not None:
         return stated, f"one unit of depth is {1000 * stated:g} mm, as the intrinsics state"
-    return (0.001, "depth in whole numbers is taken for mm") if whole else (1.0, "depth in floats is taken for m")
+    if whole:
+        return 0.001, "depth in whole numbers is taken for mm"
+    unused = "" if stated is None else f"; the {1000 * stated:g} mm of the intrinsics are for whole numbers"
+    return 1.0, f"depth in floats is taken for m{unused}"
 
 
 def _mask_file(mask: Path, depth: Path) -> Path:

@@ -19,13 +19,13 @@ from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.core.part_estimate import estimate_of_parts
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.fitting.inferred_parts import place_inferred, turn_inferred
 from artperl.fitting.joint_votes import vote_axis, vote_pivot
 from artperl.fitting.kinematic_pairs import couple_rotations
 from artperl.fitting.umeyama import Similarity, ransac_umeyama
 from artperl.perception.ancsh_networks import CoordinateNetwork, JointNetwork
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.category_prior import CategoryPrior
 from artperl.retrieval.part_names import part_names
@@ -108,9 +108,9 @@ class ANCSH:
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
         clock, rng = Clock(), np.random.default_rng(0)
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             cloud = Cloud.of(points, self.options.num_points)
-            warnings = cloud_warnings(cloud.points, cloud.good)
+            warnings = cloud_warnings(cloud)
             clouds = Clouds.of(cloud.tensor(next(self.joints.parameters()).device))
             with clock("coordinates"):
                 places = self._places(cloud, clouds)
@@ -121,7 +121,8 @@ class ANCSH:
             with clock("kinematics"):
                 estimate = self._couple(places, fits, axis, origin)
         return replace(
-            estimate, part=cloud.for_every_point(places.part, -1), milliseconds=clock.milliseconds, warnings=warnings,
+            estimate, part=cloud.for_every_point(places.part, -1), milliseconds=clock.milliseconds,
+            warnings=with_size(warnings, estimate.size, self.categories),
             part_names=part_names(self.base, 0, self.base.shapes[[0]]),
         )  # fmt: skip
 

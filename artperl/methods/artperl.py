@@ -25,13 +25,14 @@ from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.estimate import Estimate, estimate_of_fit
 from artperl.core.pose import Theta
 from artperl.core.shapes import Observed, Shapes
+from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import part_weights
 from artperl.fitting.levenberg_marquardt import Refined, refine
 from artperl.fitting.part_symptoms import symptoms_by_part
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.search import rest_places
 from artperl.methods.retrieved import AgentMethod
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 
@@ -65,6 +66,7 @@ class ArtPERL(AgentMethod):
     policy: Policy
     options: ArtPERLOptions
 
+    @steady_torch()
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.
 
@@ -80,7 +82,7 @@ class ArtPERL(AgentMethod):
         """
         clock = Clock()
         cloud = Cloud.of(points, self.options.num_points)
-        warnings, sampled = cloud_warnings(cloud.points, cloud.good), cloud.tensor(self.device)
+        warnings, sampled = cloud_warnings(cloud), cloud.tensor(self.device)
         with clock("segmentation"):
             part, certainty = self.parts(sampled)
         with clock("retrieval"):
@@ -98,15 +100,16 @@ class ArtPERL(AgentMethod):
         one, other = (rest_places(reference, observed, ends[[row]])[0] for row in (0, -1))
         apart = torch.linalg.vector_norm(one - other, dim=-1)
         doubt = 1.0 - certainty[0].cpu()
+        estimate = estimate_of_fit(reference, observed, steps, cloud.for_every_point(observed.part[0].numpy(), -1))
         estimate = replace(
-            estimate_of_fit(reference, observed, steps, cloud.for_every_point(observed.part[0].numpy(), -1)),
+            estimate,
             reference=self.base.name(row),
             residual=float(refined.energy.clamp(min=0.0).sqrt()),
             disagreement=float(apart.median()),
             doubt=float(doubt.mean()),
             milliseconds=clock.milliseconds,
             part_names=part_names(self.base, row, reference),
-            warnings=warnings,
+            warnings=with_size(warnings, estimate.size, self.categories),
         )
         own = symptoms_by_part(observed.part[0], apart, doubt, 1.0 - doubt, estimate.visibility)
         return estimate.judged(self.options.calibration, self.options.part_calibration, own)

@@ -20,7 +20,7 @@ from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.estimate import Estimate, estimate_of_fit, widen
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import Context
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.occluded_parts import pose_occluded_parts
@@ -29,7 +29,7 @@ from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import Fit, find_fit
 from artperl.methods.many import estimate_many
 from artperl.methods.tracking import track
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.perception.part_grouping import group_votes
@@ -105,7 +105,7 @@ class Estimator:
 
     def with_fit(self, points: ArrayLike) -> tuple[Estimate, Fit]:
         """An estimate, and the fitted reference that it is of."""
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             clock = Clock()
             estimate, known, fit = self._fit(points, clock)
             if self.boxes is None:
@@ -123,7 +123,7 @@ class Estimator:
 
     def evidence(self, points: ArrayLike) -> tuple[Estimate, Evidence, float]:
         """What :attr:`boxes` learn from: an estimate that goes without them, the evidence, and its unit in metres."""
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             estimate, known, _ = self._fit(points, Clock())
             return estimate, *known.evidence(estimate, self.perception.num_rows)
 
@@ -136,7 +136,7 @@ class Estimator:
         options = self.options
         with clock("clean"):
             cloud = Cloud.of(points, options.num_points)
-            warnings = cloud_warnings(cloud.points, cloud.good)
+            warnings = cloud_warnings(cloud)
         cloud, clouds, perceived, foreign = self._perceive_own(cloud, clock)
         seen = cloud.tensor(self.perception.device)
         with clock("retrieval"):
@@ -166,7 +166,7 @@ class Estimator:
                 foreign=foreign,
                 milliseconds=clock.milliseconds,
                 part_names=part_names(self.base, fit.row, fit.shapes),
-                warnings=warnings,
+                warnings=with_size(warnings, estimate.size, self.categories),
             )
             symptoms = part_symptoms(fit.shapes, fit.observed, fit.theta, perceived.to("cpu"), estimate.visibility)
             estimate = estimate.judged(self.calibration, self.part_calibration, symptoms)

@@ -20,10 +20,10 @@ from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.core.part_estimate import estimate_of_parts
 from artperl.core.pose import Theta
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.core.trees import Trees
 from artperl.fitting.keypoint_fit import KeypointFit, fit_keypoints, posed_keypoints, snap_keypoints
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.omad_networks import CueNetwork, Cues, KeypointPrior, rotation_of_quaternion
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.category_prior import CategoryPrior
@@ -89,9 +89,9 @@ class OMAD:
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
         clock, device = Clock(), next(self.cues.parameters()).device
-        with one_thread(), torch.no_grad():
+        with steady_torch(), torch.no_grad():
             cloud = Cloud.of(points, self.options.num_points)
-            warnings = cloud_warnings(cloud.points, cloud.good)
+            warnings = cloud_warnings(cloud)
             clouds = Clouds.of(cloud.tensor(device))
             with clock("cues"):
                 cues = self.cues(clouds.points)
@@ -105,7 +105,8 @@ class OMAD:
             estimate = self._report(clouds, fit, part, target, weight)
         return replace(
             estimate, part=cloud.for_every_point(part[0].cpu().numpy(), -1), milliseconds=clock.milliseconds,
-            warnings=warnings, part_names=part_names(self.base, 0, self.base.shapes[[0]]),
+            warnings=with_size(warnings, estimate.size, self.categories),
+            part_names=part_names(self.base, 0, self.base.shapes[[0]]),
         )  # fmt: skip
 
     def trees(self, device: torch.device, count: int = 1) -> Trees:

@@ -21,10 +21,10 @@ from artperl.core.estimate import Estimate, visibility
 from artperl.core.part_estimate import estimate_of_parts
 from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.core.trees import KINDS
 from artperl.methods.retrieved import AgentMethod
-from artperl.perception.cloud_checks import cloud_warnings
+from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 
@@ -50,9 +50,9 @@ class SporeAgent(AgentMethod):
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part; see :class:`artperl.methods.protocol.Method`."""
         clock = Clock()
-        with one_thread(), torch.inference_mode():
+        with steady_torch(), torch.inference_mode():
             cloud = Cloud.of(points, self.options.num_points)
-            warnings, sampled = cloud_warnings(cloud.points, cloud.good), cloud.tensor(self.device)
+            warnings, sampled = cloud_warnings(cloud), cloud.tensor(self.device)
             with clock("segmentation"):
                 part = self.segment(sampled)
             with clock("retrieval"):
@@ -67,7 +67,8 @@ class SporeAgent(AgentMethod):
             estimate = self._report(reference, observed, posed, start)
         return replace(
             estimate, part=cloud.for_every_point(observed.part[0].cpu().numpy(), -1), reference=self.base.name(row),
-            milliseconds=clock.milliseconds, warnings=warnings, part_names=part_names(self.base, row, reference),
+            milliseconds=clock.milliseconds, warnings=with_size(warnings, estimate.size, self.categories),
+            part_names=part_names(self.base, row, reference),
         )  # fmt: skip
 
     @torch.no_grad()

@@ -23,7 +23,7 @@ from artperl.core.estimate import Estimate, visibility
 from artperl.core.labels import labels_by_surface
 from artperl.core.pose import Posed, Theta, clamp_state, joint_axes, joint_states, pose_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.core.threads import one_thread
+from artperl.core.threads import steady_torch
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
 from artperl.perception.preprocess import Cloud
@@ -120,7 +120,7 @@ def _anchor(estimate: Estimate, fit: Fit, points: ArrayLike) -> _Anchor:
     carried = estimate.T_camera_part
     rest = np.einsum("kji,kj->ki", carried[:, :3, :3], estimate.translation - carried[:, :3, 3])
     state = estimate.state - _double(joint_states(fit.shapes.trees, fit.theta))[:K]
-    with one_thread(), torch.inference_mode():
+    with steady_torch(), torch.inference_mode():
         observed = _labelled(fit.shapes, fit.theta, _tensor(Cloud.of(points, POINTS)))
         refined = refine(fit.shapes, observed, fit.theta, replace(_LAST, iterations=0), rigid=True)
     residual = float(refined.energy[0].clamp(min=0.0).sqrt())
@@ -130,7 +130,7 @@ def _anchor(estimate: Estimate, fit: Fit, points: ArrayLike) -> _Anchor:
 def _follow(anchor: _Anchor, past: list[Theta], points: ArrayLike) -> tuple[Estimate, Theta] | None:
     """The estimate of the next cloud, and the fit; None where the object is lost."""
     clock = Clock()
-    with clock("tracking"), one_thread(), torch.inference_mode():
+    with clock("tracking"), steady_torch(), torch.inference_mode():
         cloud = Cloud.of(points, POINTS)
         seen, shapes = _tensor(cloud), anchor.shapes
         starts = [past[-1], moved_on(shapes, past)] if len(past) > 1 else [past[-1]]

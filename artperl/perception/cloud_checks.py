@@ -5,10 +5,13 @@ A fit has no scale of its own: a laptop of 180 m fits as well as one of 0.3 m. S
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.perception.preprocess import is_measured
+from artperl.core.usual_sizes import size_warning
+from artperl.perception.preprocess import Cloud, is_measured
 
 Array = NDArray[np.float64]
 
@@ -16,6 +19,7 @@ _LARGEST, _SMALLEST = 5.0, 0.005
 """Metres. Garage doors and earrings are beyond what the estimators know, and files in millimetres are, too."""
 _LIKELY = (0.05, 3.0)
 """Metres that most articulated objects measure, for a guess at the unit."""
+_UNIT = "hardly is in metres"
 _OUTERMOST = 1.0
 """Percent of the points on each side that are left out of an extent."""
 _MANY = 0.1
@@ -26,18 +30,18 @@ _FEW = 128
 """Points below which estimates are guesses; estimators look at 1,024 and more."""
 
 
-def cloud_warnings(points: Array, good: NDArray[np.int64]) -> tuple[str, ...]:
-    """One line for each thing that looks wrong, with its fix for the command line and for Python.
+def cloud_warnings(cloud: Cloud) -> tuple[str, ...]:
+    """One line for each thing that looks wrong, with its fix for the command line and for Python."""
+    shown = cloud.points[cloud.good]
+    return (*_unit(shown), *_axes(shown), *_missing(cloud.points, cloud.masked), *_few(shown))
 
-    Parameters
-    ----------
-    points : (N, 3) float
-        Camera frame, metres.
-    good : (M,) int64
-        Those that show the object, see :func:`artperl.perception.preprocess.clean`.
-    """
-    shown = points[good]
-    return (*_unit(shown), *_axes(shown), *_missing(points), *_few(shown))
+
+def with_size(warnings: tuple[str, ...], size: Array, categories: Sequence[str]) -> tuple[str, ...]:
+    """Warnings, with one of an object's size if its boxes (K, 3) are not of its category and nothing is said yet."""
+    if any(_UNIT in text for text in warnings):
+        return warnings
+    said = size_warning(float(np.linalg.norm(size, axis=1).max()), categories)
+    return warnings if said is None else (*warnings, said)
 
 
 def _unit(shown: Array) -> list[str]:
@@ -50,12 +54,12 @@ def _unit(shown: Array) -> list[str]:
             f"--unit {name} ({extent * factor:.2g} m; in Python: points * {factor:g})" for name, factor in likely
         )
         return [
-            f"the object is {extent:.3g} m across, so that the cloud hardly is in metres. Fix: add"
+            f"the object is {extent:.3g} m across, so that the cloud {_UNIT}. Fix: add"
             f" {fixes or '--unit mm'}; or crop the cloud to the object"
         ]
     if extent < _SMALLEST:
         return [
-            f"the object is {1000 * extent:.2g} mm across, so that the cloud hardly is in metres. Fix: leave out --unit"
+            f"the object is {1000 * extent:.2g} mm across, so that the cloud {_UNIT}. Fix: leave out --unit"
             " and --depth-scale, or correct them; in Python: points * 1000 if they were divided by 1000 twice"
         ]
     return []
@@ -76,10 +80,10 @@ def _axes(shown: Array) -> list[str]:
     return []
 
 
-def _missing(points: Array) -> list[str]:
+def _missing(points: Array, masked: int) -> list[str]:
     origin = float((points == 0).all(axis=1).mean())
-    lost = float((~is_measured(points)).mean()) - origin
-    warnings = []
+    lost = float((~is_measured(points)).mean()) - origin - masked / len(points)
+    warnings = [f"{masked} rows of the masked array are left out. Fix: none is needed"] if masked else []
     if origin > _MANY:
         warnings.append(
             f"{100 * origin:.0f} % of the points are at exactly 0 0 0, where sensors put what they did not measure:"

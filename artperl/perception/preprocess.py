@@ -23,6 +23,8 @@ _OUTLIER = 6.0
 """A point with fewer neighbours than that within so many times the usual distance is an outlier: thin legs are not."""
 _CELLS = 65536
 """Cells to either side of the middle, in each direction, within which points are looked for in cells."""
+_LEVEL = 2e-5
+"""Slope by which rows of an image differ more, and rounding differs less."""
 _CLEANED = 4096
 """Points that are looked at for outliers."""
 _FEWEST = 8
@@ -42,14 +44,17 @@ class Cloud:
     points : (N, 3) float
         Camera frame, metres.
     good : (G,) int64
-        Those that show the object.
+        Those that show the object, in an order that is the same however the points were ordered.
     seen : (M, 3) float32
         Of these, the points that a network sees.
+    masked : int
+        Rows that a masked array leaves out.
     """
 
     points: Array
     good: NDArray[np.int64]
     seen: NDArray[np.float32]
+    masked: int = 0
 
     @staticmethod
     def of(points: ArrayLike, count: int) -> Cloud:
@@ -62,7 +67,8 @@ class Cloud:
         """
         every = as_cloud(points)
         good = clean(every)
-        return Cloud(every, good, _some(every, good, count))
+        masked = int(np.ma.getmaskarray(points).any(axis=1).sum()) if isinstance(points, np.ma.MaskedArray) else 0
+        return Cloud(every, good, _some(every, good, count), masked)
 
     def without(self, foreign: NDArray[np.bool_], count: int) -> Cloud:
         """The cloud without seen points (M,) that show something else, and those given points that are nearest to them.
@@ -106,7 +112,7 @@ def _some(points: Array, good: NDArray[np.int64], count: int) -> NDArray[np.floa
 
 
 def as_cloud(points: ArrayLike) -> Array:
-    """(N, 3) points in double precision.
+    """(N, 3) points in double precision; rows of a masked array of which anything is masked are not finite.
 
     Raises
     ------
@@ -119,6 +125,8 @@ def as_cloud(points: ArrayLike) -> Array:
         raise ArtsimError(f"this is no cloud ({error})", "points", "pass (N, 3) points in metres") from error
     if cloud.ndim != 2 or cloud.shape[1] != 3:
         raise ArtsimError(f"an array of shape {cloud.shape} is no cloud", "points", "pass (N, 3) points in metres")
+    if isinstance(points, np.ma.MaskedArray):
+        cloud = np.where(np.ma.getmaskarray(points).any(axis=1, keepdims=True), np.nan, cloud)
     return cloud
 
 
@@ -133,6 +141,9 @@ def is_measured(points: Array) -> NDArray[np.bool_]:
 def clean(points: Array) -> NDArray[np.int64]:
     """Indices of the points that show the object: measured, and not on their own.
 
+    They are ordered as a camera sees them, row by row, since some of them are drawn by their places in this order: an
+    estimate is of the set of points, however they are ordered.
+
     Raises
     ------
     ArtsimError
@@ -140,6 +151,7 @@ def clean(points: Array) -> NDArray[np.int64]:
     """
     points = as_cloud(points)
     good = np.flatnonzero(is_measured(points))
+    good = good[_as_seen(points[good])]
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
         tree = KDTree.of(points[known])
@@ -154,6 +166,16 @@ def clean(points: Array) -> NDArray[np.int64]:
             f"{len(good)} of {len(points)} points show an object", "points", "pass a cloud of the object, in metres"
         )
     return good
+
+
+def _as_seen(points: Array) -> NDArray[np.int64]:
+    """(N,) order of points by the row, then the column, in which a camera sees them; the nearest first."""
+    x, y, z = points.T
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        row, column = np.rint(y / z / _LEVEL), x / z
+    if ((np.diff(row) > 0) | ((np.diff(row) == 0) & (np.diff(column) > 0))).all():  # as of an image
+        return np.arange(len(points))
+    return np.lexsort((z, column, row))
 
 
 def _is_crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]:

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.known_files import note_input, refuse_special
 from artsim.errors import ArtsimError, AssetError, ConfigError
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def write_atomic(path: Path, data: bytes) -> None:
     Raises
     ------
     ConfigError
-        When the folder cannot be written to, or the disk is full.
+        When the folder cannot be written to, the disk is full, or the path is that of a folder, a pipe or a device.
     """
     with atomic_file(path) as file:
         file.write(data)
@@ -53,6 +54,7 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         As :func:`write_atomic`.
     """
     path = Path(path)
+    refuse_special(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -148,6 +150,7 @@ def read_bounded(
                     f"{what} of {status.st_size / 1e6:.0f} MB is over the limit of {max_bytes / 1e6:.0f} MB", path, fix
                 )
             data = file.read(status.st_size + 1)
+        note_input(path)
     except IsADirectoryError as problem:
         raise error(f"{what} is a folder", path, "pass a file") from problem
     except (OSError, ValueError, RuntimeError) as problem:  # a null in the name is a ValueError, links in a circle

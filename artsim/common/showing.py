@@ -8,7 +8,7 @@ import webbrowser
 from pathlib import Path
 from typing import Any
 
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 
 _HEIGHT = 480
 """Pixels of a page in a notebook."""
@@ -43,7 +43,7 @@ class Showable:
         """
         page = self._page(**more).encode()
         if out is not None:
-            write_atomic(Path(out), page)
+            write_output(Path(out), page)
             return Path(out)
         with tempfile.NamedTemporaryFile(prefix="artsim-", suffix=".html", delete=False) as file:
             file.write(page)

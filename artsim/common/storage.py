@@ -27,6 +27,8 @@ _ATTEMPTS = 8
 """Of one request: a storage that fails every tenth one then fails once in a hundred million."""
 _FIRST_PAUSE, _LONGEST_PAUSE = 0.1, 10.0
 """Seconds before the second attempt, doubled from then on; half of it is random: workers do not come together."""
+_OF_BUCKETS = ("s3", "s3a", "gs", "gcs", "az", "abfs", "oss")
+"""Protocols whose first name is that of a bucket, or container."""
 _MISSING = "restore it, or make the dataset again"
 
 
@@ -194,6 +196,9 @@ class UrlStorage:
     """
 
     def __init__(self, url: str):
+        protocol, _, rest = url.rpartition("://")
+        if not rest.strip("/") or (rest.startswith("/") and protocol.rpartition("::")[2] in _OF_BUCKETS):
+            raise ConfigError("it names no bucket", url, f"write {protocol}://BUCKET/NAME")
         self.place = url.rstrip("/")
         self._opened: tuple[int, Any, str] | None = None
         self._system()  # what is missing is said at once
@@ -227,6 +232,8 @@ class UrlStorage:
         for attempt in range(_ATTEMPTS):
             try:
                 return work()
+            except ConfigError:
+                raise
             except FileNotFoundError as error:
                 if kind is DatasetError:
                     raise DatasetError("is missing", f"{self.place}/{name}", _MISSING) from error
@@ -300,10 +307,18 @@ class UrlStorage:
                 self._system()[0].invalidate_cache()  # others write, too
                 entries = self._system()[0].ls(self._path(below), detail=True)
             except FileNotFoundError:
+                self._refuse_missing_bucket()
                 return {}
             return {e["name"].rstrip("/").rpartition("/")[2]: int(e["size"]) for e in entries if e["type"] == "file"}
 
         return self._reading(below, work, "be listed")
+
+    def _refuse_missing_bucket(self) -> None:
+        """Say so before anything is made for a bucket that is not there: no write makes one."""
+        system, path = self._system()
+        bucket = path.partition("/")[0]
+        if self.place.rpartition("://")[0].rpartition("::")[2] in _OF_BUCKETS and not system.exists(bucket):
+            raise ConfigError(f"there is no bucket {bucket}", self.place, "make it, or correct its name")
 
     def copy(self, source: str, target: str) -> None:
         """See :meth:`Storage.copy`."""

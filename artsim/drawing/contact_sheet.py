@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from artsim.common.extras import needs
-from artsim.common.files import write_atomic
 from artsim.common.names import printable, safe_name
+from artsim.common.outputs import check_output, write_output
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
 from artsim.drawing.annotation import BOX_EDGES, Shown, axis_segment, box_corners, shade_parts
@@ -58,11 +58,12 @@ def write_contact_sheet(
         out = out or Path(f"{safe_name(f'{obj.category}-{obj.object_id}')}.png")
     if not shown:
         raise ArtsimError("there is no sample to draw", path, "choose another split, or ask for at least one")
-    write_atomic(out, contact_sheet(shown))
+    write_output(out, contact_sheet(shown), [path])
     written = [out]
     if rerun is not None:
         from artsim.drawing.rerun_recording import write_recording
 
+        check_output(rerun, [path])
         write_recording(shown, rerun)
         written.append(rerun)
     return written

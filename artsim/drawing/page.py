@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.files import write_atomic
 from artsim.common.names import printable
+from artsim.common.outputs import write_output
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
 from artsim.drawing.annotation import axis_segment
@@ -135,7 +135,7 @@ def write_page(
         page = sample_page(chosen, f"{path.resolve().name}: {len(chosen)} of {len(dataset)} samples")
     else:
         page = object_page(load(path, package_roots=package_roots, body=body))
-    write_atomic(out, page.encode())
+    write_output(out, page.encode(), [path])
 
 
 def object_page(obj: ArticulatedObject) -> str:

@@ -15,7 +15,11 @@ with needs("artsim.envs"):
 
     from artsim.envs.articulated import EnvOptions
 
-gymnasium.register(id="artsim/Articulated-v0", entry_point="artsim.envs.articulated:ArticulatedEnv")
+gymnasium.register(
+    id="artsim/Articulated-v0",
+    entry_point="artsim.envs.articulated:ArticulatedEnv",
+    additional_wrappers=(WrapperSpec("ObeyTimeLimit", "artsim.envs.articulated:ObeyTimeLimit", {}),),
+)
 # As ManiSkill's register_env does, which would have to import it: its own time limit knows batches.
 _TIME_LIMIT = WrapperSpec(
     "MSTimeLimit", "mani_skill.utils.registration:TimeLimitWrapper", {"max_episode_steps": EPISODE_LENGTH}

@@ -19,6 +19,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.datasets.padding import pad_sample
@@ -31,6 +32,9 @@ from artsim.physics.episode import Episode, EpisodeOptions, openness
 from artsim.physics.options import Control
 from artsim.physics.world import Simulation
 from artsim.renderers import render
+
+EPISODE_LENGTH = 100
+"""Control steps, by default."""
 
 Observation = dict[str, NDArray[Any]]
 
@@ -62,16 +66,29 @@ class EnvOptions(EpisodeOptions):
     """What actions are: effort or velocity."""
     max_joints: int = 16
     """Entries of an action, and joints of the largest object."""
-    episode_length: int = 100
-    """Control steps."""
+    episode_length: int | None = None
+    """Control steps. By default 100, or what ``max_episode_steps`` of ``gymnasium.make`` says."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.control not in ("effort", "velocity"):
             raise ConfigError(f"there is no control {self.control!r}", "control", "use effort or velocity")
         for name in ("max_joints", "episode_length"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{getattr(self, name)} is not a count", name, "use 1 or more")
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise ConfigError(f"{value} is not a count", name, "use 1 or more")
+
+
+class ObeyTimeLimit(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Lets ``max_episode_steps`` of ``gymnasium.make`` hold instead of the length that episodes have by default."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any]):
+        RecordConstructorArgs.__init__(self)
+        super().__init__(env)
+        own = env.unwrapped
+        assert isinstance(own, ArticulatedEnv)
+        if env.spec is not None and env.spec.max_episode_steps is not None and own.options.episode_length is None:
+            own.length = None
 
 
 class ArticulatedEnv(gymnasium.Env[Observation, Any]):
@@ -107,6 +124,8 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  # gymnasium's own name and type
 
+    length: int | None
+    """Control steps of an episode; None where only a wrapper ends it."""
     sample: Sample
     """What was seen last, with its ground truth: the record behind the info."""
 
@@ -118,7 +137,7 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ConfigError(f"there is no render mode {render_mode!r}", "artsim/Articulated-v0", "use rgb_array")
         self.options, self.render_mode = EnvOptions(**options), render_mode
-        self.episode = Episode(self.options)
+        self.episode, self.length = Episode(self.options), self.options.episode_length or EPISODE_LENGTH
         width, height = self.options.views.width, self.options.views.height
         seen: dict[str, spaces.Space[Any]] = {
             "points": spaces.Box(-np.inf, np.inf, (self.options.num_points, 3), np.float32)
@@ -202,7 +221,8 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
         self.episode.step(np.clip(given[: len(limit)], -1.0, 1.0) * limit, self.options.control)
         before, self._openness = self._openness, openness(self.episode.obj, self.simulation.state)
         observation, info = self._look()
-        return observation, self._openness - before, False, self.episode.steps >= self.options.episode_length, info
+        truncated = self.length is not None and self.episode.steps >= self.length
+        return observation, self._openness - before, False, truncated, info
 
     @property
     def simulation(self) -> Simulation:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from artsim.common.files import read_json, write_atomic, write_error
+from artsim.common.outputs import replace_folder
 from artsim.common.progress import track
 from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError
@@ -165,9 +166,7 @@ def write_object(
         raise AssetError(f"cannot be made ({type(error).__name__}: {error})", f"{category} {seed}") from error
     try:
         meta = export(obj, part, formats, {"constraints": str(constraints)} if constraints else {}, options)
-        if folder.exists():  # of another version, or in other formats
-            shutil.rmtree(folder)
-        part.rename(folder)
+        replace_folder(part, folder)  # of another version, or in other formats
     except OSError as error:
         raise write_error(error, folder) from error
     finally:

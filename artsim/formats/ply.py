@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.files import write_atomic
+from artsim.common.outputs import write_output
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.pieces import Output
@@ -42,7 +42,7 @@ def save_ply(sample: Sample, path: str | Path) -> None:
     ConfigError
         When the file cannot be written.
     """
-    write_atomic(Path(path), cloud_ply(sample))
+    write_output(Path(path), cloud_ply(sample))
 
 
 def cloud_ply(sample: Sample) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from artsim.common.files import read_bounded
@@ -95,10 +96,9 @@ def read_urdf(file: Path, max_bytes: int) -> bytes:
         When it cannot be read, is too large, or is a link that leads out of its folder.
     """
     what = "URDF file" if file.suffix == ".urdf" else "object's file"
-    if file.is_symlink() and not file.resolve().is_relative_to(file.parent.resolve()):
-        raise AssetError(
-            f"the {what} is a link that leads out of its folder", file, f"pass the file itself: {file.resolve()}"
-        )
+    real = Path(os.path.realpath(file))  # links in a circle are told where they are read
+    if file.is_symlink() and not real.is_relative_to(os.path.realpath(file.parent)):
+        raise AssetError(f"the {what} is a link that leads out of its folder", file, f"pass the file itself: {real}")
     return read_bounded(file, max_bytes, what)
 
 

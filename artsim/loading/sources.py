@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from artsim.common.sequences import listed
 from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES, make_constrained, source_name
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
@@ -101,7 +102,7 @@ Source = FileSource | FamilySource
 
 
 def family_sources(
-    categories: Sequence[str],
+    categories: Sequence[str] | str,
     objects_per_category: int,
     first_seed: int = 0,
     constraints: Constraints = NO_CONSTRAINTS,
@@ -115,6 +116,7 @@ def family_sources(
     ConfigError
         When a category is unknown, or the number is not positive.
     """
+    categories = listed(categories)
     unknown = sorted(set(categories) - FAMILIES.keys())
     if unknown:
         raise ConfigError(
@@ -127,13 +129,15 @@ def family_sources(
 
 
 def find_sources(
-    paths: Sequence[str | Path], package_roots: Mapping[str, Path] | None = None, body: str | None = None
+    paths: Sequence[str | Path] | str | Path,
+    package_roots: Mapping[str, Path] | None = None,
+    body: str | None = None,
 ) -> list[FileSource]:
     """Every object below some paths, in a stable order.
 
     Parameters
     ----------
-    paths : sequence of path
+    paths : path, or sequence of path
         URDF, MJCF, USD and joint files, object folders, or folders of object folders: below a folder, every
         ``mobility.urdf`` is taken, where there is none, every ``*.urdf``, and where there is none of these,
         ``mobility.xml`` (MJCF), ``mobility.usda`` (USD), ``mobility_v3.json``, ``mobility_v2.json`` or
@@ -151,7 +155,8 @@ def find_sources(
     from artsim.loading.object_files import find_urdf, max_bytes, read_urdf
 
     sources = []
-    for given in (Path(path).absolute() for path in paths):
+    every: list[str | Path] = listed(paths)
+    for given in (Path(path).absolute() for path in every):
         if given.is_dir():
             found = _below(given)
             if not found:

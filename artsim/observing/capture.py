@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.elementary import log
 from artsim.common.products import apply, norm
+from artsim.common.sequences import listed
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
@@ -75,6 +76,7 @@ def observe(
     """
     if num_points < 1:
         raise ConfigError(f"a cloud of {num_points} points is empty", "num_points", "ask for at least 1")
+    images = tuple(listed(images))
     unknown = set(images) - set(IMAGES)
     if unknown:
         raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")

@@ -11,6 +11,7 @@ import numpy as np
 import tyro
 from numpy.typing import ArrayLike
 
+from artsim.common.sequences import wrap_singles
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import FamilySource, Source, family_sources, find_sources
@@ -64,6 +65,7 @@ class EpisodeOptions:
     """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
 
     def __post_init__(self) -> None:
+        wrap_singles(self)
         if isinstance(self.physics, str):  # the name of an engine
             object.__setattr__(self, "physics", PhysicsOptions(engine=cast(Engine, self.physics)))
         if self.camera not in ("fixed", "orbit"):

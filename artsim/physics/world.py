@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,6 +111,12 @@ class Simulation:
         self._friction = self.options.friction * np.array([joint.friction for joint in joints])
         self.body = ENGINES[self.engine](robot, self.options)
         self.reset()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
+        """The same object in the same state, in a world of its own; what else was put into this one is not in it."""
+        copy = Simulation(self.obj, self.options)
+        copy._put(self._value.copy(), self._rate.copy())
+        return copy
 
     def close(self) -> None:
         """Free the world; happens by itself when the simulation is no longer used."""

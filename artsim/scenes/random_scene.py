@@ -14,6 +14,7 @@ from artsim.appearance import Colour, Lights, Sun
 from artsim.appearance.finishes import draw_coats, repaint_coats
 from artsim.common.elementary import cos, sin, tan
 from artsim.common.products import norm
+from artsim.common.sequences import wrap_singles
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.roots import PackageRoots
@@ -108,6 +109,7 @@ class SceneOptions:
     """Objects as they are, besides."""
 
     def __post_init__(self) -> None:
+        wrap_singles(self)
         if self.distractors < 0:
             raise ConfigError(f"{self.distractors} is not a count", "distractors", "use 0 or more")
         if self.count is not None and not 1 <= self.count[0] <= self.count[1]:

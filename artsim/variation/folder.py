@@ -20,6 +20,7 @@ import numpy as np
 
 from artsim.checks.strict_urdf import convex_collision_geometry, strict_inertia, strict_urdf
 from artsim.common.files import read_json, write_error
+from artsim.common.outputs import replace_folder
 from artsim.common.progress import track
 from artsim.common.tables import plural, table
 from artsim.datasets.worker_pool import folder_lock
@@ -270,9 +271,7 @@ def _write(
         )
         if problems:
             raise AssetError(f"its file is not as strict as that of the original: {problems[0]}", f"variation {seed}")
-        if folder.exists():  # of another version, or of other objects
-            shutil.rmtree(folder)
-        part.rename(folder)
+        replace_folder(part, folder)  # of another version, or of other objects
     except OSError as error:
         raise write_error(error, folder) from error
     finally:

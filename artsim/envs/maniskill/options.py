@@ -16,6 +16,7 @@ from mani_skill.envs.utils.observations import ALL_VISUAL_TEXTURES, parse_obs_mo
 from mani_skill.envs.utils.system.backend import CPU_SIM_BACKENDS, render_backend_name_mapping, sim_backend_name_mapping
 from mani_skill.utils import assets
 
+from artsim.common.sequences import wrap_singles
 from artsim.envs.maniskill import ENV_ID
 from artsim.envs.maniskill.goal import LEAST_OPEN, Goal
 from artsim.envs.maniskill.robots import NO_ROBOT, ROBOTS
@@ -59,6 +60,7 @@ class TaskOptions:
     """Objects with more joints are passed over. Observations have as many rows, infos one more, for the root."""
 
     def __post_init__(self) -> None:
+        wrap_singles(self)
         if self.goal not in get_args(Goal):
             raise ConfigError(f"there is no goal {self.goal!r}", "goal", "use open, close or random")
         if not 0.0 < self.tolerance < LEAST_OPEN:

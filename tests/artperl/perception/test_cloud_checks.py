@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from artperl.core.usual_sizes import USUAL, size_warning
+from artperl.estimator import load_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.cloud_checks import cloud_warnings
-from artperl.perception.preprocess import clean
+from artperl.perception.preprocess import Cloud
+from artsim.families import FAMILIES, make
 from artsim.observing.sample import Sample
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -17,7 +20,7 @@ CLOUD = np.load(CASES / "E00" / "c.npy").astype(np.float64)
 
 
 def _said(points: np.ndarray) -> tuple[str, ...]:
-    return cloud_warnings(points, clean(points))
+    return cloud_warnings(Cloud.of(points, 1024))
 
 
 def _with(value: float, share: float) -> np.ndarray:
@@ -72,3 +75,25 @@ def test_an_estimator_in_python_says_it_too_and_leaves_the_origin_out(estimator:
     assert len(text.splitlines()) == 5
     assert text.splitlines()[2].split()[:2] == ["base", "free"]
     assert text.splitlines()[3].split()[:2] == ["lid", "revolute"]
+
+
+@pytest.mark.parametrize("method", ["full", "artperl"])
+def test_a_laptop_of_four_metres_is_said_to_be_none(method: str) -> None:
+    estimator, points = load_estimator("laptop", method=method), np.load(CASES / "E00" / "c.npy")
+    assert estimator(points).warnings == ()
+    for factor, guess in ((10.0, "points * 0.1"), (0.1, "points * 10")):
+        (text,) = estimator(points * factor).warnings
+        assert "that of a usual laptop is 0.22 to 0.66 m" in text
+        assert guess in text
+
+
+def test_usual_sizes_are_those_of_the_families() -> None:
+    """Of every category there are sizes, and new objects have them."""
+    assert USUAL.keys() == FAMILIES.keys() - {"random_tree"}  # which is anything
+    for category in ("laptop", "eyeglasses", "scissors", "stapler", "drawer"):
+        for seed in (1000, 1001):
+            largest = float(np.linalg.norm(make(category, seed).box_size, axis=1).max())
+            assert size_warning(largest, [category]) is None
+            assert size_warning(100.0 * largest, [category]) is not None
+    assert size_warning(100.0, ["laptop", "gadget"]) is None  # of a category of the user's own nothing is known
+    assert size_warning(1.0, ["laptop", "drawer"]) is None

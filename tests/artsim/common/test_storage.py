@@ -12,6 +12,7 @@ import pytest
 from artsim.common import storage as module
 from artsim.common.storage import FolderStorage, Storage, UrlStorage, is_url, storage_of
 from artsim.errors import ConfigError, DatasetError
+from tests.artsim.object_storage import object_storage
 from tests.conftest import installed
 
 
@@ -90,3 +91,17 @@ def test_places_are_told_apart(tmp_path: Path) -> None:
         storage_of(Path("s3://bucket/a"))
     with pytest.raises(ConfigError, match="fsspec cannot open it"):
         storage_of("nonsense://a")
+
+
+@pytest.mark.parametrize("url", ["s3://", "s3:///", "s3:///first", "gs://", "simplecache::s3://", "memory://"])
+def test_a_url_without_a_bucket_is_refused_at_once(url: str) -> None:
+    with pytest.raises(ConfigError, match="it names no bucket"):
+        storage_of(url)
+
+
+def test_a_bucket_that_is_not_there_is_named_before_objects_are_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
+    with object_storage(monkeypatch) as (url, _):
+        bucket = url.removeprefix("s3://").partition("/")[0]
+        assert storage_of(url).sizes() == {}
+        with pytest.raises(ConfigError, match=f"there is no bucket {bucket}-not"):
+            storage_of(url.replace(bucket, f"{bucket}-not")).sizes()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -14,7 +16,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 import artsim.envs
 from artsim.datasets.verify import sample_problems
-from artsim.envs.articulated import ArticulatedEnv
+from artsim.envs.articulated import EPISODE_LENGTH, ArticulatedEnv
 from artsim.errors import ArtsimError, ConfigError
 from artsim.families import make
 from artsim.model.camera import Camera
@@ -239,3 +241,62 @@ def test_gymnasium_makes_vectors_of_environments(mode: str) -> None:
         assert reward.shape == (2,)
     finally:
         envs.close()
+
+
+def _steps(env: gymnasium.Env[Any, Any]) -> int:
+    env.reset(seed=0)
+    for n in range(1, 200):
+        *_, terminated, truncated, _ = env.step(np.zeros(16, np.float32))
+        if terminated or truncated:
+            return n
+    raise AssertionError("it does not end")
+
+
+def test_the_length_is_what_gymnasium_is_told() -> None:
+    small = {**SMALL, "num_points": 8, "categories": "laptop", "physics": "mujoco"}
+    assert _steps(gymnasium.make(ID, max_episode_steps=130, **small)) == 130
+    assert _steps(gymnasium.make(ID, max_episode_steps=20, **small)) == 20
+    env = gymnasium.make(ID, episode_length=30, **small)
+    assert _steps(env) == 30
+    assert env.spec is not None
+    assert _steps(gymnasium.make(env.spec)) == 30
+    assert _steps(gymnasium.make(ID, **small)) == EPISODE_LENGTH
+    assert _steps(ArticulatedEnv(**small)) == EPISODE_LENGTH
+    long = gymnasium.make(ID, max_episode_steps=130, **small)
+    assert long.spec is not None
+    assert long.spec.max_episode_steps == 130
+    assert _steps(gymnasium.make(long.spec)) == 130
+    both = gymnasium.make_vec(ID, num_envs=2, vectorization_mode="sync", max_episode_steps=20, **small)
+    both.reset(seed=0)
+    ends = [both.step(np.zeros((2, 16), np.float32))[3].all() for _ in range(20)]
+    assert ends == [False] * 19 + [True]
+
+
+@pytest.mark.parametrize("physics", ["mujoco", "pybullet"])
+@pytest.mark.parametrize("control", ["effort", "velocity"])
+def test_a_copy_goes_on_by_itself_from_the_same_state(physics: Any, control: Any) -> None:
+    env = gymnasium.make(ID, **SMALL, categories="drawer", physics=physics, control=control)
+    copy.deepcopy(env)  # before the first episode, too
+    env.reset(seed=3)
+    push = np.ones(16, np.float32)
+    env.step(push)
+    twin = copy.deepcopy(env)
+    first, again = ([one.step(push) for _ in range(3)] for one in (env, twin))
+    for (seen, reward, *_, info), (seen_again, reward_again, *_, info_again) in zip(first, again, strict=True):
+        assert reward == pytest.approx(reward_again, abs=1e-12)
+        np.testing.assert_allclose(info["joint_velocity"], info_again["joint_velocity"], atol=1e-9)
+        np.testing.assert_allclose(seen["points"], seen_again["points"], atol=1e-6)
+    env.close()
+    twin.step(push)
+    env.reset(seed=5)
+    twin.reset(seed=5)
+    np.testing.assert_array_equal(env.step(push)[0]["points"], twin.step(push)[0]["points"])
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_one_name_or_path_is_a_list_of_one(kind: Any, tmp_path: Path) -> None:
+    assert new(categories="laptop").reset(seed=0)[1]["category"] == "laptop"
+    with pytest.raises(ArtsimError, match="no such file or folder"):
+        new(objects=kind(tmp_path / "missing"))
+    assert new(objects=kind(ASSETS / "laptop")).reset(seed=0)[1]["part_names"]
+    assert "depth" in new(images="depth").reset(seed=0)[0]

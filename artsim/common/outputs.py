@@ -1,0 +1,123 @@
+"""Files that a user names for results: none takes the place of an input, of a dataset's own file, or of no file at all.
+
+:func:`write_output` is for these. What a program keeps for itself in a folder of its own goes by
+:func:`artsim.common.files.write_atomic`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import IO, Any, BinaryIO
+
+from artsim.common.files import atomic_file, read_json
+from artsim.common.known_files import is_input, refuse_special
+from artsim.errors import ArtsimError, ConfigError
+
+_MARKS = ("dataset.json", "plan.json", "scenes.json", "motions.json", "estimator.json")
+"""Files by which a folder is known for a dataset, a set of scenes, of motions, or an estimator."""
+_OWN = (*_MARKS, "progress.jsonl", "weights.safetensors", "base.npz")
+META = "meta.json"
+"""What describes an object that artsim wrote, in its folder."""
+_DEEPEST = 4
+"""Folders below one of those that are its own."""
+
+
+def write_output(path: Path, data: bytes, inputs: Iterable[Path | None] = ()) -> None:
+    """Write a result; see :func:`output_file`."""
+    with output_file(path, inputs) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def output_file(path: Path, inputs: Iterable[Path | None] = ()) -> Iterator[BinaryIO]:
+    """A new file to write to that takes the place of ``path`` once the block ends without an error.
+
+    Raises
+    ------
+    ConfigError
+        As :func:`check_output`; or when the folder cannot be written to, or the disk is full.
+    """
+    check_output(path, inputs)
+    with atomic_file(path) as file:
+        yield file
+
+
+def check_output(path: Path, inputs: Iterable[Path | None] = ()) -> None:
+    """Refuse to write where an input is, a file of a dataset, or what is no regular file.
+
+    Parameters
+    ----------
+    path : Path
+    inputs : iterable of Path or None
+        Files that are read, besides those that this process has read already.
+
+    Raises
+    ------
+    ConfigError
+    """
+    path = Path(path)
+    refuse_special(path)
+    given = {os.path.realpath(one) for one in inputs if one is not None}
+    if is_input(path) or os.path.realpath(path) in given:
+        raise ConfigError("it is an input, which would be lost", path, "name another file to write")
+    for depth, folder in enumerate(list(Path(os.path.realpath(path)).parents)[: _DEEPEST + 1]):
+        mark = next((name for name in _MARKS if (folder / name).is_file()), None)
+        if mark is None:
+            continue
+        if (depth and path.exists()) or (not depth and (path.name in _OWN or path.suffix == ".tar")):
+            raise ConfigError(f"it belongs to what {folder / mark} describes", path, "name another file to write")
+        return
+
+
+@contextlib.contextmanager
+def locked(file: IO[Any], path: Path) -> Iterator[None]:
+    """The one writer of a file, until the block ends or the process does; where the system has no locks, unchecked.
+
+    No other handle of the file may be closed meanwhile: the lock would go with it.
+
+    Raises
+    ------
+    ConfigError
+        When another process has it.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError) as error:
+        raise ConfigError(
+            "another program writes to it", path, "wait for its end, or name another file for --out"
+        ) from error
+    except OSError:  # a file system without locks
+        pass
+    yield
+
+
+def replace_folder(made: Path, folder: Path) -> None:
+    """Put the folder of an object where an older one of artsim may be, and nothing else.
+
+    Raises
+    ------
+    ConfigError
+        When a folder is there that artsim did not write, or that an input is in.
+    OSError
+        When it cannot be put there.
+    """
+    if folder.exists():
+        try:
+            own = "artsim" in read_json(folder / META, META)
+        except (ArtsimError, TypeError):
+            own = False
+        files = (Path(place) / name for place, _, names in os.walk(folder) for name in names if name != META)
+        if not own or any(map(is_input, files)):
+            what = "an input is in it" if own else "artsim did not write it"
+            raise ConfigError(f"a folder is there, and {what}", folder, "name another folder for --out")
+        shutil.rmtree(folder)
+    made.rename(folder)
