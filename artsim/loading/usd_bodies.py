@@ -61,6 +61,7 @@ class StageReader:
     Attributes
     ----------
     prims : list of Usd.Prim
+        Those that may be bodies, joints or shapes.
     bodies : list of UsdBody
     meters, kilograms : float
         Of one unit of the stage.
@@ -80,7 +81,7 @@ class StageReader:
             turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
             self.T_world_stage[:3, :3] = self.meters * turn
         self._cache = UsdGeom.XformCache(Usd.TimeCode.Default())
-        self.prims = list(stage.Traverse(Usd.TraverseInstanceProxies()))
+        self.prims = [prim for prim in stage.Traverse(Usd.TraverseInstanceProxies()) if _says_something(prim)]
         self._index: dict[Any, int] = {}
         self.names = {WORLD}
         world = rigid(self.T_world_stage, str(file))
@@ -247,6 +248,11 @@ class StageReader:
         world.shown = [mesh for mesh in world.shown if mesh.name not in gone]
         world.solid = [mesh for mesh in world.solid if mesh.name not in gone]
         self.repairs += [Repair(f"prim {path}", why) for path in paths]
+
+
+def _says_something(prim: Any) -> bool:
+    kind = str(prim.GetTypeName())
+    return kind in KINDS or kind in _UNREAD or kind.endswith("Joint") or bool(prim.GetAppliedSchemas())
 
 
 def _union(boxes: Sequence[Array]) -> tuple[Array, Array]:

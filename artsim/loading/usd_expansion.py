@@ -8,20 +8,32 @@ them: prims that are made of the same sites in the same number are counted once.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from artsim.errors import AssetError
 
-MAX_SITES = 200_000
-"""Sites of all prims together. Each takes some 10 microseconds and a kilobyte to compose."""
-_MAX_STEPS = 500_000
-"""Sites looked at, which is some seconds: more than as many prims of an object take."""
+MAX_SITES = 50_000
+"""Sites of all prims together: ten for each shape that an object may have. Each takes some 30 microseconds and 3
+kilobytes to find, to compose and to read."""
+_MAX_STEPS = 200_000
+"""Sites looked at: more than as many prims take."""
+_LAYERS = 16
+"""Layers of a stack that are looked through for a site in the time that a site takes."""
+_ARCS = frozenset(("references", "payload", "inheritPaths", "specializes", "variantSetNames", "clips", "relocates"))
 
 Site = tuple[str, Any]
 """Name of a stack of layers, and a path in it, variants included."""
-_Sites = Counter[Site]
+_Sites = dict[Site, int]
+"""Sites, and how often each is one of a prim's."""
+
+
+class _Found(NamedTuple):
+    """What stands at a site: specs, the names below it, and what it counts as."""
+
+    specs: tuple[Any, ...]
+    names: tuple[str, ...]
+    cost: int
 
 
 class Expansion:
@@ -41,15 +53,17 @@ class Expansion:
         from pxr import Sdf
 
         self._sdf, self._file, self._stack, self._beside = Sdf, file, stack, beside
-        self._own: dict[Site, _Sites] = {}
+        self._found: dict[Site, _Found] = {}
+        self._own: dict[Site, _Sites | None] = {}
         self._all: dict[Site, _Sites] = {}
-        self._totals: dict[frozenset[tuple[Site, int]], int] = {}
-        self._classes: dict[str, list[Site]] | None = None
+        self._totals: dict[frozenset[tuple[Site, int]], int | None] = {}
+        self._arcs: dict[Site, list[tuple[Site, bool]]] = {}
+        self._referrers: dict[Site, list[Site]] = {}
         self._stacks: list[str] = []
-        self._steps = 0
+        self._steps = self._left_out = 0
 
-    def check(self, root: str) -> None:
-        """Refuse what is too much.
+    def check(self, root: str) -> int:
+        """How many sites all prims have that a root layer expands to; no fewer than there are prims.
 
         Raises
         ------
@@ -58,36 +72,43 @@ class Expansion:
         """
         self._stacks = [root]
         try:
-            self._total(Counter({(root, self._sdf.Path.absoluteRootPath): 1}))
+            for stack in self._stacks:  # grows
+                for layer in self._stack(stack):
+                    if layer.pseudoRoot.HasInfo("layerRelocates"):
+                        raise self._unread("relocates", "/")
+                    for spec in layer.rootPrims:
+                        self._note_arcs(stack, spec)
+            return self._total_below({(root, self._sdf.Path.absoluteRootPath): 1})
         except RecursionError as error:
             raise AssetError("its prims are nested too deeply", self._file, "flatten its hierarchy") from error
 
-    def _total(self, sites: _Sites) -> int:
-        """Sites of a prim that is made of some, and of all prims below it."""
+    def _total_below(self, sites: _Sites) -> int:
+        """What all prims below one that is made of some sites count as."""
         key = frozenset(sites.items())
         if key in self._totals:
-            if self._totals[key] < 0:
+            total = self._totals[key]
+            if total is None:
                 raise self._circle(next(iter(sites))[1])
-            return self._totals[key]
-        self._totals[key] = -1
+            return total
+        self._totals[key] = None
         total = 0
-        names: dict[str, None] = {}
-        for site, count in sites.items():
-            specs = self._specs(site)
-            total = self._checked(total + count * len(specs))
-            names.update((child.name, None) for spec in specs for child in spec.nameChildren)
+        names = dict.fromkeys(name for site in sites for name in self._look(site).names)
+        self._checked(len(names))
         for name in names:
-            total = self._checked(total + self._total(self._below(sites, name)))
+            below = self._below(sites, name)
+            total += sum(count * self._look(site).cost for site, count in below.items())
+            heirs = {site: count for site, count in below.items() if self._look(site).names}
+            total = self._checked(total + (self._total_below(heirs) if heirs else 0))
         self._totals[key] = total
         return total
 
     def _below(self, sites: _Sites, name: str) -> _Sites:
         """Sites of the child of a name of a prim that is made of some."""
-        found: _Sites = Counter()
+        found: _Sites = {}
         for (stack, path), count in sites.items():
             for site, copies in self._of_spec((stack, path.AppendChild(name))).items():
-                found[site] += count * copies
-            self._count(1)
+                found[site] = found.get(site, 0) + count * copies
+        self._count(len(sites))
         self._checked(sum(found.values()))
         return found
 
@@ -97,87 +118,117 @@ class Expansion:
             return self._all[site]
         stack, path = site
         if path == self._sdf.Path.absoluteRootPath:
-            return Counter({site: 1})
+            return {site: 1}
+        before = self._left_out
         found = self._below(self._sites((stack, path.GetParentPath())), path.name)
-        self._all[site] = found
+        if self._left_out == before:
+            self._all[site] = found
         return found
 
     def _of_spec(self, site: Site) -> _Sites:
         """A site and those that its own arcs bring; none where nothing stands there."""
-        found = self._own.get(site)
-        if found is not None:
-            if site not in found and found:
-                raise self._circle(site[1])
-            return found
-        specs = self._specs(site)
-        if not specs:
-            return self._own.setdefault(site, Counter())
-        self._own[site] = Counter({("", ""): 1})  # in the making
-        total: _Sites = Counter({site: 1})
-        for spec in specs:
-            for target in self._targets(site, spec):
-                new = self._of_spec(target) if target[1].ContainsPrimVariantSelection() else self._sites(target)
-                total.update(new)
+        at = self._look(site)
+        if not at.specs:
+            return {}
+        if site not in self._arcs:
+            return {site: 1}
+        if site in self._own:
+            known = self._own[site]
+            if known is None:  # a circle, which USD leaves out there, and only there
+                self._left_out += 1
+            return known or {}
+        before = self._left_out
+        self._own[site] = None
+        total: _Sites = {site: 1}
+        for target, is_class in self._arcs[site]:
+            brought = [self._of_spec(target) if target[1].ContainsPrimVariantSelection() else self._sites(target)]
+            if is_class:
+                brought += [self._of_spec(other) for other in self._implied(target)]
+            for new in brought:
+                for other, copies in new.items():
+                    total[other] = total.get(other, 0) + copies
                 self._count(len(new))
-                self._checked(sum(total.values()))
-        self._own[site] = total
+            self._checked(sum(total.values()))
+        if self._left_out == before:
+            self._own[site] = total
+        else:
+            del self._own[site]
         return total
 
-    def _targets(self, site: Site, spec: Any) -> Iterator[Site]:
-        """Sites that the arcs of one spec lead to."""
+    def _look(self, site: Site) -> _Found:
+        found = self._found.get(site)
+        if found is None:
+            stack, path = site
+            layers = self._stack(stack)
+            self._count(1 + len(layers) // _LAYERS)
+            if path == self._sdf.Path.absoluteRootPath:
+                specs = tuple(layer.pseudoRoot for layer in layers)
+            else:
+                specs = tuple(spec for spec in (layer.GetPrimAtPath(path) for layer in layers) if spec is not None)
+            below = [spec.nameChildren for spec in specs if spec.nameChildren]
+            names = tuple(dict.fromkeys(name for children in below for name in children.keys()))  # noqa: SIM118
+            found = self._found[site] = _Found(specs, names, len(specs) + len(layers) // _LAYERS)
+        return found
+
+    def _note_arcs(self, stack: str, spec: Any) -> None:
+        """Note where the arcs of a prim and of those below it lead."""
+        self._count(1)
+        site = stack, spec.path
+        keys = _ARCS.intersection(spec.ListInfoKeys())
+        if keys:
+            targets = list(self._targets(site, spec, keys))
+            self._arcs.setdefault(site, []).extend(targets)
+            for target, _ in targets:
+                self._referrers.setdefault(target, []).append(site)
+        if spec.nameChildren:
+            for child in spec.nameChildren:
+                self._note_arcs(stack, child)
+
+    def _targets(self, site: Site, spec: Any, keys: frozenset[str]) -> Iterator[tuple[Site, bool]]:
+        """Sites that the arcs of one spec lead to, and whether they are classes."""
         stack, path = site
-        if spec.HasInfo("clips"):
-            raise AssetError("value clips are not read", f"{self._file}: prim {path}", "write the values into the file")
-        if spec.HasInfo("relocates") or spec.layer.pseudoRoot.HasInfo("layerRelocates"):
-            raise AssetError("relocates are not read", f"{self._file}: prim {path}", "flatten it: usdcat --flatten")
-        for name, variants in spec.variantSets.items():
-            for variant in variants.variants.keys():  # noqa: SIM118  # no dictionary
-                yield stack, path.AppendVariantSelection(name, variant)
+        for key, what in (("clips", "value clips"), ("relocates", "relocates")):
+            if key in keys:
+                raise self._unread(what, path)
+        if "variantSetNames" in keys or spec.variantSets:
+            for name, variants in spec.variantSets.items():
+                for variant in variants.variants.values():
+                    yield (stack, path.AppendVariantSelection(name, variant.name)), False
+                    self._note_arcs(stack, variant.primSpec)
         for arc in (*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems()):
             other = self._beside(spec.layer, arc.assetPath) if arc.assetPath else stack
             if other not in self._stacks:
                 self._stacks.append(other)
-                self._classes = None
             target = arc.primPath
             if target == self._sdf.Path.emptyPath:
-                default = next((layer.defaultPrim for layer in self._stack(other)[:1]), "")
-                target = self._sdf.Path(f"/{default.lstrip('/')}") if default else self._sdf.Path.emptyPath
+                default = self._stack(other)[0].defaultPrim
+                target = self._sdf.Path(f"/{default.lstrip('/')}") if default else target
             if target.IsPrimPath():
-                yield other, target
+                yield (other, target), False
         for arcs in (spec.inheritPathList, spec.specializesList):
-            for target in arcs.GetAddedOrExplicitItems():
-                if target.IsPrimPath():
-                    yield stack, target
-                    yield from self._implied(stack, target)
+            yield from (((stack, target), True) for target in arcs.GetAddedOrExplicitItems() if target.IsPrimPath())
 
-    def _implied(self, stack: str, target: Any) -> Iterator[Site]:
-        """Where the class of a path may stand for those who refer to its prim: sites of its name that bring arcs."""
-        if self._classes is None:
-            self._classes = {}
-            for name in self._stacks:
-                for layer in self._stack(name):
-                    for spec in layer.rootPrims:
-                        self._note(name, spec)
-        for site in self._classes.get(target.name, []):
-            if site != (stack, target) and self._own.get(site) != Counter({("", ""): 1}):
-                yield site
+    def _implied(self, site: Site) -> list[Site]:
+        """Where those who refer to a prim above a class, or to its layers, may write something of it themselves."""
+        found: dict[Site, None] = {site: None}
+        found.update(((stack, site[1]), None) for stack in self._stacks)
+        waiting = list(found)
+        while waiting:
+            stack, path = waiting.pop()
+            for prefix in path.GetPrefixes()[:-1]:
+                for other, source in self._referrers.get((stack, prefix), ()):
+                    self._count(1)
+                    new = other, path.ReplacePrefix(prefix, source)
+                    if new not in found:
+                        found[new] = None
+                        waiting.append(new)
+        del found[site]
+        return list(found)
 
-    def _note(self, stack: str, spec: Any) -> bool:
-        """Note the specs of a name that have arcs, or something below them that has."""
-        self._count(1)
-        below = [self._note(stack, child) for child in spec.nameChildren]
-        arcs = (spec.referenceList, spec.payloadList, spec.inheritPathList, spec.specializesList)
-        found = any(below) or bool(spec.variantSets) or any(arc.GetAddedOrExplicitItems() for arc in arcs)
-        if found and self._classes is not None:
-            self._classes.setdefault(spec.name, []).append((stack, spec.path))
-        return found
-
-    def _specs(self, site: Site) -> list[Any]:
-        stack, path = site
-        if path == self._sdf.Path.absoluteRootPath:
-            return [layer.pseudoRoot for layer in self._stack(stack)]
-        found = (layer.GetPrimAtPath(path) for layer in self._stack(stack))
-        return [spec for spec in found if spec is not None]
+    def _unread(self, what: str, path: Any) -> AssetError:
+        return AssetError(
+            f"{what} are not read", f"{self._file}: prim {path}", "write it into one layer: usdcat --flatten"
+        )
 
     def _count(self, steps: int) -> None:
         self._steps += steps

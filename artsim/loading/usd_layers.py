@@ -16,7 +16,7 @@ from artsim.loading.usd_expansion import Expansion
 from artsim.loading.usd_packages import members
 
 PACKAGE = ".usdz"
-_LAYERS = (".usd", ".usda", ".usdc")
+_LAYERS = (".usda", ".usdc", ".usd")
 SUFFIXES = (*_LAYERS, PACKAGE)
 _MAX_LAYERS = 200
 

@@ -255,7 +255,7 @@ def test_references_that_expand_without_end_are_refused_before_they_are_composed
     )
     path = tmp_path / "bomb.usda"
     path.write_text(f'{HEAD}{levels}class "l9" {{}}\ndef "o" (references = </l0>) {{}}\n')
-    with pytest.raises(AssetError, match="expands to over"):
+    with pytest.raises(AssetError, match="expand to over"):
         load(path)
 
 
