@@ -76,6 +76,9 @@ class StageReader:
         self.stage, self.file, self.limits, self.repairs = stage, file, limits, repairs
         self.meters = float(UsdGeom.GetStageMetersPerUnit(stage))
         self.kilograms = float(UsdPhysics.GetStageKilogramsPerUnit(stage))
+        for name, value in (("metersPerUnit", self.meters), ("kilogramsPerUnit", self.kilograms)):
+            if not 0.0 < value <= LARGEST:
+                raise AssetError(f"{name} is {value:g}, which is no size of a unit", file, f"write {name} = 1")
         self.T_world_stage = np.diag([self.meters, self.meters, self.meters, 1.0])
         if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y:
             turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -147,6 +150,7 @@ class StageReader:
     def _read_shapes(self) -> None:
         count = 0
         skipped = set()
+        lost: dict[int, UnusableMeshError] = {}
         for prim in self.prims:
             kind = str(prim.GetTypeName())
             if kind not in KINDS:
@@ -158,7 +162,8 @@ class StageReader:
                 raise AssetError(
                     f"it has over {self.limits.max_shapes} shapes", self.file, "raise LoadLimits.max_shapes"
                 )
-            body = self.bodies[self.owner(prim)]
+            owner = self.owner(prim)
+            body = self.bodies[owner]
             shown, solid = self._is_shown(prim), self._collides(prim, body)
             if not (shown or solid):
                 continue
@@ -168,11 +173,18 @@ class StageReader:
                 mesh = surface(prim, T_body_prim, self.limits.max_faces)
             except UnusableMeshError as problem:
                 self.repairs.append(Repair(f"prim {path}", f"{problem}: left out"))
+                lost.setdefault(owner, problem)
                 continue
             if shown:
                 body.shown.append(InlineMesh(path, *mesh))
             if solid:
                 body.solid.append(InlineMesh(path, *self._collision_mesh(prim, mesh)))
+        for owner, first in lost.items():
+            body = self.bodies[owner]
+            if body.prim is not None and not (body.shown or body.solid):
+                raise self.error(
+                    body.prim, f"none of its shapes can be used: {first}", "mend the shape, or leave out the body"
+                )
         for kind in sorted(skipped):
             self.repairs.append(Repair("prims", f"of type {kind} left out: they are no surface of an object"))
 

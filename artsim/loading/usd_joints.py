@@ -11,7 +11,7 @@ from artsim.common.products import matmul
 from artsim.loading.usd_bodies import StageReader, rigid
 from artsim.loading.usd_values import flag, number, rotation, token, vectors
 from artsim.loading.zero_pose import unused_name
-from artsim.model.kinematics import Array
+from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Repair
 
 _AXES = ("X", "Y", "Z")
@@ -142,6 +142,10 @@ def _end(reader: StageReader, prim: Any, side: int) -> tuple[int, str, Array]:
     T_prim_joint[:3, 3] = next(iter(vectors(position)), np.zeros(3))
     T_world_joint = np.eye(4)
     T_world_joint[:3, 3] = matmul(affine, T_prim_joint)[:3, 3]
+    if not (np.abs(T_world_joint) <= LARGEST).all():
+        raise reader.error(
+            prim, f"its frame in body {side} is not finite, or too far", "write a finite localPos and localRot"
+        )
     T_world_joint[:3, :3] = matmul(rigid(affine, reader.where(prim))[:3, :3], rotation(turn))
     return body, path, matmul(np.linalg.inv(reader.bodies[body].T_world_body), T_world_joint)
 

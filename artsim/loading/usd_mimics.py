@@ -22,6 +22,7 @@ from artsim.loading.urdf_document import MimicRelation
 from artsim.loading.usd_bodies import StageReader
 from artsim.loading.usd_joints import FreeAxis, UsdJoint
 from artsim.loading.usd_values import flag, number, numbers, token
+from artsim.model.kinematics import LARGEST
 from artsim.model.objects import Repair
 
 _DEGREE = float(np.pi / 180.0)
@@ -45,8 +46,19 @@ def read_mimics(reader: StageReader, joints: list[UsdJoint]) -> tuple[dict[str, 
             if found is None:
                 continue
             leader, rate, offset = found
+            if not (abs(rate) <= LARGEST and abs(offset) <= LARGEST):
+                raise reader.error(
+                    joint.prim, f"follows another by {rate:g} and {offset:g}", f"write numbers up to {LARGEST:g}"
+                )
             if leader is not None:
                 mimics[axis.name] = MimicRelation(leader.name, rate, offset)
+                seen = axis.name
+                while (relation := mimics.get(seen)) is not None:
+                    seen = relation.joint
+                    if seen == axis.name:
+                        raise reader.error(
+                            joint.prim, "joints follow each other in a circle", "let one of them be free"
+                        )
             else:
                 held[axis.name] = offset
                 follower.say(f"follows nothing that moves: held at {offset:.6g}")

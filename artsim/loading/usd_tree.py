@@ -156,7 +156,9 @@ class _Tree:
                 if child in self._position:
                     joint = self._between[frozenset((body, child))][-1]
                     raise self._reader.error(
-                        joint.prim, "closes a chain, and closed chains are not trees", "remove or disable one joint"
+                        joint.prim,
+                        f"{joint.prim.GetTypeName()} closes a chain, and closed chains are not trees",
+                        "remove or disable one joint",
                     )
                 self._hang(body, child)
                 waiting.append((child, body))

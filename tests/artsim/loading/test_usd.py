@@ -212,6 +212,23 @@ REFUSED: dict[str, tuple[str, str]] = {
     "an unknown axis": (
         PAIR + joint("Revolute", "base", "lid", 'uniform token physics:axis = "W"'), "which is not one of X, Y, Z"
     ),
+    "a shape without extent": (
+        body("base", shape='def Cube "s" { double size = 0 }'),
+        "prim /o/base: none of its shapes can be used: /o/base/s has no extent",
+    ),
+    "a shape too far away": (body("base", shape='def Cube "s" { double size = 3e6 }'), "over 1e.06 m"),
+    "a frame that is not finite": (
+        PAIR + joint("Revolute", "base", "lid", "point3f physics:localPos0 = (inf, 0, 0)"),
+        "prim /o/j: its frame in body 0 is not finite",
+    ),
+    "a circle of followers": (
+        PAIR + joint("Revolute", "base", "lid", "rel artsim:mimic:joint = </o/j>"),
+        "prim /o/j: joints follow each other in a circle",
+    ),
+    "a number out of range": (
+        PAIR + joint("Revolute", "base", "lid", "rel artsim:mimic:joint = </o/j>\ndouble artsim:mimic:offset = 1e30"),
+        "prim /o/j: follows another by 1 and 1e.30",
+    ),
     "broken": ("def {", "no USD layer that can be read"),
 }  # fmt: skip
 
@@ -246,6 +263,10 @@ def test_what_cannot_or_may_not_be_read_is_refused(case: str, tmp_path: Path) ->
     with pytest.raises(AssetError, match=message) as caught:
         load(written(folder, content))
     assert caught.value.fix
+    # Words of other formats, and names of what is not in the file.
+    assert not {"link", "links", "urdf", "mjcf", "mujoco", "<robot>", "geom", "type="} & set(
+        str(caught.value).lower().split()
+    )
 
 
 def test_references_that_expand_without_end_are_refused_before_they_are_composed(tmp_path: Path) -> None:
