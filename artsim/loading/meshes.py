@@ -55,7 +55,7 @@ class LoadLimits:
     max_faces: int = 5_000_000
     """Triangles over the whole object."""
     max_copied_faces: int = 500_000
-    """Triangles of meshes that are used again: a small file with many copies would take as long as a large one."""
+    """Triangles of an MJCF file's meshes that are used again: a small file of many would take as long as a large one."""
     max_links: int = 1_000
     max_shapes: int = 5_000
     """Primitives and mesh references in a URDF file."""
@@ -129,8 +129,6 @@ class MeshReader:
     notes: list[Repair] = field(default_factory=list)
     num_faces: int = 0
     _num_bytes: int = 0
-    _num_copied: int = 0
-    _used: set[Path | int] = field(default_factory=set)
     _paths: dict[str, Path] = field(default_factory=dict)
     _read: dict[Path, tuple[Surface, list[bytes]]] = field(default_factory=dict)
 
@@ -147,7 +145,7 @@ class MeshReader:
         if geometry.mesh is not None:
             return self._file(geometry.mesh)
         if geometry.inline is not None:
-            self._count(len(geometry.inline.faces), id(geometry.inline.vertices))
+            self._count(len(geometry.inline.faces))
             return geometry.inline.vertices, geometry.inline.faces
         self._count(_TRIANGLES[str(geometry)])
         if geometry.box is not None:
@@ -159,14 +157,9 @@ class MeshReader:
         assert geometry.capsule is not None
         return capsule(geometry.capsule.radius, geometry.capsule.length)
 
-    def _count(self, faces: int, mesh: Path | int | None = None) -> None:
-        """Count triangles before they are made, and those of a mesh that is used again."""
+    def _count(self, faces: int) -> None:
+        """Count triangles before they are made."""
         self.num_faces += faces
-        if mesh in self._used:
-            self._num_copied += faces
-            check_copies(self._num_copied, self.folder, self.limits)
-        elif mesh is not None:
-            self._used.add(mesh)
         if self.num_faces > self.limits.max_faces:
             raise AssetError(
                 f"the object has more than {self.limits.max_faces} triangles",
@@ -202,7 +195,7 @@ class MeshReader:
         self._take(contents, path)
         if len(surface.faces) == 0:
             raise UnusableMeshError(f"mesh {reference.filename!r} has no faces")
-        self._count(len(surface.faces), path)
+        self._count(len(surface.faces))
         vertices, faces = surface.vertices, surface.faces
         if reference.scale is not None:
             vertices = vertices * np.asarray(reference.scale, dtype=np.float64)
