@@ -171,9 +171,10 @@ def clean(points: Array) -> NDArray[np.int64]:
 def _as_seen(points: Array) -> NDArray[np.int64]:
     """(N,) order of points by the row, then the column, in which a camera sees them; the nearest first."""
     x, y, z = points.T
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of points at z = 0
         row, column = np.rint(y / z / _LEVEL), x / z
-    if ((np.diff(row) > 0) | ((np.diff(row) == 0) & (np.diff(column) > 0))).all():  # as of an image
+        down, across = np.diff(row), np.diff(column)
+    if ((down > 0) | ((down == 0) & (across > 0))).all():  # as of an image
         return np.arange(len(points))
     return np.lexsort((z, column, row))
 

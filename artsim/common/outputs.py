@@ -13,15 +13,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
-from artsim.common.files import atomic_file, read_json
+from artsim.common.files import atomic_file
 from artsim.common.known_files import is_input, refuse_special
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ConfigError
 
 _MARKS = ("dataset.json", "plan.json", "scenes.json", "motions.json", "estimator.json")
 """Files by which a folder is known for a dataset, a set of scenes, of motions, or an estimator."""
 _OWN = (*_MARKS, "progress.jsonl", "weights.safetensors", "base.npz")
-META = "meta.json"
-"""What describes an object that artsim wrote, in its folder."""
+_OBJECT = {"meta.json", "semantics.txt", "mobility.urdf", "mobility.xml", "mobility.usda", "meshes"}
+"""Everything in the folder of an object that artsim wrote."""
 _DEEPEST = 4
 """Folders below one of those that are its own."""
 
@@ -111,11 +111,9 @@ def replace_folder(made: Path, folder: Path) -> None:
         When it cannot be put there.
     """
     if folder.exists():
-        try:
-            own = "artsim" in read_json(folder / META, META)
-        except (ArtsimError, TypeError):
-            own = False
-        files = (Path(place) / name for place, _, names in os.walk(folder) for name in names if name != META)
+        entries = set(os.listdir(folder))  # noqa: PTH208  # a file is no folder, which is an OSError
+        own = not entries or "meta.json" in entries <= _OBJECT
+        files = (Path(place) / name for place, _, names in os.walk(folder) for name in names if name != "meta.json")
         if not own or any(map(is_input, files)):
             what = "an input is in it" if own else "artsim did not write it"
             raise ConfigError(f"a folder is there, and {what}", folder, "name another folder for --out")
