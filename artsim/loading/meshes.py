@@ -55,7 +55,7 @@ class LoadLimits:
     max_faces: int = 5_000_000
     """Triangles over the whole object."""
     max_copied_faces: int = 500_000
-    """Triangles of an MJCF file's meshes that are used again: a small file of many would take as long as a large one."""
+    """Triangles of an MJCF file's meshes that are used again: a small file of many takes as long as a large one."""
     max_links: int = 1_000
     max_shapes: int = 5_000
     """Primitives and mesh references in a URDF file."""
