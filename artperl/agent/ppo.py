@@ -7,7 +7,8 @@ it. A :class:`Phase` says what the agent learns by, and how it acts meanwhile.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import inf
 
 import torch
 from torch import Tensor
@@ -21,6 +22,7 @@ from artperl.core.mixed_precision import autocast
 from artperl.core.pose import Theta
 from artperl.core.ranks import ALONE, Ranks
 from artperl.core.trees import KINDS
+from artsim.errors import ConfigError
 
 _PRISMATIC = KINDS.index("prismatic")
 
@@ -47,6 +49,12 @@ class PPOOptions:
     minibatch: int = 64
     """States of an update: few, since the states of an episode are much alike, and updates are what learning needs."""
     max_gradient: float = 0.5
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, least = getattr(self, field.name), 1 if field.name in ("epochs", "minibatch") else 0
+            if not least <= value < inf:
+                raise ConfigError(f"{value} is not possible", f"ppo.{field.name}", f"use {least} or more")
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ class TrainOptions:
         for names, least in ((_AT_LEAST_ONE, 1), (_AT_LEAST_TWO, 2), (_AT_LEAST_ZERO, 0)):
             for name in names:
                 if not least <= getattr(self, name) <= _MOST:
-                    raise ConfigError(f"{getattr(self, name)} is not possible", name, f"use {least} or more")
+                    raise ConfigError(f"{getattr(self, name)} is not possible", name, f"use {least} to {_MOST}")
         for name in _SHARES:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ConfigError(f"{getattr(self, name)} is no share", name, "use 0 to 1")

@@ -61,7 +61,12 @@ class Recipe:
             recipe = parse_json(data)
         except ValueError as error:
             raise ConfigError(f"the recipe is not JSON ({error})", path) from error
-        if not isinstance(recipe, dict) or recipe.keys() != {"preset", "options", "lengths"}:
+        fields = {"preset": str, "options": dict, "lengths": dict}
+        if (
+            not isinstance(recipe, dict)
+            or recipe.keys() != fields.keys()
+            or not all(isinstance(recipe[name], kind) for name, kind in fields.items())
+        ):
             raise ConfigError("a recipe has a preset, options and lengths", path, f"write it like {known}")
         made = cls(path.stem, sha256=hashlib.sha256(data).hexdigest(), **recipe)
         made.train_options()

@@ -111,7 +111,7 @@ def read_bounded(
     what: str,
     error: type[ArtsimError] = AssetError,
     inside: Path | None = None,
-    fix: str = _RAISE_LIMITS,
+    fix: str | None = None,
 ) -> bytes:
     """The content of a regular file, refused above a size.
 
@@ -127,8 +127,8 @@ def read_bounded(
         Raised when the file cannot be used.
     inside : Path, optional
         Folder that the file must lie in once every link is followed. The folder itself may be reached through links.
-    fix : str
-        What a user can do about a file that is too large.
+    fix : str, optional
+        What a user can do about a file that is too large; by default raise the limits of an asset, or pass another file.
 
     Raises
     ------
@@ -146,8 +146,9 @@ def read_bounded(
             if not stat.S_ISREG(status.st_mode):
                 raise error(f"{what} is no regular file", path, "pass a file")
             if status.st_size > max_bytes:
+                mend = fix or (_RAISE_LIMITS if error is AssetError else "pass a smaller file")
                 raise error(
-                    f"{what} of {status.st_size / 1e6:.0f} MB is over the limit of {max_bytes / 1e6:.0f} MB", path, fix
+                    f"{what} of {status.st_size / 1e6:.3g} MB is over the limit of {max_bytes / 1e6:.3g} MB", path, mend
                 )
             data = file.read(status.st_size + 1)
         note_input(path)

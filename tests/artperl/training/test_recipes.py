@@ -47,7 +47,10 @@ def test_a_recipe_on_another_preset_keeps_its_data_and_learns_as_long_as_that_pr
     ["", "[1]", "{}", '{"preset": "huge", "options": {}, "lengths": {}}',
      '{"preset": "quick", "options": {"colour": 1}, "lengths": {}}',
      '{"preset": "quick", "options": {}, "lengths": {"perception_steps": "many"}}',
-     '{"preset": "quick", "options": {"noisy": 2.0}, "lengths": {}}'],
+     '{"preset": "quick", "options": {"noisy": 2.0}, "lengths": {}}',
+     '{"preset": ["quick"], "options": {}, "lengths": {}}', '{"preset": "quick", "options": 3, "lengths": {}}',
+     '{"preset": "quick", "options": {"method": "artperl", "ppo": {"minibatch": 0}}, "lengths": {}}',
+     '{"preset": "quick", "options": {"base_objects": 1000000000000}, "lengths": {}}'],
 )  # fmt: skip
 def test_a_recipe_that_is_none_is_named(text: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
