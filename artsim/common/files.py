@@ -128,7 +128,7 @@ def read_bounded(
     inside : Path, optional
         Folder that the file must lie in once every link is followed. The folder itself may be reached through links.
     fix : str, optional
-        What a user can do about a file that is too large; by default raise the limits of an asset, or pass another file.
+        What a user can do about a file that is too large. By default: raise the limits of an asset, pass another file.
 
     Raises
     ------
