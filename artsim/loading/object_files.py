@@ -17,7 +17,7 @@ from artsim.loading.xml_repair import xacro_error
 JOINT_FILES = ("mobility_v3.json", "mobility_v2.json", "motion_attributes.json")
 """Names of a folder's annotation of joints: of PartNet-Mobility with one glTF file, and with many meshes; and of
 Shape2Motion."""
-OTHER_FILES = ("mobility.xml", "mobility.usda", "mobility.usdc", "mobility.usd", *JOINT_FILES)
+OTHER_FILES = ("mobility.xml", *(f"mobility{suffix}" for suffix in SUFFIXES), *JOINT_FILES)
 """Names of an object's file, in a folder without a URDF file."""
 UNITY = "motion_unity.urdf"
 """The URDF file of AKB-48."""

@@ -25,6 +25,7 @@ from artsim.loading.bodies import (
 )
 from artsim.loading.described_bodies import with_described_bodies
 from artsim.loading.documents import read_document
+from artsim.loading.mesh_files.surface import is_thin
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_range, merge_shapes
 from artsim.loading.object_files import category_of_folder, find_urdf, max_bytes, object_id, read_urdf
 from artsim.loading.packages import MissingFileError
@@ -38,10 +39,6 @@ from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
 
 _FAR = 20.0
 """Times the object's size that no slide goes: a cart on its track goes once, a drawer less."""
-_THIN = 1e-6
-"""Share of its length by which a surface is a line: squares of less are lost in double precision."""
-_NOTHING = 1e-9
-"""Metres below which a whole shape is a point: an atom is a tenth of it."""
 
 
 def load(
@@ -117,7 +114,7 @@ def load(
     T_rest_part = matmul(np.linalg.inv(T_base_rest), T_base_part)
     parts = with_described_bodies(parts, bodies, robot, reader, T_rest_part, file)
     repairs += reasons
-    repairs += _far_slides(tree, parts)
+    repairs += _far_slides(tree, parts, robot.explicit)
     return ArticulatedObject(
         object_id=object_id(file, side.object_id) + ("" if body is None else f"_{body}"),
         category=category,
@@ -131,7 +128,7 @@ def load(
     )
 
 
-def _far_slides(tree: KinematicTree, parts: list[Part]) -> list[Repair]:
+def _far_slides(tree: KinematicTree, parts: list[Part], explicit: bool) -> list[Repair]:
     """Slides that go so far that their limits look like millimetres."""
     bounds = np.stack([part.bounds for part in parts if len(part.faces)])
     size = float(norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
@@ -139,8 +136,12 @@ def _far_slides(tree: KinematicTree, parts: list[Part]) -> list[Repair]:
         Repair(
             f"joint {joint.name!r}",
             f"goes from {joint.lower:g} to {joint.upper:g} m in an object of {size:.3g} m: its limits look like "
-            f'millimetres, and are taken as metres; if they are, write lower="{joint.lower / 1000:.6g}" '
-            f'upper="{joint.upper / 1000:.6g}"',
+            "millimetres, and are taken as metres; if they are, "
+            + (
+                "divide both by 1000"
+                if explicit
+                else f'write lower="{joint.lower / 1000:.6g}" upper="{joint.upper / 1000:.6g}"'
+            ),
         )
         for joint in tree.joints
         if joint.type == "prismatic" and joint.upper - joint.lower > _FAR * size
@@ -196,7 +197,7 @@ def _surfaces(
         try:
             vertices, faces = reader.shape(shape.geometry)
             check_range(vertices, f"{file}: {noun} {link.name!r}")
-            if _is_thin(vertices, faces):
+            if is_thin(vertices, faces):
                 raise UnusableMeshError(f"{shape.geometry} has no extent: all of it lies on a line or in a point")
         except UnusableMeshError as problem:
             problems.append(str(problem))
@@ -212,17 +213,6 @@ def _surfaces(
             fix or "restore the mesh files; an object with an invisible part would give wrong data",
         )
     return surfaces, [*problems, *link.empty]
-
-
-def _is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
-    """Whether a surface is a point or a line; one that is flat is not."""
-    used = vertices  # readers leave none out
-    if len(used) < 3:
-        return True
-    from_middle = used - used.mean(axis=0)
-    # Second moments, smallest first: their roots are the extents along the principal axes.
-    extents = np.sqrt(np.linalg.eigvalsh(from_middle.T @ from_middle).clip(0.0))
-    return bool(extents[1] <= _THIN * extents[2] or extents[2] < _NOTHING)
 
 
 def _tree(bodies: list[RigidBody], file: Path) -> tuple[KinematicTree, dict[str, tuple[int, float]]]:

@@ -62,14 +62,15 @@ def read_inertia(
     return Inertia(found.mass, center, tensor)
 
 
-def read_dynamics(prim: Any, slides: bool, meters: float, kilograms: float) -> JointDynamics:
-    """What a joint's drive and PhysX's attributes say of it; parameters as of :func:`read_inertia`.
+def read_dynamics(prim: Any, axis: str, meters: float, kilograms: float) -> JointDynamics:
+    """What a joint's drive and PhysX's attributes say of one of its axes; parameters as of :func:`read_inertia`.
 
-    A drive without stiffness damps; with one, its damping belongs to a controller.
+    The axis is called linear or angular, or in a generic joint ``transX`` and so on. A drive without stiffness damps;
+    with one, its damping belongs to a controller.
     """
     from pxr import UsdPhysics
 
-    axis = "linear" if slides else "angular"
+    slides = axis.startswith(("linear", "trans"))
     speed = meters if slides else np.pi / 180.0
     force = kilograms * meters * (1.0 if slides else meters)
     effort = damping = None

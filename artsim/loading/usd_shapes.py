@@ -8,13 +8,15 @@ import numpy as np
 
 from artsim.loading import primitives
 from artsim.loading.mesh_files.polygons import triangulate
-from artsim.loading.mesh_files.surface import UnusableMeshError, mirrors, transform_affine
+from artsim.loading.mesh_files.surface import UnusableMeshError, is_thin, mirrors, transform_affine
 from artsim.loading.usd_values import integers, number, token, vectors
-from artsim.model.kinematics import LARGEST, Array
+from artsim.model.kinematics import Array
 from artsim.model.objects import Mesh
 
 KINDS = ("Mesh", "Cube", "Sphere", "Cylinder", "Capsule", "Cone")
 """Types of prims that are read."""
+_LARGEST = 1e6
+"""Metres that nothing is away."""
 _UPRIGHT = {"X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]], "Z": np.eye(3).tolist()}
 """Rotations that carry the Z axis to the axis of a prim."""
 
@@ -25,7 +27,7 @@ def surface(prim: Any, T: Array, max_faces: int) -> Mesh:
     Raises
     ------
     UnusableMeshError
-        When it has no triangle, too many, or a coordinate out of range.
+        When it has no triangle, too many, no extent, or a coordinate out of range.
     """
     kind = str(prim.GetTypeName())
     vertices, faces = _mesh(prim, max_faces) if kind == "Mesh" else _primitive(prim, kind)
@@ -34,8 +36,10 @@ def surface(prim: Any, T: Array, max_faces: int) -> Mesh:
     if mirrors(T):
         faces = faces[:, ::-1]
     moved = transform_affine(T, vertices)
-    if not (np.abs(moved) <= LARGEST).all():
-        raise UnusableMeshError(f"{prim.GetPath()} has a coordinate that is not finite, or over {LARGEST:g} m")
+    if not (np.abs(moved) <= _LARGEST).all():
+        raise UnusableMeshError(f"{prim.GetPath()} has a coordinate that is not finite, or over {_LARGEST:g} m")
+    if is_thin(moved, faces):
+        raise UnusableMeshError(f"{prim.GetPath()} has no extent: all of it lies on a line or in a point")
     return moved, np.ascontiguousarray(faces, dtype=np.int32)
 
 

@@ -59,6 +59,15 @@ def vectors(attribute: Any) -> Array:
         raise _error(attribute, found, "vectors") from error
 
 
+def numbers(attribute: Any) -> Array:
+    """(N,) numbers of an array; none where it has no value."""
+    found = _value(attribute)
+    try:
+        return np.zeros(0) if found is None else np.asarray(found, dtype=np.float64).ravel()
+    except (TypeError, ValueError) as error:
+        raise _error(attribute, found, "numbers") from error
+
+
 def integers(attribute: Any) -> NDArray[np.int64]:
     """(N,) whole numbers of an array; none where it has no value."""
     found = _value(attribute)

@@ -19,7 +19,7 @@ from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.solids import box
 from artsim.model.object_file import save_object
 from artsim.model.objects import ArticulatedObject
-from benchmarks.fuzz import mjcf_texts, texts
+from benchmarks.fuzz import mjcf_texts, texts, usd_corpus
 from benchmarks.fuzz.mutations import npy_bytes
 
 
@@ -92,6 +92,9 @@ def _robots() -> Iterator[Seed]:
     for name, files in mjcf_texts.files(texts.OBJ).items():
         yield Seed("urdf", f"mjcf_{name}", files, "mobility.xml", "xml")
     yield Seed("urdf", "usd", {"mobility.usda": texts.USD.encode()}, "mobility.usda", "text")
+    for name, text in usd_corpus.TEXTS.items():
+        yield Seed("urdf", f"usda_{name}", {"mobility.usda": text.encode()}, "mobility.usda", "text")
+        yield Seed("urdf", f"usdc_{name}", {"mobility.usdc": usd_corpus.binary(text)}, "mobility.usdc", "binary")
     for member, form in (("meta.json", "json"), ("semantics.txt", "text"), ("mobility_v2.json", "json")):
         yield Seed("side", member.partition(".")[0], pair, member, form)
 

@@ -28,6 +28,11 @@ _FEW = 1000
 _MAX_NOTES = 12
 """A damaged file of a thousand geometries would otherwise fill the screen."""
 
+_THIN = 1e-6
+"""Share of its length by which a surface is a line: squares of less are lost in double precision."""
+_NOTHING = 1e-9
+"""Metres below which a whole shape is a point: an atom is a tenth of it."""
+
 
 class UnusableMeshError(Exception):
     """One mesh cannot be used, and why; the loader leaves it out and says so."""
@@ -218,3 +223,14 @@ def mirrors(T: Array) -> bool:
         a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
         < 0.0
     )
+
+
+def is_thin(vertices: Array, faces: NDArray[np.int32]) -> bool:
+    """Whether a surface is a point or a line; one that is flat is not."""
+    used = vertices  # readers leave none out
+    if len(used) < 3:
+        return True
+    from_middle = used - used.mean(axis=0)
+    # Second moments, smallest first: their roots are the extents along the principal axes.
+    extents = np.sqrt(np.linalg.eigvalsh(from_middle.T @ from_middle).clip(0.0))
+    return bool(extents[1] <= _THIN * extents[2] or extents[2] < _NOTHING)

@@ -18,36 +18,9 @@ from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.inertia import part_inertia
-from artsim.model.objects import ArticulatedObject
 from tests.artsim.loading.round_trip import FAMILIES, assert_same_geometry, assert_same_object
+from tests.artsim.loading.usd_files import AT_LID, BODY, CUBE, HEAD, HINGE, PAIR, body, joint, repairs_of, written
 from tests.conftest import installed, valve
-
-HEAD = '#usda 1.0\n(\n    defaultPrim = "o"\n    metersPerUnit = 1\n    upAxis = "Z"\n)\n'
-BODY = 'prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]'
-CUBE = 'def Cube "shape" (prepend apiSchemas = ["PhysicsCollisionAPI"]) { double size = 0.2 }'
-
-
-def body(name: str, place: tuple[float, float, float] = (0, 0, 0), more: str = "", shape: str = CUBE) -> str:
-    at = f'double3 xformOp:translate = {place}\nuniform token[] xformOpOrder = ["xformOp:translate"]'
-    return f'def Xform "{name}" ({BODY}) {{\n{at}\n{more}\n{shape}\n}}\n'
-
-
-def joint(kind: str, first: str, second: str, more: str = "", name: str = "j") -> str:
-    ends = f"rel physics:body0 = </o/{first}>\nrel physics:body1 = </o/{second}>\n"
-    return f'def Physics{kind}Joint "{name}" {{\n{ends}{more}\n}}\n'
-
-
-def written(folder: Path, content: str, head: str = HEAD, name: str = "object.usda") -> Path:
-    """A USD file with these prims below its object's."""
-    path = folder / name
-    content = content.replace("{ ", "{\n").replace(" }", "\n}")  # a closing brace stands in a row of its own
-    path.write_text(f'{head}def Xform "o" {{\n{content}\n}}\n')
-    return path
-
-
-def repairs_of(obj: ArticulatedObject) -> str:
-    return "\n".join(map(str, obj.repairs))
-
 
 # --- what artsim wrote ---------------------------------------------------------------------------------------------
 
@@ -85,11 +58,6 @@ def test_a_real_object_comes_back_as_it_was(partnet_dir: Path, tmp_path: Path) -
 
 
 # --- what others write ---------------------------------------------------------------------------------------------
-
-HINGE = "float physics:lowerLimit = -30\nfloat physics:upperLimit = 90\n"
-HALF = "float physics:lowerLimit = 0\nfloat physics:upperLimit = 0.5\n"
-PAIR = body("base") + body("lid", (0, 0, 1))
-AT_LID = "point3f physics:localPos0 = (0, 0, 1)\n"
 
 
 @pytest.mark.parametrize(
@@ -230,12 +198,11 @@ REFUSED: dict[str, tuple[str, str]] = {
         "outside the file's folder",
     ),
     "no layer": ('def "a" (references = @picture.png@) {}', "no USD layer"),
-    "spherical": (PAIR + joint("Spherical", "base", "lid"), "SphericalJoint is not supported"),
-    "six axes": (PAIR + joint("", "base", "lid"), "a joint of 6 free axes"),
+    "distance": (PAIR + joint("Distance", "base", "lid"), "a PhysicsDistanceJoint is not supported"),
     "loop": (LOOP, "closes a chain"),
     "no such body": (PAIR + joint("Revolute", "base", "nobody"), "does not exist"),
     "itself": (PAIR + joint("Revolute", "base", "base"), "joins a body to itself"),
-    "nothing to see": ('def Xform "a" {}', "no body has any geometry"),
+    "nothing to see": ('def Xform "a" {}', "no prim of the object is a surface"),
     "flat": (
         f'def Xform "a" ({BODY}) {{ float3 xformOp:scale = (1, 0, 1)\n'
         'uniform token[] xformOpOrder = ["xformOp:scale"] }',
@@ -244,6 +211,23 @@ REFUSED: dict[str, tuple[str, str]] = {
     "a word for a mass": (body("base", more='string physics:mass = "heavy"'), "'heavy', which is not a number"),
     "an unknown axis": (
         PAIR + joint("Revolute", "base", "lid", 'uniform token physics:axis = "W"'), "which is not one of X, Y, Z"
+    ),
+    "a shape without extent": (
+        body("base", shape='def Cube "s" { double size = 0 }'),
+        "prim /o/base: none of its shapes can be used: /o/base/s has no extent",
+    ),
+    "a shape too far away": (body("base", shape='def Cube "s" { double size = 3e6 }'), "over 1e.06 m"),
+    "a frame that is not finite": (
+        PAIR + joint("Revolute", "base", "lid", "point3f physics:localPos0 = (inf, 0, 0)"),
+        "prim /o/j: its frame in body 0 is not finite",
+    ),
+    "a circle of followers": (
+        PAIR + joint("Revolute", "base", "lid", "rel artsim:mimic:joint = </o/j>"),
+        "prim /o/j: joints follow each other in a circle",
+    ),
+    "a number out of range": (
+        PAIR + joint("Revolute", "base", "lid", "rel artsim:mimic:joint = </o/j>\ndouble artsim:mimic:offset = 1e30"),
+        "prim /o/j: follows another by 1 and 1e.30",
     ),
     "broken": ("def {", "no USD layer that can be read"),
 }  # fmt: skip
@@ -279,6 +263,10 @@ def test_what_cannot_or_may_not_be_read_is_refused(case: str, tmp_path: Path) ->
     with pytest.raises(AssetError, match=message) as caught:
         load(written(folder, content))
     assert caught.value.fix
+    # Words of other formats, and names of what is not in the file.
+    assert not {"link", "links", "urdf", "mjcf", "mujoco", "<robot>", "geom", "type="} & set(
+        str(caught.value).lower().split()
+    )
 
 
 def test_references_that_expand_without_end_are_refused_before_they_are_composed(tmp_path: Path) -> None:
@@ -288,7 +276,7 @@ def test_references_that_expand_without_end_are_refused_before_they_are_composed
     )
     path = tmp_path / "bomb.usda"
     path.write_text(f'{HEAD}{levels}class "l9" {{}}\ndef "o" (references = </l0>) {{}}\n')
-    with pytest.raises(AssetError, match="expands to over"):
+    with pytest.raises(AssetError, match="expand to over"):
         load(path)
 
 
