@@ -136,8 +136,9 @@ def usd_poses(file: Path) -> Poses:
     names: set[str] = {"world"}
     name_of = {prim.GetPath(): unused_name(prim.GetName(), names) for prim in bodies}
     stands = {"world": turn} | {name_of[prim.GetPath()]: pose(prim) for prim in bodies}
-    joints = [_joint_of(prim, stage, name_of, pose, unit, turn) for prim in _joints(prims)]
-    carried = {ends[1] for _, _, _, ends, _ in joints}
+    used: set[str] = set()
+    joints = [_joint_of(prim, stage, name_of, pose, unit, turn, used) for prim in _joints(prims)]
+    carried = {ends[1] for _, ends, _ in joints}
     return _stage_poses(joints, dict(sorted(stands.items(), key=lambda item: item[0] in carried)))
 
 
@@ -150,9 +151,15 @@ def _joints(prims: list[Any]) -> list[Any]:
 
 
 def _joint_of(
-    prim: Any, stage: Any, name_of: Mapping[Any, str], pose: Callable[[Any], Any], unit: float, turn: Any
+    prim: Any,
+    stage: Any,
+    name_of: Mapping[Any, str],
+    pose: Callable[[Any], Any],
+    unit: float,
+    turn: Any,
+    used: set[str],
 ) -> Any:
-    """Name, kind, axis, bodies and frames of a joint; the kind is None where another motion is meant."""
+    """Names and axes of what a joint leaves free, its bodies and its frames."""
     from pxr import Gf, UsdPhysics
 
     joint = UsdPhysics.Joint(prim)
@@ -172,10 +179,29 @@ def _joint_of(
             frame = frame * pose(target) * (pose(body) if body else turn).GetInverse()
         ends.append(name_of[body.GetPath()] if body else "world")
         frames.append(frame)
-    kinds = {"PhysicsRevoluteJoint": "turn", "PhysicsPrismaticJoint": "slide", "PhysicsFixedJoint": "fixed"}
-    kind = kinds.get(str(prim.GetTypeName()))
-    axis = prim.GetAttribute("physics:axis").Get() if kind in ("turn", "slide") else "X"
-    return prim.GetName(), kind, "XYZ".index(str(axis)), ends, frames
+    steps = _axes(prim)
+    own = [f"{prim.GetName()}_{axis}" if len(steps) > 1 else prim.GetName() for axis in steps]
+    names = [unused_name(name, used) for name in own]
+    return list(zip(names, steps, strict=True)), tuple(ends), frames
+
+
+def _axes(prim: Any) -> list[str]:
+    """What a joint leaves free, by the names of UsdPhysics's limits, from its first body on."""
+    from pxr import UsdPhysics
+
+    kind = str(prim.GetTypeName()).removeprefix("Physics").removesuffix("Joint")
+    if kind == "Fixed":
+        return []
+    if kind in ("Revolute", "Prismatic", "Spherical"):
+        axis = str(prim.GetAttribute("physics:axis").Get())
+        swings = [f"rot{'XYZ'[('XYZ'.index(axis) + step) % 3]}" for step in (2, 1)] if kind == "Spherical" else []
+        return [*swings, ("trans" if kind == "Prismatic" else "rot") + axis]
+    free = []
+    for name in (f"{word}{letter}" for word in ("trans", "rot") for letter in "XYZ"):
+        limit = UsdPhysics.LimitAPI.Get(prim, name)
+        if not prim.HasAPI(UsdPhysics.LimitAPI, name) or limit.GetLowAttr().Get() < limit.GetHighAttr().Get():
+            free.append(name)
+    return free
 
 
 def _local_to_world(prim: Any) -> Any:
@@ -185,7 +211,9 @@ def _local_to_world(prim: Any) -> Any:
 
 
 def _stage_poses(joints: list[Any], stands: Mapping[str, Any]) -> Poses:
-    from pxr import Gf
+    pairs: dict[tuple[str, ...], list[Any]] = {}
+    for steps, ends, frames in joints:
+        pairs.setdefault(ends, []).append((steps, frames))
 
     def poses(values: Mapping[str, float]) -> dict[str, Array]:
         found = {"world": stands["world"]}
@@ -194,23 +222,39 @@ def _stage_poses(joints: list[Any], stands: Mapping[str, Any]) -> Poses:
             waiting = [root]
             while waiting:
                 body = waiting.pop()
-                for name, kind, axis, ends, frames in joints:
-                    if body not in ends or kind is None or not all(end in stands for end in ends):
+                for ends, pair in pairs.items():
+                    if body not in ends or not all(end in stands for end in ends):
                         continue
                     side = ends.index(body)
                     child = ends[1 - side]
                     if child in found or child == body:
                         continue
-                    value, direction = values.get(name, 0.0), Gf.Vec3d(*np.eye(3)[axis])
-                    value = value if side == 0 else -value
-                    motion = Gf.Matrix4d(1.0)
-                    if kind == "turn":
-                        motion.SetRotate(Gf.Rotation(direction, float(np.degrees(value))))
-                    elif kind == "slide":
-                        motion.SetTranslate(direction * value)
-                    # Gf's vectors are rows: the frame nearest the body comes first.
-                    found[child] = frames[1 - side].GetInverse() * motion * frames[side] * found[body]
+                    second_in_first = _second_in_first(pair, values)
+                    found[child] = (second_in_first if side == 0 else second_in_first.GetInverse()) * found[body]
                     waiting.append(child)
         return {name: np.array(matrix).T for name, matrix in found.items()}
 
     return poses
+
+
+def _second_in_first(pair: list[Any], values: Mapping[str, float]) -> Any:
+    """Pose of the second body in the first, for joints between them one after another; Gf's vectors are rows."""
+    from pxr import Gf
+
+    _, frames = pair[0]
+    found = frames[1].GetInverse() * frames[0]
+    for steps, (frame, _) in reversed(pair):
+        motion = Gf.Matrix4d(1.0)
+        for name, axis in reversed(steps):
+            value, direction, step = (
+                values.get(name, 0.0),
+                Gf.Vec3d(*np.eye(3)["XYZ".index(axis[-1])]),
+                Gf.Matrix4d(1.0),
+            )
+            if axis.startswith("rot"):
+                step.SetRotate(Gf.Rotation(direction, float(np.degrees(value))))
+            else:
+                step.SetTranslate(direction * value)
+            motion = motion * step
+        found = found * frame.GetInverse() * motion * frame
+    return found

@@ -53,7 +53,15 @@ def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: 
     if len(objects) > 1:
         candidates = [name for name in objects if scene.is_articulated(name)] or [n for n in objects if n != _WORLD]
     if len(candidates) > 1:
-        raise several(candidates, file, scene.is_articulated(candidates[0]))
+        first = shlex.quote(printable(candidates[0], 100))
+        kind = "articulated objects" if scene.is_articulated(candidates[0]) else "objects"
+        raise SceneError(
+            f"it holds {len(candidates)} {kind}: {_list(candidates)}",
+            file,
+            f"choose one: --body {first}, in Python body={candidates[0]!r}; for programs without this option: "
+            f"artsim export {shlex.quote(str(file))} --body {first} --out FOLDER",
+            tuple(candidates),
+        )
     (name,) = candidates
     others = [other for other in objects if other != name]
     heads = scene.articulated_heads() if name == _WORLD else []
@@ -64,26 +72,6 @@ def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: 
         said = f"{len(heads)} articulated bodies are taken as one object: {_list(heads)}; --body NAME takes one of them"
         repairs.append(Repair("file", said))
     return scene.part(name, file)
-
-
-def several(names: Sequence[str], file: Path, articulated: bool) -> SceneError:
-    """The error of a file that holds several objects of which none is chosen."""
-    first = shlex.quote(printable(names[0], 100))
-    kind = "articulated objects" if articulated else "objects"
-    return SceneError(
-        f"it holds {len(names)} {kind}: {_list(names)}",
-        file,
-        f"choose one: --body {first}, in Python body={names[0]!r}; for programs without this option: "
-        f"artsim export {shlex.quote(str(file))} --body {first} --out FOLDER",
-        tuple(names),
-    )
-
-
-def no_body(name: str, names: Sequence[str], file: Path) -> SceneError:
-    """The error of a file that has no such object."""
-    return SceneError(
-        f"it has no body {name!r}; its objects are {_list(names)}", file, "name a body of it", tuple(names)
-    )
 
 
 class _Scene:
@@ -126,7 +114,10 @@ class _Scene:
         links = self.links
         root = next((k for k, link in enumerate(links) if link.name == name), None)
         if root is None:
-            raise no_body(name, self.objects(), file)
+            names = tuple(self.objects())
+            raise SceneError(
+                f"it has no body {name!r}; its objects are {_list(names)}", file, "name a body of it", names
+            )
         kept = {root: 0} if root == 0 else {0: 0, root: 1}
         for k in range(root + 1, len(links)):
             if links[k].parent in kept and self._owner[k] == self._owner[root] and (root == 0 or links[k].parent > 0):

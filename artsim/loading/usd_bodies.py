@@ -207,7 +207,7 @@ class StageReader:
     def _collision_mesh(self, prim: Any, mesh: Mesh) -> Mesh:
         api = self._physics.MeshCollisionAPI(prim)
         approximation = token(api.GetApproximationAttr(), "none") if api else "none"
-        if approximation != _HULL or is_convex(*mesh):
+        if approximation != _HULL or prim.GetTypeName() != "Mesh" or is_convex(*mesh):  # primitives are convex
             return mesh
         return convex_hull(mesh[0], _THIN)
 

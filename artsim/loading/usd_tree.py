@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.products import matmul, unit
-from artsim.loading.scene_objects import no_body, several
 from artsim.loading.urdf_document import Geometry, InlineMesh, Shape
 from artsim.loading.usd_bodies import StageReader, UsdBody
 from artsim.loading.usd_dynamics import read_dynamics, read_inertia
@@ -27,59 +26,30 @@ _MEETS = 1e-3
 _X = np.array([1.0, 0.0, 0.0])
 
 
-def read_links(reader: StageReader, joints: list[UsdJoint], body: str | None = None) -> list[WorldLink]:
-    """The world, then every body of the object after its parent, each after the links of its further axes.
-
-    Of a stage with several objects, ``body`` names one of the object's bodies.
+def read_links(reader: StageReader, joints: list[UsdJoint]) -> list[WorldLink]:
+    """The world, then every body after its parent, each after the links of its further axes.
 
     Raises
     ------
     AssetError
-        When joints close a chain, or nothing joins what the stage holds.
+        When joints close a chain.
     """
-    bodies, joints = _choose(reader, joints, body)
-    return _Tree(reader, joints).links(bodies)
+    _leave_out_surroundings(reader, joints)
+    return _Tree(reader, joints).links()
 
 
-# --- which of the stage's things the object is ---
-
-
-def _choose(reader: StageReader, joints: list[UsdJoint], body: str | None) -> tuple[list[int], list[UsdJoint]]:
-    """Bodies of the object, and its joints; what it does not hang together with is left out, and said."""
+def _leave_out_surroundings(reader: StageReader, joints: list[UsdJoint]) -> None:
+    """Leave out static shapes that are not of what the world holds, or all of them where it holds nothing."""
     groups = _groups(len(reader.bodies), joints)
     held = next(group for group in groups if 0 in group)
-    objects = [group for group in groups if group is not held]
-    if len(held) > 1 or not objects:
-        objects.insert(0, held)
-    moving = [group for group in objects if any(joint.free and joint.bodies[0] in group for joint in joints)]
-    found = (moving or objects) if len(objects) > 1 else objects
-    if body is not None:
-        found = [group for group in objects if any(reader.bodies[k].name == body for k in group if k)]
-        if not found:
-            raise no_body(body, _names(reader, objects), reader.file)
-    if len(found) > 1:
-        raise several(_names(reader, found), reader.file, bool(moving))
-    chosen = found[0]
-    for group in objects:
-        for k in group if group is not chosen else ():
-            if k:
-                where = f"prim {reader.bodies[k].prim.GetPath()}"
-                reader.repairs.append(Repair(where, "left out: nothing joins it to what moves"))
-    own = [joint for joint in joints if joint.bodies[0] in chosen]
-    bodies = [k for k in chosen if k]
-    if bodies and chosen is not held:
-        reader.leave_out_all_of_world()
-    elif bodies:
-        holders = {reader.bodies[b].prim.GetPath() for b in bodies}
-        frames = [path for joint in own if joint.free for path in joint.static]
-        frames = [path for path in frames if not any(str(h).startswith(f"{path}/") for h in holders)]
+    bodies = [body for body in held if body]
+    if bodies:
+        holders = [str(reader.bodies[body].prim.GetPath()) for body in bodies]
+        frames = [path for joint in joints if joint.free for path in joint.static]
+        frames = [path for path in frames if not any(holder.startswith(f"{path}/") for holder in holders)]
         reader.leave_out_ground(bodies, frames)
-    return bodies, own
-
-
-def _names(reader: StageReader, groups: Sequence[Sequence[int]]) -> list[str]:
-    """Of each group the name of its first body; the world is none."""
-    return [reader.bodies[next((k for k in group if k), 0)].name for group in groups]
+    elif len(groups) > 1:
+        reader.leave_out_all_of_world()
 
 
 def _groups(count: int, joints: Sequence[UsdJoint]) -> list[list[int]]:
@@ -133,9 +103,9 @@ class _Tree:
         self._position = {0: 0}
         self._links = [self._link(0, -1, None)]
 
-    def links(self, bodies: Sequence[int]) -> list[WorldLink]:
+    def links(self) -> list[WorldLink]:
         self._walk(0)
-        for body in self._roots(bodies):
+        for body in self._roots():
             if body in self._position:
                 continue
             found = self._reader.bodies[body]
@@ -219,7 +189,7 @@ class _Tree:
     def _frame(self, joint: UsdJoint, child: int) -> Array:
         return matmul(self._T_world_zero[child], joint.frames[joint.bodies.index(child)])
 
-    def _roots(self, bodies: Sequence[int]) -> list[int]:
+    def _roots(self) -> list[int]:
         """Bodies in the order in which one is taken for a root: articulation roots, those that none carries, others."""
         from pxr import UsdPhysics
 
@@ -228,7 +198,7 @@ class _Tree:
         def rank(body: int) -> tuple[bool, bool, int]:
             return not self._reader.bodies[body].prim.HasAPI(UsdPhysics.ArticulationRootAPI), body in carried, body
 
-        return sorted(bodies, key=rank)
+        return sorted(range(1, len(self._reader.bodies)), key=rank)
 
     def _link(self, body: int, parent: int, joint: WorldJoint | None) -> WorldLink:
         reader, found, T_world_zero = self._reader, self._reader.bodies[body], self._T_world_zero[body]

@@ -208,7 +208,7 @@ def test_a_kinematic_body_that_nothing_joins_stands_as_static_shapes_do(tmp_path
 def test_bodies_that_nothing_joins_to_what_moves_are_left_out_and_said(tmp_path: Path) -> None:
     obj = load(written(tmp_path, HINGED + body("ball", (5, 0, 0))))
     assert [part.name for part in obj.parts] == ["base", "lid"]
-    assert "prim /o/ball: left out: nothing joins it to what moves" in repairs_of(obj)
+    assert "other objects are left out: ball" in repairs_of(obj)
 
 
 def test_bodies_without_shapes_are_boxes_of_their_inertia(tmp_path: Path) -> None:
