@@ -281,7 +281,7 @@ def replay(file: Path) -> bool:
     """Read a stored input again, in this process; whether it is a finding."""
     desk = Desk(Path(tempfile.mkdtemp(prefix="fuzz-")))
     try:
-        spent, finding = examine(0, input_of(file, corpus()), desk)
+        spent, _, finding = examine(0, input_of(file, corpus()), desk)
     finally:
         desk.clear()
     print("nothing to complain of" if finding is None else f"{finding.sort}: {finding.text}")

@@ -62,9 +62,15 @@ class Report:
     findings: list[Finding] = field(default_factory=list)
 
 
-def peak_mb() -> float:
-    """Most memory that this process has ever had, MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+def memory_mb(name: str) -> float:
+    """Memory of this process, MB: ``VmRSS`` now, ``VmHWM`` at most since :func:`forget_most`."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return float(next(line.split()[1] for line in lines if line.startswith(name))) / 1024
+
+
+def forget_most() -> None:
+    """Let the most memory of this process be what it has now."""
+    Path("/proc/self/clear_refs").write_text("5")
 
 
 def warm_up(kinds: Sequence[str], corpus: Sequence[Seed], desk: Desk) -> None:
@@ -80,19 +86,20 @@ def scratch() -> Path:
     return Path(tempfile.mkdtemp(prefix="fuzz-", dir=shared if os.access(shared, os.W_OK) else None))
 
 
-def examine(index: int, given: Input, desk: Desk) -> tuple[float, Finding | None]:
-    """Processor time of reading an input, seconds; and what is wrong with it."""
+def examine(index: int, given: Input, desk: Desk) -> tuple[float, float, Finding | None]:
+    """Processor time and memory of reading an input, seconds and MB; and what is wrong with it."""
     folder = desk.lay_out(given)
-    before, start = peak_mb(), time.process_time()
+    forget_most()
+    before, start = memory_mb("VmRSS"), time.process_time()
     error = fails(given.seed.kind, folder)
-    spent = time.process_time() - start
+    spent, taken = time.process_time() - start, memory_mb("VmHWM") - before
     if error is not None:
-        return spent, Finding(index, "raw", _cause(error), "".join(traceback.format_exception(error)))
+        return spent, taken, Finding(index, "raw", _cause(error), "".join(traceback.format_exception(error)))
     if spent > SLOW_S:
-        return spent, Finding(index, "slow", f"slow {given.file_name}", f"{spent:.1f} s of processor time")
-    if peak_mb() > LARGE_MB >= before:
-        return spent, Finding(index, "large", f"large {given.file_name}", f"{peak_mb():.0f} MB, {before:.0f} MB before")
-    return spent, None
+        return spent, taken, Finding(index, "slow", f"slow {given.file_name}", f"{spent:.1f} s of processor time")
+    if taken > LARGE_MB:
+        return spent, taken, Finding(index, "large", f"large {given.file_name}", f"{taken:.0f} MB")
+    return spent, taken, None
 
 
 def _cause(error: BaseException) -> str:
@@ -123,17 +130,16 @@ def work(
         desk = Desk(root)
         warm_up(kinds, corpus, desk)
         gc.freeze()
-        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (taken + HEADROOM, taken + HEADROOM))
+        held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (held + HEADROOM, held + HEADROOM))
         while (wanted := pipe.recv()) is not None:
             report = Report(*wanted)
             for index in range(*wanted):
                 given = input_at(seed, index, kinds, corpus)
                 current.value = index
-                spent, finding = examine(index, given, desk)
-                report.slowest_s = max(report.slowest_s, spent)
+                spent, taken, finding = examine(index, given, desk)
+                report.slowest_s, report.peak_mb = max(report.slowest_s, spent), max(report.peak_mb, taken)
                 if finding is not None:
                     report.findings.append(finding)
             current.value = -1
-            report.peak_mb = peak_mb()
             pipe.send(report)
