@@ -88,7 +88,7 @@ def test_a_run_of_worker_processes_counts_what_it_read(tmp_path: Path) -> None:
     state = run(options)
     assert (state.runs, state.raw_exceptions, state.crashes) == (30, 0, 0)
     assert 0.0 < state.slowest_s < 2.0
-    assert state.peak_mb > 1.0
+    assert 0.0 < state.peak_mb < 500.0
     assert run(options) == state  # nothing is left to be done
     with pytest.raises(ConfigError, match="another run is in this folder"):
         run(Options(runs=30, seed=1, kinds=("side",), out=tmp_path / "out"))
