@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 import torch
 import tyro
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.policy import Policy
@@ -65,6 +67,8 @@ class Options:
     """Problems of each test."""
     out: Path = Path("out/agents.jsonl")
     """File of the runs that are done. Other options need another file."""
+    picture: Path | None = None
+    """Draw here the reward of the rollouts with PPO, mean and range over runs."""
 
     @property
     def fitting(self) -> FittingOptions:
@@ -112,6 +116,8 @@ def main(options: Options) -> None:
                 file.write(json.dumps({"options": _asked(options), **rows[category, way, seed]}) + "\n")
                 file.flush()
             _print(category, rows, options, {name: error(test.start, test) for name, test in tests.items()})
+    if options.picture is not None:
+        draw(rows, options)
     print(json.dumps(list(rows.values())))
 
 
@@ -158,9 +164,24 @@ def error(theta: Theta, test: Any) -> float:
     return float((angle.sum(1) / trees.valid.sum(1)).mean())
 
 
+def draw(rows: dict[tuple[str, str, int], dict[str, Any]], options: Options) -> None:
+    """Write the picture of the rewards."""
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(xlabel="steps of the agent", ylabel="mean reward of a step")
+    for category in options.categories:
+        rewards = np.array([rows[category, _WAYS[2], seed]["rewards"] for seed in range(options.seeds)])
+        steps = np.arange(rewards.shape[1]) * options.episodes * options.fitting.steps
+        (line,) = axes.plot(steps, rewards.mean(0), label=category)
+        axes.fill_between(steps, rewards.min(0), rewards.max(0), color=line.get_color(), alpha=0.2, linewidth=0)
+    axes.legend(frameon=False)
+    assert options.picture is not None
+    figure.savefig(options.picture, dpi=120)
+
+
 def _asked(options: Options) -> dict[str, Any]:
     own = asdict(options)
-    for name in ("out", "categories", "seeds"):
+    for name in ("out", "categories", "seeds", "picture"):
         own.pop(name)
     return own
 
