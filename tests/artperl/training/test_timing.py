@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from artperl.training.options import METHOD_PRESETS, TrainOptions, preset_of, scaled
+from artperl.training.options import LENGTHS, METHOD_PRESETS, TrainOptions, changed, preset_of, scaled
 from artperl.training.run import Training
 from artperl.training.stages import stages_of
 from artperl.training.timing import expected_seconds, filling, seconds_per_step, trained_minutes
@@ -30,6 +30,13 @@ def test_every_length_of_a_preset_is_that_of_a_stage_that_is_timed(method: str) 
         assert expected_seconds(scaled(options, 2.0), dict.fromkeys(groups, 1.0)) == 2.0 * once
         assert scaled(options, 0.5).validate_every == options.validate_every // 2
         assert scaled(options, 1e-9).perception_steps == 1
+
+
+@pytest.mark.parametrize("method", METHOD_PRESETS)
+def test_the_lengths_of_any_method_are_taken_again(method: str) -> None:
+    options = scaled(preset_of(method, "quick"), 0.5)  # type: ignore[arg-type]
+    lengths = {name: getattr(options, name) for name in (*LENGTHS, "validate_every")}
+    assert changed(preset_of(method, "quick"), lengths) == options  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
