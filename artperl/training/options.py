@@ -6,9 +6,8 @@ presets name fields of :class:`TrainOptions` and give them values by :func:`chan
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, TypeVar
 
 from artperl.agent.ppo import CLONING, JOINT, OWN_STATES, Phase, PPOOptions
@@ -204,8 +203,7 @@ def changed(options: T, changes: Mapping[str, Any]) -> T:
         When there is no such field, or a value is not of its type or impossible.
     """
     try:
-        # What is possible depends on the other fields: a method without an agent has no rollouts.
-        given = from_json_values(type(options), {**json.loads(json.dumps(asdict(options))), **changes})
+        given = from_json_values(type(options), changes)
     except ValueError as error:
         raise ConfigError(str(error), "options", "see artperl.training.options.TrainOptions") from error
     values = {

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from artperl.training.options import LENGTHS, TrainOptions, changed, scaled
+from artperl.training.options import LENGTHS, TrainOptions, scaled
 from artperl.training.run import Training
 from artperl.training.stages import stages_of
 from artsim.common.files import read_json, write_atomic
@@ -75,15 +75,19 @@ def filling(options: TrainOptions, minutes: float, kept: Path) -> TrainOptions:
     ConfigError
         When the file holds lengths of another run.
     """
-    asked = json.loads(json.dumps({"options": asdict(options), "minutes": minutes}))
+    asked, names = (
+        json.loads(json.dumps({"options": asdict(options), "minutes": minutes})),
+        {*LENGTHS, "validate_every"},
+    )
     if kept.is_file():
         told = read_json(kept, "the lengths of the run", ConfigError, _MAX_BYTES)
-        if not isinstance(told, dict) or told.get("asked") != asked or not isinstance(told.get("lengths"), dict):
+        known = told.get("lengths") if isinstance(told, dict) and told.get("asked") == asked else None
+        if not isinstance(known, dict) or known.keys() != names or not all(type(n) is int for n in known.values()):
             raise ConfigError("it holds lengths of another run", kept, "name another --out, or remove it")
-        return changed(options, told["lengths"])
+        return replace(options, **known)
     per_step = seconds_per_step(options)
     made = scaled(options, 60.0 * minutes / expected_seconds(options, per_step))
-    lengths: dict[str, Any] = {name: getattr(made, name) for name in (*LENGTHS, "validate_every")}
+    lengths: dict[str, Any] = {name: getattr(made, name) for name in sorted(names)}
     told = {"asked": asked, "seconds_per_step": per_step, "lengths": lengths}
     write_atomic(kept, (json.dumps(told, indent=1) + "\n").encode())
     return made

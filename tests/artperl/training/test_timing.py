@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from artperl.training.options import LENGTHS, METHOD_PRESETS, TrainOptions, changed, preset_of, scaled
+from artperl.training.options import METHOD_PRESETS, TrainOptions, preset_of, scaled
 from artperl.training.run import Training
 from artperl.training.stages import stages_of
 from artperl.training.timing import expected_seconds, filling, seconds_per_step, trained_minutes
@@ -32,13 +32,6 @@ def test_every_length_of_a_preset_is_that_of_a_stage_that_is_timed(method: str) 
         assert scaled(options, 1e-9).perception_steps == 1
 
 
-@pytest.mark.parametrize("method", METHOD_PRESETS)
-def test_the_lengths_of_any_method_are_taken_again(method: str) -> None:
-    options = scaled(preset_of(method, "quick"), 0.5)  # type: ignore[arg-type]
-    lengths = {name: getattr(options, name) for name in (*LENGTHS, "validate_every")}
-    assert changed(preset_of(method, "quick"), lengths) == options  # type: ignore[arg-type]
-
-
 @pytest.mark.slow
 def test_a_run_takes_the_minutes_that_it_is_given_and_the_same_steps_again(tmp_path: Path) -> None:
     kept = tmp_path / "lengths.json"
@@ -57,6 +50,14 @@ def test_a_run_takes_the_minutes_that_it_is_given_and_the_same_steps_again(tmp_p
         filling(TINY, 0.2, kept)
     with pytest.raises(ConfigError, match="lengths of another run"):
         filling(replace(TINY, seed=1), 0.1, kept)
+
+
+@pytest.mark.slow
+def test_the_lengths_of_a_method_with_an_agent_are_taken_again(tmp_path: Path) -> None:
+    options = replace(TINY, method="artperl", perception_steps=2, retrieval_steps=1, agent_rollouts=2, episodes=4)
+    made = filling(options, 0.01, tmp_path / "lengths.json")
+    assert made.agent_rollouts > 0
+    assert filling(options, 0.01, tmp_path / "lengths.json") == made
 
 
 @pytest.mark.slow
