@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from artsim.loading.usd_crate_lists import RATIO, unpacked
 
-_MAX_FIELDS = 1_000_000
-_MAX_VALUES = 1_000_000
+_MAX_FIELDS = 400_000
+_MAX_VALUES = 400_000
 """Values looked at, those inside others each time."""
 _MAX_DEPTH = 100
 """Values inside each other."""
