@@ -12,6 +12,9 @@ import struct
 
 import numpy as np
 
+from artsim.loading.usd_crate_lists import RATIO
+from artsim.loading.usd_crate_values import are_sound
+
 _MAX_NESTING = 600
 """Brackets inside each other: each prim, dictionary, list and tuple is one."""
 _QUOTED = re.compile(
@@ -24,8 +27,6 @@ _HEADER, _ENTRY = 24, 32
 _MAX_SECTIONS = 64
 _OLDEST = (0, 4)
 """Lists of older files are not compressed."""
-_RATIO = 1100
-"""Numbers for each byte: LZ4 packs up to 255 bytes into one, and such a byte holds four numbers."""
 _SIZES = {b"TOKENS": 1, b"FIELDS": 2, b"FIELDSETS": 1, b"PATHS": 3, b"SPECS": 3}
 """Compressed lists of each section."""
 
@@ -57,10 +58,12 @@ def _problem_of_crate(data: bytes) -> str | None:
         return "its table of contents is damaged"
     for number in range(sections):
         entry = table + 8 + _ENTRY * number
-        name = data[entry : entry + 16].rstrip(b"\0")
+        name = data[entry : entry + 16].partition(b"\0")[0]
         start, size = _count(data, entry + 16), _count(data, entry + 24)
         if start < _HEADER or start + size > len(data) or not _is_sound(name, data[start : start + size]):
             return f"its section {name.decode('latin-1')!a} is damaged"
+        if name == b"FIELDS" and not are_sound(data, start):
+            return "its values are damaged, or too many"
     return None
 
 
@@ -68,11 +71,11 @@ def _is_sound(name: bytes, section: bytes) -> bool:
     """Whether a section can hold as much as it says."""
     if len(section) < 8:
         return False
-    if _count(section, 0) > _RATIO * len(section):
+    if _count(section, 0) > RATIO * len(section):
         return False
     at = 8
     if name in (b"TOKENS", b"PATHS"):  # bytes of all tokens; the number of paths once more
-        if _count(section, at) > _RATIO * len(section):
+        if _count(section, at) > RATIO * len(section):
             return False
         at += 8
     for _ in range(_SIZES.get(name, 0)):
