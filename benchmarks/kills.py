@@ -111,7 +111,7 @@ def main(options: Options) -> None:
             for _ in range(options.kills):
                 process = started(program, out, options.workers)
                 try:
-                    process.wait(rng.uniform(0.0, 0.5 * longest))
+                    process.wait(rng.uniform(0.0, 2.0 * longest / options.kills))
                 except subprocess.TimeoutExpired:
                     process.kill()
                     process.wait()
