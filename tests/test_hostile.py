@@ -209,7 +209,7 @@ def made_mjcf(root: Path) -> dict[str, tuple[str, Path, str | None]]:
         "a long chain of includes": (mjcf(root / "chain", "", '<include file="0.xml"/>', **chain), "over 100 files"),
         "one mesh many times": (mjcf(root / "hulls", many, meshes, m__stl=ball), "copies of its meshes"),
         "one file as many meshes": (
-            mjcf(root / "assets", "", f"<asset>{assets}</asset>", m__stl=ball), "copies of its meshes"
+            mjcf(root / "assets", "", f"<asset>{assets}</asset>", m__stl=ball), "more than 5000000 triangles"
         ),
         "copies of copies": (mjcf(root / "copies", copies), "more than"),
         "many joints": (mjcf(root / "joints", '<body><joint type="slide"/></body>' * 2000), "more than"),

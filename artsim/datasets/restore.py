@@ -156,9 +156,11 @@ def _in_the_way(path: Path) -> str | None:
 
 
 def _clear(path: Path) -> None:
-    """Remove an empty folder from the place of a file."""
+    """Remove an empty folder, a pipe or a device from the place of a file."""
     if path.is_dir() and not path.is_symlink():
         path.rmdir()
+    elif path.exists() and not path.is_file():
+        path.unlink()
 
 
 def _make_shards(

@@ -242,7 +242,7 @@ def test_an_object_that_cannot_be_written_is_not_a_broken_one(sources: list[Sour
     """A full disk while objects are compiled must never end in a dataset without them."""
     in_the_way = tmp_path / "out" / "objects" / "_staged_1.npz"
     in_the_way.mkdir(parents=True)
-    with pytest.raises(ConfigError, match=r"_staged_1\.npz: cannot write"):
+    with pytest.raises(ConfigError, match=r"_staged_1\.npz: it is a folder"):
         make(sources, tmp_path / "out", skip_broken=True)
     in_the_way.rmdir()
     make(sources, tmp_path / "out", skip_broken=True)
@@ -375,7 +375,7 @@ def test_objects_that_a_killed_run_has_prepared_are_not_loaded_again(sources: li
     straight, out = tmp_path / "straight", tmp_path / "out"
     make(sources, straight)
     (out / "objects" / "_staged_2.npz").mkdir(parents=True)  # the last object cannot be written
-    with pytest.raises(ConfigError, match=r"_staged_2\.npz: cannot write"):
+    with pytest.raises(ConfigError, match=r"_staged_2\.npz: it is a folder"):
         make(sources, out, workers=1)
     (out / "objects" / "_staged_2.npz").rmdir()
     journal = out / "objects" / ".prepared.jsonl"

@@ -297,7 +297,7 @@ def test_bad_input_gives_an_error_that_says_what_and_where(case: str, tmp_path: 
 def test_limits_hold(tmp_path: Path, box_laptop: Path) -> None:
     with pytest.raises(AssetError, match="2 links are over the limit of 1"):
         load(box_laptop, limits=LoadLimits(max_links=1))
-    with pytest.raises(AssetError, match="URDF file of 0 MB is over the limit"):
+    with pytest.raises(AssetError, match=r"URDF file of 0\.000423 MB is over the limit of 0\.0001 MB"):
         load(box_laptop, limits=LoadLimits(max_urdf_bytes=100))
     with pytest.raises(AssetError, match="more than 5 triangles"):
         load(QUIRKS / "meshes", limits=LoadLimits(max_faces=5))
