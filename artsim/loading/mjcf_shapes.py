@@ -6,6 +6,7 @@ seen of it. Where shapes to be seen have groups of their own, a body that has so
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -30,6 +31,8 @@ _CLEAR = 0.5 / 255.0
 """Opacity that no picture of 8 bits shows."""
 _NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
 """Colour of a geom whose document gives it none: that of its material counts."""
+_NO_TURN = 1e-15
+"""Length of a quaternion up to which MuJoCo takes it for no rotation."""
 _THIN = 1e-4
 """Metres of thickness that a flat mesh has where it collides."""
 
@@ -230,9 +233,11 @@ def pose(position: Array, turn: Array) -> Array:
 
 
 def rotation(quaternion: Sequence[float] | Array) -> Array:
-    """(3, 3) rotation of a quaternion w, x, y, z of any length."""
+    """(3, 3) rotation of a quaternion w, x, y, z of any length; none where it is 0, as MuJoCo has it."""
     from scipy.spatial.transform import Rotation
 
     w, x, y, z = np.asarray(quaternion, dtype=np.float64).tolist()
+    if not math.hypot(w, x, y, z) > _NO_TURN:
+        return np.eye(3)
     matrix: Array = Rotation.from_quat([x, y, z, w]).as_matrix()
     return matrix

@@ -73,7 +73,7 @@ def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[U
     try:
         reader = StageReader(stage, file, limits, repairs)
         links = read_links(reader, read_joints(reader))
-    except Tf.ErrorException as error:  # values are read when they are asked for
+    except (Tf.ErrorException, UnicodeDecodeError) as error:  # values are read when they are asked for
         raise unreadable(file, error) from error
     _show_something(links, file, repairs)
     return as_document(links, file, repairs, body), repairs, contents

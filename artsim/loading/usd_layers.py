@@ -11,7 +11,7 @@ from artsim.common.extras import needs
 from artsim.common.files import read_bounded
 from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits
-from artsim.loading.usd_bytes import problem_of
+from artsim.loading.usd_bytes import MAGIC, problem_of
 from artsim.loading.usd_expansion import Expansion
 from artsim.loading.usd_packages import members
 
@@ -160,7 +160,28 @@ class _Layers:
             raise unreadable(path, error) from error
         if layer is None:
             raise unreadable(path, "unknown content")
+        if data.startswith(MAGIC):
+            _check_specs(layer, path)
         return layer
+
+
+def _check_specs(layer: Any, path: Path) -> None:
+    """Refuse a layer that lists what it does not hold: usd-core ends the process where it meets that.
+
+    Raises
+    ------
+    AssetError
+    """
+
+    def look(spec: Any) -> None:
+        is_object = spec.isEmpty or spec.IsPrimPath() or spec.IsPrimVariantSelectionPath() or spec.IsPrimPropertyPath()
+        if is_object and layer.GetObjectAtPath(spec) is None:  # the targets of a relationship are no objects
+            lost.append(spec)
+
+    lost: list[Any] = []
+    layer.Traverse(layer.pseudoRoot.path, look)
+    if lost:
+        raise unreadable(path, "it lists prims or properties that it does not hold")
 
 
 def unreadable(path: Path, why: object) -> AssetError:
