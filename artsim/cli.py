@@ -16,7 +16,7 @@ from artsim.export.command import Export
 from artsim.families.constraints import Constraints
 from artsim.formats.base import FormatName
 from artsim.formats.command import Convert
-from artsim.loading.roots import PackageRoots
+from artsim.loading.roots import Opened, PackageRoots
 from artsim.physics.episode import EpisodeOptions
 from artsim.variation.command import Vary
 
@@ -37,7 +37,7 @@ Having = Annotated[
 
 
 @dataclass(frozen=True)
-class Generate:
+class Generate(Opened):
     """Generate a dataset of labelled partial point clouds.
 
     Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
@@ -77,12 +77,6 @@ class Generate:
     """Shares of each category's objects in train, val and test: by object, never by view."""
     shard_size: int = 256
     """Samples of each tar file."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
-    below these folders, too. Repeatable."""
-    body: str | None = None
-    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
-    on the world."""
     skip_broken: bool = False
     """Leave out objects that do not load, or that no view sees, and say which, instead of stopping."""
     strict: bool = False
@@ -238,7 +232,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class View:
+class View(Opened):
     """Draw samples of a dataset, or an object in several states.
 
     Writes a contact sheet (PNG: depth, part colours, boxes, joint axes). With --rerun, a recording for the rerun
@@ -257,12 +251,6 @@ class View:
     """Also write a rerun recording (.rrd) to this file."""
     html: Path | None = None
     """Page to write, such as laptop.html; it needs no network and no other file."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
-    below these folders, too. Repeatable."""
-    body: str | None = None
-    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
-    on the world."""
 
     def run(self) -> None:
         from artsim.drawing.contact_sheet import write_contact_sheet
@@ -329,19 +317,13 @@ class Families:
 
 
 @dataclass(frozen=True)
-class Inspect:
+class Inspect(Opened):
     """Print an object's tree, joints, limits, boxes, and what was mended while loading it."""
 
     path: tyro.conf.Positional[Path]
     """URDF, MJCF or USD file, GLB or joint file (mobility_v2.json, motion_attributes.json), or its folder."""
     gates: bool = False
     """Also pass the object through the sim-readiness gates, and list what each finds."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
-    below these folders, too. Repeatable."""
-    body: str | None = None
-    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
-    on the world."""
 
     def run(self) -> None:
         from artsim.drawing.inspect import describe

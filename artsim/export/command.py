@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import tyro
 
 from artsim.errors import ConfigError
-from artsim.loading.roots import PackageRoots
+from artsim.loading.roots import Opened
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Opened):
     """Write an object as URDF, MJCF and USD for simulators, such as one of PartNet-Mobility.
 
     What collides is cut into convex pieces, so that things can be put into drawers. That takes seconds for each hollow
@@ -38,12 +38,6 @@ class Export:
     actuators: Literal["none", "motor", "position"] = "none"
     """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
     control is where the joint shall be."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
-    below these folders, too. Repeatable."""
-    body: str | None = None
-    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
-    on the world."""
 
     def run(self) -> None:
         from artsim.export import check_formats, export

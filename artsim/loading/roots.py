@@ -1,8 +1,9 @@
-"""The option ``--package-root NAME=FOLDER`` of every program that loads objects."""
+"""Options of programs that load objects: where files lie, ``--package-root NAME=FOLDER``, and which object is meant."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,3 +36,15 @@ PackageRoots = Annotated[
     ),
 ]
 """Folder of each ``package://`` name: several after one option, or the option several times."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opened:
+    """Options of commands that open objects of files."""
+
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
+    below these folders, too. Repeatable."""
+    body: str | None = None
+    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
+    on the world."""
