@@ -34,7 +34,6 @@ from artsim.common.progress import track
 from artsim.errors import ConfigError
 from artsim.making.assembly import Assembly
 from artsim.making.solids import ellipsoid
-from artsim.renderers.compiled import compile_now
 from benchmarks.compared.generation import wall_of_drawers
 
 Work = Callable[[], object]
@@ -160,7 +159,6 @@ class Options:
 
 def main(options: Options) -> None:
     """Measure all, and print exponents."""
-    compile_now()  # as in a process that makes many clouds
     exponents: dict[str, float] = {}
     times: dict[str, tuple[list[float], list[float]]] = {}
     for name in options.only or GROWTHS:

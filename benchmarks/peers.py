@@ -29,7 +29,6 @@ from artsim.errors import ArtsimError, ConfigError
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import Array, transform_points
 from artsim.observing.capture import draw_visible
-from artsim.renderers.compiled import compile_now
 from artsim.renderers.raycast import pose
 from benchmarks.compared.generation import benchmark_objects
 
@@ -69,8 +68,7 @@ def main(options: Options) -> None:
             q = sample_state(obj, StateOptions(), rng)
             scenes.append((obj, q, draw_camera(obj, q, ViewOptions(), rng)))
     scenes = [scenes[i] for i in rng.permutation(len(scenes))]  # those that are cut off are no special ones
-    compiled = compile_now()
-    print(f"{len(scenes)} scenes, artsim's loops {'compiled' if compiled else 'in NumPy'}")
+    print(f"{len(scenes)} scenes")
     rates: dict[str, float] = {}
     for name, program in PROGRAMS.items():
         if options.only and name not in ("artsim", *options.only):

@@ -38,7 +38,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
 from artsim.observing.sensor import SENSORS
-from artsim.renderers import compiled, raycast
+from artsim.renderers import raycast
 from tests.conftest import ASSETS
 from tests.processors import EMBREE, can_run
 
@@ -86,7 +86,6 @@ def everything() -> dict[str, Any]:
         "labels": labels,
         "noise": noise_digests(),
         "clouds": {EMBREE[name]: clouds(objects, EMBREE[name]) for name in EMBREE if can_run(name)},
-        "clouds by numba": clouds_by_numba(objects),
         "files": digests,
     }
 
@@ -200,16 +199,6 @@ def clouds(objects: list[ArticulatedObject], code: str) -> dict[str, list[float]
     """Mean of the points of each object's cloud, in metres, as Embree's code for other instructions finds them."""
     with embree(code):
         return {obj.category: cloud(obj).points.mean(axis=0, dtype=np.float64).tolist() for obj in objects}
-
-
-def clouds_by_numba(objects: list[ArticulatedObject]) -> dict[str, str]:
-    """Digest of the clouds with the loops around the rays as NumPy does them, and as numba compiles them."""
-    made = {}
-    for name, by_numba in (("NumPy", False), ("numba", True)):
-        with compiled.use(by_numba) as used:
-            assert used == by_numba, "numba compiles nothing here"
-            made[name] = sha256(b"".join(cloud(obj).points.tobytes() for obj in objects[::3]))
-    return made
 
 
 @contextlib.contextmanager

@@ -82,12 +82,6 @@ def test_every_file_is_the_same_bytes_with_the_code_of_every_processor(processor
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("processor", ["as it is", *PROCESSORS])
-def test_numba_and_numpy_make_the_same_clouds(processor: str) -> None:
-    assert len(set(made(processor)["clouds by numba"].values())) == 1
-
-
-@pytest.mark.slow
 def test_clouds_of_every_code_of_embree_are_those_of_the_record(record: dict[str, Any]) -> None:
     """Their last bits differ between codes, and between makers of processors."""
     found = made("as it is")["clouds"]

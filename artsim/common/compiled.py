@@ -17,15 +17,12 @@ from typing import Any, Generic, TypeVar
 
 from typing_extensions import ParamSpec
 
-from artsim.common.extras import needs
-
 P = ParamSpec("P")
 R = TypeVar("R")
 
 _MATHS = {"contract", "reassoc", "nsz"}
 """Liberties that do not touch infinities and NaN: sums in any order, and fused products, so that loops use wide
 registers."""
-
 
 _SAID_AFTER = 1.5
 """Seconds after which it is said that something is compiled. What is kept on the disk loads in a tenth of that."""
@@ -60,6 +57,9 @@ class Compiled(Generic[P, R]):
     ----------
     function : callable
         Loops over NumPy arrays and numbers; it may call other compiled functions of its module.
+    exact : bool
+        Whether every operation is rounded as IEEE 754 says, in the order in which it stands: the same bytes as in
+        Python, on every processor.
 
     Attributes
     ----------
@@ -67,8 +67,8 @@ class Compiled(Generic[P, R]):
         The function as it is written, for tests.
     """
 
-    def __init__(self, function: Callable[P, R]):
-        self.python = function
+    def __init__(self, function: Callable[P, R], exact: bool = False):
+        self.python, self._exact = function, exact
         self.__doc__, self.__name__, self.__module__ = function.__doc__, function.__name__, function.__module__
         self._dispatcher: Any = None
         self._called = False
@@ -85,9 +85,9 @@ class Compiled(Generic[P, R]):
     def _prepare(self) -> Any:
         """Numba's own function, which others of the module then call by the same name."""
         if self._dispatcher is None:
-            with needs("compiled loops"):
-                import numba
-            how: dict[str, Any] = {"nogil": True, "fastmath": _MATHS, "error_model": "numpy"}
+            import numba
+
+            how: dict[str, Any] = {"nogil": True, "fastmath": not self._exact and _MATHS, "error_model": "numpy"}
             try:
                 self._dispatcher = numba.njit(cache=True, **how)(self.python)
             except RuntimeError:  # no folder can be written to
@@ -102,3 +102,8 @@ class Compiled(Generic[P, R]):
 def compiled(function: Callable[P, R]) -> Compiled[P, R]:
     """Decorate a function to be compiled: see :class:`Compiled`."""
     return Compiled(function)
+
+
+def compiled_exactly(function: Callable[P, R]) -> Compiled[P, R]:
+    """Decorate a function to be compiled without liberties: see :class:`Compiled`."""
+    return Compiled(function, exact=True)

@@ -40,7 +40,6 @@ MODULES = {
     "fsspec": ("fsspec", "storage"),
     "s3fs": ("s3fs", "storage"),
     "torch": ("torch", "train"),
-    "numba": ("numba", "train"),
     "tensorboard": ("tensorboard", "train"),
     "safetensors": ("safetensors", "train"),
     "yaml": ("PyYAML", "train"),

@@ -27,7 +27,6 @@ from artsim.model.kinematics import Array, invert_transform
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
-from artsim.renderers.compiled import count_cloud
 from artsim.renderers.raycast import cast, pose
 
 _TOLERANCE = 1e-4
@@ -395,7 +394,6 @@ def _image_problems(sample: Sample, obj: ArticulatedObject, true_points: Array) 
     if sample.part_mask is not None and (sample.part_mask[row, column] != sample.part).any():
         yield "points do not agree with the part mask"
     if sample.renderer == "raycast":
-        count_cloud()
         T_world_object = sample.T_world_camera @ sample.T_camera_part[0]
         if _close(T_world_object, np.eye(4), 1e-9):
             T_world_object = np.eye(4)  # exactly the rays that made the sample

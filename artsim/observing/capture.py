@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.elementary import log
-from artsim.common.products import apply, norm
 from artsim.common.sequences import listed
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
@@ -18,8 +17,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.noise import Look, PixelView
 from artsim.observing.sample import ARTSIM_VERSION, IMAGES, Sample
 from artsim.observing.sensor import Sensor, find_sensor
-from artsim.renderers import Renderer, shared_renderer
-from artsim.renderers.compiled import count_cloud, kernels
+from artsim.renderers import Renderer, ray_kernels, shared_renderer
 from artsim.renderers.raycast import PosedObject, cast, cast_counted, pose, render_posed, visibility
 
 
@@ -81,7 +79,6 @@ def observe(
     if unknown:
         raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")
     rng = rng or np.random.default_rng(0)
-    count_cloud()
     name, sensor = renderer if isinstance(renderer, str) else renderer.name, find_sensor(noise)
     key = int(rng.integers(2**63)) if sensor.steps else 0
     posed = pose(obj, q, camera, T_world_object)
@@ -208,7 +205,7 @@ def draw_visible(
     """
     first, end = posed.candidates()
     up_to = np.cumsum(end - first)  # candidates in the rows so far
-    total, width, compiled = int(up_to[-1]), posed.camera.width, kernels()
+    total, width = int(up_to[-1]), posed.camera.width
     fresh = np.ones(total, dtype=bool)
     hits: list[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]] = []
     found = visited = 0
@@ -219,11 +216,7 @@ def draw_visible(
         wanted = min(int((missing + 2.5 * np.sqrt(missing * (1.03 - share))) / share) + 16, total)
         row, column = _draw_candidates(wanted, total - visited, fresh, up_to, end, rng)
         depth, part = look(row, column)
-        if compiled is None:
-            hit = (part != BACKGROUND).nonzero()[0]
-            hits.append((row[hit] * width + column[hit], depth[hit], part[hit]))
-        else:
-            hits.append(compiled.hits(row, column, depth, part, width))
+        hits.append(ray_kernels.hits(row, column, depth, part, width))
         visited, found = visited + len(row), found + len(hits[-1][0])
     if found == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, np.uint8)
@@ -244,25 +237,18 @@ def _draw_candidates(
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows and columns, in order, of about so many of the candidates ``left``: the ``fresh`` ones."""
-    compiled = kernels()
+    pixels: tuple[NDArray[np.int64], NDArray[np.int64]]
     if wanted > left // 2:
         rest = fresh.nonzero()[0]
         local = rest if wanted > 0.7 * left else np.sort(rng.permutation(rest)[:wanted])
     else:
         # Numbers drawn with replacement repeat each other and earlier rounds: so many leave ``wanted`` new ones.
         drawn = rng.integers(0, len(fresh), size=int(-len(fresh) * log(1.0 - wanted / left)))
-        if compiled is not None:
-            pixels: tuple[NDArray[np.int64], NDArray[np.int64]] = compiled.unvisited(np.sort(drawn), fresh, up_to, end)
-            return pixels
-        chosen = np.zeros(len(fresh), dtype=bool)
-        chosen[drawn] = True
-        local = (chosen & fresh).nonzero()[0]  # in order: neighbouring rays share memory
-    fresh[local] = False
-    if compiled is not None:
-        pixels = compiled.pixels_of(local, up_to, end)
+        pixels = ray_kernels.unvisited(np.sort(drawn), fresh, up_to, end)
         return pixels
-    row = np.searchsorted(up_to, local, side="right")
-    return row, local + (end - up_to)[row]
+    fresh[local] = False
+    pixels = ray_kernels.pixels_of(local, up_to, end)
+    return pixels
 
 
 class _Rays:
@@ -315,31 +301,9 @@ def _labelled(
     posed: PosedObject,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(N, 3) points that are reported, and (N, 3) normalised coordinates of the places that their rays truly meet."""
-    camera, obj, compiled = posed.camera, posed.obj, kernels()
-    if compiled is not None:
-        K, T = np.array(camera.K, dtype=np.float64, order="C"), np.ascontiguousarray(posed.T_camera_part)
-        both: tuple[NDArray[np.float32], NDArray[np.float32]] = compiled.labels(
-            pixels, depth, true_depth, part, camera.width, K, T, obj.box_center, obj.box_size
-        )
-        return both
-    points = true_points = camera.unproject(pixels, depth)
-    if true_depth is not depth:
-        true_points = camera.unproject(pixels, true_depth)
-    return points.astype(np.float32), _npcs(true_points, part, posed).astype(np.float32, order="C")
-
-
-def _npcs(points: Array, part: NDArray[np.uint8], posed: PosedObject) -> Array:
-    """(N, 3) normalised part coordinates of camera-frame points: one uniform scale per part."""
-    rotation, translation = posed.T_camera_part[:, :3, :3], posed.T_camera_part[:, :3, 3]
-    size = norm(posed.obj.box_size)
-    size[size == 0] = 1.0  # parts without geometry have no points
-    # R^T (p - t) is the inverse transform; the part's centre and scale are folded into it.
-    linear = rotation / size[:, None, None]
-    shift = 0.5 - (apply(np.swapaxes(rotation, 1, 2), translation) + posed.obj.box_center) / size[:, None]
-    # One column for each point, so that each step runs over memory in order.
-    table = np.concatenate([linear, shift[:, None]], axis=1).reshape(-1, 12).T.take(part, axis=1).reshape(4, 3, -1)
-    npcs = table[0] * points[:, 0]
-    npcs += table[1] * points[:, 1]
-    npcs += table[2] * points[:, 2]
-    npcs += table[3]
-    return npcs.T
+    camera, obj = posed.camera, posed.obj
+    K, T = np.array(camera.K, dtype=np.float64, order="C"), np.ascontiguousarray(posed.T_camera_part)
+    both: tuple[NDArray[np.float32], NDArray[np.float32]] = ray_kernels.labels(
+        pixels, depth, true_depth, part, camera.width, K, T, obj.box_center, obj.box_size
+    )
+    return both

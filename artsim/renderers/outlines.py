@@ -13,7 +13,7 @@ from artsim.common.products import dot, matmul, unit
 from artsim.model.camera import Camera
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.compiled import kernels
+from artsim.renderers.ray_kernels import spans
 
 
 def bounding_corners(points: Array) -> Array:
@@ -63,11 +63,10 @@ def _meetings() -> tuple[NDArray[np.int64], Array]:
 
 
 _TILTS = np.deg2rad(np.arange(-72.0, 73.0, 18.0))  # of the lines that bound an outline to its left and right
-_TANGENTS = tan(_TILTS)[:, None]
+_TANGENTS = tan(_TILTS)
 _SLOPES = np.stack([_TANGENTS, -_TANGENTS]).astype(np.float32)  # for the left side, and for the negated right side
 _MARGIN = 0.05  # pixels: covers single precision
-_MARGINS = _MARGIN / cos(_TILTS)
-_LINES = (_TANGENTS[:, 0].copy(), _SLOPES[..., 0].copy(), _MARGINS, _MARGIN)
+_LINES = (_TANGENTS, _SLOPES, _MARGIN / cos(_TILTS), _MARGIN)
 
 
 def outline_spans(
@@ -86,32 +85,8 @@ def outline_spans(
     camera : Camera
     T_camera_part : (K, 4, 4) float
     """
-    compiled = kernels()
-    if compiled is not None:
-        T, K = np.ascontiguousarray(T_camera_part), np.array(camera.K, dtype=np.float64, order="C")
-        outlines: tuple[NDArray[np.float32], NDArray[np.int64]] = compiled.spans(
-            T, corners, float(obj.scale), obj.has_surface, K, camera.height, *_LINES
-        )
-        return outlines
-    seen = matmul(T_camera_part[:, :3, :3], corners * obj.scale) + T_camera_part[:, :3, 3, None]
-    depth = seen[:, 2]
-    u, v, _ = np.swapaxes(matmul(camera.K, seen) / np.where(depth > 0, depth, np.inf)[:, None], 0, 1).clip(-1e6, 1e6)
-    heights = np.stack([v.min(axis=1) - _MARGIN, v.max(axis=1) + 1.0 + _MARGIN], axis=1)
-    row_ranges = np.clip(np.ceil(heights - 0.5), 0, camera.height).astype(np.int64)
-    # u + tan * v of the corners: the line through the outermost bounds the outline. Spans count from pixel centres.
-    across = u[:, None] + v[:, None] * _TANGENTS
-    bounds = np.stack([across.min(axis=2) - _MARGINS, -across.max(axis=2) - _MARGINS], axis=1)
-    bounds -= [[0.5], [-0.5]]
-    first_row, end_row = row_ranges[:, 0].min(), row_ranges[:, 1].max()
-    rows = np.arange(first_row, end_row, dtype=np.float32) + np.float32(0.5)
-    spans = np.full((len(obj), 2, camera.height), np.inf, dtype=np.float32)
-    lines = bounds.astype(np.float32)[..., None] - _SLOPES * rows
-    spans[:, :, first_row:end_row] = lines.max(axis=2)
-    spans[:, 1] *= -1.0
-    for k in range(len(obj)):
-        spans[k, 1, : row_ranges[k, 0]] = spans[k, 1, row_ranges[k, 1] :] = -np.inf
-    around = (depth <= 0).any(axis=1)  # reaches behind the camera: it may cover any pixel
-    spans[around], row_ranges[around] = np.array([[-np.inf], [np.inf]]), (0, camera.height)
-    hidden = (depth <= 0).all(axis=1) | ~obj.has_surface
-    spans[hidden], row_ranges[hidden] = np.array([[np.inf], [-np.inf]]), 0
-    return spans, row_ranges
+    T, K = np.ascontiguousarray(T_camera_part), np.array(camera.K, dtype=np.float64, order="C")
+    outlines: tuple[NDArray[np.float32], NDArray[np.int64]] = spans(
+        T, corners, float(obj.scale), obj.has_surface, K, camera.height, *_LINES
+    )
+    return outlines

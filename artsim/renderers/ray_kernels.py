@@ -1,24 +1,21 @@
-"""Loops around the rays, compiled by numba: the same operations in the same order as NumPy's, so the same bytes.
+"""Loops around the rays: what is worked out for every pixel, ray and point.
 
-Nothing here contracts or reorders floating-point operations. Imported by :mod:`artsim.renderers.compiled` alone.
+Nothing here contracts or reorders floating-point operations, so that clouds are the same bytes on every processor.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
+from artsim.common.compiled import compiled_exactly
 from artsim.model.frame import BACKGROUND
-
-# nogil: loaders with threads go on meanwhile. error_model: a division by zero gives infinity, as NumPy's does.
-_compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
 
 _BACKGROUND = np.uint8(BACKGROUND)
 
 
-@_compiled
+@compiled_exactly
 def spans(
     T: Any, corners: Any, scale: float, has_surface: Any, K: Any, height: int,
     tangents: Any, slopes: Any, margins: Any, margin: float,
@@ -74,7 +71,7 @@ def spans(
     return found, row_ranges
 
 
-@_compiled
+@compiled_exactly
 def columns(spans: Any, width: int) -> Any:
     """First and end column of each row's candidates; see :meth:`artsim.renderers.raycast.PosedObject.candidates`."""
     parts, height = len(spans), spans.shape[2]
@@ -88,7 +85,7 @@ def columns(spans: Any, width: int) -> Any:
     return first, end
 
 
-@_compiled
+@compiled_exactly
 def set_out(T: Any, scale: float) -> Any:
     """Rotations (K, 3, 3) from each part to the camera, and the camera's place (K, 3) in each part, native units."""
     rotations, origins = np.empty((len(T), 3, 3), np.float32), np.empty((len(T), 3), np.float32)
@@ -101,7 +98,7 @@ def set_out(T: Any, scale: float) -> Any:
     return rotations, origins
 
 
-@_compiled
+@compiled_exactly
 def unvisited(drawn: Any, fresh: Any, up_to: Any, end: Any) -> Any:
     """Row and column of the candidates drawn, in ascending order, that are still ``fresh`` (total,): then no longer.
 
@@ -119,7 +116,7 @@ def unvisited(drawn: Any, fresh: Any, up_to: Any, end: Any) -> Any:
     return row[:m], column[:m]
 
 
-@_compiled
+@compiled_exactly
 def hits(row: Any, column: Any, depth: Any, part: Any, width: int) -> Any:
     """Flat indices, depth and part of the pixels that show a part."""
     count = 0
@@ -134,7 +131,7 @@ def hits(row: Any, column: Any, depth: Any, part: Any, width: int) -> Any:
     return pixels, depths, parts
 
 
-@_compiled
+@compiled_exactly
 def pixels_of(numbers: Any, up_to: Any, end: Any) -> Any:
     """Row and column of candidates, of which ``up_to`` (H,) stand up to the end of each row, at column ``end`` (H,)."""
     row, column = np.empty(len(numbers), np.int64), np.empty(len(numbers), np.int64)
@@ -146,7 +143,7 @@ def pixels_of(numbers: Any, up_to: Any, end: Any) -> Any:
     return row, column
 
 
-@_compiled
+@compiled_exactly
 def ray_set_up(row: Any, column: Any, row_ranges: Any, spans: Any, rotations: Any, K: Any) -> Any:
     """Which rays to cast at each part, and their directions in its rest frame.
 
@@ -184,11 +181,11 @@ def ray_set_up(row: Any, column: Any, row_ranges: Any, spans: Any, rotations: An
     return rays[:m], directions[:m], ends
 
 
-@_compiled
+@compiled_exactly
 def nearest(rays: Any, ends: Any, distance: Any, count: int, miss: Any, scale: Any) -> Any:
     """Of each ray the depth and the part of its nearest hit; and of each part how many rays meet it, how many see it.
 
-    See :class:`artsim.renderers.raycast._Nearest`.
+    Where surfaces of two parts coincide exactly, the part with the lower index is seen.
     """
     parts = len(ends) - 1
     depth, part = np.full(count, miss, np.float32), np.full(count, _BACKGROUND, np.uint8)
@@ -208,13 +205,13 @@ def nearest(rays: Any, ends: Any, distance: Any, count: int, miss: Any, scale: A
     return depth, part, met, saw
 
 
-@_compiled
+@compiled_exactly
 def labels(
     pixels: Any, depth: Any, true_depth: Any, part: Any, width: int, K: Any, T: Any, center: Any, size: Any
 ) -> Any:
     """Points that a sensor reports at pixels, and the normalised coordinates of the places that the rays truly meet.
 
-    See :func:`artsim.observing.capture._npcs`.
+    ``R^T (p - t)`` is the inverse transform; the part's centre and its one scale are folded into it.
     """
     table = np.empty((len(T), 4, 3))
     for k in range(len(T)):
@@ -242,7 +239,7 @@ def labels(
     return points, npcs
 
 
-@_compiled
+@compiled_exactly
 def every_nth(first: Any, end: Any, most: int) -> Any:
     """Row and column of each n-th pixel between columns ``first`` and ``end`` (P, H); where those of each part end.
 
@@ -267,7 +264,7 @@ def every_nth(first: Any, end: Any, most: int) -> Any:
     return row, column, ends
 
 
-@_compiled
+@compiled_exactly
 def part_directions(row: Any, column: Any, ends: Any, rotations: Any, K: Any) -> Any:
     """(N, 3) directions of rays through pixels in the rest frame of a part: those up to ``ends[k + 1]`` of part k."""
     half = np.float32(0.5)
@@ -280,22 +277,3 @@ def part_directions(row: Any, column: Any, ends: Any, rotations: Any, K: Any) ->
             for axis in range(3):
                 directions[i, axis] = (x * R[0, axis] + y * R[1, axis]) + R[2, axis]
     return directions
-
-
-def warm_up() -> None:
-    """Compile all of them, or load what was compiled before: none is left for later."""
-    one, K, K32 = np.zeros(1, np.int64), np.eye(3), np.eye(3, dtype=np.float32)
-    T, flags, depth = np.eye(4)[None], np.zeros(1, np.bool_), np.zeros(1, np.float32)
-    lines, tilts = np.zeros((2, 1), np.float32), np.zeros(1)
-    found, row_ranges = spans(T, np.zeros((1, 3, 1)), 1.0, flags, K, 1, tilts, lines, tilts, 0.0)
-    row, column = pixels_of(one, one + 1, one + 1)
-    unvisited(one, np.ones(1, np.bool_), one + 1, one + 1)
-    hits(row, column, depth, np.zeros(1, np.uint8), 1)
-    rotations = np.zeros((1, 3, 3), np.float32)
-    rays, _, ends = ray_set_up(row, column, row_ranges, found, rotations, K32)
-    nearest(rays, ends, np.zeros(len(rays), np.float32), 1, np.float32(1.0), np.float32(1.0))
-    labels(one, depth, depth, np.zeros(1, np.uint8), 1, K, T, np.zeros((1, 3)), np.ones((1, 3)))
-    columns(found, 1)
-    set_out(T, 1.0)
-    row, column, ends = every_nth(one[None], one[None] + 1, 1)
-    part_directions(row, column, ends, rotations, K32)

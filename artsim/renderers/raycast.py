@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.products import apply, matmul
+from artsim.common.products import matmul
 from artsim.model.camera import Camera
-from artsim.model.frame import BACKGROUND, Frame
+from artsim.model.frame import Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.compiled import kernels
+from artsim.renderers import ray_kernels
 from artsim.renderers.outlines import bounding_corners, outline_spans
 from artsim.renderers.ray_scenes import RayScene, ray_scene
 
@@ -84,13 +84,9 @@ class PosedObject:
 
     @cached_property
     def _set_out(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        compiled, T = kernels(), np.ascontiguousarray(self.T_camera_part)
-        if compiled is not None:
-            known: tuple[NDArray[np.float32], NDArray[np.float32]] = compiled.set_out(T, float(self.obj.scale))
-            return known
-        rotation, translation = T[:, :3, :3], T[:, :3, 3]
-        origins = apply(np.swapaxes(rotation, 1, 2), translation) / -self.obj.scale
-        return rotation.astype(np.float32, order="C"), origins.astype(np.float32, order="C")
+        known: tuple[NDArray[np.float32], NDArray[np.float32]]
+        known = ray_kernels.set_out(np.ascontiguousarray(self.T_camera_part), float(self.obj.scale))
+        return known
 
     @property
     def rotations(self) -> NDArray[np.float32]:
@@ -102,29 +98,10 @@ class PosedObject:
         """(K, 3) position of the camera in each part's rest frame, native units."""
         return self._set_out[1]
 
-    def image_plane(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.float32]:
-        """(2, N) x and y of the directions of the rays through pixel centres, camera frame, where z = 1."""
-        K = self.intrinsics
-        plane = np.empty((2, len(row)), dtype=np.float32)
-        plane[1] = (row.astype(np.float32) + (np.float32(0.5) - K[1, 2])) / K[1, 1]
-        plane[0] = (column.astype(np.float32) + (np.float32(0.5) - K[0, 2]) - K[0, 1] * plane[1]) / K[0, 0]
-        return plane
-
     def candidates(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(H,) first and end column, in each row, of the pixels that the whole object can cover."""
-        compiled = kernels()
-        if compiled is not None:
-            columns: tuple[NDArray[np.int64], NDArray[np.int64]] = compiled.columns(self.spans, self.camera.width)
-            return columns
-        return _columns(self.spans[:, 0].min(axis=0), self.spans[:, 1].max(axis=0), self.camera.width)
-
-
-def _columns(
-    low: NDArray[np.float32], high: NDArray[np.float32], width: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and end column of the pixels whose centres lie between two bounds."""
-    first = np.clip(np.ceil(low), 0, width).astype(np.int64)
-    return first, np.maximum(np.clip(np.floor(high) + 1, 0, width).astype(np.int64), first)
+        columns: tuple[NDArray[np.int64], NDArray[np.int64]] = ray_kernels.columns(self.spans, self.camera.width)
+        return columns
 
 
 def pose(obj: ArticulatedObject, q: ArrayLike, camera: Camera, T_world_object: ArrayLike | None = None) -> PosedObject:
@@ -190,73 +167,27 @@ def cast_counted(
     posed: PosedObject, row: NDArray[np.int64], column: NDArray[np.int64]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
     """As :func:`cast`; and of each part (K,) how many rays see it."""
-    compiled = kernels()
-    if compiled is not None:
-        rays, directions, ends = compiled.ray_set_up(
-            row, column, posed.row_ranges, posed.spans, posed.rotations, posed.intrinsics
-        )
-        distance = _cast_directions(posed, range(len(posed.obj)), directions, ends)
-        found: tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]
-        found = compiled.nearest(rays, ends, distance, len(row), _MISS, np.float32(posed.obj.scale))
-        return found
-    nearest = _Nearest(len(row), len(posed.obj))
-    plane = posed.image_plane(row, column)
-    for k, (start, end) in enumerate(np.searchsorted(row, posed.row_ranges).tolist()):
-        low, high = posed.spans[k]
-        near_row, near_column = row[start:end], column[start:end]
-        mine = ((near_column >= low[near_row]) & (near_column <= high[near_row])).nonzero()[0] + start
-        if len(mine):
-            nearest.update(k, mine, _cast_part(posed, k, plane.take(mine, axis=1)))
-    depth, part_ids = nearest.result(posed.obj.scale)
-    seen = np.bincount(part_ids, minlength=BACKGROUND + 1)[: len(posed.obj)]
-    return depth, part_ids, nearest.amodal, seen
+    rays, directions, ends = ray_kernels.ray_set_up(
+        row, column, posed.row_ranges, posed.spans, posed.rotations, posed.intrinsics
+    )
+    return _nearest(posed, rays, _cast_directions(posed, range(len(posed.obj)), directions, ends), ends, len(row))
 
 
-class _Nearest:
-    """The nearest hit of each ray so far."""
-
-    def __init__(self, num_rays: int, num_parts: int):
-        self.distance = np.full(num_rays, _MISS, dtype=np.float32)
-        self.part_ids = np.full(num_rays, BACKGROUND, dtype=np.uint8)
-        self.amodal = np.zeros(num_parts, dtype=np.int64)
-
-    def update(self, k: int, rays: NDArray[np.int64], distance: NDArray[np.float32]) -> None:
-        """Take in the native z-depths at which some rays meet part k."""
-        self.amodal[k] += np.count_nonzero(distance < _MISS)
-        nearer = (distance < self.distance[rays]).nonzero()[0]
-        rays = rays[nearer]
-        self.distance[rays] = distance[nearer]
-        self.part_ids[rays] = k
-
-    def result(self, scale: float) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Depth in metres (0 for no hit) and part ids."""
-        self.distance[self.part_ids == BACKGROUND] = 0.0
-        return self.distance * np.float32(scale), self.part_ids
+def _nearest(
+    posed: PosedObject, rays: NDArray[np.int64], distance: NDArray[np.float32], ends: NDArray[np.int64], count: int
+) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
+    """Depth, part, and how many rays of each part meet and see it, of native z-depths along ``count`` rays."""
+    found: tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]
+    found = ray_kernels.nearest(rays, ends, distance, count, _MISS, np.float32(posed.obj.scale))
+    return found
 
 
 def hit_faces(posed: PosedObject, k: int, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
     """(N,) first face of part k that the ray through the centre of each pixel meets; -1 where it meets none."""
-    directions = _part_directions(posed, k, posed.image_plane(row, column))
+    ends = np.array([0, len(row)])
+    directions = ray_kernels.part_directions(row, column, ends, posed.rotations[k : k + 1], posed.intrinsics)
     faces = ray_surface(posed.obj.parts[k]).scene.run(_origins(posed, k, len(row)), directions, query="INTERSECT")
     return np.asarray(faces, dtype=np.int64)
-
-
-def _cast_part(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Native z-depth at which rays from the camera meet part k, ``_MISS`` or more where they do not.
-
-    ``plane`` is (2, N), what :meth:`PosedObject.image_plane` gives.
-    """
-    return _distance(posed, k, _part_directions(posed, k, plane))
-
-
-def _part_directions(posed: PosedObject, k: int, plane: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(N, 3) directions of rays in the frame of part k."""
-    # Row by row of the rotation, not by BLAS: see `artsim.common.products`.
-    x, y, z = posed.rotations[k][..., None]
-    directions = plane[0] * x
-    directions += plane[1] * y
-    directions += z
-    return directions.T
 
 
 def _origins(posed: PosedObject, k: int, count: int) -> NDArray[np.float32]:
@@ -264,23 +195,20 @@ def _origins(posed: PosedObject, k: int, count: int) -> NDArray[np.float32]:
     return np.ndarray((count, 3), np.float32, posed.origins, offset=12 * k, strides=(0, 4))
 
 
-def _distance(posed: PosedObject, k: int, directions: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Native z-depth along directions (N, 3) in the frame of part k."""
-    scene = ray_surface(posed.obj.parts[k]).scene
-    distance: NDArray[np.float32] = scene.run(_origins(posed, k, len(directions)), directions, query="DISTANCE")
-    return distance
-
-
 def _cast_directions(
     posed: PosedObject, parts: Iterable[int], directions: NDArray[np.float32], ends: NDArray[np.int64]
 ) -> NDArray[np.float32]:
-    """Native z-depth along directions, of which those up to ``ends[i + 1]`` are cast at the i-th of some parts."""
+    """Native z-depth along directions, of which those up to ``ends[i + 1]`` are cast at the i-th of some parts.
+
+    It is ``_MISS`` or more where a ray does not meet the part.
+    """
     distance = np.empty(len(directions), np.float32)
     last = ends.tolist()
     for i, k in enumerate(parts):
         if last[i + 1] > last[i]:
             mine = slice(last[i], last[i + 1])
-            distance[mine] = _distance(posed, k, directions[mine])
+            scene, origins = ray_surface(posed.obj.parts[k]).scene, _origins(posed, k, last[i + 1] - last[i])
+            distance[mine] = scene.run(origins, directions[mine], query="DISTANCE")
     return distance
 
 
@@ -298,7 +226,9 @@ def visibility(posed: PosedObject, parts: Sequence[int], max_rays: int) -> NDArr
     -------
     (len(parts), 2) int
     """
-    row, column, owner = _met_pixels(posed, parts, max_rays)
+    row, column, distance, ends = _cast_spans(posed, parts, max_rays)
+    met = (distance < _MISS).nonzero()[0]
+    row, column, owner = row[met], column[met], np.searchsorted(ends, met, side="right") - 1
     counts = np.zeros((len(parts), 2), dtype=np.int64)
     if len(row):
         order = np.argsort(row, kind="stable")
@@ -309,44 +239,31 @@ def visibility(posed: PosedObject, parts: Sequence[int], max_rays: int) -> NDArr
     return counts
 
 
-def _met_pixels(
+def _cast_spans(
     posed: PosedObject, parts: Sequence[int], max_rays: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Row, column and the number of the part of pixels, every n-th of a part's spans, whose rays meet that part."""
-    low, high = posed.spans[parts, 0], posed.spans[parts, 1]
-    first, end = _columns(low, high, posed.camera.width)
-    compiled = kernels()
-    if compiled is not None:
-        row, column, ends = compiled.every_nth(first, end, max_rays)
-        directions = compiled.part_directions(row, column, ends, posed.rotations[parts], posed.intrinsics)
-        met = (_cast_directions(posed, parts, directions, ends) < _MISS).nonzero()[0]
-        return row[met], column[met], np.searchsorted(ends, met, side="right") - 1
-    nothing = np.zeros(0, np.int64)
-    found = [(nothing, nothing, nothing)]
-    for i, k in enumerate(parts):
-        up_to = np.cumsum(end[i] - first[i])
-        step = max(1, int(up_to[-1]) // max_rays)
-        number = np.arange(step // 2, int(up_to[-1]), step)
-        row = np.searchsorted(up_to, number, side="right")
-        column = number + (end[i] - up_to)[row]
-        if len(row):
-            met = _cast_part(posed, k, posed.image_plane(row, column)) < _MISS
-            found.append((row[met], column[met], np.full(np.count_nonzero(met), i)))
-    rows, columns, owners = (np.concatenate(pieces) for pieces in zip(*found, strict=True))
-    return rows, columns, owners
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32], NDArray[np.int64]]:
+    """Row and column of every n-th pixel of the spans of some parts, native z-depth of the part there, where each ends.
+
+    ``n`` is such that about ``max_rays`` are cast at a part.
+    """
+    low, high, width = posed.spans[parts, 0], posed.spans[parts, 1], posed.camera.width
+    first = np.clip(np.ceil(low), 0, width).astype(np.int64)
+    end = np.maximum(np.clip(np.floor(high) + 1, 0, width).astype(np.int64), first)
+    row, column, ends = ray_kernels.every_nth(first, end, max_rays)
+    directions = ray_kernels.part_directions(row, column, ends, posed.rotations[parts], posed.intrinsics)
+    return row, column, _cast_directions(posed, parts, directions, ends), ends
 
 
 def render_posed(posed: PosedObject, only: int | None = None) -> Frame:
     """Cast a ray through every pixel that a part, or only one of them, can cover."""
-    camera = posed.camera
-    nearest = _Nearest(camera.height * camera.width, len(posed.obj))
-    for k in range(len(posed.obj)) if only is None else (only,):
-        row, column = _span_pixels(posed, k)
-        if len(row):
-            nearest.update(k, row * camera.width + column, _cast_part(posed, k, posed.image_plane(row, column)))
-    depth, part_ids = nearest.result(posed.obj.scale)
-    shape = (camera.height, camera.width)
-    return Frame(depth.reshape(shape), part_ids.reshape(shape), nearest.amodal)
+    shape, parts = (posed.camera.height, posed.camera.width), len(posed.obj)
+    shown = range(parts) if only is None else (only,)
+    row, column, distance, ends = _cast_spans(posed, list(shown), shape[0] * shape[1])
+    all_ends = np.zeros(parts + 1, np.int64)
+    all_ends[1:][list(shown)] = ends[1:]
+    np.maximum.accumulate(all_ends, out=all_ends)
+    depth, part_ids, amodal, _ = _nearest(posed, row * shape[1] + column, distance, all_ends, shape[0] * shape[1])
+    return Frame(depth.reshape(shape), part_ids.reshape(shape), amodal)
 
 
 class RaycastRenderer:
@@ -362,13 +279,3 @@ class RaycastRenderer:
 
     def close(self) -> None:
         """Nothing to release: acceleration structures live as long as their parts."""
-
-
-def _span_pixels(posed: PosedObject, k: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the pixels within a part's spans, row by row."""
-    low, high = posed.spans[k]
-    first, end = _columns(low, high, posed.camera.width)
-    count = end - first
-    row = np.repeat(np.arange(len(count)), count)
-    before = np.cumsum(count) - count  # pixels in earlier rows
-    return row, np.arange(len(row)) + np.repeat(first - before, count)

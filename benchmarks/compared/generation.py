@@ -6,8 +6,6 @@ import hashlib
 import os
 import shutil
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +34,6 @@ def _samples(objects: Sequence[Any], **options: Any) -> Callable[[], Work]:
     from artsim.renderers import make_renderer
 
     renderer, asked = make_renderer("raycast"), SampleOptions(**options)
-    with suppress(ImportError):  # as after the first hundreds of clouds of a process
-        import_module("artsim.renderers.compiled").compile_now()
 
     def work() -> Work:
         made = [
