@@ -106,7 +106,7 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
     repairs, notes = header.get("repairs"), header.get("notes", [])  # older files have no notes
     if not isinstance(repairs, list) or not isinstance(notes, list):
         raise ValueError("its repairs are no list")
-    return ArticulatedObject(
+    obj = ArticulatedObject(
         object_id=object_id,
         category=category,
         parts=_parts(arrays, names, labels),
@@ -121,6 +121,9 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
         source=source,
         source_joints=_source_joints(header.get("source_joints"), len(tree)),
     )
+    if not obj.diagonal > 0.0:
+        raise ValueError("it has no extent")
+    return obj
 
 
 def _parts(arrays: Mapping[str, NDArray[Any]], names: Sequence[str], labels: Sequence[str]) -> tuple[Part, ...]:
