@@ -26,7 +26,7 @@ ROOT = Path(artsim.__file__).resolve().parent
 HERE = [name for name in PROCESSORS if can_run(name)]
 EXACT = ("objects", "families", "compiled objects", "labels", "noise")
 SINGLE_PRECISION = 2e-6
-"""Metres. Depths differ in their last bit, 2.4e-7 at 2 m; rays that graze a face differ in some bits more."""
+"""Metres: less than what one ray moves the middle of a cloud by."""
 
 
 def on(processor: str, *command: str) -> str:
@@ -83,9 +83,10 @@ def test_every_file_is_the_same_bytes_with_the_code_of_every_processor(processor
 
 @pytest.mark.slow
 def test_clouds_of_every_code_of_embree_are_those_of_the_record(record: dict[str, Any]) -> None:
-    """Their last bits differ between codes, and between makers of processors."""
+    """Those with AVX make the same bits. By older code and other makers, a ray may pass an edge that others meet."""
     found = made("as it is")["clouds"]
     assert len(found) == len(HERE)
+    assert len({json.dumps(found[code]) for code in found if code.startswith("avx")}) <= 1
     for code, clouds in found.items():
         away = [
             np.abs(np.subtract(clouds[category], mean)).max() > SINGLE_PRECISION

@@ -182,6 +182,34 @@ def ray_set_up(row: Any, column: Any, row_ranges: Any, spans: Any, rotations: An
 
 
 @compiled_exactly
+def depths(met: Any, directions: Any, eye: Any, forward: Any, vertices: Any, faces: Any, miss: Any, depth: Any) -> None:
+    """Write where rays meet the planes of faces (N,), as multiples of their directions (N, 3); ``miss`` for face -1.
+
+    In double precision, of the vertices that the ray caster has. Directions have the component 1 along ``forward``, so
+    that no depth lies outside those of the face's corners, however much it is seen from the side.
+    """
+    corner, plane = np.empty((3, 3)), np.empty(3)
+    for m in range(len(met)):
+        if met[m] < 0:
+            depth[m] = miss
+            continue
+        low, high = np.inf, -np.inf
+        for c in range(3):
+            for axis in range(3):
+                corner[c, axis] = np.float64(np.float32(vertices[faces[met[m], c], axis])) - np.float64(eye[axis])
+            z = (corner[c, 0] * forward[0] + corner[c, 1] * forward[1]) + corner[c, 2] * forward[2]
+            low, high = min(low, z), max(high, z)
+        for axis in range(3):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            plane[axis] = (corner[1, i] - corner[0, i]) * (corner[2, j] - corner[0, j]) - (
+                corner[1, j] - corner[0, j]
+            ) * (corner[2, i] - corner[0, i])
+        along = (plane[0] * directions[m, 0] + plane[1] * directions[m, 1]) + plane[2] * directions[m, 2]
+        away = (plane[0] * corner[0, 0] + plane[1] * corner[0, 1]) + plane[2] * corner[0, 2]
+        depth[m] = min(max(away / along if along != 0.0 else low, low), high)
+
+
+@compiled_exactly
 def nearest(rays: Any, ends: Any, distance: Any, count: int, miss: Any, scale: Any) -> Any:
     """Of each ray the depth and the part of its nearest hit; and of each part how many rays meet it, how many see it.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +13,13 @@ RAY_LIBRARY = "embreex" if find_spec("embreex") else "warp-lang"
 
 
 class RayScene(Protocol):
-    """One static acceleration structure."""
+    """One static acceleration structure.
 
-    def run(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], query: Literal["DISTANCE", "INTERSECT"]
-    ) -> NDArray[Any]:
-        """What rays (N, 3) and (N, 3) meet first.
+    It says which face a ray meets. How far that is, libraries work out in another last bit on each kind of processor.
+    """
 
-        Returns
-        -------
-        (N,) float32 or int32
-            DISTANCE: in lengths of the direction, 1e30 or more where there is nothing. INTERSECT: the face, or -1.
-        """
+    def run(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[Any]:
+        """(N,) int32 first face that rays (N, 3), (N, 3) meet; -1 for none."""
 
 
 def ray_scene(vertices: NDArray[np.floating[Any]], faces: NDArray[np.integer[Any]]) -> RayScene:
@@ -64,19 +59,13 @@ class WarpScene:
             bvh_constructor="sah",  # slower to build than others, faster to look through
         )
 
-    def run(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], query: Literal["DISTANCE", "INTERSECT"]
-    ) -> NDArray[Any]:
+    def run(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[Any]:
         """See :meth:`RayScene.run`."""
         from artsim.renderers.warp_ray_kernels import first_hits
 
-        wp = self._wp
-        distance, face = np.empty(len(directions), np.float32), np.empty(len(directions), np.int32)
+        wp, face = self._wp, np.empty(len(directions), np.int32)
         rays = [np.ascontiguousarray(each, dtype=np.float32) for each in (origins, directions)]
         given = [wp.array(each, dtype=wp.vec3, device="cpu", copy=False) for each in rays]
-        found = [
-            wp.array(distance, dtype=wp.float32, device="cpu", copy=False),
-            wp.array(face, dtype=wp.int32, device="cpu", copy=False),
-        ]
-        wp.launch(first_hits, dim=len(directions), inputs=[self._mesh.id, *given], outputs=found, device="cpu")
-        return distance if query == "DISTANCE" else face
+        found = wp.array(face, dtype=wp.int32, device="cpu", copy=False)
+        wp.launch(first_hits, dim=len(directions), inputs=[self._mesh.id, *given], outputs=[found], device="cpu")
+        return face

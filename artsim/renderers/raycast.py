@@ -186,7 +186,7 @@ def hit_faces(posed: PosedObject, k: int, row: NDArray[np.int64], column: NDArra
     """(N,) first face of part k that the ray through the centre of each pixel meets; -1 where it meets none."""
     ends = np.array([0, len(row)])
     directions = ray_kernels.part_directions(row, column, ends, posed.rotations[k : k + 1], posed.intrinsics)
-    faces = ray_surface(posed.obj.parts[k]).scene.run(_origins(posed, k, len(row)), directions, query="INTERSECT")
+    faces = ray_surface(posed.obj.parts[k]).scene.run(_origins(posed, k, len(row)), directions)
     return np.asarray(faces, dtype=np.int64)
 
 
@@ -207,8 +207,10 @@ def _cast_directions(
     for i, k in enumerate(parts):
         if last[i + 1] > last[i]:
             mine = slice(last[i], last[i + 1])
-            scene, origins = ray_surface(posed.obj.parts[k]).scene, _origins(posed, k, last[i + 1] - last[i])
-            distance[mine] = scene.run(origins, directions[mine], query="DISTANCE")
+            part, origins = posed.obj.parts[k], _origins(posed, k, last[i + 1] - last[i])
+            met = ray_surface(part).scene.run(origins, directions[mine])
+            eye, forward = posed.origins[k], posed.rotations[k, 2]
+            ray_kernels.depths(met, directions[mine], eye, forward, part.vertices, part.faces, _MISS, distance[mine])
     return distance
 
 

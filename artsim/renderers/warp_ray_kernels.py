@@ -10,11 +10,9 @@ def first_hits(
     mesh: wp.uint64,
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
-    distance: wp.array(dtype=wp.float32),
     face: wp.array(dtype=wp.int32),
 ):
-    """The first face that each ray meets, and how far it is in lengths of the direction; 1e30 and -1 for none."""
+    """The first face that each ray meets; -1 for none."""
     i = wp.tid()
     hit = wp.mesh_query_ray(mesh, origins[i], directions[i], _FAR)
-    distance[i] = wp.where(hit.result, hit.t, _FAR)
     face[i] = wp.where(hit.result, hit.face, -1)
