@@ -73,7 +73,7 @@ def tree_of(shapes: Shapes, row: int) -> Tree:
     trees = shapes.trees
     names = ("parent", "axis", "origin", "lower", "upper", "rest", "turn", "slide", "source", "multiplier", "offset")
     fields: dict[str, Any] = {name: _double(getattr(trees, name)[row]) for name in (*names, "carries")}
-    return Tree(**fields, order=np.argsort(trees.depth[row].numpy(), kind="stable"))
+    return Tree(**fields, order=np.argsort(trees.depth[row].cpu().numpy(), kind="stable"))
 
 
 def reference_of(shapes: Shapes, row: int) -> Reference:
@@ -89,9 +89,9 @@ def state_of(theta: Theta, row: int) -> State:
 
 def view_of(target: Target, row: int) -> View:
     """One cloud."""
-    rays = target.rays[row].double()
+    rays = target.rays[row].double().cpu()
     return View(
-        _double(target.observed.points[row]), target.observed.part[row].numpy(), _double(target.share[row]),
+        _double(target.observed.points[row]), target.observed.part[row].cpu().numpy(), _double(target.share[row]),
         _double(target.middle[row, 0]), float(target.unit[row]),
         torch.cat([rays.T, rays.square().sum(-1)[None]]).float().numpy(), float(target.gap[row]),
     )  # fmt: skip
@@ -100,4 +100,4 @@ def view_of(target: Target, row: int) -> View:
 def _double(values: torch.Tensor) -> NDArray[np.float64]:
     """Contiguous, floats in double precision; masks and indices as they are."""
     own = values.double() if values.is_floating_point() else values
-    return own.contiguous().numpy()
+    return own.contiguous().cpu().numpy()

@@ -18,8 +18,8 @@ from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import Trees
 from artperl.fitting.arrays import State, reference_of, tree_of, view_of
-from artperl.fitting.correspondence import Target, match
-from artperl.fitting.levenberg_marquardt import refine, robust_mean
+from artperl.fitting.correspondence import Target
+from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.match_loops import misfits, pose_each
 from artperl.fitting.refine_options import RefineOptions
 
@@ -54,17 +54,12 @@ class _Part(Batch):
 
         It may be infinite where so many others are lower.
         """
-        if before.device.type == "cpu":
-            R, t, known = (values.double().contiguous().numpy() for values in (rotation, translation, before))
-            found = misfits(
-                reference_of(self.shape, 0), view_of(self.target, 0), R, t, known, keep, options.outline_weight,
-                options.robust_end,
-            )  # fmt: skip
-            return torch.from_numpy(found).to(before.dtype)
-        one = self.map(lambda tensor: tensor.expand(len(rotation), *tensor.shape[1:]))
-        placed = replace(Theta.at_rest(one.shape.trees), rotation=rotation, translation=translation)
-        matches = match(one.shape, one.target, placed, options.outline_weight)
-        return before + robust_mean(matches, options.robust_end)
+        R, t, known = (values.double().contiguous().cpu().numpy() for values in (rotation, translation, before))
+        found = misfits(
+            reference_of(self.shape, 0), view_of(self.target, 0), R, t, known, keep, options.outline_weight,
+            options.robust_end,
+        )  # fmt: skip
+        return torch.from_numpy(found).to(before)
 
 
 def beam(
@@ -205,12 +200,9 @@ def _pose(shapes: Shapes, theta: Theta) -> Posed:
 
 def _poses(shapes: Shapes, theta: Theta) -> tuple[Tensor, Tensor]:
     """Rotations (B, P, 3, 3) and translations (B, P, 3) of the parts of one reference in B states."""
-    if theta.state.device.type != "cpu":
-        posed = _pose(shapes, theta)
-        return posed.rotation, posed.translation
-    states = (getattr(theta, name).double().contiguous().numpy() for name in State._fields)
+    states = (getattr(theta, name).double().contiguous().cpu().numpy() for name in State._fields)
     found = pose_each(tree_of(shapes, 0), reference_of(shapes, 0).box_center, *states)
-    rotation, translation = (torch.from_numpy(values).to(theta.state.dtype) for values in found)
+    rotation, translation = (torch.from_numpy(values).to(theta.state) for values in found)
     return rotation, translation
 
 

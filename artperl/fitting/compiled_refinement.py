@@ -1,7 +1,6 @@
-"""The loop of :func:`artperl.fitting.levenberg_marquardt.refine` for one object on a processor, over compiled parts.
+"""The loop of :func:`artperl.fitting.levenberg_marquardt.refine` for one object, over compiled parts.
 
-Torch takes thousands of small operations for what these parts do in one call each. On a GPU, and where gradients are
-wanted, torch's own loop works on all objects at once.
+Torch takes thousands of small operations for what these parts do in one call each.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ from torch import Tensor
 from artperl.core.pose import Theta
 from artperl.core.shapes import Shapes
 from artperl.fitting.arrays import Array, Reference, State, Tree, View, reference_of, state_of, tree_of, view_of
+from artperl.fitting.columns import Columns
 from artperl.fitting.correspondence import Target
 from artperl.fitting.damping import DAMPING, DAMPING_FALL, DAMPING_RISE, LEAST_DAMPING, MOST_DAMPING, RIGID_ITERATIONS
-from artperl.fitting.jacobian import Columns
 from artperl.fitting.match_loops import match, robust_mean, rotation_of_vector
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.shape_prior import ShapePrior
@@ -41,12 +40,12 @@ class _Problem:
         return Columns(len(self.tree.parent))
 
     def cost(self, state: State, lean: Array) -> float:
-        """See :meth:`ShapePrior.cost`."""
+        """Of the shape in a state, whose axes lean: see :class:`ShapePrior`."""
         own = self.deviations(state, lean)
         return float(own @ self.precision @ own)
 
     def deviations(self, state: State, lean: Array) -> Array:
-        """See :meth:`ShapePrior.deviations`."""
+        """(D,) from the reference's shape; pose and states count as 0."""
         pose = np.zeros(6 + len(state.state))
         every = [pose, state.log_scale, state.stretch.ravel(), state.shift.ravel(), lean.ravel()]
         return np.concatenate(every)[: len(self.active)]
@@ -59,7 +58,7 @@ class _Problem:
         return self.tree._replace(axis=np.stack(axes))
 
     def retract(self, state: State, lean: Array, step: Array) -> tuple[State, Array]:
-        """See :func:`artperl.fitting.jacobian.retract`."""
+        """State and lean after a step (D,), columns as :class:`Columns`; states stay within their limits."""
         columns, pivot = self.columns, self.view.middle
         turn = rotation_of_vector(step[:3])
         limited = np.clip(state.state + step[columns.state], self.tree.lower, self.tree.upper)
@@ -118,19 +117,25 @@ class _Problem:
 def refine_each(
     shapes: Shapes, target: Target, start: Theta, prior: ShapePrior, options: RefineOptions, rigid: bool
 ) -> tuple[Theta, Tensor, Tensor, Tensor, Tensor]:
-    """Fields of :class:`artperl.fitting.levenberg_marquardt.Refined` for a batch on a processor, one object at a time.
+    """Fields of :class:`artperl.fitting.levenberg_marquardt.Refined` for a batch, one object at a time.
 
     Parameters are as :func:`artperl.fitting.levenberg_marquardt.refine` has them, prepared.
     """
     found = []
     for b in range(len(shapes)):
         tree, shape, view = tree_of(shapes, b), reference_of(shapes, b), view_of(target, b)
-        precision = prior.precision[b].double().numpy()
-        problem = _Problem(tree, shape, view, prior.active[b].numpy(), precision, options, rigid)
+        precision = prior.precision[b].double().cpu().numpy()
+        problem = _Problem(tree, shape, view, prior.active[b].cpu().numpy(), precision, options, rigid)
         state, lean, *numbers = problem.refine(state_of(start, b))
         found.append((state, problem.leaning(lean).axis, *numbers))
     states, axes, energy, first, steps = zip(*found, strict=True)
     like = start.state
     theta = Theta(*(torch.from_numpy(np.stack(values)).to(like) for values in zip(*states, strict=True)))
     axis = torch.from_numpy(np.stack(axes)).to(like)
-    return theta, axis, torch.tensor(energy).to(like), torch.tensor(first).to(like), torch.tensor(steps)
+    return (
+        theta,
+        axis,
+        torch.tensor(energy).to(like),
+        torch.tensor(first).to(like),
+        torch.tensor(steps, device=like.device),
+    )

@@ -1,4 +1,4 @@
-"""Compiled :func:`artperl.fitting.correspondence.match`, of one object: its parts are posed, and each point is matched.
+"""Compiled :mod:`artperl.fitting.correspondence` of one object: its parts are posed, and each point is matched.
 
 Distances that choose a disc, or a ray, are in single precision; everything else is in double precision.
 """
@@ -38,7 +38,22 @@ class Posed(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """See :class:`artperl.fitting.correspondence.Matches`; ``residual`` (R, 2) holds both, in diagonals."""
+    """Distances between a cloud and a posed reference. Camera frame; R rows: observed points, then outline points.
+
+    Attributes
+    ----------
+    point : (R, 3) float
+        Where a distance is measured.
+    part : (R,) int64
+        Part of the reference that it depends on.
+    local : (R, 3) float
+        The reference's own point, in its rest frame.
+    normal, tangent : (R, 3) float
+        Unit directions in which the point is off.
+    residual : (R, 2) float
+        By how much, in diagonals; the second counts ``TANGENT_WEIGHT`` times.
+    weight : (R,) float
+    """
 
     point: Array
     part: Indices

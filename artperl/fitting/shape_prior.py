@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from artperl.core.batch import Batch
-from artperl.core.pose import AxisPrior, Theta
+from artperl.core.pose import AxisPrior
 from artperl.core.shapes import Shapes
-from artperl.fitting.jacobian import Columns
+from artperl.fitting.columns import Columns
 from artperl.fitting.refine_options import RefineOptions
 
 _AXIS_FLOOR = 0.02
@@ -57,14 +57,3 @@ class ShapePrior(Batch):
             precision[:, columns.lean, columns.lean] = torch.linalg.inv(axis_prior.covariance + floor).to(unit.dtype)
         precision = precision * active[:, None] * active[:, :, None]
         return ShapePrior(active, options.prior_weight * precision)
-
-    def cost(self, theta: Theta, lean: Tensor) -> Tensor:
-        """(B,) of a state and of its axes' lean (B, P, 3)."""
-        deviations = self.deviations(theta, lean)
-        return (deviations * (self.precision @ deviations[..., None])[..., 0]).sum(-1)
-
-    def deviations(self, theta: Theta, lean: Tensor) -> Tensor:
-        """(B, D) from the reference's shape; pose and states count as 0."""
-        pose = torch.zeros_like(self.active[:, : 6 + theta.state.shape[1]], dtype=theta.state.dtype)
-        shape = [theta.log_scale, theta.stretch.flatten(1), theta.shift.flatten(1), lean.flatten(1)]
-        return torch.cat([pose, *shape], dim=1)[:, : self.active.shape[1]]

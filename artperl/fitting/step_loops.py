@@ -1,6 +1,9 @@
-"""Compiled normal equations and steps of one object: :mod:`artperl.fitting.normal_equations`, in double precision.
+"""Compiled normal equations of the reweighted least squares of one object, and their damped steps, in double precision.
 
-Only parameters that move take part. Columns stand as :class:`artperl.fitting.jacobian.Columns` has them.
+A part moves rigidly and grows about its box centre, whatever the tree. So the Jacobian is a product of two factors: how
+a residual changes with the turn about the middle of the cloud (3), motion (3) and growth (3) of its part, and how these
+nine numbers change with all parameters. Only parameters that move take part. Columns stand as
+:class:`artperl.fitting.columns.Columns` has them.
 """
 
 from __future__ import annotations
@@ -17,7 +20,17 @@ from artsim.common.compiled import compiled
 
 
 class Equations(NamedTuple):
-    """See :class:`artperl.fitting.normal_equations.NormalEquations`, for the ``columns`` that move."""
+    """``(J^T W J + precision) step = -gradient`` at one state, for the ``columns`` (d,) that move.
+
+    Attributes
+    ----------
+    curvature : (d, d) float
+        The left side (Gauss-Newton).
+    gradient : (d,) float
+        Half that of the energy.
+    free : (d,) bool
+        False for states at a limit beyond which the energy falls: they stay there.
+    """
 
     curvature: Array
     gradient: Array
@@ -30,7 +43,7 @@ def normal_equations(
     tree: Tree, shape: Reference, view: View, state: State, posed: Posed, rows: Rows, deviations: Array,
     precision: Array, columns: Indices, width: float, rigid: bool, leans: bool,
 ) -> Equations:  # fmt: skip
-    """See :meth:`artperl.fitting.normal_equations.NormalEquations.of`.
+    """At the state that was matched, with a robust kernel of a width; ``rigid`` leaves out the shape.
 
     Parameters
     ----------
@@ -88,7 +101,7 @@ def normal_equations(
 def _sums(shape: Reference, view: View, posed: Posed, rows: Rows, P: int, width: float) -> tuple[Array, Array]:
     """Weighted sums of products of the residual's rates by the nine numbers of its part, and with the residual.
 
-    (P, 9, 9) and (P, 9); see :func:`artperl.fitting.jacobian.residual_rates`.
+    (P, 9, 9) and (P, 9).
     """
     squares, pulls, rate, wide = np.zeros((P, 9, 9)), np.zeros((P, 9)), np.empty(9), width * width
     for r in range(len(rows.weight)):
@@ -128,7 +141,10 @@ def _sums(shape: Reference, view: View, posed: Posed, rows: Rows, P: int, width:
 def _part_rates(
     tree: Tree, shape: Reference, view: View, state: State, posed: Posed, k: int, rigid: bool, leans: bool, rates: Array
 ) -> None:
-    """Row k of :func:`artperl.fitting.jacobian.part_rates`, into (9, D)."""
+    """Derivatives of the motion and growth of part k by the parameters, into (9, D).
+
+    The moment about a joint's axis is that about the middle less the direction's own about the axis (Pluecker).
+    """
     P = len(tree.parent)
     rates[:] = 0.0
     for i in range(6):
@@ -181,7 +197,7 @@ def _part_rates(
 
 @compiled
 def damped_step(equations: Equations, damping: float, count: int, total: int) -> tuple[Array, float]:
-    """See :meth:`artperl.fitting.normal_equations.NormalEquations.step` and ``predicted_decrease``.
+    """Damped step after Marquardt 1963, and by how much the energy would fall if every point kept its match.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Compiled loops do what torch does: both stay, torch's for a GPU, and as the reference of these tests."""
+"""Compiled loops do what torch does."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from artperl.core.pose import AxisPrior, Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.arrays import State, reference_of, state_of, tree_of, view_of
 from artperl.fitting.compiled_refinement import refine_each
-from artperl.fitting.correspondence import Target, match
-from artperl.fitting.levenberg_marquardt import _refine_together, robust_mean
+from artperl.fitting.correspondence import Target
 from artperl.fitting.match_loops import match as match_one
 from artperl.fitting.match_loops import misfits, pose_each
-from artperl.fitting.normal_equations import NormalEquations
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.shape_prior import ShapePrior
 from artperl.fitting.step_loops import damped_step, normal_equations
+from tests.artperl.fitting.torch_matches import match
+from tests.artperl.fitting.torch_refinement import NormalEquations, deviations, refine_together, robust_mean
 from tests.artperl.worlds import small_problem
 
 World = tuple[Shapes, Observed, Theta]
@@ -61,7 +61,7 @@ def test_matches_and_steps_are_those_of_torch(world: World) -> None:
         for rigid, count in ((True, 6 + P), (False, D)):
             moving = np.flatnonzero(prior.active[b, :count].numpy())
             equations = normal_equations(
-                tree, shape, view, state, posed, rows, prior.deviations(start, lean)[b].numpy(),
+                tree, shape, view, state, posed, rows, deviations(prior, start, lean)[b].numpy(),
                 prior.precision[b].numpy(), moving, 0.2, rigid, True,
             )  # fmt: skip
             step, decrease = damped_step(equations, 0.01, count, D)
@@ -77,7 +77,7 @@ def test_refinements_end_where_those_of_torch_end(world: World) -> None:
     target = Target.of(observed, shapes.diagonal)
     prior = ShapePrior.of(shapes, target.unit, options, None)
     theta, _, energy, first, _ = refine_each(shapes, target, start, prior, options, True)
-    expected = _refine_together(shapes, target, start, prior, options, True)
+    expected = refine_together(shapes, target, start, prior, options, True)
     torch.testing.assert_close(first, expected.start_energy, rtol=1e-5, atol=1e-12)
     torch.testing.assert_close(energy, expected.energy, rtol=1e-3, atol=1e-9)
     torch.testing.assert_close(theta.rotation, expected.theta.rotation, atol=1e-4, rtol=0.0)

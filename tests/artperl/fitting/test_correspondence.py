@@ -9,7 +9,8 @@ import torch
 
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.shapes import Observed, Shapes
-from artperl.fitting.correspondence import Target, match
+from artperl.fitting.correspondence import Target
+from tests.artperl.fitting.torch_matches import match
 
 
 def test_true_poses_are_at_next_to_no_distance(laptops: tuple[Shapes, Observed, Theta]) -> None:

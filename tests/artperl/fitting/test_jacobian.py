@@ -10,8 +10,9 @@ import artsim
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
-from artperl.fitting.correspondence import Matches, Target, match
-from artperl.fitting.jacobian import part_rates, residual_rates, retract
+from artperl.fitting.correspondence import Target
+from tests.artperl.fitting.torch_jacobian import part_rates, residual_rates, retract
+from tests.artperl.fitting.torch_matches import Matches, match
 
 
 def test_the_jacobian_is_the_derivative_of_the_distances() -> None:

@@ -12,11 +12,11 @@ import artsim
 from artperl.core.pose import AxisPrior, Theta
 from artperl.core.shapes import Observed, Shapes
 from artperl.evaluation import metrics
-from artperl.fitting.jacobian import lean_axes
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
 from artsim.errors import ConfigError
 from tests.artperl.fitting.problems import errors, observe, perturbed, true_theta, views
+from tests.artperl.fitting.torch_jacobian import lean_axes
 
 KNOWN_SHAPE = RefineOptions(sigma_scale=1e-3, sigma_aspect=1e-3, sigma_stretch=1e-3, sigma_shift=1e-3)
 
