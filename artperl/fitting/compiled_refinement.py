@@ -132,10 +132,5 @@ def refine_each(
     like = start.state
     theta = Theta(*(torch.from_numpy(np.stack(values)).to(like) for values in zip(*states, strict=True)))
     axis = torch.from_numpy(np.stack(axes)).to(like)
-    return (
-        theta,
-        axis,
-        torch.tensor(energy).to(like),
-        torch.tensor(first).to(like),
-        torch.tensor(steps, device=like.device),
-    )
+    counts = torch.tensor(steps, device=like.device)
+    return theta, axis, torch.tensor(energy).to(like), torch.tensor(first).to(like), counts
