@@ -2,8 +2,8 @@
 
 Results obey the joints by construction, since Theta has no other. The energy is the mean robust squared distance of
 :mod:`artperl.fitting.correspondence`, and the cost of :class:`artperl.fitting.shape_prior.ShapePrior`. The robust
-kernel is that of Geman and McClure 1987, ``w^2 e^2 / (w^2 + e^2)``: it falls when the width w shrinks, so that narrowing
-it on the way never raises the energy either.
+kernel is that of Geman and McClure 1987, ``w^2 e^2 / (w^2 + e^2)``: it falls when the width w shrinks, so that
+narrowing it on the way never raises the energy either.
 """
 
 from __future__ import annotations
