@@ -3,7 +3,7 @@
 
 def main() -> None:
     """Run it. Worker processes import this module, too, and want none of the program."""
-    from artperl.cli import main as run
+    from artperl.commands.verbs import main as run
 
     run()
 

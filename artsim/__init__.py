@@ -16,7 +16,7 @@ Rooms, from the ground up. Each imports only rooms that come before it (import-l
 - scenes: several objects. checks: gates for simulators.
 - export: objects as URDF, MJCF and USD.
 - variation: objects out of a given one. physics: objects that move. drawing: pictures.
-- envs: reinforcement learning. doctor, cli: programs.
+- envs: reinforcement learning. commands: the verbs of the program.
 """
 
 from __future__ import annotations

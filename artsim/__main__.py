@@ -3,7 +3,7 @@
 
 def main() -> None:
     """Run it. Worker processes import this module, too, and want none of the program."""
-    from artsim.cli import main as run
+    from artsim.commands.verbs import main as run
 
     run()
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.doctor import examine
+from artsim.commands.doctor import examine
 from artsim.errors import RenderError
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers.view_batch import draw_views

@@ -58,7 +58,7 @@ _ESTIMATE = (
 
 SLICES: dict[str, list[str]] = {
     "tests": ["-m", "pytest", "-q", "-m", "gpu"],
-    "doctor": ["-c", "import sys; sys.argv[1:] = ['doctor']; from artsim.cli import main; main()"],
+    "doctor": ["-c", "import sys; sys.argv[1:] = ['doctor']; from artsim.commands.verbs import main; main()"],
     "renderers": ["-m", "benchmarks.renderers"],
     "estimation": ["-c", _ESTIMATE],
     "training_gpu": ["-c", _TRAIN.replace("DEVICE", "cuda").replace("WORKERS", _WORKERS)],

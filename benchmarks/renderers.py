@@ -19,8 +19,8 @@ import numpy as np
 import tyro
 
 from artsim import Camera, make_renderer
+from artsim.commands.doctor import Finding, examine
 from artsim.common.progress import track
-from artsim.doctor import Finding, examine
 from artsim.renderers import RENDERERS, Renderer
 from benchmarks.agreement import choose, choose_procedural, draw_scenes
 from benchmarks.batches import measure_batches

@@ -20,8 +20,8 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from hypothesis import settings
 
+from artsim.commands.doctor import processor
 from artsim.common.program import cores
-from artsim.doctor import processor
 from artsim.errors import RenderError
 from artsim.families import make
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw

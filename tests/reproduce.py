@@ -28,8 +28,8 @@ from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 
 import artsim
+from artsim.commands.doctor import processor
 from artsim.datasets.plan import SampleOptions
-from artsim.doctor import processor
 from artsim.families import CATEGORIES, make
 from artsim.loading.sources import family_sources, find_sources
 from artsim.model.camera import Camera

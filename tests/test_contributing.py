@@ -23,8 +23,8 @@ SECTIONS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", (ROOT / "CONTRIBUTING
 # As the installed programs are, but of the copy.
 PROGRAMS = {
     "python": [],
-    "artsim": ["-c", "from artsim.cli import main; main()"],
-    "artperl": ["-c", "from artperl.cli import main; main()"],
+    "artsim": ["-c", "from artsim.commands.verbs import main; main()"],
+    "artperl": ["-c", "from artperl.commands.verbs import main; main()"],
 }
 
 

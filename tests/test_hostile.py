@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import artsim
-from artsim.cli import main
+from artsim.commands.verbs import main
 from artsim.errors import ArtsimError, AssetError
 
 CASES = Path(__file__).parent / "cases" / "hostile"

@@ -11,8 +11,8 @@ from typing import Any, get_args
 
 import pytest
 
-import artperl.cli
-import artsim.cli
+import artperl.commands.verbs
+import artsim.commands.verbs
 from tests.conftest import ROOT, installed
 
 PAGE = (ROOT / "docs" / "api.md").read_text()
@@ -48,7 +48,7 @@ def test_page_lists_every_name_of_a_public_package(package: str) -> None:
 
 @pytest.mark.parametrize("program", ["artsim", "artperl"])
 def test_page_lists_every_command(program: str) -> None:
-    verbs = get_args({"artsim": artsim.cli.Verb, "artperl": artperl.cli.Verb}[program])
+    verbs = get_args({"artsim": artsim.commands.verbs.Verb, "artperl": artperl.commands.verbs.Verb}[program])
     assert {get_args(verb)[1].name for verb in verbs} == set(
         re.findall(rf"^\| `{program} ([\w-]+)`", PAGE, re.MULTILINE)
     )

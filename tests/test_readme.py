@@ -20,18 +20,18 @@ from typing import Any
 import pytest
 import tyro
 
-import artperl.cli
-import artsim.cli
+import artperl.commands.verbs
+import artsim.commands.verbs
 from tests.conftest import ASSETS, ROOT
 
 README = ROOT / "README.md"
 TUTORIAL = ROOT / "docs" / "tutorial.md"
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]
 PROGRAMS: dict[str, Any] = {
-    "artsim": artsim.cli.Verb,
-    "artperl": artperl.cli.Verb,
-    "generate.py": artsim.cli.Generate,
-    "train.py": artperl.cli.Train,
+    "artsim": artsim.commands.verbs.Verb,
+    "artperl": artperl.commands.verbs.Verb,
+    "generate.py": artsim.commands.verbs.Generate,
+    "train.py": artperl.commands.verbs.Train,
 }
 BLOCKS = [
     (kind, block)
@@ -151,9 +151,13 @@ SLOW = ("make", "python3 -m venv", ". .venv", "pip install", "python train.py", 
 # In one process: to start Python anew for each line takes longer than all that they do.
 READER = """
 import json, shlex, sys
-import artperl.cli, artsim.cli
+import artperl.commands.verbs, artsim.commands.verbs
 
-programs = {"artsim": artsim.cli.main, "artperl": artperl.cli.main, "generate.py": artsim.cli.generate_main}
+programs = {
+    "artsim": artsim.commands.verbs.main,
+    "artperl": artperl.commands.verbs.main,
+    "generate.py": artsim.commands.verbs.generate_main,
+}
 names = {}
 if __name__ == "__main__":
     for kind, block in json.load(sys.stdin):

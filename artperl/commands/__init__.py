@@ -1,1 +1,1 @@
-"""The verbs of the program artperl."""
+"""Verbs of the program ``artperl``."""

@@ -40,7 +40,7 @@ def write_contact_sheet(
     package_roots: Mapping[str, Path] | None = None,
     body: str | None = None,
 ) -> list[Path]:
-    """Draw a dataset or an object; see :class:`artsim.cli.View`.
+    """Draw a dataset or an object; see :class:`artsim.commands.view.View`.
 
     Returns
     -------

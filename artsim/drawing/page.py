@@ -122,7 +122,7 @@ def write_page(
     package_roots: Mapping[str, Path] | None = None,
     body: str | None = None,
 ) -> None:
-    """Write the page of a dataset or an object; see :class:`artsim.cli.View`.
+    """Write the page of a dataset or an object; see :class:`artsim.commands.view.View`.
 
     Raises
     ------

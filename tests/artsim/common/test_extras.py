@@ -16,9 +16,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-import artperl.cli
+import artperl.commands.verbs
 import artsim
-import artsim.cli
+import artsim.commands.verbs
 from artsim.common.extras import MODULES, import_failure, import_mujoco, install_command, needs
 from artsim.errors import ConfigError, RenderError
 from artsim.renderers import RENDERERS
@@ -120,9 +120,9 @@ def told(run):
 def program(name, words):
     import importlib
     def run():
-        module, function = {"artsim": ("artsim.cli", "main"), "artperl": ("artperl.cli", "main")}[name]
+        module = f"{name}.commands.verbs"
         sys.argv = [name, *words]
-        getattr(importlib.import_module(module), function)()
+        importlib.import_module(module).main()
     return told(run)
 
 def benchmark(name):
@@ -192,7 +192,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
 def test_every_verb_works_with_the_core_alone_or_says_in_one_line_which_extra_it_wants(
     alone: tuple[Path, dict[str, str]],
 ) -> None:
-    for name, verbs in (("artsim", artsim.cli.Verb), ("artperl", artperl.cli.Verb)):
+    for name, verbs in (("artsim", artsim.commands.verbs.Verb), ("artperl", artperl.commands.verbs.Verb)):
         known = {get_args(verb)[1].name for verb in get_args(verbs)}
         assert set(VERBS[name]) == known, "a new verb needs a line here"
     lines = [

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from artsim.cli import Gallery, View
+from artsim.commands.view import Gallery, View
 from artsim.common.files import read_bounded, write_atomic
 from artsim.common.outputs import check_output, locked, write_output
 from artsim.datasets.generate import generate

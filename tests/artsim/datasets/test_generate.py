@@ -254,7 +254,7 @@ def test_a_full_disk_is_a_clear_error_and_nothing_is_left_half_written(sources: 
     code = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY));"
-        "sys.argv[0] = 'generate.py'; from artsim.cli import generate_main; generate_main()"
+        "sys.argv[0] = 'generate.py'; from artsim.commands.verbs import generate_main; generate_main()"
     )
     out = tmp_path / "out"
     whole = command(tmp_path / "objects", out, "--skip-broken")

@@ -143,7 +143,7 @@ def test_sigterm_in_each_phase_costs_the_work_in_hand_alone(tmp_path: Path) -> N
 _SMALL_FILES = (
     "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
     "resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, resource.RLIM_INFINITY));"
-    "sys.argv[0] = 'generate.py'; from artsim.cli import generate_main; generate_main()"
+    "sys.argv[0] = 'generate.py'; from artsim.commands.verbs import generate_main; generate_main()"
 )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.cli import View
+from artsim.commands.view import View
 from artsim.drawing.page import object_page, sample_page
 from artsim.errors import ArtsimError
 from artsim.families import make

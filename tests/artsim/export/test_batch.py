@@ -101,7 +101,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
 def test_ctrl_c_keeps_whole_objects_and_leaves_nothing_else(tmp_path: Path) -> None:
     options = ["--category", "laptop", "--count", "2000", "--workers", "1", "--out", str(tmp_path)]
     run = subprocess.Popen(
-        [sys.executable, "-c", "from artsim.cli import main; main()", "generate-objects", *options],
+        [sys.executable, "-c", "from artsim.commands.verbs import main; main()", "generate-objects", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,

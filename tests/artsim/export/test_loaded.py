@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.cli import Export
+from artsim.commands.export import Export
 from artsim.errors import ArtsimError, AssetError
 from artsim.export import FORMATS, export, prepare
 from artsim.model.convex_bodies import is_convex

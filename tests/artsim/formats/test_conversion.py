@@ -14,7 +14,7 @@ import pytest
 
 import artsim
 from artsim import Dataset
-from artsim.cli import Generate
+from artsim.commands.generate import Generate
 from artsim.datasets.pieces import JOURNAL
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
@@ -54,7 +54,7 @@ def test_a_conversion_that_was_killed_goes_on(imaged: Dataset, tmp_path: Path) -
     convert(imaged, "coco", whole, group=2, progress=False)
     words = ["convert", str(imaged.folder), "--to", "coco", "--out", str(out), "--group", "2", "--workers", "1"]
     script = tmp_path / "script.py"
-    script.write_text("import artsim.cli\nif __name__ == '__main__':\n    artsim.cli.main()\n")
+    script.write_text("import artsim.commands.verbs\nif __name__ == '__main__':\n    artsim.commands.verbs.main()\n")
     with subprocess.Popen(
         [sys.executable, script, *words], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
     ) as run:

@@ -15,7 +15,7 @@ import trimesh
 
 import artsim
 from artsim.appearance.painted import painted_coats
-from artsim.cli import Inspect
+from artsim.commands.inspect import Inspect
 from artsim.errors import ArtsimError, AssetError
 from artsim.loading.sources import find_sources
 from artsim.model.kinematics import Array

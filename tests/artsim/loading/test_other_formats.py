@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from artsim.checks.validity import check_file
-from artsim.cli import Inspect
+from artsim.commands.inspect import Inspect
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.generate import generate
 from artsim.datasets.plan import SampleOptions

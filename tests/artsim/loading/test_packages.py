@@ -218,7 +218,7 @@ def test_a_broken_manifest_names_nothing_but_marks_its_folder(manifest: str, tmp
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
-    from artsim.cli import main
+    from artsim.commands.verbs import main
 
     monkeypatch.setattr("sys.argv", ["artsim", *words])
     main()
@@ -238,8 +238,8 @@ def test_what_the_command_line_says_can_be_pasted(
 def test_every_command_that_loads_objects_takes_package_roots() -> None:
     import tyro
 
-    from artperl.cli import Evaluate, Train
-    from artsim.cli import Generate, Inspect, Record, Scene, View
+    from artperl.commands.verbs import Evaluate, Train
+    from artsim.commands.verbs import Generate, Inspect, Record, Scene, View
 
     roots = ["--package-root", "a=/x", "b=/y"]
     expected = {"a": Path("/x"), "b": Path("/y")}

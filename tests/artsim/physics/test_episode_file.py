@@ -77,7 +77,7 @@ def test_the_program_records_files(tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ["record", "--out", out, "--objects", ASSETS / "laptop", "--motions", "1", "--frames", "3"]
     subprocess.run(
-        [sys.executable, "-c", "import artsim.cli; artsim.cli.main()", *map(str, words)],
+        [sys.executable, "-c", "import artsim.commands.verbs; artsim.commands.verbs.main()", *map(str, words)],
         check=True,
         capture_output=True,
     )

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 
+import tyro
+
 from artsim.common.extras import import_failure, install_command
 from artsim.errors import ArtsimError, ConfigError, RenderError
 from artsim.renderers import RENDERERS
@@ -82,7 +84,7 @@ def examine(backend: str) -> Finding:
         raise ConfigError(f"there is no backend {backend!r}", "backend", f"use one of {', '.join(BACKENDS)}")
     try:
         child = subprocess.run(
-            [sys.executable, "-m", "artsim.doctor", backend], capture_output=True, text=True, timeout=_TIMEOUT
+            [sys.executable, "-m", "artsim.commands.doctor", backend], capture_output=True, text=True, timeout=_TIMEOUT
         )
     except subprocess.TimeoutExpired:
         return _failure(backend, f"gave no answer within {_TIMEOUT:.0f} s")
@@ -235,6 +237,17 @@ def _answer(backend: str) -> Finding:
     except Exception as error:  # backends fail in many ways
         return _failure(backend, f"{type(error).__name__}: {error}")
     return Finding(backend, works=True, device=device, fps=fps)
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """Try every backend: does it work, on which device, how fast, and what to do if not."""
+
+    backends: tyro.conf.Positional[tuple[str, ...]] = ()
+    """raycast, pybullet, pybullet-egl, sapien, warp, maniskill, ray, torch; by default all of them."""
+
+    def run(self) -> None:
+        print(finding_table([examine(backend) for backend in self.backends or BACKENDS]))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from artsim.doctor import BACKENDS, Finding, examine, finding_table
+from artsim.commands.doctor import BACKENDS, Finding, examine, finding_table
 from artsim.errors import ConfigError
 from artsim.renderers import RENDERERS
 from tests.conftest import absent
@@ -95,7 +95,7 @@ def test_the_table_has_a_mend_below_each_backend_that_does_not_work() -> None:
 
 def test_the_program_prints_the_table() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", "from artsim.cli import main; main()", "doctor", "raycast"],
+        [sys.executable, "-c", "from artsim.commands.verbs import main; main()", "doctor", "raycast"],
         capture_output=True,
         text=True,
         timeout=120,

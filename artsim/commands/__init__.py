@@ -1,0 +1,1 @@
+"""Verbs of the program ``artsim``: the options of each, and what it prints."""

@@ -1,0 +1,67 @@
+"""The verb ``artsim generate-objects``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from artsim.commands.having import Having, categories_named
+from artsim.common.program import cores
+from artsim.families.constraints import Constraints
+
+
+@dataclass(frozen=True)
+class GenerateObjects:
+    """Write procedural objects as files: simulation-ready URDF folders in PartNet-Mobility's style, MJCF, USD.
+
+    Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: the same
+    command goes on where it stopped. On one kind of processor, bytes depend on category, seed and formats alone.
+
+    Example: artsim generate-objects --category drawer --count 1000 --out out/drawers
+    """
+
+    category: tuple[str, ...]
+    """Categories, such as drawer laptop; 'all' for every one."""
+    out: Path
+    """Folder to write to; made if missing."""
+    count: int = 1000
+    """Objects of each category."""
+    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    seed: int = 0
+    """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
+    having: Having = ()
+    base: Literal["fixed", "free"] = "fixed"
+    """fixed: the root is fixed to the world; free: it falls. Of MJCF and USD: for URDF the simulator is told."""
+    actuators: Literal["none", "motor", "position"] = "none"
+    """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
+    control is where the joint shall be."""
+    materials: bool = False
+    """Write finishes, other for each object: colours, textures, and where they lie."""
+    workers: int = field(default_factory=cores)
+    """Worker processes; by default one for each core."""
+
+    def run(self) -> None:
+        from artsim.export.batch import generate_objects
+        from artsim.export.options import ExportOptions
+
+        try:
+            result = generate_objects(
+                categories_named(self.category),
+                self.out,
+                self.count,
+                self.seed,
+                self.formats,
+                self.workers,
+                constraints=Constraints.parse(self.having),
+                options=ExportOptions(self.base, self.actuators, self.materials),
+            )
+        except KeyboardInterrupt:
+            print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")
+            raise
+        if result.made == 0:
+            print(f"{result.folder}: already complete, {result.objects} objects")
+            return
+        rate = result.made / result.seconds
+        print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")

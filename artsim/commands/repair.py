@@ -1,0 +1,106 @@
+"""The verbs ``artsim verify``, ``artsim repair`` and ``artsim merge``: datasets that are there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from artsim.common.program import cores
+from artsim.errors import ConfigError, DatasetError
+from artsim.loading.roots import PackageRoots
+
+_LISTED = 50
+"""Lines of a list before the rest is only counted."""
+
+
+@dataclass(frozen=True)
+class Verify:
+    """Check a dataset: every checksum, the descriptions, the objects, and what must hold of every sample's truth.
+
+    Nothing is written. Each problem says what to do.
+    """
+
+    path: tyro.conf.Positional[Path]
+    """Dataset folder."""
+    workers: int = field(default_factory=cores)
+    """Processes that check samples, of a dataset that is worth them."""
+
+    def run(self) -> None:
+        from artsim.datasets.problems import repair_command
+        from artsim.datasets.verify import verify
+
+        if self.workers < 1:
+            raise ConfigError(f"{self.workers} processes check nothing", "workers", "use 1 or more")
+        problems = verify(self.path, workers=self.workers)
+        for problem in problems[:_LISTED]:
+            print(problem)
+        if len(problems) > _LISTED:
+            print(f"... and {len(problems) - _LISTED} more")
+        if problems:
+            plural = "problem" if len(problems) == 1 else "problems"
+            raise DatasetError(f"{len(problems)} {plural} found", self.path, repair_command(self.path))
+        print(f"{self.path}: sound")
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Restore what is damaged or missing of a dataset, to the same bytes, or say why that cannot be.
+
+    Shards are drawn again, objects are made or loaded again, plan.json and dataset.json restore each other. A dataset
+    that was stopped is completed. What cannot be restored is listed, and the exit code is 2.
+    """
+
+    path: tyro.conf.Positional[Path]
+    """Dataset folder."""
+    objects: tuple[Path, ...] = ()
+    """Where objects lie that were loaded from files, if they are not where they were."""
+    package_root: PackageRoots = field(default_factory=dict)
+    """Folder of a package:// name: NAME=FOLDER ..."""
+    workers: int = field(default_factory=cores)
+    """Worker processes; by default one for each core."""
+
+    def run(self) -> None:
+        from artsim.datasets.repair import repair
+        from artsim.loading.sources import find_sources
+
+        try:
+            result = repair(self.path, find_sources(self.objects, self.package_root), self.workers)
+        except KeyboardInterrupt:
+            print(f"\nstopped; what was restored stays in {self.path}: the same command goes on from there")
+            raise
+        for file in result.restored[:_LISTED]:
+            print(f"restored: {file}")
+        if len(result.restored) > _LISTED:
+            print(f"... and {len(result.restored) - _LISTED} more")
+        for problem in result.failed[:_LISTED]:
+            print(problem)
+        if result.failed:
+            raise DatasetError(f"{len(result.failed)} problems are left", self.path)
+        print(f"{self.path}: " + (f"{len(result.restored)} files restored" if result.restored else "nothing to repair"))
+
+
+@dataclass(frozen=True)
+class Merge:
+    """Complete a dataset that several machines made with generate.py --part.
+
+    Nothing is complete before: shards that are missing are named, with the parts to run again.
+
+    Example: artsim merge s3://bucket/first --check
+    """
+
+    path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER|URL")]
+    """Folder or URL that the parts wrote to."""
+    check: bool = False
+    """Read every file again, and compare its checksum; otherwise sizes alone are compared."""
+
+    def run(self) -> None:
+        from artsim.datasets.merge import merge
+
+        result = merge(self.path, self.check)
+        if result.already:
+            print(f"{result.place}: already complete, {result.num_samples} samples")
+        else:
+            print(f"{result.place}: {result.num_samples} samples in {result.num_shards} shards, complete")
