@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from artperl.detection import SHIPPED
 from artsim.common.extras import needs
+from artsim.common.showing import PAGE_MODULES
 
 if TYPE_CHECKING:
     from artperl.core.estimate import Estimate
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from artperl.scene.estimator import SceneEstimator
 
 __all__ = ["Estimate", "load_estimator", "load_scene_estimator"]
+
+
+PAGE_MODULES.append("artperl.viewer")
 
 
 def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Method:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artperl.core.estimate import Estimate
-from artperl.core.listing import HEAD, cells, summary
+from artperl.core.estimate import HEAD, Estimate, cells, summary
 from artperl.perception.preprocess import is_measured
 from artsim.common.names import printable
+from artsim.common.showing import page_of
 from artsim.drawing.page import PageContent, PageFrame, frames_page
 
 
+@page_of.register
 def page(estimate: Estimate, points: ArrayLike | None = None, title: str = "") -> str:
     """HTML with everything in it: the way of the fit step by step, and what was found.
 

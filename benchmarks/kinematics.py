@@ -22,13 +22,14 @@ import tyro
 from lxml import etree
 
 from artsim import load
+from artsim.common.extras import silence_output
 from artsim.common.progress import track
 from artsim.loading.sources import find_sources
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, invert_transform
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.simulators import LinkPoses, poses_in_file
-from artsim.renderers.bullet import import_pybullet, silence_output
+from artsim.renderers.bullet import import_pybullet
 
 
 @dataclass(frozen=True)

@@ -178,7 +178,6 @@ class Estimate:
         )  # fmt: skip
 
     def _estimate_one(self, file: Path, estimator: Method) -> None:
-        from artperl.core.listing import full_text
         from artperl.inputs import read_cloud
         from artperl.viewer import page
 
@@ -194,7 +193,7 @@ class Estimate:
             print(json.dumps(record, indent=1))
             return
         _warn(cloud.warnings)
-        print(full_text(result))
+        print(result)
         if self.out is not None and self.out.suffix == ".npz":
             with output_file(self.out) as out:
                 np.savez(out, allow_pickle=False, **arrays_of(result, cloud))

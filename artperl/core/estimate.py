@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from artperl.core.confidence import Calibration, PartCalibration, PartSymptoms, Symptoms
 from artperl.core.kd_tree import KDTree
-from artperl.core.listing import full_text, short_text
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import KINDS
 from artsim.common.showing import Showable
 
 Array = NDArray[np.float64]
+
+HEAD = ("part", "joint", "state", "limits", "box centre, m", "rotation vector, deg", "box size, m", "seen", "sure")
+_MOST_PARTS = 40
+"""Parts that are listed: as many as fit a screen."""
 
 _ENOUGH_TO_WIDEN = 32
 """Points of a part from which they say how large it is."""
@@ -131,14 +133,53 @@ class Estimate(Showable):
         return tuple(units.get(kind, "rad") for kind in self.joint_type)
 
     def __str__(self) -> str:
-        return full_text(self)
+        rows = [HEAD, *cells(self)[:_MOST_PARTS]]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        more = len(self.joint_type) - _MOST_PARTS
+        lines += [f"... and {more} parts more"] if more > 0 else []
+        return "\n".join([summary(self), *lines, *(f"warning: {text}" for text in self.warnings)])
 
     def __repr__(self) -> str:
-        return short_text(self)
+        states = [f"{name} {state}".strip() for name, _, state, *_ in cells(self)[:8]]
+        states += ["..."] if len(self.joint_type) > 8 else []
+        warnings = f", {len(self.warnings)} warnings" if self.warnings else ""
+        sure = f"confidence {100 * self.confidence:.0f} %"
+        return f"<Estimate of {self.reference}: {', '.join(states)}; {sure}{warnings}>"
 
-    def _page(self, **more: Any) -> str:
-        # By name: pages stand floors above estimates, which use none of them themselves.
-        return str(import_module("artperl.viewer").page(self, **more))
+
+def summary(estimate: Estimate) -> str:
+    """One line: how sure it is, how well it fits, and by which reference."""
+    reference = f"reference {estimate.reference}, " if estimate.reference else ""  # some methods have none
+    other = f"{100 * estimate.foreign:.0f} % of the points left out, " if estimate.foreign >= 0.005 else ""
+    return (
+        f"confidence {100 * estimate.confidence:.0f} %, residual {100 * estimate.residual:.2f} % of the diagonal, "
+        f"{other}{reference}{sum(estimate.milliseconds.values()):.0f} ms"
+    )
+
+
+def cells(estimate: Estimate) -> list[tuple[str, ...]]:
+    """What `HEAD` names, of each part."""
+    rows: list[tuple[str, ...]] = []
+    for k, kind in enumerate(estimate.joint_type):
+        turn = Rotation.from_matrix(estimate.rotation[k]).as_rotvec(degrees=True)
+        low, high = estimate.joint_limits[k] if k < len(estimate.joint_limits) else (np.nan, np.nan)
+        rows.append((
+            estimate.part_names[k] if k < len(estimate.part_names) else f"{k}", kind,
+            "" if kind in ("free", "fixed") else _amount(kind, estimate.state[k]),
+            "" if kind in ("free", "fixed") or not np.isfinite([low, high]).all()
+            else f"{_amount(kind, low)} to {_amount(kind, high)}",
+            " ".join(f"{x:.3f}" for x in estimate.translation[k]),
+            " ".join(f"{x:.1f}" for x in turn), " x ".join(f"{x:.3f}" for x in estimate.size[k]),
+            f"{100 * estimate.visibility[k]:.0f} %",
+            f"{100 * estimate.part_confidence[k]:.0f} %" if k < len(estimate.part_confidence) else "",
+        ))  # fmt: skip
+    return rows
+
+
+def _amount(kind: str, state: float) -> str:
+    """A joint's state with its unit: centimetres of a slide, degrees of what turns."""
+    return f"{100 * state:.1f} cm" if kind == "prismatic" else f"{np.rad2deg(state):.1f}°"
 
 
 def slide_parts(estimate: Estimate, farther: Array) -> Estimate:

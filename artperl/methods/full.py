@@ -115,7 +115,7 @@ class Estimator:
 
     def track(self, clouds: Iterable[ArrayLike]) -> Iterator[Estimate]:
         """Estimates of the clouds of one moving object, each from the last: :func:`artperl.methods.tracking.track`."""
-        return track(self, clouds)
+        return track(self.with_fit, clouds)
 
     def many(self, clouds: Iterable[ArrayLike], workers: int = 1) -> Iterator[Estimate | ArtsimError]:
         """Estimates of many clouds, in several processes: :func:`artperl.methods.many.estimate_many`."""

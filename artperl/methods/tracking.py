@@ -8,9 +8,8 @@ anew: flat parts slide and turn a little from frame to frame, and nothing else b
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -26,12 +25,9 @@ from artperl.core.shapes import Observed, Shapes
 from artperl.core.threads import steady_torch
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
+from artperl.fitting.search import Fit
 from artperl.perception.preprocess import Cloud
 from artsim.model.kinematics import Array, invert_transform
-
-if TYPE_CHECKING:
-    from artperl.fitting.search import Fit
-    from artperl.methods.full import Estimator
 
 POINTS = 1024
 """Points of a frame that are looked at, and labelled."""
@@ -76,12 +72,13 @@ class _Anchor:
     residual: float
 
 
-def track(estimator: Estimator, clouds: Iterable[ArrayLike]) -> Iterator[Estimate]:
+def track(with_fit: Callable[[ArrayLike], tuple[Estimate, Fit]], clouds: Iterable[ArrayLike]) -> Iterator[Estimate]:
     """Estimates of the clouds of one moving object, in their order.
 
     Parameters
     ----------
-    estimator : Estimator
+    with_fit : callable
+        Estimates one cloud from the beginning; the fit comes with the estimate.
     clouds : iterable of (N, 3) float
         Camera frame, metres, of the object alone; one after the other, as a camera sees them.
 
@@ -102,7 +99,7 @@ def track(estimator: Estimator, clouds: Iterable[ArrayLike]) -> Iterator[Estimat
         followed = None if anchor is None else _follow(anchor, past, points)
         since += 1
         if followed is None or since >= INTERVAL:
-            estimate, fit = estimator.with_fit(points)
+            estimate, fit = with_fit(points)
             new, since = _anchor(estimate, fit, points), 0
             if followed is None or new.residual <= _AS_GOOD * followed[0].residual:
                 # A new fit has another shape: how the object moves is only known from two frames of one fit.

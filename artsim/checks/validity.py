@@ -21,8 +21,7 @@ from artsim.errors import ArtsimError
 from artsim.loading.object_files import find_urdf, is_urdf
 from artsim.model.collision import Collision, Sweep
 from artsim.model.convex_bodies import is_convex
-from artsim.model.inertia import part_inertia
-from artsim.model.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject, part_inertia
 
 _SHOWN = 5
 

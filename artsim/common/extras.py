@@ -7,8 +7,10 @@ Every import of an optional dependency stands in :func:`needs`, or is reached th
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import importlib.util
+import os
 import platform
 import re
 import shlex
@@ -162,3 +164,20 @@ def _pip() -> str:
     found = shutil.which("pip")
     own = found is not None and Path(found).parent == Path(sys.executable).parent
     return "pip" if own else f"{shlex.quote(sys.executable)} -m pip"
+
+
+@contextlib.contextmanager
+def silence_output() -> Iterator[None]:
+    """Keep what a library prints from C, such as PyBullet's chatter, out of the program's output."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    with contextlib.ExitStack() as stack:
+        null = os.open(os.devnull, os.O_WRONLY)
+        stack.callback(os.close, null)
+        for stream in (1, 2):
+            saved = os.dup(stream)
+            stack.callback(os.close, saved)
+            os.dup2(null, stream)
+            stack.callback(os.dup2, saved, stream)
+        stack.callback(ctypes.CDLL(None).fflush, None)  # C buffers what it prints
+        yield

@@ -3,15 +3,34 @@
 from __future__ import annotations
 
 import html
-import tempfile
-import webbrowser
+from functools import singledispatch
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from artsim.common.outputs import write_output
-
+PAGE_MODULES: list[str] = []
+"""Modules that register pages with ``page_of``. A package names its own when it is imported; each is imported when the
+first page is asked for."""
 _HEIGHT = 480
 """Pixels of a page in a notebook."""
+
+
+@singledispatch
+def page_of(thing: Any, **more: Any) -> str:
+    """HTML of the page of a thing. Modules of ``PAGE_MODULES`` register a function for each type.
+
+    Parameters
+    ----------
+    thing : object
+    **more
+        What else the page shows: ``points`` (N, 3) of an estimate.
+
+    Raises
+    ------
+    TypeError
+        When the type has no page.
+    """
+    raise TypeError(f"{type(thing).__name__} has no page")
 
 
 class Showable:
@@ -19,7 +38,10 @@ class Showable:
 
     def _page(self, **more: Any) -> str:
         """HTML of the page."""
-        raise NotImplementedError
+        for module in PAGE_MODULES:
+            if page_of.dispatch(type(self)) is page_of.dispatch(object):
+                import_module(module)
+        return page_of(self, **more)
 
     def show(self, out: str | Path | None = None, **more: Any) -> Path:
         """Write a page that works without a network, and open it in the browser unless a file is named.
@@ -41,6 +63,11 @@ class Showable:
         ArtsimError
             When it cannot be written.
         """
+        import tempfile  # here, since every "import artsim" imports this module
+        import webbrowser
+
+        from artsim.common.outputs import write_output
+
         page = self._page(**more).encode()
         if out is not None:
             write_output(Path(out), page)

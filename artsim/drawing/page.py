@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.names import printable
 from artsim.common.outputs import write_output
 from artsim.common.palette import PALETTE
+from artsim.common.showing import page_of
 from artsim.datasets.dataset import Dataset
 from artsim.drawing.annotation import axis_segment
 from artsim.drawing.contact_sheet import spread
@@ -138,6 +139,7 @@ def write_page(
     write_output(out, page.encode(), [path])
 
 
+@page_of.register
 def object_page(obj: ArticulatedObject) -> str:
     """HTML that shows an object: its parts, a slider for each joint, boxes and joint axes.
 
@@ -206,6 +208,9 @@ def sample_page(samples: Sequence[Sample], title: str = "") -> str:
         title or f"{most.category} {most.object_id}", [printable(name, 60) for name in names], types, notes
     )
     return frames_page(content, frames)
+
+
+page_of.register(Sample, lambda sample, **more: sample_page([sample], **more))
 
 
 def _arrows(sample: Sample) -> list[tuple[int, Array, Array]]:

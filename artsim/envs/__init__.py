@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from artsim.common.extras import needs
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
 
@@ -14,6 +16,20 @@ with needs("artsim.envs"):
     from gymnasium.envs.registration import WrapperSpec
 
     from artsim.envs.articulated import EnvOptions
+
+
+def make_maniskill(**options: Any) -> Any:
+    """What ``gymnasium.make("ArtSimArticulated-v1")`` calls.
+
+    Raises
+    ------
+    ConfigError
+        When ManiSkill is not installed, or an option makes no sense.
+    """
+    with needs(ENV_ID, extra="maniskill"):
+        from artsim.envs.maniskill.task import ArticulatedTask
+    return ArticulatedTask(**options)
+
 
 gymnasium.register(
     id="artsim/Articulated-v0",
@@ -26,7 +42,7 @@ _TIME_LIMIT = WrapperSpec(
 )
 gymnasium.register(
     id=ENV_ID,
-    entry_point="artsim.envs.maniskill:make",
+    entry_point="artsim.envs:make_maniskill",
     max_episode_steps=EPISODE_LENGTH,
     disable_env_checker=True,
     additional_wrappers=(_TIME_LIMIT,),

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from artsim.common.names import safe_name
 from artsim.errors import AssetError
-from artsim.model.inertia import Inertia, combine_inertias, part_inertia
+from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.kinematics import Array, Joint
-from artsim.model.objects import ArticulatedObject, Mesh
+from artsim.model.objects import ArticulatedObject, Mesh, part_inertia
 
 GRAVITY = 9.81
 DECAY = 0.5

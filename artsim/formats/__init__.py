@@ -9,15 +9,13 @@ from artsim.common.lazy import lazy_names
 
 if TYPE_CHECKING:
     from artsim.formats.conversion import ConvertResult, convert
-    from artsim.formats.ply import save_ply
     from artsim.formats.webdataset import decode_values
 
-__all__ = ["ConvertResult", "convert", "decode_values", "save_ply"]
+__all__ = ["ConvertResult", "convert", "decode_values"]
 
 _HOMES = {
     "ConvertResult": "conversion",
     "convert": "conversion",
-    "save_ply": "ply",
     "decode_values": "webdataset",
 }
 __getattr__, __dir__ = lazy_names(__name__, _HOMES)

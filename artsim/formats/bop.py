@@ -22,11 +22,11 @@ from artsim.errors import ConfigError
 from artsim.formats.base import Piece, require_images
 from artsim.formats.images import depth_png, mask_png, png_bytes
 from artsim.formats.pinhole import integer_centre_K
-from artsim.formats.ply import mesh_ply
 from artsim.model.camera import Camera
 from artsim.model.draws import sample_scale
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
+from artsim.model.ply import mesh_ply
 from artsim.observing.sample import Sample
 from artsim.renderers.raycast import pose, render_posed
 

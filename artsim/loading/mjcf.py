@@ -32,9 +32,10 @@ from artsim.loading.meshes import MeshReader, UnusableMeshError
 from artsim.loading.mjcf_equalities import EqualityReader
 from artsim.loading.mjcf_shapes import ShapeReader, Shapes, numbers, rotation
 from artsim.loading.mjcf_xml import SafeMjcf, safe_mjcf
+from artsim.loading.scene_objects import WORLD, WorldJoint, WorldLink
 from artsim.loading.urdf_document import Geometry, MeshFile, UrdfRobot
 from artsim.loading.xml_values import Element
-from artsim.loading.zero_pose import WORLD, WorldJoint, WorldLink, as_document, unused_name
+from artsim.loading.zero_pose import as_document, unused_name
 from artsim.model.inertia import Inertia
 from artsim.model.objects import JointDynamics, Mesh, Repair
 

@@ -8,20 +8,74 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from artsim.common.names import printable
 from artsim.errors import SceneError
-from artsim.model.objects import Repair
+from artsim.loading.urdf_document import MimicRelation, Shape
+from artsim.model.inertia import Inertia
+from artsim.model.kinematics import Array
+from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics, Repair
 
-if TYPE_CHECKING:
-    from artsim.loading.zero_pose import WorldLink
-
-_WORLD = "world"
+WORLD = "world"
 _LISTED = 20
 _MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True, eq=False)
+class WorldJoint:
+    """A joint in the world's frame, at the zero of all joints.
+
+    Attributes
+    ----------
+    name, type : str
+        As of :class:`~artsim.loading.urdf_document.UrdfJoint`.
+    anchor : (3,) float
+        A point on the axis, metres.
+    axis : (3,) float
+        Unit.
+    lower, upper : float
+        Radians or metres; infinite where there is no end.
+    mimic : MimicRelation or None
+    dynamics : JointDynamics
+    """
+
+    name: str
+    type: str
+    anchor: Array
+    axis: Array
+    lower: float = -np.inf
+    upper: float = np.inf
+    mimic: MimicRelation | None = None
+    dynamics: JointDynamics = UNKNOWN_DYNAMICS
+
+
+@dataclass(eq=False)
+class WorldLink:
+    """A link in the world's frame, at the zero of all joints.
+
+    Attributes
+    ----------
+    name : str
+    parent : int
+        Index of the link that carries it; -1 for the world.
+    joint : WorldJoint or None
+        None for the world.
+    shapes, collision : list of Shape
+        What it shows and what collides; their origins map to the world's frame.
+    inertia : Inertia or None
+        In the world's frame.
+    """
+
+    name: str
+    parent: int = -1
+    joint: WorldJoint | None = None
+    shapes: list[Shape] = field(default_factory=list)
+    collision: list[Shape] = field(default_factory=list)
+    inertia: Inertia | None = None
 
 
 def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> list[WorldLink]:
@@ -51,7 +105,7 @@ def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: 
         return list(links)
     candidates = objects
     if len(objects) > 1:
-        candidates = [name for name in objects if scene.is_articulated(name)] or [n for n in objects if n != _WORLD]
+        candidates = [name for name in objects if scene.is_articulated(name)] or [n for n in objects if n != WORLD]
     if len(candidates) > 1:
         first = shlex.quote(printable(candidates[0], 100))
         kind = "articulated objects" if scene.is_articulated(candidates[0]) else "objects"
@@ -64,7 +118,7 @@ def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: 
         )
     (name,) = candidates
     others = [other for other in objects if other != name]
-    heads = scene.articulated_heads() if name == _WORLD else []
+    heads = scene.articulated_heads() if name == WORLD else []
     if others:
         said = f"{name!r} is taken, and other objects are left out: {_list(others)}; --body NAME takes another"
         repairs.append(Repair("file", said))

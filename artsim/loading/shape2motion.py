@@ -16,9 +16,10 @@ from artsim.common.products import norm
 from artsim.errors import AssetError
 from artsim.loading.json_values import text, triple
 from artsim.loading.meshes import MeshReader
+from artsim.loading.scene_objects import WorldJoint, WorldLink
 from artsim.loading.urdf_document import Geometry, MeshFile, Shape, UrdfRobot
 from artsim.loading.xml_values import Element
-from artsim.loading.zero_pose import WorldJoint, WorldLink, as_document
+from artsim.loading.zero_pose import as_document
 from artsim.model.objects import Repair
 
 _MOVES = {"rotation": "continuous", "translation": "prismatic", "none": "fixed"}

@@ -33,12 +33,13 @@ from artsim.errors import AssetError
 from artsim.loading import primitives
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.reader_process import Reader, read_apart
+from artsim.loading.scene_objects import WorldLink
 from artsim.loading.urdf_document import Geometry, InlineMesh, Shape, UrdfRobot
 from artsim.loading.usd_bodies import StageReader
 from artsim.loading.usd_joints import read_joints
 from artsim.loading.usd_layers import open_stage, unreadable
 from artsim.loading.usd_tree import read_links
-from artsim.loading.zero_pose import WorldLink, as_document
+from artsim.loading.zero_pose import as_document
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair

@@ -8,7 +8,7 @@ link's frame has the axes of the world, and its origin at the anchor of its join
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,67 +16,12 @@ import numpy as np
 from artsim.common.products import matmul
 from artsim.errors import AssetError
 from artsim.loading.joint_xml import settle_limits
-from artsim.loading.scene_objects import chosen
-from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
+from artsim.loading.scene_objects import WorldLink, chosen
+from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.kinematics import LARGEST, Array
-from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics, Repair
-
-WORLD = "world"
-
-
-@dataclass(frozen=True, eq=False)
-class WorldJoint:
-    """A joint in the world's frame, at the zero of all joints.
-
-    Attributes
-    ----------
-    name, type : str
-        As of :class:`~artsim.loading.urdf_document.UrdfJoint`.
-    anchor : (3,) float
-        A point on the axis, metres.
-    axis : (3,) float
-        Unit.
-    lower, upper : float
-        Radians or metres; infinite where there is no end.
-    mimic : MimicRelation or None
-    dynamics : JointDynamics
-    """
-
-    name: str
-    type: str
-    anchor: Array
-    axis: Array
-    lower: float = -np.inf
-    upper: float = np.inf
-    mimic: MimicRelation | None = None
-    dynamics: JointDynamics = UNKNOWN_DYNAMICS
-
-
-@dataclass(eq=False)
-class WorldLink:
-    """A link in the world's frame, at the zero of all joints.
-
-    Attributes
-    ----------
-    name : str
-    parent : int
-        Index of the link that carries it; -1 for the world.
-    joint : WorldJoint or None
-        None for the world.
-    shapes, collision : list of Shape
-        What it shows and what collides; their origins map to the world's frame.
-    inertia : Inertia or None
-        In the world's frame.
-    """
-
-    name: str
-    parent: int = -1
-    joint: WorldJoint | None = None
-    shapes: list[Shape] = field(default_factory=list)
-    collision: list[Shape] = field(default_factory=list)
-    inertia: Inertia | None = None
+from artsim.model.objects import Repair
 
 
 def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> UrdfRobot:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.outputs import write_output
 from artsim.common.products import norm
 from artsim.common.showing import Showable
 from artsim.common.tables import centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.model.kinematics import Array
+from artsim.model.ply import cloud_ply
 
 ARTSIM_VERSION = version("artsim")
 """Of this installation; each sample names the one that made it."""
@@ -140,10 +140,6 @@ class Sample(Showable):
         who = f"{type(self).__name__} {label_of(self.category)} {label_of(self.object_id)}"
         return f"<{who}: {len(self.points):,} points, {plural(len(self.joint_type), 'part')}>"
 
-    def _page(self, **more: Any) -> str:
-        # By name: pictures stand floors above samples, which use none of them themselves.
-        return str(import_module("artsim.drawing.page").sample_page([self], **more))
-
     def save_ply(self, path: str | Path) -> Path:
         """Write the cloud as PLY, in the camera frame and metres, each point in the colour of its part.
 
@@ -161,7 +157,7 @@ class Sample(Showable):
         ConfigError
             When it cannot be written.
         """
-        import_module("artsim.formats.ply").save_ply(self, path)  # by name, as the page
+        write_output(Path(path), cloud_ply(self.points, self.part))
         return Path(path)
 
     @property

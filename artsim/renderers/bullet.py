@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import importlib.util
-import os
-import sys
 import tempfile
 import weakref
 from collections.abc import Iterator, Sequence
@@ -19,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from artsim.appearance import Coat, Lights, Patch, patches, subpixel
-from artsim.common.extras import needs
+from artsim.common.extras import needs, silence_output
 from artsim.errors import RenderError
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
@@ -305,20 +301,3 @@ def import_pybullet() -> ModuleType:
     with needs("pybullet", RenderError), silence_output():
         import pybullet
     return pybullet
-
-
-@contextlib.contextmanager
-def silence_output() -> Iterator[None]:
-    """Keep PyBullet's own chatter, which it prints from C, out of the program's output."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    with contextlib.ExitStack() as stack:
-        null = os.open(os.devnull, os.O_WRONLY)
-        stack.callback(os.close, null)
-        for stream in (1, 2):
-            saved = os.dup(stream)
-            stack.callback(os.close, saved)
-            os.dup2(null, stream)
-            stack.callback(os.dup2, saved, stream)
-        stack.callback(ctypes.CDLL(None).fflush, None)  # C buffers what it prints
-        yield

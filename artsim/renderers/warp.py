@@ -17,13 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.extras import needs
+from artsim.common.extras import needs, silence_output
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
 from artsim.model.frame import Frame
 from artsim.model.kinematics import ROTATING, Array
 from artsim.model.objects import ArticulatedObject, Part
-from artsim.renderers.bullet import silence_output
 from artsim.renderers.view_batch import Clouds, Images, Views
 
 

@@ -15,26 +15,8 @@ ManiSkill.
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
-
-from artsim.common.extras import needs
-
 ENV_ID = "ArtSimArticulated-v1"
 RECORDED_ID = f"artsim.envs:{ENV_ID}"
 """The id as programs know it that import no artsim: gymnasium imports the module before the colon."""
 EPISODE_LENGTH = 100
 """Control steps, unless ``max_episode_steps`` says otherwise."""
-
-
-def make(**options: Any) -> Any:
-    """What ``gymnasium.make("ArtSimArticulated-v1")`` calls.
-
-    Raises
-    ------
-    ConfigError
-        When ManiSkill is not installed, or an option makes no sense.
-    """
-    with needs(ENV_ID, extra="maniskill"):
-        task = importlib.import_module("artsim.envs.maniskill.task")
-    return task.ArticulatedTask(**options)

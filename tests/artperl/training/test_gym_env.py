@@ -10,8 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 from artperl.agent.actions import NOTHING
 from artperl.agent.decision_process import Fitting, FittingOptions
-from artperl.training.gym_env import ENV_ID, PoseFittingEnv, nothing
-from artperl.training.gym_vector_env import PoseFittingVectorEnv
+from artperl.training.gym_env import ENV_ID, PoseFittingEnv, PoseFittingVectorEnv, nothing
 from tests.conftest import installed
 
 OPTIONS = FittingOptions(steps=4, observed_points=64, reference_points=32)

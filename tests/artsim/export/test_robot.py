@@ -11,7 +11,7 @@ from lxml import etree
 from artsim.export import export
 from artsim.export.robot import HELPER_SHARE, as_robot
 from artsim.families import make
-from artsim.model.inertia import part_inertia
+from artsim.model.objects import part_inertia
 from tests.conftest import valve
 
 

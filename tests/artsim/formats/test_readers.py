@@ -24,7 +24,6 @@ from artsim.common.palette import PALETTE
 from artsim.datasets.shards import sample_key
 from artsim.formats.coco import run_lengths
 from artsim.formats.conversion import convert
-from artsim.formats.ply import save_ply
 from artsim.formats.webdataset import decode_values
 
 
@@ -140,5 +139,5 @@ def test_trimesh_reads_clouds_with_a_colour_for_each_part(imaged: Dataset, tmp_p
     assert np.array_equal(cloud.metadata["_ply_raw"]["vertex"]["data"]["part"].ravel(), sample.part)
     assert sample.save_ply(tmp_path / "own.ply").read_bytes() == path.read_bytes()
     foreign = replace(sample, part=np.where(np.arange(len(sample.part)) < 9, 255, sample.part).astype(np.uint8))
-    save_ply(foreign, tmp_path / "own.ply")
+    foreign.save_ply(tmp_path / "own.ply")
     assert np.array_equal(trimesh.load(tmp_path / "own.ply").colors[:9, :3], np.full((9, 3), 128))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.export.robot import as_robot
-from artsim.model.inertia import part_inertia
-from artsim.model.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject, part_inertia
 
 CLOSE = 1e-6
 """Metres, radians, and shares of masses and moments."""

@@ -19,9 +19,9 @@ from artsim.export.robot import as_robot
 from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
 from artsim.loading.sources import find_sources
-from artsim.model.inertia import combine_inertias, part_inertia
+from artsim.model.inertia import combine_inertias
 from artsim.model.kinematics import Array, KinematicTree
-from artsim.model.objects import ArticulatedObject
+from artsim.model.objects import ArticulatedObject, part_inertia
 from artsim.physics import world
 from artsim.physics.bullet_body import BulletBody
 from artsim.physics.options import PhysicsOptions
