@@ -9,7 +9,7 @@ joint states those nearest to the true poses. Lines:
 - ``true labels``: points have their true parts, for retrieval, too;
 - ``own shape, true labels``: the reference is the observed object itself.
 
-Objects are the unseen ones of ``artperl evaluate --benchmark artimage``. Each category begins with the mean rank of the
+Objects are the unseen ones of ``artperl artimage``. Each category begins with the mean rank of the
 retrieved object by true boxes, 1 for the best, and the share of points labelled right. The last line is one JSON
 object.
 """

@@ -10,27 +10,25 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import tee
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
 
+from artperl.commands.estimate_options import STDOUT, EstimateOptions
 from artperl.commands.estimate_record import arrays_of, record_of
+from artperl.commands.estimate_scene import estimate_scene, is_image_pair
+from artperl.commands.estimators import estimator_folder
 from artperl.commands.resumed_lines import line_name
-from artperl.methods import StoredMethod
 from artsim.common.outputs import check_output, output_file, write_output
 from artsim.common.progress import track
 from artsim.errors import ConfigError
 
 if TYPE_CHECKING:
-    from artperl.inputs import InputOptions
     from artperl.methods.protocol import Method
-
-STDOUT = Path("-")
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(EstimateOptions):
     """Estimate the poses of the parts of an object, and list them: by name, with states, limits and boxes.
 
     From a cloud: artperl estimate cloud.ply --category laptop --view out.html
@@ -68,68 +66,7 @@ class Estimate:
     warnings.
     """
 
-    clouds: tyro.conf.Positional[tuple[Path, ...]]
-    """Files, or folders of them; datasets of artsim, and shards (.tar)."""
-    category: str = "laptop"
-    """An estimator that comes with the package, by its name; or its folder; or the folder of a training run."""
-    out: Path | None = None
-    """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list. Of
-    several files: .jsonl, a line each; the same command goes on where it stopped."""
-    view: Path | None = None
-    """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
-    unit: Literal["m", "mm", "cm"] | None = None
-    """Unit of the numbers in the file. By default m, and mm for depth images of whole numbers."""
-    camera: Literal["opencv", "opengl"] = "opencv"
-    """Axes of the camera frame of a cloud: x right, y down, z forward; or, in OpenGL and Blender, y up and z back."""
-    intrinsics: Path | None = None
-    """Camera of a depth image, which the file is then taken for."""
-    mask: Path | None = None
-    """Image that is not black where the object is in the depth image; or a folder of them, named as the images."""
-    mask_id: str | None = None
-    """Which object of the mask: its number, its index in a palette, its colour as R,G,B, or the number of a mask in a
-    stack."""
-    mask_kind: Literal["auto", "binary", "parts"] = "auto"
-    """parts: the object is what is not 255, as in artsim's masks; binary: what is not 0; auto: as the mask looks."""
-    depth_scale: float | None = None
-    """Number of units (metres, or what --unit says) in one step of the depth image. By default what the intrinsics
-    state, for whole numbers; else 0.001 for whole numbers, and 1 for floats."""
-    depth_kind: Literal["z", "distance"] = "z"
-    """Depth along the camera's axis, or distance along each ray, as some simulators write it. An image does not tell
-    which."""
-    pixel_center: Literal["0", "0.5"] | None = None
-    """Where the intrinsics have the centre of the first pixel. By default as their format has it."""
-    image_id: str | None = None
-    """Which image of a scene_camera.json; by default that in the depth image's name."""
-    detector: str | None = None
-    """Finds the objects of an image: name the image in colour and the depth image, and no category. tabletop, which
-    comes with the package, or a folder that artperl train-detector wrote. The default where the first of two files is a
-    picture in colour."""
-    detections: Path | None = None
-    """Instead of a detector, the objects that another one has found."""
-    estimators: tuple[str, ...] = ()
-    """Of an image of several objects: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one
-    for each category. By default those that come with the package, by their names."""
-    picture: Path | None = None
-    """Of an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
-    apart: bool = False
-    """Of an image of several objects: move those whose boxes overlap apart, by 3 cm at most, as a simulator needs them.
-    It makes estimates less exact."""
-    skip_bad: bool = False
-    """Leave out detections that cannot be used, and list them, instead of refusing the file."""
-    seen_from: tuple[float, float] | None = None
-    """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
-    a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
-    method: StoredMethod = "full"
-    """Method of the estimator: full, which comes with the package; artperl, the paper's, with weights for laptop,
-    eyeglasses, dishwasher, scissors and drawer; or a baseline that you trained."""
-    workers: int = 1
-    """Processes, each of which takes a core. Lines are the same, in the same order, whatever their number."""
-    ray: str | None = None
-    """Instead of processes here, those of a Ray cluster: auto for the one that this machine belongs to, local to start
-    one here, or HOST:PORT of its head. Every node must see the files, under the same names. Extra: ray."""
-
     def run(self) -> None:
-        from artperl.commands.estimate_scene import estimate_scene, is_image_pair
         from artperl.estimator import load_estimator
 
         inputs = (*self.clouds, self.intrinsics, self.mask, self.detections)
@@ -166,16 +103,6 @@ class Estimate:
             raise ConfigError("a cluster has its own processes", "workers, ray", "leave one of them out")
         if several and self.view is not None:
             raise ConfigError("a page shows one object", "view", "give one file, or leave it out")
-
-    def input_options(self) -> InputOptions:
-        """How the files are to be read."""
-        from artperl.inputs import InputOptions
-
-        return InputOptions(
-            unit=self.unit, camera=self.camera, intrinsics=self.intrinsics, mask=self.mask, mask_id=self.mask_id,
-            mask_kind=self.mask_kind, depth_scale=self.depth_scale, depth_kind=self.depth_kind,
-            pixel_center=self.pixel_center, image_id=self.image_id,
-        )  # fmt: skip
 
     def _estimate_one(self, file: Path, estimator: Method) -> None:
         from artperl.inputs import read_cloud
@@ -229,29 +156,6 @@ class Estimate:
             kind = "clouds" if clouds.shards else "files"
             print(f"error: {failed} of {total} {kind} failed; each line with an 'error' says why", file=sys.stderr)
             sys.exit(1)
-
-
-def estimator_folder(name: str) -> Path:
-    """Folder of an estimator: one of the package's by its name, a folder of one, or that of a training run.
-
-    Raises
-    ------
-    ConfigError
-        When there is none.
-    """
-    from artperl.estimator import WEIGHTS, folder_of
-
-    settings = "estimator.json"
-    for folder in (folder_of(name), Path(name) / "best"):
-        if (folder / settings).is_file():
-            return folder
-    shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{settings}")))
-    what = "holds no estimator" if Path(name).is_dir() else "is no estimator"
-    raise ConfigError(
-        f"{name!r} {what}",
-        "category",
-        f"use one that comes with the package ({shipped}), or a folder that train.py wrote",
-    )
 
 
 def _warn(texts: Iterable[str]) -> None:

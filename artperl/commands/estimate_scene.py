@@ -10,42 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from PIL import Image
 
+from artperl.commands.estimate_options import STDOUT, EstimateOptions
+from artperl.commands.estimate_record import plain_record
+from artperl.commands.estimators import named_estimators
 from artperl.detection import SHIPPED
 from artsim.common.outputs import write_output
 from artsim.errors import ConfigError
 
 if TYPE_CHECKING:
-    from artperl.commands.estimate import Estimate
     from artperl.inputs.detections import Detections
     from artperl.scene.estimator import SceneEstimate
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
-
-
-def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:
-    """Estimators by category: out of CATEGORY=NAME, and of folders with one for each category.
-
-    Raises
-    ------
-    ConfigError
-        When there is no such estimator.
-    """
-    from artperl.commands.estimate import estimator_folder
-
-    found: dict[str, str | Path] = {}
-    for text in texts:
-        category, equals, name = text.partition("=")
-        if equals:
-            found[category] = estimator_folder(name)
-            continue
-        below = [path.parent for path in sorted(Path(text).glob("*/estimator.json"))]
-        runs = [path.parent.parent for path in sorted(Path(text).glob("*/best/estimator.json"))]
-        found |= {folder.name: folder for folder in below} | {run.name: run / "best" for run in runs}
-        if not below and not runs:
-            raise ConfigError(
-                "it is no folder with an estimator for each category", text, "write CATEGORY=NAME, such as drawer=any"
-            )
-    return found
 
 
 def is_image_pair(files: Sequence[Path]) -> bool:
@@ -61,7 +37,7 @@ def is_image_pair(files: Sequence[Path]) -> bool:
         return False  # what is wrong with it is told where it is read
 
 
-def estimate_scene(options: Estimate) -> None:
+def estimate_scene(options: EstimateOptions) -> None:
     """Estimate, print, and write what is asked for.
 
     Raises
@@ -69,7 +45,6 @@ def estimate_scene(options: Estimate) -> None:
     ConfigError
         When a file cannot be used, or an option does not fit.
     """
-    from artperl.commands.estimate import STDOUT
     from artperl.inputs.detections import Detections
     from artperl.inputs.images import read_image
     from artperl.inputs.reading import read_depth_image
@@ -107,7 +82,7 @@ def estimate_scene(options: Estimate) -> None:
         write_output(options.out, (json.dumps(record, indent=1) + "\n").encode())
 
 
-def _check(options: Estimate) -> None:
+def _check(options: EstimateOptions) -> None:
     if len(options.clouds) != 2 or any(path.is_dir() for path in options.clouds):
         raise ConfigError(
             f"{len(options.clouds)} files are named", "estimate",
@@ -126,7 +101,7 @@ def _check(options: Estimate) -> None:
         raise ConfigError("these do not go with several objects", names, "leave them out")
 
 
-def _read_detections(options: Estimate, image: Path, size: tuple[int, int]) -> Detections:
+def _read_detections(options: EstimateOptions, image: Path, size: tuple[int, int]) -> Detections:
     """Detections of this one image, whichever of a file's images it is."""
     from artperl.inputs.detections import image_ids, read_detections
 
@@ -150,8 +125,6 @@ def _read_detections(options: Estimate, image: Path, size: tuple[int, int]) -> D
 
 def scene_record(result: SceneEstimate, detections: Detections) -> dict[str, Any]:
     """Estimates of an image in JSON's terms."""
-    from artperl.commands.estimate_record import plain_record
-
     objects = []
     for obj in result.objects:
         found = obj.detection

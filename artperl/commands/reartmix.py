@@ -1,65 +1,76 @@
-"""``artperl evaluate --benchmark reartmix``."""
+"""The verb ``artperl reartmix``."""
 
 from __future__ import annotations
 
-import json
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from artperl.commands.estimators import named_estimators
+from artperl.commands.evaluate import write_figures
 from artperl.detection import SHIPPED
-from artsim.common.files import write_atomic
 from artsim.common.outputs import check_output
 from artsim.common.program import cores
 from artsim.common.progress import say
 from artsim.errors import ConfigError
 
-if TYPE_CHECKING:
-    from artperl.commands.evaluate import Evaluate
-
-_SCENES = 50
 _FOLDER = Path("out/reartmix")
 
 
-def evaluate_reartmix(options: Evaluate) -> None:
-    """Make or open the images, read or make detections, estimate, print the table.
+@dataclass(frozen=True)
+class ReArtMix:
+    """Test estimators on images of several objects: average precision at 5 degrees, 5 cm and IoU 0.5.
 
-    Raises
-    ------
-    ConfigError
-        When an option does not fit, or detections cannot be used.
-    DatasetError
-        When the folder holds no images.
+    With --json, the same command continues a run that was stopped.
     """
-    from artperl.commands.estimate_scene import named_estimators
-    from artperl.evaluation.reartmix import SEEDS, open_images, reartmix_scenes, run_reartmix
-    from artperl.inputs.detections import read_detections
-    from artperl.scene.estimator import SceneEstimator
-    from artsim.scenes import generate_scenes
 
-    own = ("rows", "conditions", "real_weights", "files", "package_root", "states", "preset", "noise", "ablation",
-           "category", "num_points", "estimator", "method")  # fmt: skip
-    given = [name for name in own if getattr(options, name) != getattr(type(options)(), name)]
-    if given:
-        raise ConfigError(
-            "reartmix has images of its own", ", ".join(given), "leave it out; name estimators with --estimators"
-        )
-    if options.json is not None:
-        check_output(options.json, [options.detections])
-    root = options.root
-    if root is None:
-        root = _FOLDER
-        generate_scenes(reartmix_scenes(), root, options.views or _SCENES, SEEDS, 10, cores())
-    images = open_images(root)
-    if options.detector is not None and options.detections is not None:
-        raise ConfigError("objects are found once", "detector, detections", "leave one of them out")
-    detections = None if options.detector is not None else images.own_detections(0)
-    if options.detections is not None:
-        detections = read_detections(options.detections, images.sizes, images.names(), options.skip_bad)
-    for text in () if detections is None else detections.skipped:
-        say(f"left out: {text}")
-    told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    named: dict[str, str | Path] = {"drawer": "any", **named_estimators(options.estimators)}
-    estimator = SceneEstimator(named, options.detector or SHIPPED, apart=options.apart, **told)
-    figures = run_reartmix(images, detections, estimator, True, say, options.picture, options.json)
-    if options.json is not None:  # it may have been read: a stopped run goes on from it
-        write_atomic(options.json, (json.dumps(figures, indent=1) + "\n").encode())
+    root: Path | None = None
+    """Folder that artsim scene wrote, or that has the layout of ReArtMix; by default scenes are made in
+    out/reartmix."""
+    views: int = 50
+    """Scenes that are made."""
+    detector: str | None = None
+    """What finds the objects: tabletop, which comes with the package, or a folder that artperl train-detector wrote. By
+    default detections are realistic ones, made from the truth."""
+    detections: Path | None = None
+    """COCO's results instead, with image_id as artperl detections writes it."""
+    skip_bad: bool = False
+    """Leave out detections that cannot be used, and list them, instead of refusing the file."""
+    estimators: tuple[str, ...] = ()
+    """CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category, of any method. By default
+    those that come with the package, by their names, and any for drawers, whose number varies."""
+    seen_from: tuple[float, float] | None = None
+    """Azimuths that the estimators are told that the camera is within, degrees about the object's vertical, 0 for its
+    front. By default they are not told."""
+    apart: bool = False
+    """Move estimates whose boxes overlap apart, as artperl estimate --apart does."""
+    picture: Path | None = None
+    """Write the first 12 images with the estimates over them here, as PNG."""
+    json: Path | None = None
+    """Write the figures to this file."""
+
+    def run(self) -> None:
+        from artperl.evaluation.reartmix import SEEDS, open_images, reartmix_scenes, run_reartmix
+        from artperl.inputs.detections import read_detections
+        from artperl.scene.estimator import SceneEstimator
+        from artsim.scenes import generate_scenes
+
+        if self.json is not None:
+            check_output(self.json, [self.detections])
+        root = self.root
+        if root is None:
+            root = _FOLDER
+            generate_scenes(reartmix_scenes(), root, self.views, SEEDS, 10, cores())
+        images = open_images(root)
+        if self.detector is not None and self.detections is not None:
+            raise ConfigError("objects are found once", "detector, detections", "leave one of them out")
+        detections = None if self.detector is not None else images.own_detections(0)
+        if self.detections is not None:
+            detections = read_detections(self.detections, images.sizes, images.names(), self.skip_bad)
+        for text in () if detections is None else detections.skipped:
+            say(f"left out: {text}")
+        told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
+        named: dict[str, str | Path] = {"drawer": "any", **named_estimators(self.estimators)}
+        estimator = SceneEstimator(named, self.detector or SHIPPED, apart=self.apart, **told)
+        figures = run_reartmix(images, detections, estimator, True, say, self.picture, self.json)
+        write_figures(self.json, figures)

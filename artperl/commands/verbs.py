@@ -1,4 +1,4 @@
-"""The program ``artperl``: train, evaluate, estimate, report, calibrate, detections, train-detector."""
+"""The program ``artperl``: training, estimation, tests, benchmarks and reports."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from typing import Annotated
 
 import tyro
 
+from artperl.commands.benchmarks import Ablation, ArtImage, Robustness
 from artperl.commands.calibrate import Calibrate
 from artperl.commands.detections import MakeDetections
 from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
+from artperl.commands.reartmix import ReArtMix
 from artperl.commands.report import Report
 from artperl.commands.train import Train
 from artperl.commands.train_detector import TrainDetector
@@ -18,6 +20,10 @@ from artsim.common.program import run_program
 Verb = (
     Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[ArtImage, tyro.conf.subcommand("artimage")]
+    | Annotated[Robustness, tyro.conf.subcommand("robustness")]
+    | Annotated[ReArtMix, tyro.conf.subcommand("reartmix")]
+    | Annotated[Ablation, tyro.conf.subcommand("ablation")]
     | Annotated[Estimate, tyro.conf.subcommand("estimate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]

@@ -28,7 +28,7 @@ MEDIAN_DEGREES = {
     "scissors": (1.5, 1.9),
     "drawer": (0.03, 0.03, 0.03, 0.03),
 }
-"""Median rotation error of each part, from the front: two to five times what ``artperl evaluate --benchmark artimage``
+"""Median rotation error of each part, from the front: two to five times what ``artperl artimage``
 prints for many more views."""
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from artperl import cli
-from artperl.commands.estimate import estimator_folder
+from artperl.commands import verbs
+from artperl.commands.estimators import estimator_folder
 from artperl.evaluation.metrics import translation_error, true_poses
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.generate import generate
@@ -37,7 +37,7 @@ class Program:
         self._monkeypatch.setattr("sys.argv", ["artperl", "estimate", *map(str, words)])
         self.code = 0
         try:
-            cli.main()
+            verbs.main()
         except SystemExit as stop:
             self.code = stop.code
         captured = self._capsys.readouterr()

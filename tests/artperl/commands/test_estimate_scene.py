@@ -11,8 +11,8 @@ from PIL import Image
 
 from artperl.commands.detections import MakeDetections
 from artperl.commands.estimate import Estimate
-from artperl.commands.estimate_scene import is_image_pair, named_estimators
-from artperl.commands.evaluate import Evaluate
+from artperl.commands.estimate_scene import is_image_pair
+from artperl.commands.estimators import named_estimators
 from artperl.inputs.images import read_image
 from artsim.errors import ConfigError
 from artsim.scenes import SceneCameraOptions, SceneOptions, SceneRun, generate_scenes
@@ -108,11 +108,7 @@ def test_what_does_not_fit_is_refused_with_its_mend(
         Estimate((view / "depth.npy",), picture=tmp_path / "x.png").run()
 
 
-def test_options_that_do_not_fit_the_benchmark_are_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="add --benchmark reartmix"):
-        Evaluate(skip_bad=True).run()
-    with pytest.raises(ConfigError, match="noise"):
-        Evaluate(benchmark="reartmix", noise="azure").run()
+def test_estimators_are_named_by_category(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="CATEGORY=NAME"):
         named_estimators((str(tmp_path),))
     assert named_estimators(("drawer=any",))["drawer"].name == "any"  # type: ignore[union-attr]

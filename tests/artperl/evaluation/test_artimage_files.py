@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from artperl import cli
+from artperl.commands import verbs
 from artperl.data.categories import objects_of
 from artperl.evaluation.artimage_files import TEST_IDS, ArtImageFiles
 from artperl.evaluation.metrics import rotation_error
@@ -95,7 +95,7 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
 def test_a_method_is_evaluated_on_such_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written(tmp_path, "laptop")
     json_path = tmp_path / "figures.json"
-    cli.Evaluate(benchmark="artimage", root=tmp_path, json=json_path).run()
+    verbs.ArtImage(root=tmp_path, json=json_path).run()
     printed = capsys.readouterr().out
     assert "laptop 1" in printed
     assert "eyeglasses: left out" in printed

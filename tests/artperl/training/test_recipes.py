@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from artperl import cli
+from artperl.commands import verbs
 from artperl.data.categories import ARTIMAGE
 from artperl.estimator import WEIGHTS, read_settings
 from artperl.training.options import PRESETS, TrainOptions, changed
@@ -88,7 +88,7 @@ def test_an_estimator_says_which_recipe_made_it_and_from_what(
     recipe.write_text(json.dumps({"preset": "quick", "options": options, "lengths": lengths}))
     out = tmp_path / "run"
     monkeypatch.setattr("sys.argv", ["train.py", "--recipe", str(recipe), "--out", str(out)])
-    cli.train_main()
+    verbs.train_main()
     about = read_settings(out / "best")["about"]
     assert about["recipe"] == {"name": "tiny", "sha256": hashlib.sha256(recipe.read_bytes()).hexdigest()}
     weights = (WEIGHTS / "laptop" / "weights.safetensors").read_bytes()
@@ -96,14 +96,14 @@ def test_an_estimator_says_which_recipe_made_it_and_from_what(
     assert about["commit"]
     before = (out / "best" / "estimator.json").stat().st_mtime_ns
     capsys.readouterr()
-    cli.train_main()
+    verbs.train_main()
     assert "laptop 1" in capsys.readouterr().out
     assert (out / "best" / "estimator.json").stat().st_mtime_ns == before
     recipe.write_text(recipe.read_text() + "\n")
     assert not is_made(out, Recipe.read(str(recipe)))
     monkeypatch.setattr("sys.argv", ["train.py", "--recipe", str(recipe), "--seed", "1", "--out", str(out)])
     with pytest.raises(SystemExit):
-        cli.train_main()
+        verbs.train_main()
     assert "seed" in capsys.readouterr().err
 
 

@@ -14,8 +14,8 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from artperl import cli
 from artperl.boxes.network import Boxes
+from artperl.commands import verbs
 from artperl.data.sources import Given
 from artperl.estimator import load_estimator, read_settings, save_estimator
 from artperl.evaluation.samples import TEST_SEEDS, VALIDATION_SEEDS
@@ -194,7 +194,7 @@ def test_the_learning_rate_rises_once_and_falls() -> None:
 def test_the_program_evaluates_and_estimates(
     whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cli.Evaluate(whole / "best", objects=1, views=1, json=tmp_path / "figures.json").run()
+    verbs.Evaluate(whole / "best", objects=1, views=1, json=tmp_path / "figures.json").run()
     assert "laptop 0" in capsys.readouterr().out
     assert json.loads((tmp_path / "figures.json").read_text())["laptop"]["instances"] == 1
     cloud = np.random.default_rng(0).normal(size=(200, 3)) * 0.1 + [0.0, 0.0, 1.0]
@@ -208,10 +208,10 @@ def test_the_program_evaluates_and_estimates(
         monkeypatch.setattr(
             "sys.argv", ["artperl", "estimate", str(tmp_path / name), "--category", str(whole / "best"), "--out", "-"]
         )
-        cli.main()
+        verbs.main()
         record = json.loads(capsys.readouterr().out)
         assert len(record["rotation"]) == 2
-    cli.Estimate((tmp_path / "cloud.npy",), str(whole / "best"), tmp_path / "out.npz").run()
+    verbs.Estimate((tmp_path / "cloud.npy",), str(whole / "best"), tmp_path / "out.npz").run()
     with np.load(tmp_path / "out.npz") as arrays:
         assert arrays["part"].shape == (200,)
     whole_line, head, *parts = capsys.readouterr().out.splitlines()
@@ -234,7 +234,7 @@ def test_the_program_says_what_is_wrong(
             "sys.argv", ["artperl", *argv, *(["--out", str(tmp_path / "t")] if "train" in argv else [])]
         )
         with pytest.raises(SystemExit) as stopped:
-            cli.main()
+            verbs.main()
         assert stopped.value.code == 2
         assert "Fix:" in capsys.readouterr().err
 
@@ -278,12 +278,12 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
         Training(replace(options, max_parts=2), tmp_path / "few", workers=0, progress=False)
     # What it was learnt from is no family, so that a test needs to be told its objects.
     with pytest.raises(ConfigError, match="--files"):
-        cli.Evaluate(tmp_path / "best").run()
-    cli.Evaluate(tmp_path / "best", files=(urdf,), views=2).run()
+        verbs.Evaluate(tmp_path / "best").run()
+    verbs.Evaluate(tmp_path / "best", files=(urdf,), views=2).run()
     assert f"{category} 0" in capsys.readouterr().out
     monkeypatch.setattr("sys.argv", ["train.py", "--files", str(urdf), "--category", "laptop", "--out", str(tmp_path)])
     with pytest.raises(SystemExit):
-        cli.train_main()
+        verbs.train_main()
     assert "files are learnt from alone" in capsys.readouterr().err
 
 
@@ -296,6 +296,6 @@ def test_an_impossible_option_is_named(
 ) -> None:
     monkeypatch.setattr("sys.argv", ["train.py", option, value, "--out", str(tmp_path)])
     with pytest.raises(SystemExit):
-        cli.train_main()
+        verbs.train_main()
     assert option.removeprefix("--").replace("-", "_") in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from artperl import cli
+from artperl.commands import verbs
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artperl.training.box_records import load_records
 from artperl.training.run import Training
@@ -81,7 +81,7 @@ def test_two_processes_never_train_in_one_folder_and_a_killed_one_is_gone_on_wit
             Training(OPTIONS, out, workers=0, progress=False)
         monkeypatch.setattr("sys.argv", ["train.py", "--category", "globe", "--parts", "any", "--out", str(out)])
         with pytest.raises(SystemExit) as stopped:
-            cli.train_main()
+            verbs.train_main()
         assert stopped.value.code == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert line == f"error: {out}: another run is writing here. Fix: wait for it or stop it"

@@ -66,7 +66,11 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
     },
     "artperl": {
         "train": [("--out run", "train")],
-        "evaluate": [("laptop", "train"), ("--benchmark artimage", "train")],
+        "evaluate": [("laptop", "train")],
+        "artimage": [("", "train")],
+        "robustness": [("", "train")],
+        "reartmix": [("", "train")],
+        "ablation": [("", "train")],
         "estimate": [("cloud.npy", "train"), ("--help", "")],
         "calibrate": [("laptop", "train"), ("--help", "")],
         "detections": [("--help", "")],

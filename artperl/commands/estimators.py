@@ -1,0 +1,55 @@
+"""Estimators by the names that commands take: those of the package, and folders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from artsim.errors import ConfigError
+
+
+def estimator_folder(name: str) -> Path:
+    """Folder of an estimator: one of the package's by its name, a folder of one, or that of a training run.
+
+    Raises
+    ------
+    ConfigError
+        When there is none.
+    """
+    from artperl.estimator import WEIGHTS, folder_of
+
+    settings = "estimator.json"
+    for folder in (folder_of(name), Path(name) / "best"):
+        if (folder / settings).is_file():
+            return folder
+    shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{settings}")))
+    what = "holds no estimator" if Path(name).is_dir() else "is no estimator"
+    raise ConfigError(
+        f"{name!r} {what}",
+        "category",
+        f"use one that comes with the package ({shipped}), or a folder that train.py wrote",
+    )
+
+
+def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:
+    """Estimators by category: out of CATEGORY=NAME, and of folders with one for each category.
+
+    Raises
+    ------
+    ConfigError
+        When there is no such estimator.
+    """
+    found: dict[str, str | Path] = {}
+    for text in texts:
+        category, equals, name = text.partition("=")
+        if equals:
+            found[category] = estimator_folder(name)
+            continue
+        below = [path.parent for path in sorted(Path(text).glob("*/estimator.json"))]
+        runs = [path.parent.parent for path in sorted(Path(text).glob("*/best/estimator.json"))]
+        found |= {folder.name: folder for folder in below} | {run.name: run / "best" for run in runs}
+        if not below and not runs:
+            raise ConfigError(
+                "it is no folder with an estimator for each category", text, "write CATEGORY=NAME, such as drawer=any"
+            )
+    return found
