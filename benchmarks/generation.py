@@ -8,6 +8,7 @@ line is one JSON object.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import multiprocessing
 import os
@@ -32,8 +33,8 @@ from artsim.model.object_file import ObjectCache, save_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import draw_visible
 from artsim.renderers.raycast import cast, pose
-from benchmarks.demo_objects import demo_paths
 
+ASSETS = Path(__file__).resolve().parents[1] / "urdf_assets"
 Scene = tuple[ArticulatedObject, Array, Camera]
 
 
@@ -60,6 +61,15 @@ def main(options: Options) -> None:
     result = compare_renderers(scenes) | rays_per_second(scenes) | end_to_end(options.samples)
     result |= worker_memory(options)
     print(json.dumps({name: round(value, 3) for name, value in result.items()}))
+
+
+def demo_paths() -> list[Path]:
+    """URDF files of the demo objects: our own, and the Franka Panda that comes with PyBullet."""
+    paths = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
+    data = importlib.util.find_spec("pybullet_data")
+    if data is not None and data.submodule_search_locations:
+        paths.append(Path(data.submodule_search_locations[0]) / "franka_panda" / "panda.urdf")
+    return paths
 
 
 def draw_scenes(objects: list[ArticulatedObject], views: int) -> list[Scene]:

@@ -6,10 +6,10 @@ Every file below the folders is loaded as given, each in a worker process under 
 - MJCF: ``*.xml`` whose top element is ``<mujoco>``, and that MuJoCo itself compiles;
 - USD: ``*.usd``, ``.usda``, ``.usdc`` and ``.usdz`` with a joint of UsdPhysics that moves.
 
-Loaded MJCF and USD files are posed at random, and every part is compared with what MuJoCo, or usd-core's own frames
-of the joints, make of the file. A scene of several objects counts as loaded where each of them loads by its name.
-One line for each failure says why, then failures are counted by kind. The last line is one JSON object: ``{"files",
-"loaded", "reasons"}`` of all files, and under ``"formats"`` the same of each format.
+Loaded files are posed at random, and every part is compared with what yourdfpy, MuJoCo or usd-core make of the file. A
+scene of several objects counts as loaded where each of them loads by its name. One line for each failure says why, then
+failures are counted by kind. The last line is one JSON object: ``{"files", "loaded", "reasons"}`` of all files, and
+under ``"formats"`` the same of each format.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tyro
 
 from artsim import load
@@ -34,7 +33,7 @@ from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError, SceneError
 from artsim.loading.roots import PackageRoots
 from artsim.model.objects import ArticulatedObject
-from benchmarks.oracles import NoOracleError, deviation, poses_of
+from tests.oracles import NoOracleError, deviation, poses_of, random_states
 
 FORMATS = {".urdf": "urdf", ".xml": "mjcf", ".usd": "usd", ".usda": "usd", ".usdc": "usd", ".usdz": "usd"}
 """Format of each ending."""
@@ -53,7 +52,7 @@ class Options:
     seconds: float = 60.0
     """Time limit of each file."""
     states: int = 3
-    """Random states in which an MJCF or USD file is compared with the format's own library; 0 compares none."""
+    """Random states in which a file is compared with the other program; 0 compares none."""
     repairs: bool = False
     """Also list what was assumed or left out while loading, by file."""
     package_root: PackageRoots = field(default_factory=dict)
@@ -75,71 +74,65 @@ class Outcome:
     parts : int
         How many were compared with that library.
     deviation : float
-        Largest difference of an entry of their motions, radians and metres.
+        Largest difference of an entry of their poses, radians and metres.
     """
 
     file: Path
-    error: str | None
+    error: str | None = None
     repairs: tuple[str, ...] = ()
     skipped: str = ""
     parts: int = 0
     deviation: float = 0.0
 
+    @property
+    def format(self) -> str:
+        """A value of :data:`FORMATS`."""
+        return FORMATS[self.file.suffix.lower()]
+
+    @property
+    def reason(self) -> str:
+        """The failure without what differs from file to file: paths, names and numbers."""
+        text = str(self.error).replace(str(self.file), "").partition(". Fix:")[0]
+        text = re.sub(r"'[^']*'|\"[^\"]*\"|/\S+", "...", text)
+        text = re.sub(r"\d+(\.\d+)?", "N", text).strip(" :")
+        return text if len(text) <= 120 else f"{text[:117]}..."
+
 
 def main(options: Options) -> None:
     """Load and print."""
     files = object_files(options.folders)
-    work = (options.states, {name: root.absolute() for name, root in options.package_root.items()})
-    every = list(track("files", load_all(files, options.seconds, *work), total=len(files), unit="file"))
+    roots = {name: root.absolute() for name, root in options.package_root.items()}
+    loading = load_all(files, options.seconds, options.states, roots)
+    every = list(track("files", loading, total=len(files), unit="file"))
     outcomes = [outcome for outcome in every if not outcome.skipped]
-    failed = [outcome for outcome in outcomes if outcome.error is not None]
-    for outcome in failed:
-        print(f"does not load: {outcome.error}")
-    if options.repairs:
-        for outcome in outcomes:
-            for repair in outcome.repairs:
-                print(f"{outcome.file}: {repair}")
-    for reason, count in _reasons(failed).items():
+    for outcome in outcomes:
+        if outcome.error is not None:
+            print(f"does not load: {outcome.error}")
+        for repair in outcome.repairs if options.repairs else ():
+            print(f"{outcome.file}: {repair}")
+    result, formats = _summary(outcomes), {}
+    for reason, count in result["reasons"].items():
         print(f"{count:6d}  {reason}")
     for name in dict.fromkeys(FORMATS.values()):
-        of_format = [outcome for outcome in every if FORMATS[outcome.file.suffix.lower()] == name]
-        skipped = Counter(outcome.skipped.partition(":")[0] for outcome in of_format if outcome.skipped)
-        for reason, count in skipped.items():
+        own = [outcome for outcome in every if outcome.format == name]
+        for reason, count in Counter(outcome.skipped.partition(":")[0] for outcome in own if outcome.skipped).items():
             print(f"{name}: {count} files do not count: {reason}")
-        compared = [outcome for outcome in of_format if outcome.parts]
-        if compared:
-            worst = max(compared, key=lambda outcome: outcome.deviation)
-            print(
-                f"{name}: {sum(outcome.parts for outcome in compared)} parts of {len(compared)} files move as in the "
-                f"format's own library, to {worst.deviation:.2g} at most ({worst.file})"
-            )
-    loaded, repaired = len(outcomes) - len(failed), sum(bool(outcome.repairs) for outcome in outcomes)
-    share = 100.0 * loaded / max(len(outcomes), 1)
-    print(f"{loaded} of {len(outcomes)} files load as given ({share:.1f} %), {repaired} of them with repairs")
-    print(json.dumps(_summary(outcomes) | {"formats": _by_format(outcomes)}))
+        if counted := [outcome for outcome in own if not outcome.skipped]:
+            formats[name] = _summary(counted)
+            print(f"{name}: {formats[name]}")
+    repaired = sum(bool(outcome.repairs) for outcome in outcomes)
+    share = 100.0 * result["loaded"] / max(len(outcomes), 1)
+    print(f"{result['loaded']} of {len(outcomes)} files load as given ({share:.1f} %), {repaired} of them with repairs")
+    print(json.dumps(result | {"formats": formats}))
 
 
 def _summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    failed = [outcome for outcome in outcomes if outcome.error is not None]
-    return {"files": len(outcomes), "loaded": len(outcomes) - len(failed), "reasons": _reasons(failed)}
-
-
-def _by_format(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
-    found = {}
-    for name in dict.fromkeys(FORMATS.values()):
-        of_format = [outcome for outcome in outcomes if FORMATS[outcome.file.suffix.lower()] == name]
-        if not of_format:
-            continue
-        found[name] = _summary(of_format)
-        compared = [outcome for outcome in of_format if outcome.parts]
-        if compared:
-            largest = max(outcome.deviation for outcome in compared)
-            found[name] |= {"compared": len(compared), "max_deviation": largest}
+    reasons = Counter(outcome.reason for outcome in outcomes if outcome.error is not None)
+    found = {"files": len(outcomes), "loaded": len(outcomes) - reasons.total(), "reasons": dict(reasons.most_common())}
+    if compared := [outcome for outcome in outcomes if outcome.parts]:
+        found |= {"compared": len(compared), "parts": sum(outcome.parts for outcome in compared)}
+        found["max_deviation"] = max(outcome.deviation for outcome in compared)
     return found
-
-
-def _reasons(failed: Sequence[Outcome]) -> dict[str, int]:
-    return dict(Counter(kind_of(outcome) for outcome in failed).most_common())
 
 
 def object_files(folders: Sequence[Path]) -> list[Path]:
@@ -169,13 +162,11 @@ def _is_mjcf(file: Path) -> bool:
     return re.match(rb"(\xef\xbb\xbf)?\s*<mujoco[\s/>]", text) is not None
 
 
-def load_all(
-    files: Sequence[Path], seconds: float, states: int = 0, package_roots: Mapping[str, Path] | None = None
-) -> Iterator[Outcome]:
+def load_all(files: Sequence[Path], seconds: float, states: int, roots: Mapping[str, Path]) -> Iterator[Outcome]:
     """Outcomes in the order of the files, from one worker process that a new one replaces when a file kills it."""
     worker, ours = _start()
     for file in files:
-        ours.send((file, states, dict(package_roots or {})))
+        ours.send((file, states, roots))
         answer: Outcome | None = None
         try:
             if ours.poll(seconds):
@@ -211,19 +202,19 @@ def _work(connection: Connection) -> None:
             connection.send(_outcome(*task))
 
 
-def _outcome(file: Path, states: int, package_roots: Mapping[str, Path]) -> Outcome:
+def _outcome(file: Path, states: int, roots: Mapping[str, Path]) -> Outcome:
     poses = None
-    if FORMATS[file.suffix.lower()] != "urdf":
-        try:
-            poses = poses_of(file)
-        except NoOracleError as error:
-            return Outcome(file, None, skipped=str(error))
+    try:
+        poses = poses_of(file) if states or FORMATS[file.suffix.lower()] != "urdf" else None
+    except NoOracleError as error:
+        if FORMATS[file.suffix.lower()] != "urdf":
+            return Outcome(file, skipped=str(error))
     try:
         parts, largest = 0, 0.0
-        objects = _objects(file, package_roots)
+        objects = _objects(file, roots)
         if poses is not None and states:
             for obj in objects:
-                compared, found = deviation(obj, poses, states, np.random.default_rng(0))
+                compared, found = deviation(obj, poses, random_states(obj, states))
                 parts, largest = parts + compared, max(largest, found)
     except ArtsimError as error:
         return Outcome(file, str(error))
@@ -233,23 +224,14 @@ def _outcome(file: Path, states: int, package_roots: Mapping[str, Path]) -> Outc
     return Outcome(file, None, tuple(repairs), parts=parts, deviation=largest)
 
 
-def _objects(file: Path, package_roots: Mapping[str, Path]) -> list[ArticulatedObject]:
+def _objects(file: Path, roots: Mapping[str, Path]) -> list[ArticulatedObject]:
     """The object of a file; of a scene of several, each by its name, the first ones of very many."""
     try:
-        return [load(file, package_roots=package_roots)]
+        return [load(file, package_roots=roots)]
     except SceneError as error:
         if not error.names:
             raise
-        return [load(file, package_roots=package_roots, body=name) for name in error.names[:_OBJECTS]]
-
-
-def kind_of(outcome: Outcome) -> str:
-    """The reason of a failure without what differs from file to file: paths, names and numbers."""
-    text = str(outcome.error).replace(str(outcome.file), "").partition(". Fix:")[0]
-    text = re.sub(r"'[^']*'|\"[^\"]*\"", "...", text)
-    text = re.sub(r"/\S+", "...", text)
-    text = re.sub(r"\d+(\.\d+)?", "N", text).strip(" :")
-    return text if len(text) <= 120 else f"{text[:117]}..."
+        return [load(file, package_roots=roots, body=name) for name in error.names[:_OBJECTS]]
 
 
 if __name__ == "__main__":

@@ -21,10 +21,9 @@ import numpy as np
 import tyro
 
 from artsim.common.files import file_sha256, write_atomic
-from benchmarks.demo_objects import ASSETS
 
-ROOT = ASSETS.parent
-_DEMO = [str(ASSETS / name) for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
+ROOT = Path(__file__).resolve().parents[1]
+_DEMO = [str(ROOT / "urdf_assets" / name) for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
 _TINY: dict[str, Any] = {
     "categories": ["laptop"],
     "base_objects": 4,

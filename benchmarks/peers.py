@@ -16,24 +16,23 @@ import time
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from artsim import ArticulatedObject, Camera, StateOptions, ViewOptions, make_renderer, observe, sample_state
-from artsim import sample_view as draw_camera
+from artsim import ArticulatedObject, Camera, make_renderer, observe
 from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import transform_points
 from artsim.observing.capture import draw_visible
 from artsim.renderers.raycast import pose
-from benchmarks.compared.generation import benchmark_objects
+from tests.agreement import Scene, choose, choose_procedural, draw_scenes
 
 NUM_POINTS = 2048
-Scene = tuple[ArticulatedObject, Array, Camera]
 Cloud = tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.uint8]]
 
 
@@ -61,13 +60,12 @@ def main(options: Options) -> None:
         os.environ[f"{library}_NUM_THREADS"] = "1"
     for library in ("MUJOCO_GL", "PYOPENGL_PLATFORM"):
         os.environ.setdefault(library, "egl")
-    rng = np.random.default_rng(0)
-    scenes: list[Scene] = []
-    for obj in benchmark_objects(options.objects):
-        for _ in range(options.views):
-            q = sample_state(obj, StateOptions(), rng)
-            scenes.append((obj, q, draw_camera(obj, q, ViewOptions(), rng)))
-    scenes = [scenes[i] for i in rng.permutation(len(scenes))]  # those that are cut off are no special ones
+    partnet = os.environ.get("ARTSIM_PARTNET_DIR")
+    real = choose(Path(partnet), options.objects // 2) if partnet else []
+    sources = real + choose_procedural(options.objects - len(real))
+    scenes = [scene for i, one in enumerate(sources) for scene in draw_scenes(one.load(), options.views, 1, i)]
+    # In any order: those that are cut off are no special ones.
+    scenes = [scenes[i] for i in np.random.default_rng(0).permutation(len(scenes))]
     print(f"{len(scenes)} scenes")
     rates: dict[str, float] = {}
     for name, program in PROGRAMS.items():

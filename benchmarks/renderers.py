@@ -1,9 +1,8 @@
-"""Frames per second of each renderer: ``python -m benchmarks.renderers``.
+"""Renderers beside the ray caster: ``python -m benchmarks.renderers``.
 
-Depth and part ids (and colour, where a renderer always makes it) of the same objects, states and views at two image
-sizes. An object's first frame, for which it is loaded and its scene built, does not count. Then many views of different
-objects at once, by Warp and, where there is a GPU, by ManiSkill's batched camera. The last line is one JSON object:
-``fps`` by renderer and size, and ``batched``, views per second.
+Real and procedural objects of 1 m diagonal, in random states and views. For each renderer: its frames of depth and part
+ids per second at two image sizes, without the first frame of an object; its depth differences from the ray caster at
+640x480; and every pixel on which they differ, under the reason for it. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -14,31 +13,74 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import tyro
 
 from artsim import Camera, make_renderer
 from artsim.commands.doctor import Finding, examine
 from artsim.common.progress import track
 from artsim.renderers import RENDERERS, Renderer
-from benchmarks.agreement import choose, choose_procedural, draw_scenes
-from benchmarks.batches import measure_batches
-from benchmarks.differences import Scene
+from tests.agreement import CLASSES, LIMITS, Agreement, Scene, choose, choose_procedural, compare, draw_scenes
 
 _SIZES = ((640, 480), (128, 128))
 
 
 @dataclass(frozen=True)
 class Options:
-    """Measure frames per second."""
+    """Measure frames per second, and compare with the ray caster."""
 
-    partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
-    """Folder of real objects, which half of the objects are; without it, all are procedural."""
-    objects: int = 20
-    views: int = 10
-    """Frames of each object that count, each of another state and view."""
+    partnet: Path = Path(os.environ.get("ARTSIM_PARTNET_DIR", "partnet_mobility"))
+    """Folder of real objects."""
+    objects: int = 30
+    """Real objects, spread over their categories."""
+    procedural: int = 30
+    """Procedural objects, likewise."""
+    states: int = 4
+    views: int = 1
+    """Of each state."""
     renderers: tuple[str, ...] = tuple(RENDERERS)
+
+
+def main(options: Options) -> None:
+    """Measure, compare and print."""
+    sources = choose(options.partnet, options.objects) + choose_procedural(options.procedural)
+    loaded = [(source.name, source.load()) for source in track("objects", sources, unit="object", leave=False)]
+    scenes = {name: draw_scenes(obj, options.states, options.views, seed=i) for i, (name, obj) in enumerate(loaded)}
+    print(f"{options.objects} real and {options.procedural} procedural objects, {options.states} states", end=" ")
+    print(f"x {options.views} views; {os.cpu_count()} processor cores")
+    result: dict[str, Any] = {}
+    for name in options.renderers:
+        finding = examine(name)
+        if not finding.works:
+            print(f"{name}: not measured: {finding.problem} (fix: {finding.fix})")
+            result[name] = None
+            continue
+        renderer = make_renderer(name)
+        result[name] = {"fps": frames_per_second(renderer, list(scenes.values()))}
+        rates = ", ".join(f"{rate} /s at {size}" for size, rate in result[name]["fps"].items())
+        print(f"{name}: {rates}, on {finding.device}")
+        if name in LIMITS:
+            rows = {what: compare(own, renderer) for what, own in track(name, scenes.items(), leave=False)}
+            result[name] |= agreement(rows, LIMITS[name])
+        renderer.close()
+    print(json.dumps(result))
+
+
+def frames_per_second(renderer: Renderer, per_object: Sequence[Sequence[Scene]]) -> dict[str, float]:
+    """Of each image size, without the first frame of an object, for which its scene is built."""
+    rates = {}
+    for width, height in _SIZES:
+        count, seconds = 0, 0.0
+        for scenes in per_object:
+            sized = [(obj, q, resized(camera, width, height)) for obj, q, camera in scenes]
+            renderer.render(*sized[0])
+            start = time.perf_counter()
+            for scene in sized:
+                renderer.render(*scene)
+            count, seconds = count + len(sized), seconds + time.perf_counter() - start
+        rates[f"{width}x{height}"] = round(count / seconds, 1)
+    return rates
 
 
 def resized(camera: Camera, width: int, height: int) -> Camera:
@@ -49,54 +91,22 @@ def resized(camera: Camera, width: int, height: int) -> Camera:
     return replace(camera, K=K, width=width, height=height)
 
 
-def sized(scenes: Sequence[Scene], size: tuple[int, int]) -> list[Scene]:
-    """Scenes with another image size."""
-    return [(obj, q, resized(camera, *size)) for obj, q, camera in scenes]
-
-
-def measure(renderer: Renderer, scenes: Sequence[Scene]) -> tuple[int, float]:
-    """Frames drawn of one object, and the seconds that they took."""
-    renderer.render(*scenes[0])
-    start = time.perf_counter()
-    for scene in scenes[1:]:
-        renderer.render(*scene)
-    return len(scenes) - 1, time.perf_counter() - start
-
-
-def main(options: Options) -> None:
-    """Print a table and the JSON line."""
-    real = [] if options.partnet is None else choose(options.partnet, options.objects // 2)
-    sources = real + choose_procedural(options.objects - len(real))
-    per_object = [draw_scenes(source.load(), options.views + 1, 1, seed=i) for i, source in enumerate(sources)]
-    triangles = int(np.median([scenes[0][0].num_faces for scenes in per_object]))
-    print(f"{len(real)} real and {len(sources) - len(real)} procedural objects, {triangles} triangles in the median,")
-    print(f"{options.views} states and views of each; {os.cpu_count()} processor cores")
-    print(f"{'':14s}" + "".join(f"{f'{w}x{h}':>10s}" for w, h in _SIZES) + "  frames/s, on")
-    fps: dict[str, dict[str, float]] = {}
-    for name in options.renderers:
-        finding = examine(name)
-        if finding.works:
-            fps[name] = _rates(name, per_object)
-        print(_row(finding, fps.get(name)))
-    batched = measure_batches([scenes[0][0] for scenes in per_object]) if "warp" in fps else None
-    print(json.dumps({"fps": fps, "batched": batched}))
-
-
-def _rates(name: str, per_object: Sequence[Sequence[Scene]]) -> dict[str, float]:
-    renderer = make_renderer(name)
-    total = dict.fromkeys(_SIZES, (0, 0.0))
-    for scenes in track(name, per_object, unit="object", leave=False):
-        for size in _SIZES:
-            frames, seconds = measure(renderer, sized(scenes, size))
-            total[size] = total[size][0] + frames, total[size][1] + seconds
-    renderer.close()
-    return {f"{w}x{h}": round(frames / seconds, 1) for (w, h), (frames, seconds) in total.items()}
-
-
-def _row(finding: Finding, rates: dict[str, float] | None) -> str:
-    if rates is None:
-        return f"{finding.backend:14s}{'-':>10s}{'-':>10s}  not measured: {finding.problem} (fix: {finding.fix})"
-    return f"{finding.backend:14s}" + "".join(f"{rate:10.1f}" for rate in rates.values()) + f"  {finding.device}"
+def agreement(rows: dict[str, Agreement], limits: tuple[float, float, float]) -> dict[str, Any]:
+    """Print and return how closely a renderer agrees with the ray caster over all objects."""
+    total = Agreement()
+    for one in rows.values():
+        total.merge(one)
+    summary, agrees = total.summary(), total.agrees(limits)
+    print(f"  depth: median {summary['median_mm']:.5f} mm (limit {limits[0]}), 99.9 % within", end=" ")
+    print(f"{summary['p999_mm']:.4f} mm away from edges (limit {limits[1]})")
+    print(f"  part ids equal on {summary['part_ids_equal']:.5%} of {total.object_pixels} pixels", end=" ")
+    print(f"(limit {limits[2]:.1%}): {'agrees' if agrees else 'DOES NOT AGREE'}")
+    for name, why in CLASSES.items():
+        print(f"  {name:22s}{total.ids_differ[name]:8d} part ids,{total.depth_off[name]:8d} depths differ  {why}")
+    least = min(rows, key=lambda what: rows[what].summary()["part_ids_equal"])
+    print(f"  least agreement: {least}, part ids {rows[least].summary()['part_ids_equal']:.4%}")
+    differ = {"ids_differ": dict(total.ids_differ), "depth_off": dict(total.depth_off)}
+    return {**summary, "agrees": agrees, "object_pixels": total.object_pixels, **differ}
 
 
 if __name__ == "__main__":

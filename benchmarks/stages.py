@@ -59,6 +59,8 @@ class Options:
     categories: tuple[str, ...] = tuple(ARTIMAGE)
     rows: tuple[Literal["procedural", "real"], ...] = ("procedural", "real")
     """Real objects are those in the folder that ARTSIM_PARTNET_DIR names; without one they are left out."""
+    objects: int = 40
+    """Procedural ones of each category."""
     views: int = 80
     """Of each category, at least."""
 
@@ -73,7 +75,7 @@ def main(options: Options) -> None:
             if row == "real" and not (folder and has_half(category, "test")):
                 continue
             method = load_estimator(category_folder(options.weights, category, "artperl"), method="artperl")
-            tested = row_objects(row, category, Path(folder or "."))
+            tested = row_objects(row, category, Path(folder or "."), options.objects)
             found = measure(method, tested, row_samples(row, tested, options.views))
             result.setdefault(row, {})[category] = found
             print(f"{row} {category}: rank {found['rank']:.1f}, {100 * found['labels']:.1f} % of points labelled right")

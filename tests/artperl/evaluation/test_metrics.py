@@ -13,7 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from artperl.evaluation import metrics
 from artperl.evaluation.box_overlap import intersection_volume, iou_omad_legacy
-from benchmarks.legacy_iou import FRAMES
+
+FRAMES = {
+    "as in our tables: x back, z up": np.eye(3),
+    "y up, x to the right, z to the front": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]),
+    "y up, x to the left, z to the back": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "y up, x to the back, z to the right": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+}
+"""Rotations of the rest frame into the frame that boxes are compared in; ArtImage's have y up."""
 
 Box = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 

@@ -14,7 +14,7 @@ from artsim.checks.realism import REAL, read_split, real_objects
 from artsim.families import CATEGORIES
 from artsim.model.kinematics import Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject
-from benchmarks.realism import SPLIT
+from tests.artsim.checks.test_realism import SPLIT
 
 _OBJECTS = 30
 EDITED = ("toaster",)

@@ -11,8 +11,8 @@ from artsim.errors import AssetError
 from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
 from tests.artsim.loading.usd_files import AT_LID, BODY, CUBE, HEAD, HINGE, PAIR, body, joint, repairs_of, written
-from tests.artsim.loading.usd_oracle import assert_moves_as_parsed
 from tests.conftest import CASES
+from tests.usd_oracle import assert_moves_as_parsed
 
 SECOND = CASES / "second"
 

@@ -10,7 +10,7 @@ import trimesh
 
 import artsim
 from artsim import Camera, make_renderer, observe
-from benchmarks.agreement import LIMITS, choose, compare, draw_scenes
+from tests.agreement import LIMITS, choose, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
 
 pytestmark = pytest.mark.slow

@@ -20,7 +20,7 @@ from artsim.loading.sources import find_sources
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers import Renderer
-from benchmarks.agreement import LIMITS, compare, draw_scenes
+from tests.agreement import LIMITS, compare, draw_scenes
 from tests.conftest import ASSETS, DEMO, backend, rigid
 from tests.without import environment
 

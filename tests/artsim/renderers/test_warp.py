@@ -25,8 +25,7 @@ from artsim.renderers import render_cameras
 from artsim.renderers.raycast import pose
 from artsim.renderers.view_batch import Views
 from artsim.renderers.warp import WarpRenderer
-from benchmarks.agreement import Agreement, draw_scenes
-from benchmarks.differences import Scene
+from tests.agreement import Agreement, Scene, draw_scenes
 from tests.conftest import ASSETS, DEMO, absent, installed, rigid, solid, valve
 from tests.without import environment
 

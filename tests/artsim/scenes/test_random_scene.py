@@ -28,7 +28,7 @@ from artsim.renderers.scene_renderer import render_scene
 from artsim.scenes.ground_truth import SceneView, observe_scene, write_view
 from artsim.scenes.props import place_solid
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera, with_appearance
-from benchmarks.agreement import LIMITS
+from tests.agreement import LIMITS
 from tests.conftest import backend
 
 pytestmark = pytest.mark.slow

@@ -14,8 +14,7 @@ from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers import render
-from benchmarks.agreement import LIMITS, Agreement
-from benchmarks.differences import CLASSES, Scene, classify, grazing, slivers
+from tests.agreement import CLASSES, LIMITS, Agreement, Scene, classify, grazing, slivers
 from tests.conftest import ASSETS, rigid, solid
 
 

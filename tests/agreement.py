@@ -1,35 +1,29 @@
-"""Agreement of the renderers: ``python -m benchmarks.agreement``.
+"""How closely two renderers agree, and why they differ at a pixel.
 
-Real and procedural objects of 1 m diagonal, in random states and views at 640x480, drawn by the ray caster and by the
-other renderers. Every pixel on which they differ is counted under the reason for it. The last line is one JSON object:
-for each renderer its median depth difference, the share of equal part ids, whether that is what was asked of it, and
-the pixels of each class that differ.
+Every pixel falls into the first class that applies to it.
 """
 
 from __future__ import annotations
 
-import json
-import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
 from artsim import make_renderer
-from artsim.common.progress import track
-from artsim.errors import RenderError
 from artsim.families import FAMILIES
 from artsim.loading.sources import Source, family_sources, find_sources
+from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.model.frame import BACKGROUND, Frame
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers import Renderer
-from benchmarks.differences import CLASSES, Scene, classify, near_edge
+from artsim.renderers.raycast import pose, render_posed
 
 LIMITS = {
     "warp": (0.005, 0.1, 0.999),
@@ -40,22 +34,107 @@ LIMITS = {
 """What is asked of each renderer: at most this median, and 99.9th percentile away from edges, of the depth differences
 in mm; at least this share of equal part ids."""
 
-_OFF = 1.0  # mm of depth that count as a difference
+DIFFERENCE_MM = 1.0
+"""Of depth that counts."""
+
+Scene = tuple[ArticulatedObject, Array, Camera]
+"""A sized object, its joint states and the camera that looks at it."""
+Mask = NDArray[np.bool_]
+
+CLASSES = {
+    "coincident surfaces": "two parts' surfaces lie within 0.1 mm of each other: rounding chooses",
+    "sliver": "a part or a gap thinner than 3 px: whether a pixel's centre meets it is rounding",
+    "silhouette": "within 2 px of the object's outline: the pixel's centre falls on either side",
+    "edge": "within 2 px of a part's border, a step or a crease",
+    "grazing": "seen at more than 80 deg: a fraction of a pixel is a long way along the ray",
+    "unexplained": "none of these",
+}
+"""Classes of pixels, and why renderers differ there."""
+
+_REACH = 2  # pixels about an edge
+_JUMP = 2e-3  # metres between neighbouring pixels, beyond the local slope: a step
+_COINCIDENT = 1e-4  # metres
+_GRAZING = np.tan(np.deg2rad(80.0))
 
 
-@dataclass(frozen=True)
-class Options:
-    """Compare renderers with the ray caster."""
+def classify(scene: Scene, rays: Frame, other: Frame) -> dict[str, Mask]:
+    """Pixels of each class: (H, W) each, every pixel in one of them.
 
-    partnet: Path = Path(os.environ.get("ARTSIM_PARTNET_DIR", "partnet_mobility"))
-    """Folder of real objects."""
-    objects: int = 40
-    """Real objects, spread over their categories."""
-    procedural: int = 30
-    """Procedural objects, likewise."""
-    states: int = 5
-    views: int = 2
-    renderers: tuple[str, ...] = tuple(LIMITS)
+    Parameters
+    ----------
+    scene : Scene
+    rays : Frame
+        By the ray caster.
+    other : Frame
+        By another renderer.
+    """
+    found = {
+        "coincident surfaces": coincident_parts(*scene, rays, other),
+        "sliver": slivers(rays) | slivers(other),
+        "silhouette": near_outline(rays) | near_outline(other),
+        "edge": near_edge(rays) | near_edge(other),
+        "grazing": grazing(rays, scene[2]),
+        "unexplained": np.ones(rays.depth.shape, dtype=bool),
+    }
+    left = np.ones(rays.depth.shape, dtype=bool)
+    for name in CLASSES:
+        found[name] &= left
+        left &= ~found[name]
+    return found
+
+
+def near_edge(frame: Frame) -> Mask:
+    """(H, W) pixels within 2 px of a part's border or of a jump in depth."""
+    ids, depth = frame.part_ids, frame.depth
+    edge = np.zeros(ids.shape, dtype=bool)
+    for first, second in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
+        step = np.abs(depth[first] - depth[second])
+        border = (ids[first] != ids[second]) | (step > _JUMP + 0.02 * depth[first])
+        edge[first] |= border
+        edge[second] |= border
+    # A smooth slope has equal steps either side; a thin gap or sliver does not.
+    bend = np.zeros(ids.shape, dtype=bool)
+    bend[1:-1] |= np.abs(depth[2:] - 2 * depth[1:-1] + depth[:-2]) > _JUMP
+    bend[:, 1:-1] |= np.abs(depth[:, 2:] - 2 * depth[:, 1:-1] + depth[:, :-2]) > _JUMP
+    return binary_dilation(edge | bend, iterations=_REACH)
+
+
+def near_outline(frame: Frame) -> Mask:
+    """(H, W) pixels within 2 px of where the object ends and the background begins."""
+    shown = frame.part_ids != BACKGROUND
+    return binary_dilation(shown, iterations=_REACH) & binary_dilation(~shown, iterations=_REACH)
+
+
+def slivers(frame: Frame) -> Mask:
+    """(H, W) pixels that no 3x3 window of one part, or of background, contains."""
+    ids = frame.part_ids
+    uniform = minimum_filter(ids, 3) == maximum_filter(ids, 3)
+    return ~binary_dilation(uniform, np.ones((3, 3), dtype=bool))
+
+
+def grazing(frame: Frame, camera: Camera) -> Mask:
+    """(H, W) pixels at which the surface is seen at more than 80 deg from its normal, by the slope of the depth."""
+    depth = frame.depth.astype(np.float64)
+    across = np.zeros_like(depth)
+    for axis, focal in ((0, camera.K[1, 1]), (1, camera.K[0, 0])):
+        step = np.abs(np.diff(depth, axis=axis)) * focal
+        before = np.concatenate([step.take([0], axis), step], axis)
+        after = np.concatenate([step, step.take([-1], axis)], axis)
+        across += np.minimum(before, after) ** 2  # the smaller: the larger may be a step
+    grazes: Mask = (depth > 0) & (np.sqrt(across) > _GRAZING * depth)
+    return grazes
+
+
+def coincident_parts(obj: ArticulatedObject, q: Array, camera: Camera, rays: Frame, other: Frame) -> Mask:
+    """(H, W) pixels at which the two parts that the renderers show lie at the same depth."""
+    differ = (rays.part_ids != other.part_ids) & (rays.part_ids != BACKGROUND) & (other.part_ids != BACKGROUND)
+    apart = np.full(rays.depth.shape, np.inf)
+    posed = pose(obj, q, camera)
+    for k in np.unique(other.part_ids[differ]):
+        alone = render_posed(posed, only=int(k)).depth
+        theirs = differ & (other.part_ids == k) & (alone > 0)
+        apart[theirs] = np.abs(alone - rays.depth)[theirs]
+    return apart < _COINCIDENT
 
 
 @dataclass
@@ -78,7 +157,7 @@ class Agreement:
         self.depth_mm.append(error[same])
         self.inner_mm.append(error[same & ~near_edge(rays) & ~near_edge(other)])
         self.object_pixels += int(shown.sum())
-        differ, off = shown & ~same, same & (error > _OFF)
+        differ, off = shown & ~same, same & (error > DIFFERENCE_MM)
         if differ.any() or off.any():
             for name, pixels in classify(scene, rays, other).items():
                 self.ids_differ[name] += int((differ & pixels).sum())
@@ -143,61 +222,3 @@ def choose_procedural(count: int) -> list[Source]:
 def _in_turn(lists: list[list[Source]], count: int) -> list[Source]:
     turns = max(map(len, lists), default=0)
     return [sources[i] for i in range(turns) for sources in lists if i < len(sources)][:count]
-
-
-def main(options: Options) -> None:
-    """Compare and print."""
-    sources = choose(options.partnet, options.objects) + choose_procedural(options.procedural)
-    result: dict[str, Any] = {}
-    for name in options.renderers:
-        try:
-            renderer = make_renderer(name)
-        except RenderError as error:
-            print(f"{name}: not compared: {error}")
-            result[name] = None
-            continue
-        rows, total = [], Agreement()
-        for number, source in enumerate(track(name, sources, unit="object", leave=False)):
-            one = compare(draw_scenes(source.load(), options.states, options.views, seed=number), renderer)
-            rows.append((source.name, one))
-            total.merge(one)
-        renderer.close()
-        print(f"{name} against raycast: {options.objects} real and {options.procedural} procedural objects", end="")
-        print(f" x {options.states} states x {options.views} views")
-        _print_total(total, LIMITS[name])
-        _print_worst(rows)
-        result[name] = _row(total, LIMITS[name])
-    print(json.dumps(result))
-
-
-def _row(total: Agreement, limits: tuple[float, float, float]) -> dict[str, Any]:
-    return {
-        **total.summary(),
-        "agrees": total.agrees(limits),
-        "object_pixels": total.object_pixels,
-        "ids_differ": {name: total.ids_differ[name] for name in CLASSES},
-        "depth_off": {name: total.depth_off[name] for name in CLASSES},
-    }
-
-
-def _print_total(total: Agreement, limits: tuple[float, float, float]) -> None:
-    summary = total.summary()
-    print(f"  depth: median {summary['median_mm']:.5f} mm (asked: {limits[0]}), 99.9 % within", end=" ")
-    print(f"{summary['p999_mm']:.4f} mm away from edges (asked: {limits[1]})")
-    print(f"  part ids equal on {summary['part_ids_equal']:.5%} of {total.object_pixels} pixels", end=" ")
-    print(f"(asked: {limits[2]:.1%}): {'agrees' if total.agrees(limits) else 'DOES NOT AGREE'}")
-    print(f"  {'pixels that differ':22s}{'part ids':>10s}{f'depth > {_OFF:.0f} mm':>15s}")
-    for name, why in CLASSES.items():
-        print(f"  {name:22s}{total.ids_differ[name]:10d}{total.depth_off[name]:15d}  {why}")
-
-
-def _print_worst(rows: Sequence[tuple[str, Agreement]]) -> None:
-    print("  least agreement:")
-    for label, one in sorted(rows, key=lambda row: row[1].summary()["part_ids_equal"])[:3]:
-        print(f"    {label}: part ids {one.summary()['part_ids_equal']:.4%}, differing {dict(+one.ids_differ)}")
-    for label, one in sorted(rows, key=lambda row: -row[1].summary()["p999_mm"])[:3]:
-        print(f"    {label}: 99.9 % within {one.summary()['p999_mm']:.4f} mm, off {dict(+one.depth_off)}")
-
-
-if __name__ == "__main__":
-    main(tyro.cli(Options, description=__doc__))

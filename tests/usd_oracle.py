@@ -19,7 +19,7 @@ _AXES = [f"{word}{letter}" for word in ("trans", "rot") for letter in "XYZ"]
 
 def assert_moves_as_parsed(obj: ArticulatedObject, file: Path, samples: int = 3, atol: float = 1e-6) -> None:
     """Every part moves from the zero of all joints as the body of its name does by usd-core's parser."""
-    stage, rng = _Parsed(file), np.random.default_rng(0)
+    stage, rng = ParsedStage(file), np.random.default_rng(0)
     zero = stage.posed({})
     names = {path.rpartition("/")[2]: path for path in zero}
     parts = [(k, names[part.name]) for k, part in enumerate(obj.parts) if part.name in names]
@@ -45,7 +45,7 @@ def assert_moves_as_parsed(obj: ArticulatedObject, file: Path, samples: int = 3,
     np.testing.assert_allclose(A @ np.linalg.lstsq(A, b, rcond=None)[0], b, atol=atol)
 
 
-class _Parsed:
+class ParsedStage:
     """Bodies and joints as ``UsdPhysics.LoadUsdPhysicsFromRange`` gives them, in metres, Z up."""
 
     def __init__(self, file: Path):
