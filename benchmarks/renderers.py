@@ -18,7 +18,7 @@ from typing import Any
 import tyro
 
 from artsim import Camera, make_renderer
-from artsim.commands.doctor import Finding, examine
+from artsim.commands.doctor import examine
 from artsim.common.progress import track
 from artsim.renderers import RENDERERS, Renderer
 from tests.agreement import CLASSES, LIMITS, Agreement, Scene, choose, choose_procedural, compare, draw_scenes

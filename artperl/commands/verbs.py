@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import tyro
@@ -16,6 +17,7 @@ from artperl.commands.report import Report
 from artperl.commands.train import Train
 from artperl.commands.train_detector import TrainDetector
 from artsim.common.program import run_program
+from artsim.common.progress import say
 
 Verb = (
     Annotated[Train, tyro.conf.subcommand("train")]
@@ -34,7 +36,26 @@ Verb = (
 
 def main() -> None:
     """Entry point of ``artperl``."""
+    sys.argv[1:] = with_new_names(sys.argv[1:])
     run_program(Verb, "artperl", __doc__)
+
+
+def with_new_names(words: list[str]) -> list[str]:
+    """Words of a command line, in which ``evaluate --benchmark NAME`` and ``evaluate --ablation`` are commands."""
+    if words[:1] != ["evaluate"]:
+        return words
+    rest = words[1:]
+    if "--ablation" in rest:
+        rest.remove("--ablation")
+        name = "ablation"
+    elif "--benchmark" in rest[:-1]:
+        at = rest.index("--benchmark")
+        name = rest[at + 1]
+        del rest[at : at + 2]
+    else:
+        return words
+    say(f"note: artperl evaluate {'--ablation' if name == 'ablation' else f'--benchmark {name}'} is now artperl {name}")
+    return [name, *rest]
 
 
 def train_main() -> None:

@@ -30,3 +30,16 @@ def test_the_ablation_is_told_of_no_azimuths_and_an_evaluation_of_no_detections(
     for verb, option in ((verbs.Ablation, "--seen-from -75 75"), (verbs.Evaluate, "laptop --skip-bad")):
         with pytest.raises(SystemExit):
             tyro.cli(verb, args=option.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["evaluate", "--benchmark", "reartmix", "--views", "3"], ["reartmix", "--views", "3"]),
+        (["evaluate", "folder", "--ablation"], ["ablation", "folder"]),
+        (["evaluate", "laptop"], ["evaluate", "laptop"]),
+        (["report", "--benchmark", "artimage"], ["report", "--benchmark", "artimage"]),
+    ],
+)
+def test_former_names_of_benchmarks_are_commands(words: list[str], expected: list[str]) -> None:
+    assert verbs.with_new_names(words) == expected
