@@ -2,7 +2,8 @@
 
 Objects are drawn in their rest frame (metres, Z up, front towards -X) and written as PartNet-Mobility folders: Y-up
 meshes, an empty ``base`` link, and joints without rotations of their own. The binary meshes of ``quirks/formats`` are
-written too; all other quirk cases are written by hand. ``procedural`` holds one exported object of each family.
+written too; all other quirk cases are written by hand. ``procedural`` holds one exported object of each family, and
+``procedural.sha256`` the digests of their files, which alone is in the repository.
 
 Last digits of the demo objects and of inertias depend on which kernels numpy and its BLAS choose for a processor.
 The program starts itself anew with those that every x86-64 processor with AVX2 and FMA has.
@@ -15,6 +16,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
 
@@ -425,10 +427,16 @@ def write_formats(folder: Path) -> None:
 
 
 def write_procedural(folder: Path) -> None:
-    """One procedural object of each category, the smallest file of the first few seeds."""
+    """One procedural object of each category, the smallest file of the first few seeds; and the digests of their files.
+
+    A line of the list is as ``sha256sum`` writes it.
+    """
     for category in sorted(FAMILIES):
         objects = [make(category, seed) for seed in range(SEEDS_TO_CHOOSE_FROM)]
         export(min(objects, key=shape_size), folder / category)
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    lines = (f"{sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}\n" for path in files)
+    folder.with_suffix(".sha256").write_text("".join(lines))
 
 
 def shape_size(obj: ArticulatedObject) -> int:
