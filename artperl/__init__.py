@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["Estimate", "load_estimator", "load_scene_estimator"]
 
 
-PAGE_MODULES.append("artperl.viewer")
+PAGE_MODULES.append("artperl.evaluation.estimate_page")
 
 
 def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Method:
@@ -42,7 +42,7 @@ def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Me
         When there is no such estimator, or its files are damaged.
     """
     with needs("artperl"):
-        from artperl.estimator import load_estimator as load  # torch takes seconds to import
+        from artperl.methods.estimator_files import load_estimator as load  # torch takes seconds to import
 
     return load(name, method=method, **changes)
 

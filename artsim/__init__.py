@@ -12,7 +12,7 @@ Rooms, from the ground up. Each imports only rooms that come before it (import-l
 - appearance: materials and light.
 - renderers: one scene in, one frame out.
 - observing: frames to labelled samples; sensor noise.
-- datasets, then stream: samples to disk and back, or without end. formats: datasets as other programs read them.
+- datasets: samples to disk and back, or without end (stream). formats: datasets as other programs read them.
 - scenes: several objects. checks: gates for simulators.
 - export: objects as URDF, MJCF and USD.
 - variation: objects out of a given one. physics: objects that move. drawing: pictures.

@@ -30,11 +30,11 @@ from artperl.agent.ppo import CLONING, JOINT, OWN_STATES, Phase, PPOOptions, alg
 from artperl.core.batch import concatenate
 from artperl.core.pose import Theta, pose_parts
 from artperl.data.categories import objects_of
-from artperl.data.fitting_problems import Problem, Problems
 from artperl.data.sources import DataOptions
 from artperl.evaluation.samples import TEST_SEEDS
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.fitting_problems import Problem, Problems
 from artperl.training.options import TrainOptions
 from artperl.training.steps import set_rate
 from artsim.common.files import read_bounded

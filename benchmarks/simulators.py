@@ -22,17 +22,16 @@ import numpy as np
 import tyro
 
 from artsim import make
-from artsim.common.extras import silence_output
+from artsim.common.extras import import_pybullet, silence_output
 from artsim.common.progress import say, track
 from artsim.export import FORMATS, export
 from artsim.export.options import ExportOptions
-from artsim.export.robot import LinkJoint, as_robot
 from artsim.families import FAMILIES
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.robot import LinkJoint, as_robot
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.physics.simulators import AGREEMENT, Agreement, compare_simulators
-from artsim.renderers.bullet import import_pybullet
 
 _DRIVE = 1e6
 """Damping of SAPIEN's drives: their force limit is what acts."""

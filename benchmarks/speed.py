@@ -27,13 +27,13 @@ from artperl.agent.ppo import JOINT, PPOOptions, rollout, update
 from artperl.core.mixed_precision import autocast
 from artperl.data.batches import batches
 from artperl.data.categories import ARTIMAGE, objects_of
-from artperl.data.fitting_problems import Problem, Problems
 from artperl.data.sources import DataOptions
 from artperl.evaluation.artimage import row_objects, row_samples
 from artperl.evaluation.benchmark import find_estimator
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.fitting_problems import Problem, Problems
 from artperl.training.objects import BASE_SEEDS
 from artperl.training.perception_losses import perception_losses
 

@@ -31,16 +31,16 @@ from torch import Tensor
 from artperl.core.pose import Theta, clamp_state, pose_parts, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.data.categories import ARTIMAGE
-from artperl.data.fitting_problems import part_truth
-from artperl.estimator import load_estimator
 from artperl.evaluation.artimage import has_half, row_objects, row_samples
 from artperl.evaluation.benchmark import category_folder
 from artperl.evaluation.metrics import Array, rotation_error
 from artperl.fitting.hypotheses import part_weights
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.methods.artperl import ArtPERL
+from artperl.methods.estimator_files import load_estimator
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.box_embedding import box_embedding, by_boxes
+from artperl.training.fitting_problems import part_truth
 from artsim.common.progress import track
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample

@@ -16,9 +16,9 @@ import tyro
 
 import artsim
 from artperl.data.categories import objects_of
-from artperl.estimator import load_estimator
 from artperl.evaluation.metrics import rotation_error, true_poses
 from artperl.evaluation.samples import TEST_SEEDS
+from artperl.methods.estimator_files import load_estimator
 from artsim.model.camera import Camera
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from artperl.estimator import WEIGHTS
+from artperl.methods.estimator_files import WEIGHTS
 from tests.conftest import ROOT
 from tests.reproduce import RECORD as REPRODUCED
 from tests.reproduce import sha256

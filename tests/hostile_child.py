@@ -36,7 +36,7 @@ def base(path: Path) -> str:
 
 
 def estimator(path: Path) -> str:
-    from artperl.estimator import load_estimator
+    from artperl.methods.estimator_files import load_estimator
 
     return str(load_estimator(path).options)
 
@@ -107,6 +107,5 @@ if __name__ == "__main__":
 
     wanted = [(kind, Path(path)) for kind, path in json.loads(sys.argv[1])]
     if any(kind in ("base", "estimator", "points", "intrinsics") for kind, _ in wanted):
-        import artperl.estimator
-        import artperl.inputs  # noqa: F401  # as above
+        pass  # as above
     print(json.dumps([forked(kind, path) for kind, path in wanted]))

@@ -12,12 +12,11 @@ import numpy as np
 from lxml import etree
 from scipy.spatial.transform import Rotation
 
-from artsim.common.extras import silence_output
+from artsim.common.extras import import_pybullet, silence_output
 from artsim.loading.zero_pose import unused_name
 from artsim.model.kinematics import Array, invert_transform
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.simulators import poses_in_file
-from artsim.renderers.bullet import import_pybullet
 from tests.usd_oracle import ParsedStage
 
 Poses = Callable[[dict[str, float]], Mapping[str, Array]]

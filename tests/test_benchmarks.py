@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from artperl.estimator import load_estimator
 from artperl.evaluation.artimage import row_objects, row_samples
 from artperl.evaluation.metrics import rotation_error
+from artperl.methods.estimator_files import load_estimator
 from artsim.export import export
 from artsim.families import make
 from tests.conftest import BOX_LAPTOP, ROOT, absent, installed, valve

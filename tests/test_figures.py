@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from artperl.estimator import WEIGHTS
+from artperl.methods.estimator_files import WEIGHTS
 from artsim.families import make
 from tests.conftest import ROOT
 from tests.figures import (

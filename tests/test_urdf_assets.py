@@ -324,12 +324,7 @@ def test_rebuilding_changes_no_byte(tmp_path: Path) -> None:
     assert Path("procedural.sha256") in built
     changed = [str(name) for name, content in built.items() if (ASSETS / name).read_bytes() != content]
     assert not changed
-    kept = {
-        path.relative_to(ASSETS)
-        for folder in DEMO
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
+    kept = {path.relative_to(ASSETS) for folder in DEMO for path in folder.rglob("*") if path.is_file()}
     kept.add(Path("procedural.sha256"))
     assert kept == {name for name in built if name.parts[0] != "quirks"}, "a file that build.py no longer writes"
 

@@ -35,7 +35,6 @@ class Calibrate:
 
     def run(self) -> None:
         from artperl.data.categories import JOINTS, Parts
-        from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings, save_estimator
         from artperl.evaluation.calibration import calibrated
         from artperl.evaluation.samples import (
             NUM_POINTS,
@@ -46,6 +45,7 @@ class Calibrate:
         )
         from artperl.evaluation.scoring import evaluate, evaluate_foreign
         from artperl.evaluation.tables import summary, table
+        from artperl.methods.estimator_files import WEIGHTS, folder_of, load_estimator, read_settings, save_estimator
         from artsim.families import FAMILIES
 
         mixed = SampleOptions(NUM_POINTS, states=StateOptions("mixed"), views=ViewOptions("mixed"))

@@ -67,7 +67,7 @@ class Estimate(EstimateOptions):
     """
 
     def run(self) -> None:
-        from artperl.estimator import load_estimator
+        from artperl.methods.estimator_files import load_estimator
 
         inputs = (*self.clouds, self.intrinsics, self.mask, self.detections)
         for path in (self.out, self.view, self.picture):
@@ -105,8 +105,8 @@ class Estimate(EstimateOptions):
             raise ConfigError("a page shows one object", "view", "give one file, or leave it out")
 
     def _estimate_one(self, file: Path, estimator: Method) -> None:
+        from artperl.evaluation.estimate_page import page
         from artperl.inputs import read_cloud
-        from artperl.viewer import page
 
         cloud = read_cloud(file, self.input_options())
         for text in cloud.notes:

@@ -16,7 +16,7 @@ def estimator_folder(name: str) -> Path:
     ConfigError
         When there is none.
     """
-    from artperl.estimator import WEIGHTS, folder_of
+    from artperl.methods.estimator_files import WEIGHTS, folder_of
 
     settings = "estimator.json"
     for folder in (folder_of(name), Path(name) / "best"):

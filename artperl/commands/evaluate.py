@@ -59,12 +59,12 @@ class Evaluate:
 
     def run(self) -> None:
         from artperl.data.categories import objects_of
-        from artperl.estimator import folder_of, load_estimator, read_settings
         from artperl.evaluation.artimage import match_category
         from artperl.evaluation.samples import TEST_SEEDS, frozen_samples, samples_of
         from artperl.evaluation.scoring import evaluate, object_symmetries
         from artperl.evaluation.tables import summary, table
         from artperl.methods import STORED_METHODS
+        from artperl.methods.estimator_files import folder_of, load_estimator, read_settings
         from artsim.loading.sources import find_sources
 
         if self.json is not None:

@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.core.batch import Batch
 from artsim.model.kinematics import ROTATING, Array
+
+_FARTHEST = 1e9
+"""Coordinates beyond stand for no measurement, as the largest float does for some sensors; squares of them overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,3 +63,17 @@ def joint_rows(kinds: Sequence[str], axis: Array, origin: Array, center: Array, 
     pivot = (away - (away * axis).sum(-1, keepdims=True) * axis) / diagonal
     rows: Array = np.concatenate([axis * sliding, axis * turning, pivot * turning], axis=1)
     return rows
+
+
+def is_measured(points: Array) -> NDArray[np.bool_]:
+    """(N,) which points a sensor can have measured: finite, not beyond all reach, and not at exactly 0 0 0.
+
+    The origin is the camera itself; sensors and exporters write it where nothing came back.
+    """
+    return np.logical_and((np.abs(points) < _FARTHEST).all(axis=1), points.any(axis=1))
+
+
+def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """``count`` of ``available`` indices in random order, every one before any comes twice."""
+    rounds = [rng.permutation(available) for _ in range(-(-count // available))]
+    return np.concatenate(rounds)[:count]

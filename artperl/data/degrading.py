@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from artperl.perception.preprocess import draw
+from artperl.core.clouds import draw
 from artsim.observing.interference import interfere
 from artsim.observing.sample import Sample
 

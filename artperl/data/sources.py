@@ -18,13 +18,13 @@ from artperl.core.part_order import reorder_sample, visible_order
 from artperl.data.categories import Parts, has_parts, order_parts
 from artperl.data.facing import Facing
 from artsim.datasets.dataset import open_dataset
+from artsim.datasets.family_stream import FamilyStream
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.datasets.sample_options import SensorName
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import shared_renderer
-from artsim.stream import FamilyStream
 
 _ATTEMPTS = 200
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from artperl.data.categories import ARTIMAGE
-from artperl.estimator import folder_of, load_estimator
 from artperl.evaluation.artimage import OBJECTS, VIEWS, Row, has_half, row_objects, row_samples
 from artperl.evaluation.artimage_files import ArtImageFiles
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.evaluation.tables import against_published, summary, table
+from artperl.methods.estimator_files import folder_of, load_estimator
 from artperl.methods.full import Estimator
 from artsim.common.progress import track
 from artsim.errors import DatasetError

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from artperl.estimator import folder_of, weights_sha256
 from artperl.evaluation.average_precision import PosedObject
 from artperl.inputs.detections import Detections
+from artperl.methods.estimator_files import folder_of, weights_sha256
 from artperl.scene.estimator import SceneEstimate, SceneEstimator
 from artsim.common.files import read_json, write_atomic
 from artsim.errors import ConfigError

@@ -17,12 +17,12 @@ from torch import Tensor
 from artperl.core.batch import concatenate
 from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta
+from artperl.core.references import References
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting import beam_search, initial_pose
 from artperl.fitting.options import EstimatorOptions
 from artperl.perception.network import Perceived
-from artperl.retrieval.references import References
 
 _CHAIN = 3
 """Joints one after another from which parts below have to tell how those above have turned."""

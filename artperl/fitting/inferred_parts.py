@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from artperl.retrieval.category_prior import CategoryPrior
+from artperl.core.category_prior import CategoryPrior
 
 Array = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
+from artperl.core.category_prior import CategoryPrior
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
@@ -27,7 +28,6 @@ from artperl.fitting.umeyama import Similarity, ransac_umeyama
 from artperl.perception.ancsh_networks import CoordinateNetwork, JointNetwork
 from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
-from artperl.retrieval.category_prior import CategoryPrior
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.json_records import from_json_values
@@ -98,7 +98,7 @@ class ANCSH:
         self, coordinates: CoordinateNetwork, joints: JointNetwork, base: ShapeBase, options: ANCSHOptions | None = None
     ):  # fmt: skip
         self.coordinates, self.joints = coordinates.eval(), joints.eval()
-        self.base, self.prior, self.options = base, CategoryPrior.of(base), options or ANCSHOptions()
+        self.base, self.prior, self.options = base, CategoryPrior.of(base.shapes, base.kind), options or ANCSHOptions()
 
     @property
     def categories(self) -> tuple[str, ...]:

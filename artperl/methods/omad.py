@@ -15,6 +15,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
+from artperl.core.category_prior import CategoryPrior
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
@@ -26,7 +27,6 @@ from artperl.fitting.keypoint_fit import KeypointFit, fit_keypoints, posed_keypo
 from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.omad_networks import CueNetwork, Cues, KeypointPrior, rotation_of_quaternion
 from artperl.perception.preprocess import Cloud
-from artperl.retrieval.category_prior import CategoryPrior
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.json_records import from_json_values
@@ -79,7 +79,7 @@ class OMAD:
         self, keypoint_prior: KeypointPrior, cues: CueNetwork, base: ShapeBase, options: OMADOptions | None = None
     ):  # fmt: skip
         self.keypoint_prior, self.cues = keypoint_prior.eval(), cues.eval()
-        self.base, self.prior, self.options = base, CategoryPrior.of(base), options or OMADOptions()
+        self.base, self.prior, self.options = base, CategoryPrior.of(base.shapes, base.kind), options or OMADOptions()
 
     @property
     def categories(self) -> tuple[str, ...]:
@@ -166,7 +166,7 @@ def omad_networks(sizes: OMADSizes, base: ShapeBase | None = None) -> dict[str, 
     """New networks of these sizes, by name; the prior begins with the means of a base, if there is one."""
     mirrored, joint = torch.zeros(sizes.num_rows), None
     if base is not None:
-        known = CategoryPrior.of(base)
+        known = CategoryPrior.of(base.shapes, base.kind)
         mirrored = (base.shapes.box_center[..., 1].abs() < _CENTRAL).all(0).float()
         joint = torch.from_numpy(np.concatenate([known.axis, known.origin], axis=1))
     return {"keypoint_prior": KeypointPrior(mirrored, joint), "cues": CueNetwork(sizes.num_rows, sizes.width)}

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from artperl.core.clouds import is_measured
 from artperl.core.usual_sizes import size_warning
-from artperl.perception.preprocess import Cloud, is_measured
+from artperl.perception.preprocess import Cloud
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from artperl.core.clouds import draw, is_measured
 from artperl.core.kd_tree import KDTree
 from artsim.errors import ArtsimError
 
@@ -29,8 +30,6 @@ _CLEANED = 4096
 """Points that are looked at for outliers."""
 _FEWEST = 8
 """Points below which there is nothing to fit."""
-_FARTHEST = 1e9
-"""Coordinates beyond stand for no measurement, as the largest float does for some sensors; squares of them overflow."""
 _SMALLEST = 1e-6
 """Extent below which single precision, in which networks work, hardly tells points from each other."""
 
@@ -130,14 +129,6 @@ def as_cloud(points: ArrayLike) -> Array:
     return cloud
 
 
-def is_measured(points: Array) -> NDArray[np.bool_]:
-    """(N,) which points a sensor can have measured: finite, not beyond all reach, and not at exactly 0 0 0.
-
-    The origin is the camera itself; sensors and exporters write it where nothing came back.
-    """
-    return np.logical_and((np.abs(points) < _FARTHEST).all(axis=1), points.any(axis=1))
-
-
 def clean(points: Array) -> NDArray[np.int64]:
     """Indices of the points that show the object: measured, and not on their own.
 
@@ -188,9 +179,3 @@ def _is_crowded(points: Array, known: Array, within: float) -> NDArray[np.bool_]
     )
     taken, count = np.unique(own, return_counts=True)
     return np.isin(number, taken[count > _FEW_NEIGHBOURS]) & (np.abs(cells[0]) < _CELLS).all(axis=1)
-
-
-def draw(available: int, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """``count`` of ``available`` indices in random order, every one before any comes twice."""
-    rounds = [rng.permutation(available) for _ in range(-(-count // available))]
-    return np.concatenate(rounds)[:count]

@@ -2,38 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from artperl.core.batch import concatenate
-from artperl.core.pose import AxisPrior
+from artperl.core.references import References
 from artperl.core.shapes import Shapes
 from artperl.perception.network import Perceived
 from artperl.perception.part_grouping import PerceivedTree
 from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.composition import compose, joint_features, motion, same_axes
 from artperl.retrieval.shape_base import ShapeBase
-
-
-@dataclass(frozen=True, eq=False)
-class References:
-    """R objects of the base that may explain a cloud, the nearest first.
-
-    Attributes
-    ----------
-    shapes : Shapes
-        R rows, as the base has them.
-    row : (R,) int64
-        Of the base.
-    axis_priors : dict
-        By row of the base, how the axes of such objects lean; None where they do not.
-    """
-
-    shapes: Shapes
-    row: Tensor
-    axis_priors: dict[int, AxisPrior | None]
 
 
 def retrieve_references(base: ShapeBase, perceived: Perceived, count: int) -> References:

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from artperl.core.estimate import Estimate
 from artperl.detection import SHIPPED
-from artperl.estimator import WEIGHTS, load_estimator, stored_method
 from artperl.inputs.depth_images import points_of_depth
 from artperl.inputs.detections import Detection
+from artperl.methods.estimator_files import WEIGHTS, load_estimator, stored_method
 from artperl.methods.protocol import Method
 from artperl.scene.denoise import denoise
 from artperl.scene.separation import moved, moved_apart

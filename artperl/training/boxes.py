@@ -13,10 +13,10 @@ from artperl.boxes.network import Boxes
 from artperl.data.batches import SENSORS
 from artperl.data.degrading import degrade
 from artperl.data.sources import Source
-from artperl.estimator import save_estimator
 from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS
 from artperl.evaluation.scoring import evaluate, mean_iou
 from artperl.evaluation.tables import summary
+from artperl.methods.estimator_files import save_estimator
 from artperl.methods.full import Estimator
 from artperl.training.box_records import learn, record
 from artperl.training.context import Context

@@ -14,21 +14,21 @@ from pathlib import Path
 from typing import Any, Literal
 
 from artperl.data.categories import ARTIMAGE
-from artperl.estimator import WEIGHTS, folder_of, load_estimator
 from artperl.evaluation.artimage import has_half, row_objects, row_samples
 from artperl.evaluation.comparison import row_record
 from artperl.evaluation.comparison_page import html_page, markdown
+from artperl.evaluation.estimate_page import page
 from artperl.evaluation.pictures import curves, overlays
 from artperl.evaluation.robotarm import ARM, arm_samples, seven_part_arm
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.methods import StoredMethod
+from artperl.methods.estimator_files import WEIGHTS, folder_of, load_estimator
 from artperl.methods.protocol import Method
 from artperl.training.options import LENGTHS, PRESETS, TrainOptions, preset_of
 from artperl.training.recipes import about_tested
 from artperl.training.run import Training
 from artperl.training.timing import filling, trained_minutes
-from artperl.viewer import page
 from artsim.common.files import read_json, write_atomic
 from artsim.errors import ArtsimError, ConfigError
 from artsim.export import export

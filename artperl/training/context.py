@@ -12,7 +12,7 @@ from typing import Any, Protocol, cast
 import torch
 
 from artperl.core.ranks import Ranks
-from artperl.estimator import load_estimator
+from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.training.objects import TrainingObjects

@@ -18,13 +18,13 @@ from torch.nn import functional
 from torch.utils.data import DataLoader
 
 from artperl.core.mixed_precision import autocast
-from artperl.data.scene_cells import Cells, SceneCells
 from artperl.detection.detector import Detector, save_detector
 from artperl.detection.images import WIDTH
 from artperl.detection.network import OFFSET, DetectorNetwork, DetectorSize
 from artperl.training.recipes import commit
 from artperl.training.report import write_scalars
 from artperl.training.run_folder import RunFolder
+from artperl.training.scene_cells import Cells, SceneCells
 from artperl.training.state import RunState
 from artperl.training.steps import Stop, one_cycle, set_rate
 from artperl.training.supervised import SAVE_STEPS, descend

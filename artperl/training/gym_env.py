@@ -25,10 +25,10 @@ from artperl.agent.actions import NOTHING, NUM_AXES, NUM_BINS
 from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.core.trees import KINDS
 from artperl.data.categories import objects_of
-from artperl.data.fitting_problems import Problem, Problems
 from artperl.data.sources import DataOptions
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.fitting_problems import Problem, Problems
 
 ENV_ID = "artperl/PoseFitting-v0"
 _FAR = np.float32(1e3)

@@ -22,13 +22,13 @@ from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, theta_from_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.data.batches import row_batches
-from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Source
 from artperl.methods.artperl import ArtPERL
 from artperl.methods.retrieved import AgentMethod, Sizes
 from artperl.retrieval.box_embedding import box_embedding
 from artperl.retrieval.siamese import POINTS, by_siamese, canonical_clouds, contrastive_loss, margins
 from artperl.training.context import Context
+from artperl.training.fitting_problems import part_truth
 from artperl.training.options import TrainOptions
 from artperl.training.steps import one_cycle, set_rate
 from artperl.training.supervised import SupervisedStage, Taken, descend, segmentation_loss, take_steps, told

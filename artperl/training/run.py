@@ -16,8 +16,8 @@ with needs("training"):
     from torch import nn
 
 from artperl.core.ranks import Ranks, several_started
-from artperl.estimator import load_estimator
 from artperl.methods import StoredMethod
+from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.perception.network import Perception

@@ -8,11 +8,11 @@ from typing import Protocol
 
 from torch import nn
 
+from artperl.core.category_prior import CategoryPrior
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.perception.network import Perception
-from artperl.retrieval.category_prior import CategoryPrior
 from artperl.training.ancsh_stages import ancsh_estimator, ancsh_run_networks, ancsh_stages
 from artperl.training.boxes import BoxStage
 from artperl.training.context import Context
@@ -45,7 +45,7 @@ def _anything(objects: TrainingObjects) -> None:
 
 def _one_tree(objects: TrainingObjects) -> CategoryPrior:
     """A method that learns one kinematic tree."""
-    return CategoryPrior.of(objects.base)
+    return CategoryPrior.of(objects.base.shapes, objects.base.kind)
 
 
 @dataclass(frozen=True)

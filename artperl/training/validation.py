@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from artperl.estimator import read_settings, save_estimator
 from artperl.evaluation.calibration import calibrated
 from artperl.evaluation.samples import (
     NUM_POINTS,
@@ -21,6 +20,7 @@ from artperl.evaluation.samples import (
 from artperl.evaluation.scoring import Scored, evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
 from artperl.methods.artperl import ArtPERL
+from artperl.methods.estimator_files import read_settings, save_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Method
 from artperl.training.context import Context

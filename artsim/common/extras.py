@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ArtsimError, ConfigError, RenderError
 
 MODULES = {
     "pybullet": ("PyBullet", "pybullet"),
@@ -181,3 +181,16 @@ def silence_output() -> Iterator[None]:
             stack.callback(os.dup2, saved, stream)
         stack.callback(ctypes.CDLL(None).fflush, None)  # C buffers what it prints
         yield
+
+
+def import_pybullet() -> ModuleType:
+    """PyBullet, without its greeting.
+
+    Raises
+    ------
+    RenderError
+        When it is not installed.
+    """
+    with needs("pybullet", RenderError), silence_output():
+        import pybullet
+    return pybullet

@@ -14,13 +14,13 @@ from artsim.common.names import printable, safe_name
 from artsim.common.outputs import check_output, write_output
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
-from artsim.drawing.annotation import BOX_EDGES, Shown, axis_segment, box_corners, shade_parts
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, ViewOptions, joint_intervals, sample_state, sample_view
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.annotation import BOX_EDGES, Shown, axis_segment, box_corners, shade_parts
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
 from artsim.renderers import render

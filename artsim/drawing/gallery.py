@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.common.names import printable
-from artsim.drawing.annotation import shade_parts
 from artsim.model.draws import ViewOptions, joint_intervals, sample_view
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.annotation import shade_parts
 from artsim.renderers import render
 
 _TILE = 260  # pixels

@@ -23,13 +23,13 @@ from artsim.common.outputs import write_output
 from artsim.common.palette import PALETTE
 from artsim.common.showing import page_of
 from artsim.datasets.dataset import Dataset
-from artsim.drawing.annotation import axis_segment
 from artsim.drawing.contact_sheet import spread
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import ROTATING, Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.annotation import axis_segment
 from artsim.observing.sample import Sample
 
 _MOST_POINTS = 20_000

@@ -11,9 +11,9 @@ from artsim.common.extras import needs
 from artsim.common.files import write_error
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
-from artsim.drawing.annotation import Shown, axis_segment
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
+from artsim.observing.annotation import Shown, axis_segment
 
 
 def write_recording(shown: Sequence[Shown], path: Path) -> None:

@@ -11,9 +11,9 @@ from PIL import Image, ImageDraw
 from artsim.common.files import write_atomic
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
-from artsim.drawing.annotation import BOX_EDGES, axis_segment, box_corners
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND
+from artsim.observing.annotation import BOX_EDGES, axis_segment, box_corners
 from artsim.observing.sample import Sample
 from artsim.scenes.ground_truth import SceneView, png_bytes, write_view
 

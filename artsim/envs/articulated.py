@@ -23,10 +23,10 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.datasets.padding import pad_sample
-from artsim.drawing.annotation import shade_parts
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.annotation import shade_parts
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions, openness
 from artsim.physics.options import Control

@@ -21,9 +21,9 @@ from artsim.errors import ConfigError
 from artsim.export.loaded import prepare
 from artsim.export.looks import MATERIALS_FILE, NO_FINISH, Finish, draw_finish, looks_text, materials_text
 from artsim.export.options import ExportOptions
-from artsim.export.robot import Robot, as_robot
 from artsim.export.text import obj_text
 from artsim.model.objects import ArticulatedObject
+from artsim.model.robot import Robot, as_robot
 
 DEFAULTS = ExportOptions()
 FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda"}

@@ -12,9 +12,9 @@ from PIL import Image as Picture
 
 from artsim.appearance import Material, patches
 from artsim.appearance.finishes import draw_coats
-from artsim.export.robot import Robot
 from artsim.export.text import number
 from artsim.model.kinematics import Array
+from artsim.model.robot import Robot
 
 MATERIALS_FILE = "materials.mtl"
 """Lies beside the meshes, with the pictures of its textures."""

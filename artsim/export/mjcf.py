@@ -11,8 +11,8 @@ from artsim.common.extras import import_mujoco
 from artsim.errors import AssetError
 from artsim.export.looks import NO_FINISH, Finish, Look, looks_text
 from artsim.export.options import ExportOptions
-from artsim.export.robot import STRENGTH, BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers, obj_text
+from artsim.model.robot import STRENGTH, BoxShape, Link, LinkJoint, MeshShape, Robot
 
 _SOLREF, _SOLIMP = "0.004 1", "0.9999 0.9999 0.001 0.5 2"
 """As stiff as MuJoCo's time step of 2 ms allows."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from artsim.export.robot import MeshShape
+from artsim.model.robot import MeshShape
 
 
 def number(value: float) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from lxml import etree
 
-from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.export.text import number, numbers
+from artsim.model.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 
 _KINDS = {"free": "free", "revolute": "hinge", "continuous": "hinge", "prismatic": "slider", "screw": "screw"}
 """What ``semantics.txt`` calls the joint of each part."""

@@ -10,8 +10,8 @@ import numpy as np
 from artsim.common.extras import needs
 from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
-from artsim.export.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 from artsim.model.kinematics import Array
+from artsim.model.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 
 
 def usd_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -> str:

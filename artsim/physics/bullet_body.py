@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from artsim.common.extras import silence_output
-from artsim.export.robot import BoxShape, Link, MeshShape, Robot
+from artsim.common.extras import import_pybullet, silence_output
 from artsim.model.kinematics import Array
+from artsim.model.robot import BoxShape, Link, MeshShape, Robot
 from artsim.physics.options import PhysicsOptions
-from artsim.renderers.bullet import import_pybullet
 
 _ANY_SPEED = 1e4
 

@@ -12,6 +12,7 @@ import tyro
 from numpy.typing import ArrayLike
 
 from artsim.common.sequences import wrap_singles
+from artsim.datasets.family_stream import STREAM_SEEDS
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.loading.sources import FamilySource, Source, family_sources, find_sources
@@ -33,7 +34,6 @@ from artsim.observing.sample import Sample
 from artsim.observing.sensor import find_sensor
 from artsim.physics.options import Control, Engine, PhysicsOptions
 from artsim.physics.world import Simulation
-from artsim.stream import STREAM_SEEDS
 
 
 @dataclass(frozen=True)

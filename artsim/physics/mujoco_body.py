@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from artsim.common.extras import import_mujoco
-from artsim.export.robot import Robot
 from artsim.model.kinematics import Array
+from artsim.model.robot import Robot
 from artsim.physics.options import PhysicsOptions
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from artsim.errors import ConfigError
-from artsim.export.robot import GRAVITY
+from artsim.model.robot import GRAVITY
 
 Control = Literal["effort", "velocity"]
 Engine = Literal["auto", "pybullet", "mujoco"]

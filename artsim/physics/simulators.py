@@ -26,14 +26,13 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from artsim.common.extras import import_mujoco, needs, silence_output
+from artsim.common.extras import import_mujoco, import_pybullet, needs, silence_output
 from artsim.errors import ArtsimError
 from artsim.loading.object_files import find_urdf
 from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
-from artsim.renderers.bullet import import_pybullet
 
 AGREEMENT = 1e-6
 """Metres by which places of parts may differ; for objects larger than 1 m, share of their diagonal."""

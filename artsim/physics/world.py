@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.errors import ConfigError
-from artsim.export.robot import LinkJoint, Robot, as_robot
 from artsim.loading.decomposition import decompose
 from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.robot import LinkJoint, Robot, as_robot
 from artsim.physics.bullet_body import BulletBody
 from artsim.physics.friction import held_speeds
 from artsim.physics.mujoco_body import MujocoBody
@@ -62,7 +62,7 @@ class Simulation:
 
     Its rest frame is the world's. Friction is Coulomb's: a joint at rest stays until the effort exceeds it. Damping is
     viscous. Masses follow from densities; what holds damping, friction and efforts is told in
-    :mod:`artsim.export.robot`, so that a simulation here moves as the exported file does elsewhere.
+    :mod:`artsim.model.robot`, so that a simulation here moves as the exported file does elsewhere.
 
     Parameters
     ----------

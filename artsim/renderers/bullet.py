@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from artsim.appearance import Coat, Lights, Patch, patches, subpixel
-from artsim.common.extras import needs, silence_output
+from artsim.common.extras import import_pybullet, silence_output
 from artsim.errors import RenderError
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
@@ -288,16 +288,3 @@ def _projection(camera: Camera, near: float, far: float, shift: tuple[float, flo
             [0, 0, -1, 0],
         ]
     )
-
-
-def import_pybullet() -> ModuleType:
-    """PyBullet, without its greeting.
-
-    Raises
-    ------
-    RenderError
-        When it is not installed.
-    """
-    with needs("pybullet", RenderError), silence_output():
-        import pybullet
-    return pybullet

@@ -145,7 +145,7 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
     AssetError
         When an object does not load.
     """
-    from artsim.appearance.painted import painted_coats  # with it, the readers of meshes come
+    from artsim.loading.painted import painted_coats  # with it, the readers of meshes come
 
     if seed < 0:
         raise ConfigError(f"seed {seed} is negative", "seed", "use 0 or more")

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from artperl.data.categories import ARTIMAGE
-from artperl.estimator import load_estimator
 from artperl.evaluation import metrics
 from artperl.evaluation.artimage import row_objects, row_samples
 from artperl.evaluation.scoring import evaluate
+from artperl.methods.estimator_files import load_estimator
 from tests.artperl import golden
 
 pytestmark = pytest.mark.slow

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.estimator import load_estimator
 from artperl.inputs import points_of_depth
+from artperl.methods.estimator_files import load_estimator
 from artsim.errors import ConfigError
 from tests.artperl import golden
 

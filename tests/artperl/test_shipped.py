@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from artperl.data.categories import ARTIMAGE, JOINTS
-from artperl.estimator import WEIGHTS, folder_of, load_estimator, read_settings
 from artperl.evaluation import metrics
 from artperl.evaluation.artimage import real_objects
 from artperl.evaluation.samples import frozen_samples, samples_of
 from artperl.evaluation.scoring import evaluate
+from artperl.methods.estimator_files import WEIGHTS, folder_of, load_estimator, read_settings
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import StateOptions, ViewOptions
 from artsim.observing.interference import FOREIGN, interfere

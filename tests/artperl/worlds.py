@@ -8,12 +8,12 @@ import numpy as np
 import torch
 
 import artsim
-from artperl.data.fitting_problems import Problem, Problems
 from artperl.data.sources import DataOptions
 from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.retrieval.box_embedding import by_boxes
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.fitting_problems import Problem, Problems
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample

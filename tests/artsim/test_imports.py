@@ -37,7 +37,7 @@ def test_import_artsim_is_all_but_free() -> None:
 
 def test_help_waits_for_no_family_no_mesh_reader_and_no_scipy() -> None:
     modules = imported("import artsim.commands.verbs")
-    assert not modules & {"scipy", "trimesh", "torch", "numba", "pybullet", "artsim.appearance.painted"}
+    assert not modules & {"scipy", "trimesh", "torch", "numba", "pybullet", "artsim.loading.painted"}
     assert not [name for name in modules if name.startswith("artsim.families.") and name.split(".")[-1] in CATEGORIES]
 
 

@@ -15,11 +15,11 @@ from torch import distributed, multiprocessing
 from torch.utils.data import DataLoader, IterableDataset
 
 import artsim
+from artsim.datasets.family_stream import FamilyStream
 from artsim.datasets.generate import generate
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.loading.sources import family_sources
-from artsim.stream import FamilyStream
 
 SMALL = SampleOptions(num_points=32)
 

@@ -58,7 +58,7 @@ def _base(folder: Path) -> None:
 
 
 def _estimator(folder: Path) -> None:
-    from artperl.estimator import load_estimator
+    from artperl.methods.estimator_files import load_estimator
 
     load_estimator(folder)
 

@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from artsim.appearance import Coat
 from artsim.envs.maniskill.places import T_world_object
-from artsim.export.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
 from artsim.loading.decomposition import decompose
 from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.robot import DECAY, GRAVITY, BoxShape, Link, LinkJoint, MeshShape, Robot, as_robot
 from artsim.renderers.sapien_stage import render_body
 
 OBJECT_BIT = 28
@@ -64,7 +64,7 @@ def build(
 ) -> Built:
     """Put an object on the ground of a sub-scene, its base fixed.
 
-    Damping, friction and masses are those of :func:`artsim.export.robot.as_robot`, as in :mod:`artsim.physics.world`; a
+    Damping, friction and masses are those of :func:`artsim.model.robot.as_robot`, as in :mod:`artsim.physics.world`; a
     loaded object moves as its convex hulls do, and looks as its own surface does.
 
     Parameters

@@ -11,7 +11,7 @@ import torch
 from artperl.agent.actions import NOTHING
 from artperl.agent.decision_process import Fitting, FittingOptions, View
 from artperl.core.rotations import rotation_from_vector
-from artperl.data.fitting_problems import Problem
+from artperl.training.fitting_problems import Problem
 from tests.artperl.worlds import small_problem
 
 OPTIONS = FittingOptions()

@@ -12,12 +12,12 @@ from torch import Tensor
 
 from artperl.commands.detections import MakeDetections
 from artperl.commands.estimate import Estimate
-from artperl.data.scene_cells import Cells, SceneCells
 from artperl.detection.detector import Detector, load_detector, save_detector
 from artperl.detection.network import DetectorNetwork, DetectorSize
 from artperl.evaluation.mask_precision import mask_precision
 from artperl.evaluation.realistic_detections import Flaws, realistic_detections
 from artperl.training.detector import detector_losses, scene_options, train_detector
+from artperl.training.scene_cells import Cells, SceneCells
 from artsim.errors import ConfigError, DatasetError
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun, generate_scenes
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
@@ -53,7 +53,7 @@ class Truthful(DetectorNetwork):
 
 def truthful(folder: Path, view: int, monkeypatch: pytest.MonkeyPatch) -> Detector:
     """A detector that knows a view, seen as it is."""
-    import artperl.data.scene_cells as module
+    import artperl.training.scene_cells as module
 
     monkeypatch.setattr(module, "_ZOOM", (1.0, 1.0))
     monkeypatch.setattr(module, "_WINDOW_CELLS", (90, 160))
@@ -110,7 +110,7 @@ def test_a_window_shows_what_the_whole_image_shows_there(folder: Path) -> None:
     categories = SceneDataset(folder).categories
     whole, windows = SceneCells([folder], categories, 1, 2, 640), SceneCells([folder], categories, 4, 2, 640)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("artperl.data.scene_cells._WINDOW_CELLS", (90, 160))
+        patch.setattr("artperl.training.scene_cells._WINDOW_CELLS", (90, 160))
         image = whole[0]
     window = windows[0]
     assert window.channels.shape == (4, 8, 192, 320)

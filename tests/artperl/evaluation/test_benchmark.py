@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from artperl.estimator import save_estimator
 from artperl.evaluation.benchmark import category_folder, run_benchmark
+from artperl.methods.estimator_files import save_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from tests.artperl.worlds import small_base

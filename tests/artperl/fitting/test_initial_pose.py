@@ -13,7 +13,6 @@ from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, joint_states, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Shapes
-from artperl.data.fitting_problems import part_truth
 from artperl.data.sources import Samples
 from artperl.data.truth import Truth, to_batch, training_rows
 from artperl.evaluation import metrics
@@ -27,6 +26,7 @@ from artperl.fitting.initial_pose import (
 )
 from artperl.perception.network import Perceived
 from artperl.retrieval.shape_base import ShapeBase
+from artperl.training.fitting_problems import part_truth
 from artsim.datasets.plan import SampleOptions
 from artsim.observing.sample import Sample
 

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-from artperl.estimator import load_estimator
+from artperl.methods.estimator_files import load_estimator
 from tests.artperl import golden
 
 if "--clouds" in sys.argv[1:]:

@@ -12,11 +12,11 @@ import pytest
 from PIL import Image
 
 import artsim
+from artperl.evaluation.estimate_page import page
 from artperl.evaluation.samples import samples_of
 from artperl.inputs import points_of_depth, read_intrinsics, read_points
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
-from artperl.viewer import page
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError, ConfigError
 from artsim.model.frame import BACKGROUND

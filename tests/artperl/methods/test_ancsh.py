@@ -12,10 +12,10 @@ import torch
 import artsim
 from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
-from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.scoring import Scored, score
 from artperl.inputs.detections import Detection
 from artperl.methods.ancsh import ANCSH, ANCSHSizes, ancsh_networks
+from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.perception.ancsh_networks import CoordinateNetwork, Coordinates, JointNetwork, JointPoints
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.scene.estimator import SceneEstimator

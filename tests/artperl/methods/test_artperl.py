@@ -15,17 +15,17 @@ from artperl.agent.decision_process import Fitting, FittingOptions
 from artperl.agent.ppo import PPOOptions, rollout
 from artperl.agent.start import MeanView
 from artperl.core.shapes import Observed
-from artperl.data.fitting_problems import part_truth
-from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.metrics import rotation_error
 from artperl.evaluation.scoring import evaluate
 from artperl.fitting.refine_options import RefineOptions
 from artperl.methods import METHODS, method_of
 from artperl.methods.artperl import ArtPERL, ArtPERLOptions
+from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.retrieved import Sizes
 from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese
+from artperl.training.fitting_problems import part_truth
 from artperl.training.options import PAPER_PRESETS
 from artperl.training.run import Training
 from artsim.errors import ConfigError, DatasetError

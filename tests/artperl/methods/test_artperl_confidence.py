@@ -11,8 +11,8 @@ import torch
 import artsim
 from artperl.agent.start import MeanView
 from artperl.core.confidence import Calibration, PartCalibration
-from artperl.estimator import load_estimator, save_estimator
 from artperl.methods.artperl import ArtPERL
+from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.retrieved import Sizes
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese

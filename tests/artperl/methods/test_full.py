@@ -11,11 +11,11 @@ import torch
 
 from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
-from artperl.estimator import load_estimator
 from artperl.evaluation import metrics
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.samples import frozen_samples
 from artperl.evaluation.scoring import score
+from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.network import Votes
 from artperl.retrieval.box_embedding import by_boxes

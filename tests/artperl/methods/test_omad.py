@@ -14,8 +14,8 @@ from artperl.data.batches import row_batches
 from artperl.data.categories import objects_of
 from artperl.data.sources import DataOptions
 from artperl.data.truth import to_batch
-from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.metrics import rotation_error, true_poses
+from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.omad import OMAD, OMADOptions, OMADSizes, omad_networks, state_range
 from artperl.perception.omad_networks import CueNetwork, Cues
 from artperl.retrieval.shape_base import ShapeBase

@@ -13,13 +13,13 @@ import artsim
 from artperl.agent.registration import part_goals, part_problems
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.shapes import Observed
-from artperl.data.fitting_problems import part_truth
-from artperl.estimator import load_estimator, save_estimator
 from artperl.evaluation.metrics import rotation_error
+from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.retrieved import Sizes
 from artperl.methods.sporeagent import SporeAgent, posed_apart
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese
+from artperl.training.fitting_problems import part_truth
 from artperl.training.options import SPOREAGENT_PRESETS
 from artperl.training.run import Training
 from tests.artperl.worlds import view

@@ -12,8 +12,8 @@ import torch
 import artsim
 from artperl.core.pose import Theta, pose_parts
 from artperl.core.rotations import rotation_from_vector
-from artperl.estimator import load_estimator
 from artperl.evaluation.metrics import rotation_error, translation_error, true_poses
+from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.tracking import INTERVAL, moved_on
 from artsim.errors import ArtsimError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from artperl.core.usual_sizes import USUAL, size_warning
-from artperl.estimator import load_estimator
+from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.cloud_checks import cloud_warnings
 from artperl.perception.preprocess import Cloud

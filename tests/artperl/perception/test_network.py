@@ -12,8 +12,8 @@ from artperl.data.batches import batches
 from artperl.data.categories import ARTIMAGE
 from artperl.data.sources import DataOptions
 from artperl.data.truth import Truth
-from artperl.estimator import load_estimator
 from artperl.evaluation.samples import VALIDATION_SEEDS, frozen_samples
+from artperl.methods.estimator_files import load_estimator
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.training.perception_losses import perception_figures, perception_losses
 from artsim.datasets.plan import SampleOptions

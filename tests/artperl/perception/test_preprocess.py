@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from artperl.perception.preprocess import Cloud, clean, draw
+from artperl.core.clouds import draw
+from artperl.perception.preprocess import Cloud, clean
 from artsim.errors import ArtsimError
 
 

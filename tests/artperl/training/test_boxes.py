@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from artperl.boxes.evidence import PERCEIVED, SHARES, Evidence, roughness
 from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import concatenate
-from artperl.estimator import load_estimator
 from artperl.evaluation.box_overlap import iou_aligned
 from artperl.evaluation.samples import frozen_samples
+from artperl.methods.estimator_files import load_estimator
 from artperl.training import box_records
 from artperl.training.boxes import best_without_own_references
 from artperl.training.options import TrainOptions

@@ -17,19 +17,19 @@ from safetensors.torch import load_file
 from artperl.boxes.network import Boxes
 from artperl.commands import verbs
 from artperl.data.sources import Given
-from artperl.estimator import load_estimator, read_settings, save_estimator
 from artperl.evaluation.samples import TEST_SEEDS, VALIDATION_SEEDS
+from artperl.methods.estimator_files import load_estimator, read_settings, save_estimator
 from artperl.training.context import Report
 from artperl.training.objects import BASE_SEEDS
 from artperl.training.options import PRESETS, TrainOptions
 from artperl.training.run import Training
 from artperl.training.steps import one_cycle
 from artsim import generate
+from artsim.datasets.family_stream import STREAM_SEEDS
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import family_sources
 from artsim.loading.urdf import load
-from artsim.stream import STREAM_SEEDS
 
 pytestmark = pytest.mark.slow
 

@@ -9,10 +9,10 @@ import pytest
 
 import artsim
 from artsim.common.sequences import listed
+from artsim.datasets.family_stream import FamilyStream
 from artsim.errors import ArtsimError, ConfigError
 from artsim.model.draws import ViewOptions
 from artsim.scenes.random_scene import SceneOptions
-from artsim.stream import FamilyStream
 from tests.conftest import ASSETS
 
 

@@ -13,10 +13,10 @@ from scipy.spatial import ConvexHull, Delaunay
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.plan import SampleOptions
-from artsim.drawing.annotation import PALETTE, axis_segment, box_corners, shade_parts
 from artsim.drawing.contact_sheet import contact_sheet, show_sample, show_states, spread, write_contact_sheet
 from artsim.errors import ArtsimError
 from artsim.loading.sources import find_sources
+from artsim.observing.annotation import PALETTE, axis_segment, box_corners, shade_parts
 from tests.conftest import ASSETS
 
 

@@ -11,10 +11,10 @@ import trimesh
 from artsim.export import export
 from artsim.export.looks import draw_finish
 from artsim.export.options import ExportOptions
-from artsim.export.robot import as_robot
 from artsim.families import make
 from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
+from artsim.model.robot import as_robot
 from tests.conftest import installed
 
 Exported = tuple[ArticulatedObject, Path]

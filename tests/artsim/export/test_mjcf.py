@@ -10,10 +10,10 @@ import pytest
 from artsim.errors import ConfigError
 from artsim.export import FORMATS, export
 from artsim.export.options import Base, ExportOptions
-from artsim.export.robot import as_robot
 from artsim.families import make
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.robot import as_robot
 from tests.conftest import installed, valve
 
 rng = np.random.default_rng(0)

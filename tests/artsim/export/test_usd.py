@@ -10,9 +10,9 @@ import pytest
 
 from artsim.export import FORMATS, export
 from artsim.export.options import ExportOptions
-from artsim.export.robot import as_robot
 from artsim.export.usd import frame_along, principal_axes
 from artsim.families import make
+from artsim.model.robot import as_robot
 from tests.conftest import installed, valve
 
 rng = np.random.default_rng(0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.export.robot import as_robot
 from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.robot import as_robot
 
 CLOSE = 1e-6
 """Metres, radians, and shares of masses and moments."""

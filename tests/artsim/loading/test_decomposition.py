@@ -10,13 +10,13 @@ import pytest
 import trimesh
 from manifold3d import Manifold, OpType
 
+from artsim.common.extras import import_pybullet
 from artsim.errors import ArtsimError
 from artsim.families import make
 from artsim.loading.decomposition import DecompositionOptions, connected_surfaces, convex_pieces, decompose, hollow
 from artsim.model.objects import Mesh
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.physics.bullet_body import BulletBody
-from artsim.renderers.bullet import import_pybullet
 from tests.conftest import installed
 
 

@@ -15,7 +15,6 @@ import pytest
 from artsim.errors import AssetError, ConfigError
 from artsim.export import export
 from artsim.export.options import ExportOptions
-from artsim.export.robot import as_robot
 from artsim.families import make
 from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
@@ -24,6 +23,7 @@ from artsim.model.draws import ViewOptions, sample_view
 from artsim.model.kinematics import transform_points
 from artsim.model.object_file import load_object, save_object
 from artsim.model.objects import ArticulatedObject, JointDynamics, part_inertia
+from artsim.model.robot import as_robot
 from artsim.renderers import render
 from tests.artsim.loading.round_trip import FAMILIES, assert_same_geometry, assert_same_object
 from tests.conftest import installed, valve

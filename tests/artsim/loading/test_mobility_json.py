@@ -14,9 +14,9 @@ import pytest
 import trimesh
 
 import artsim
-from artsim.appearance.painted import painted_coats
 from artsim.commands.inspect import Inspect
 from artsim.errors import ArtsimError, AssetError
+from artsim.loading.painted import painted_coats
 from artsim.loading.sources import find_sources
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject

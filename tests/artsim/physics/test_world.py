@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 
 import artsim
+from artsim.common.extras import import_pybullet
 from artsim.errors import ArtsimError
 from artsim.export import export
 from artsim.export.mjcf import mjcf_text
 from artsim.export.options import ExportOptions
-from artsim.export.robot import as_robot
 from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
 from artsim.loading.sources import find_sources
 from artsim.model.inertia import combine_inertias
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.robot import as_robot
 from artsim.physics import world
 from artsim.physics.bullet_body import BulletBody
 from artsim.physics.options import PhysicsOptions
 from artsim.physics.world import ENGINES, Simulation
-from artsim.renderers.bullet import import_pybullet
 from tests.conftest import DEMO, installed
 
 FREE = PhysicsOptions(damping=0.0, friction=0.0)

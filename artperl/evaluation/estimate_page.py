@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from artperl.core.clouds import is_measured
 from artperl.core.estimate import HEAD, Estimate, cells, summary
-from artperl.perception.preprocess import is_measured
 from artsim.common.names import printable
 from artsim.common.showing import page_of
 from artsim.drawing.page import PageContent, PageFrame, frames_page

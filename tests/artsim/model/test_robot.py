@@ -9,9 +9,9 @@ import pytest
 from lxml import etree
 
 from artsim.export import export
-from artsim.export.robot import HELPER_SHARE, as_robot
 from artsim.families import make
 from artsim.model.objects import part_inertia
+from artsim.model.robot import HELPER_SHARE, as_robot
 from tests.conftest import valve
 
 

@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from artperl.core.confidence import Calibration
-from artperl.estimator import load_estimator, save_estimator
 from artperl.fitting.options import EstimatorOptions
+from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.retrieval.shape_base import ShapeBase

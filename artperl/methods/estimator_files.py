@@ -37,7 +37,7 @@ from artsim.model.objects import MAX_PARTS
 if TYPE_CHECKING:
     from artperl.methods.artperl import ArtPERL
 
-WEIGHTS = Path(__file__).parent / "weights"
+WEIGHTS = Path(__file__).parents[1] / "weights"
 """Folder of the estimators that come with the package."""
 
 _FORMAT = 4

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
+from artperl.core.shapes import Shapes
 from artperl.core.trees import KINDS
-from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -62,16 +62,16 @@ class CategoryPrior:
         return typical
 
     @staticmethod
-    def of(base: ShapeBase) -> CategoryPrior:
-        """The prior of the objects of a base.
+    def of(shapes: Shapes, kind: Tensor) -> CategoryPrior:
+        """The prior of objects; ``kind`` (B,) is the same for those with the same kinematic tree.
 
         Raises
         ------
         ConfigError
             When they have different kinematic trees, or a joint that is neither a hinge nor a slide.
         """
-        trees, shapes = base.shapes.trees, base.shapes
-        if bool((base.kind != base.kind[0]).any()):
+        trees = shapes.trees
+        if bool((kind != kind[0]).any()):
             raise ConfigError(
                 "its objects have different kinematic trees, and this method learns one", "categories",
                 "name one category of ArtImage, with --parts artimage",
@@ -84,7 +84,7 @@ class CategoryPrior:
                 "use the method full or artperl",
             )  # fmt: skip
 
-        def mean(values: torch.Tensor) -> Array:
+        def mean(values: Tensor) -> Array:
             averaged: Array = values[:, :K].double().mean(0).cpu().numpy()
             return averaged
 

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 
+from artsim.datasets.family_stream import FamilyStream
 from artsim.families import FAMILIES
-from artsim.stream import FamilyStream
 from tests.conftest import in_another_process
 
 

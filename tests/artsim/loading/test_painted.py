@@ -11,7 +11,7 @@ from PIL import Image
 import artsim
 from artsim import make
 from artsim.appearance import Coat
-from artsim.appearance.painted import painted_coats
+from artsim.loading.painted import painted_coats
 from artsim.loading.sources import find_sources
 
 OBJ = """mtllib look.mtl

@@ -15,7 +15,7 @@ from torch.utils.data import Dataset
 
 from artperl.detection.images import CELL, cell_pixels, look_at
 from artperl.detection.network import OFFSET
-from artsim.drawing.annotation import box_corners
+from artsim.observing.annotation import box_corners
 from artsim.scenes import SceneDataset, SceneRecord
 
 _ZOOM = (0.75, 1.5)

@@ -7,10 +7,10 @@ import torch
 
 from artperl.agent.actions import residual
 from artperl.core.pose import pose_parts
-from artperl.data.fitting_problems import Problems, part_truth
 from artperl.data.sources import DataOptions
 from artperl.evaluation import metrics
 from artperl.retrieval.box_embedding import box_embedding
+from artperl.training.fitting_problems import Problems, part_truth
 from tests.artperl.worlds import small_base
 
 
