@@ -6,10 +6,9 @@ imported when first used.
 Rooms, from the ground up. Each imports only rooms that come before it (import-linter holds this, see pyproject.toml):
 
 - common, errors: what every module may use.
-- model: an articulated object, its kinematics, cameras and frames. No backend.
+- model: an articulated object, its kinematics, materials, cameras and frames. No backend.
 - making, families: objects from a seed.
 - loading: objects from files.
-- appearance: materials and light.
 - renderers: one scene in, one frame out.
 - observing: frames to labelled samples; sensor noise.
 - datasets: samples to disk and back, or without end (stream). formats: datasets as other programs read them.

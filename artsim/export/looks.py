@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Picture
 
-from artsim.appearance import Material, patches
-from artsim.appearance.finishes import draw_coats
 from artsim.export.text import number
+from artsim.model.appearance import Material, patches
+from artsim.model.appearance.finishes import draw_coats
 from artsim.model.kinematics import Array
 from artsim.model.robot import Robot
 

@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image as Pictures
 
-from artsim.appearance import Coat, Colour, Material
-from artsim.appearance.textures import Image
 from artsim.common.files import read_bounded
 from artsim.errors import AssetError
 from artsim.loading.bodies import merge_fixed_links
@@ -24,6 +22,8 @@ from artsim.loading.mesh_files.obj import read_painted
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.object_files import read_urdf
 from artsim.loading.partnet import read_side_files
+from artsim.model.appearance import Coat, Colour, Material
+from artsim.model.appearance.textures import Image
 from artsim.model.objects import ArticulatedObject
 
 _MAX_PICTURE_BYTES = 50_000_000

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from artsim.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.common.extras import import_pybullet, silence_output
 from artsim.errors import RenderError
+from artsim.model.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array, transform_points

@@ -11,10 +11,10 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artsim.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.common.extras import install_command
 from artsim.errors import RenderError
 from artsim.loading.painted import painted_coats
+from artsim.model.appearance import Coat, Lights, Material, Sun, plain_coat
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from artsim.appearance import Coat, Colour, Lights, Material, patches, subpixel
+from artsim.model.appearance import Coat, Colour, Lights, Material, patches, subpixel
 from artsim.model.camera import Camera
 from artsim.model.kinematics import Array
 from artsim.model.objects import Part

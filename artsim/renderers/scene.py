@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.appearance import Coat, Lights
 from artsim.common.products import matmul
 from artsim.errors import ConfigError
+from artsim.model.appearance import Coat, Lights
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import Array, Joint, KinematicTree, transform_points
 from artsim.model.objects import ArticulatedObject, Mesh, Part, content_sha256

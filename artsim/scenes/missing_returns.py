@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.appearance import Coat, Material
+from artsim.model.appearance import Coat, Material
 from artsim.model.camera import Camera
 from artsim.model.kinematics import Array
 from artsim.observing.noise import PixelView

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from artsim.appearance import Coat
 from artsim.common.elementary import arccos, arctan2, cos
 from artsim.common.extras import needs
 from artsim.common.products import apply, dot, matmul, unit
 from artsim.making.solids import rotation_about
+from artsim.model.appearance import Coat
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers.scene import Thing, used_vertices

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from artsim.appearance import Coat, Material, plain_coat
-from artsim.appearance.finishes import draw_material, piece_of_face
 from artsim.common.elementary import cos, sin
 from artsim.common.products import matmul
 from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
+from artsim.model.appearance import Coat, Material, plain_coat
+from artsim.model.appearance.finishes import draw_material, piece_of_face
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers.scene import Thing, rigid_object

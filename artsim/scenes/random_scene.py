@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 import tyro
 
-from artsim.appearance import Colour, Lights, Sun
-from artsim.appearance.finishes import draw_coats, repaint_coats
 from artsim.common.elementary import cos, sin, tan
 from artsim.common.products import norm
 from artsim.common.sequences import wrap_singles
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, make
 from artsim.loading.roots import PackageRoots
+from artsim.model.appearance import Colour, Lights, Sun
+from artsim.model.appearance.finishes import draw_coats, repaint_coats
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array, transform_points

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from artsim.appearance import Coat
 from artsim.common.extras import import_mujoco
 from artsim.common.products import apply, matmul, norm
 from artsim.making.solids import rotation_about
+from artsim.model.appearance import Coat
 from artsim.model.convex_bodies import add_bodies, convex_hull
 from artsim.model.kinematics import Array, transform_points
 from artsim.model.objects import ArticulatedObject

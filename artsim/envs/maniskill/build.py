@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from sapien.wrapper.articulation_builder import LinkBuilder
 from scipy.spatial.transform import Rotation
 
-from artsim.appearance import Coat
 from artsim.envs.maniskill.places import T_world_object
 from artsim.loading.decomposition import decompose
+from artsim.model.appearance import Coat
 from artsim.model.convex_bodies import add_bodies
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject

@@ -20,7 +20,6 @@ from mani_skill.utils.structs import Pose
 from mani_skill.utils.structs.types import GPUMemoryConfig, SimConfig
 from torch import Tensor
 
-from artsim.appearance.finishes import draw_coats
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH, RECORDED_ID
 from artsim.envs.maniskill.build import OBJECT_BIT, build
 from artsim.envs.maniskill.cameras import camera_record, look, poses
@@ -33,6 +32,7 @@ from artsim.envs.maniskill.robots import NO_ROBOT, ROBOTS
 from artsim.envs.maniskill.truth import Record, Truth, start_and_goal, truth_of
 from artsim.errors import ConfigError
 from artsim.loading.painted import painted_coats
+from artsim.model.appearance.finishes import draw_coats
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.episode import Episode, EpisodeOptions
 from artsim.renderers.sapien import import_sapien

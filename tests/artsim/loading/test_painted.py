@@ -10,9 +10,9 @@ from PIL import Image
 
 import artsim
 from artsim import make
-from artsim.appearance import Coat
 from artsim.loading.painted import painted_coats
 from artsim.loading.sources import find_sources
+from artsim.model.appearance import Coat
 
 OBJ = """mtllib look.mtl
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from artsim import Camera
-from artsim.appearance import Lights, Material, Sun
 from artsim.making.solids import box
+from artsim.model.appearance import Lights, Material, Sun
 from artsim.renderers.scene import Scene
 from artsim.scenes.ground_truth import observe_scene
 from artsim.scenes.missing_returns import missing_share

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from artsim import make
-from artsim.appearance import Material, plain_coat
 from artsim.making.solids import box
+from artsim.model.appearance import Material, plain_coat
 from artsim.renderers.scene import Thing, rigid_object
 from artsim.scenes.placement import Area, Arrangement, are_apart, resting_rotation
 from artsim.scenes.props import place_solid

@@ -15,11 +15,11 @@ from manifold3d import Manifold, Mesh64
 from PIL import Image
 
 from artsim import Camera
-from artsim.appearance import Lights, Material, Sun
 from artsim.datasets.shards import sample_from_members
 from artsim.drawing.scene_overview import overview
 from artsim.errors import ConfigError
 from artsim.making.solids import box
+from artsim.model.appearance import Lights, Material, Sun
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import transform_points
 from artsim.renderers import Renderer

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from artsim.appearance.textures import TEXTURES, noise
+from artsim.model.appearance.textures import TEXTURES, noise
 
 
 @pytest.mark.slow

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from artsim import make
-from artsim.appearance import Coat, Material
-from artsim.appearance.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repaint_coats
 from artsim.making.solids import box, cylinder
+from artsim.model.appearance import Coat, Material
+from artsim.model.appearance.finishes import FINISHES, draw_coats, draw_material, piece_of_face, repaint_coats
 
 MATT = Material((0.6, 0.4, 0.2), roughness=1.0, specular=0.0)
 

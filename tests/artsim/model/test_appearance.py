@@ -10,9 +10,9 @@ import pytest
 import trimesh
 
 from artsim import Camera, make
-from artsim.appearance import Coat, Lights, Material, Sun, corner_normals, patches, plain_coat, subpixel
-from artsim.appearance.finishes import draw_coats
 from artsim.making.solids import box
+from artsim.model.appearance import Coat, Lights, Material, Sun, corner_normals, patches, plain_coat, subpixel
+from artsim.model.appearance.finishes import draw_coats
 from artsim.model.objects import Part
 from artsim.renderers import Renderer
 from artsim.renderers.sapien import SapienRenderer

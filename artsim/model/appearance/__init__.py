@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.appearance.textures import Image
+from artsim.model.appearance.textures import Image
 from artsim.model.kinematics import Array
 from artsim.model.objects import Part
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.appearance import Coat, Colour, Material
-from artsim.appearance.textures import TEXTURES
+from artsim.model.appearance import Coat, Colour, Material
+from artsim.model.appearance.textures import TEXTURES
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Mesh, Part
 
