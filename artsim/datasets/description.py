@@ -17,7 +17,6 @@ from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_j
 from artsim.common.names import printable
 from artsim.common.storage import FolderStorage, Place, Storage, storage_of
 from artsim.datasets import json_values
-from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.errors import ConfigError, DatasetError
@@ -149,7 +148,7 @@ def _document(storage: Storage, name: str) -> dict[str, Any]:
     data = storage.read(name, MAX_JSON_BYTES)
     try:
         document = dict(json_values.mapping(parse_json(data), "it"))
-        if document["format"] not in (1, FORMAT):
+        if document["format"] != FORMAT:
             raise DatasetError(
                 f"format {document['format']!r:.20} is not {FORMAT}",
                 f"{storage.place}/{name}",
@@ -158,10 +157,8 @@ def _document(storage: Storage, name: str) -> dict[str, Any]:
         unknown = document.keys() - {*_PLAN_KEYS, *_MORE_KEYS, _SEAL}
         if unknown:
             raise ValueError(f"it has no key {printable(min(unknown), 40)}")
-        if document["format"] == FORMAT:
-            seal = document.pop(_SEAL)
-            if seal != _seal(document):
-                raise ValueError("it is not as it was written: its own sha256 is another")
+        if document.pop(_SEAL) != _seal(document):
+            raise ValueError("it is not as it was written: its own sha256 is another")
     except (ValueError, KeyError) as error:
         raise _damage_error(storage, name, error) from error
     return document
@@ -169,7 +166,7 @@ def _document(storage: Storage, name: str) -> dict[str, Any]:
 
 def _plan(document: Mapping[str, Any], storage: Storage, name: str) -> Plan:
     try:
-        plan: Plan = (Plan if document["format"] == FORMAT else PlanFormat1).from_dict(document)
+        plan = Plan.from_dict(document)
         for entries in (document["left_out"], document["repeated"]):
             for entry in json_values.sequence(entries, "sources", 10_000_000):
                 for name in ("source", "source_sha256"):

@@ -53,7 +53,7 @@ class PlannedObject:
     split : str
         One of ``SPLITS``.
     file_sha256 : str
-        Digest of its file; empty in datasets of format 1.
+        Digest of its file.
     rigid : bool
         Whether no joint can move.
     repairs : tuple of (where, what)
@@ -131,8 +131,6 @@ class Plan:
     strict: bool = False
     artsim_version: str = ""
 
-    format = FORMAT
-
     @cached_property
     def objects_of(self) -> dict[str, list[PlannedObject]]:
         """Objects of each split, in the plan's order."""
@@ -198,14 +196,14 @@ class Plan:
     @cached_property
     def _ingredients(self) -> str:
         """Digest of what all shards follow from."""
-        made_of = [self.format, self.artsim_version, self.seed, asdict(self.sample)]
+        made_of = [FORMAT, self.artsim_version, self.seed, asdict(self.sample)]
         objects = [[planned.key, planned.file_sha256] for planned in self.objects]
         return hashlib.sha256(json.dumps([made_of, objects], sort_keys=True).encode()).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready description, inverse of :meth:`from_dict`."""
         plan = {
-            "format": self.format,
+            "format": FORMAT,
             "artsim_version": self.artsim_version,
             "seed": self.seed,
             "num_samples": self.num_samples,
@@ -273,7 +271,7 @@ class ShardRecord(Shard):
     bytes: int
     sha256: str
     recipe: str = ""
-    """See :meth:`Plan.recipe`; empty in datasets of format 1."""
+    """See :meth:`Plan.recipe`."""
 
     @property
     def shard(self) -> Shard:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from artsim.datasets.description import read_started
 from artsim.datasets.origins import Origins
-from artsim.datasets.plan import FORMAT
 from artsim.datasets.problems import Problem
 from artsim.datasets.restore import remove_leftovers, restore
 from artsim.datasets.state import examine, leftover_problems, strangers
@@ -70,10 +69,6 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     begun = read_started(folder)
     if begun is None:
         raise DatasetError("no dataset here", folder, "name a folder that generate.py wrote")
-    if begun.plan.format != FORMAT:
-        raise DatasetError(
-            f"a dataset of format {begun.plan.format} opens, but is not repaired", folder, "generate it again"
-        )
     state = examine(folder, begun, workers, progress)
     foreign = strangers(folder, begun)
     if not state and begun.complete and not begun.problems and not leftover_problems(folder, begun):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from artsim.datasets.plan import FORMAT, Plan
+from artsim.datasets.plan import Plan
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 
@@ -32,12 +32,6 @@ def check_same_plan(
     DatasetError
         Naming the options that differ.
     """
-    if document["format"] != FORMAT:
-        raise DatasetError(
-            f"the folder holds a dataset of format {document['format']}, which opens but is not gone on with",
-            place,
-            "choose another --out folder",
-        )
     wanted = asked.to_dict()
     del wanted["objects"]
     if grows and asked.num_samples > document["num_samples"]:

@@ -74,8 +74,7 @@ def examine(folder: Path, begun: StartedDataset, workers: int = 2, progress: boo
         return _file_problem(folder / planned.file, [planned.file_sha256] if planned.file_sha256 else [])[0]
 
     def shard_state(shard: Shard) -> tuple[str | None, ShardRecord | None]:
-        recipe = begun.plan.recipe(shard) if begun.plan.format > 1 else ""
-        records = [record for record in claims[shard.name, recipe] if record.shard == shard]
+        records = [record for record in claims[shard.name, begun.plan.recipe(shard)] if record.shard == shard]
         if not records:
             return "is another one than the plan makes" if begun.complete else "is not finished", None
         problem, digest = _file_problem(folder / shard.name, [record.sha256 for record in records])

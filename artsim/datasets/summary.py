@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from artsim.common.names import printable
-from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
+from artsim.datasets.plan import FORMAT, Plan, PlannedObject, ShardRecord
 from artsim.datasets.splits import SPLITS
 
 _CATEGORIES_SHOWN = 12
@@ -46,7 +46,7 @@ def summary(
         f"views       {views.custom or views.preset}, {views.width}x{views.height}, field of view {views.fov:g} deg",
         f"states      {states.mode if states.fraction_open is None else f'open by {_value(states.fraction_open)}'}"
         + "".join(f", {name} {_value(bounds)}" for name, bounds in list(states.joint_range.items())[:4]),
-        f"made by     artsim {plan.artsim_version}, seed {plan.seed}, format {plan.format}",
+        f"made by     artsim {plan.artsim_version}, seed {plan.seed}, format {FORMAT}",
     ]
     versions = description.get("versions")
     if isinstance(versions, dict):

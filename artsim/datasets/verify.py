@@ -137,7 +137,7 @@ def _object_problems(dataset: Dataset, unusable: set[str]) -> Iterator[Problem]:
             named = planned.category, planned.object_id, planned.sha256, planned.num_parts
             if (obj.category, obj.object_id, obj.sha256, len(obj)) != named:
                 yield Problem(planned.file, "is another object than the plan says", fix)
-            elif dataset.plan.format > 1 and obj.is_rigid != planned.rigid:
+            elif obj.is_rigid != planned.rigid:
                 yield Problem(planned.file, "moves, or does not, other than the plan says", fix)
             else:
                 yield from (Problem(planned.file, what, fix) for what in _object_flaws(obj))

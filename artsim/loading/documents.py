@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from artsim.common.files import parse_json
 from artsim.errors import AssetError, ConfigError
@@ -18,10 +19,12 @@ from artsim.loading.urdf_xml import parse_robot
 from artsim.loading.usd_layers import SUFFIXES
 from artsim.model.objects import Repair
 
+Document: TypeAlias = tuple[UrdfRobot, list[Repair], list[bytes]]
+
 
 def read_document(
     data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str], body: str | None = None
-) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
+) -> Document:
     """Links and joints of a file of any format.
 
     Parameters
@@ -50,28 +53,32 @@ def read_document(
     ConfigError
         When MuJoCo (MJCF) or usd-core (USD) is not installed.
     """
-    limits = reader.limits
-    if file.suffix.lower() in SUFFIXES:
-        from artsim.loading.usd import read_usd
+    return READERS.get(file.suffix.lower(), _read_xml)(data, file, reader, helpers, body)
 
-        return read_usd(file, limits, body)
-    if file.suffix.lower() != ".json" and is_mjcf(data, file):
+
+def _read_usd(data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str], body: str | None) -> Document:
+    from artsim.loading.usd import read_usd
+
+    return read_usd(file, reader.limits, body)
+
+
+def _read_xml(data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str], body: str | None) -> Document:
+    """Links and joints of MJCF or URDF, told by the top element."""
+    if is_mjcf(data, file):
         from artsim.loading.mjcf import read_mjcf
 
         return read_mjcf(data, file, reader, body)
-    if body is not None:
-        raise ConfigError(f"body {body!r} is chosen of {file.name}, which holds one object", "body", "leave it out")
-    if file.suffix.lower() == ".json":
-        return _read_json(data, file, reader)
-    check_shapes(data, file, limits)
-    robot, repairs = parse_robot(data, file, limits.max_links, helpers)
+    _refuse_choice(body, file)
+    check_shapes(data, file, reader.limits)
+    robot, repairs = parse_robot(data, file, reader.limits.max_links, helpers)
     if file.name == UNITY:
         robot = with_meshes_of_unity(robot, repairs)
     return robot, repairs, []
 
 
-def _read_json(data: bytes, file: Path, reader: MeshReader) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
-    """Links and joints of an annotation in JSON, told by what it holds."""
+def _read_json(data: bytes, file: Path, reader: MeshReader, helpers: Sequence[str], body: str | None) -> Document:
+    """Links and joints of an annotation, told by what it holds."""
+    _refuse_choice(body, file)
     try:
         document = parse_json(data)
     except ValueError as error:
@@ -85,3 +92,12 @@ def _read_json(data: bytes, file: Path, reader: MeshReader) -> tuple[UrdfRobot, 
         file,
         "pass PartNet-Mobility's mobility_v2.json or mobility_v3.json, or Shape2Motion's motion_attributes.json",
     )
+
+
+def _refuse_choice(body: str | None, file: Path) -> None:
+    if body is not None:
+        raise ConfigError(f"body {body!r} is chosen of {file.name}, which holds one object", "body", "leave it out")
+
+
+READERS = {**dict.fromkeys(SUFFIXES, _read_usd), ".json": _read_json}
+"""Readers by the ending of a file's name; files of all other names hold XML."""

@@ -20,8 +20,25 @@ from artsim.loading.mesh_files.surface import Bounds, Surface, UnusableMeshError
 
 __all__ = ["FORMATS", "Bounds", "Surface", "UnusableMeshError", "read_mesh"]
 
-FORMATS = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply", ".msh")
-"""What mesh files may be called."""
+Neighbour = Callable[[str], bytes]
+
+
+def _alone(read: Callable[[bytes, Bounds], Surface]) -> Callable[[bytes, Bounds, Neighbour], Surface]:
+    """A reader of files that name no others."""
+    return lambda data, bounds, neighbour: read(data, bounds)
+
+
+READERS: dict[str, Callable[[bytes, Bounds, Neighbour], Surface]] = {
+    ".obj": _alone(read_obj),
+    ".stl": _alone(read_stl),
+    ".dae": _alone(read_dae),
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".ply": _alone(read_ply),
+    ".msh": _alone(read_msh),
+}
+"""Readers of mesh files by the ending of their names, in small letters."""
+FORMATS = tuple(READERS)
 
 
 def no_neighbour(name: str) -> bytes:
@@ -29,7 +46,7 @@ def no_neighbour(name: str) -> bytes:
     raise UnusableMeshError("names another file, which is not read here")
 
 
-def read_mesh(data: bytes, kind: str, bounds: Bounds, neighbour: Callable[[str], bytes] = no_neighbour) -> Surface:
+def read_mesh(data: bytes, kind: str, bounds: Bounds, neighbour: Neighbour = no_neighbour) -> Surface:
     """The surface that a mesh file describes.
 
     Parameters
@@ -50,17 +67,7 @@ def read_mesh(data: bytes, kind: str, bounds: Bounds, neighbour: Callable[[str],
     AssetError
         When it is over the bounds or dangerous.
     """
-    if kind not in FORMATS:
-        raise UnusableMeshError(f"is of a kind that is not read ({', '.join(FORMATS)})")
+    if kind not in READERS:
+        raise UnusableMeshError(f"is of a kind that is not read ({', '.join(READERS)})")
     with np.errstate(all="ignore"):  # numbers out of range are found, counted and said at the end
-        if kind == ".obj":
-            return read_obj(data, bounds)
-        if kind == ".stl":
-            return read_stl(data, bounds)
-        if kind == ".dae":
-            return read_dae(data, bounds)
-        if kind == ".ply":
-            return read_ply(data, bounds)
-        if kind == ".msh":
-            return read_msh(data, bounds)
-        return read_gltf(data, bounds, neighbour)
+        return READERS[kind](data, bounds, neighbour)

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,11 @@ import pytest
 
 import artsim
 from artsim.datasets.description import document_bytes
-from artsim.datasets.format1 import PlanFormat1
 from artsim.datasets.repair import repair
-from artsim.datasets.sample_options import SampleOptions, draw_sample
-from artsim.datasets.shards import write_shard
+from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.verify import verify
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import Source, family_sources, find_sources
-from artsim.model.object_file import ObjectCache
-from artsim.renderers import make_renderer
 from tests.artsim.datasets.troublesome import digests
 from tests.conftest import BOX_LAPTOP
 
@@ -373,45 +369,13 @@ def test_other_formats_are_refused_by_number(folder: Path) -> None:
         artsim.open_dataset(folder)
 
 
-def in_format_1(folder: Path) -> None:
-    """The dataset as artsim wrote it until November 2026."""
-    document = json.loads((folder / "dataset.json").read_text())
-    plan = PlanFormat1.from_dict(document)
-    objects, renderer = ObjectCache(folder / "objects"), make_renderer("raycast")
-    for path in folder.glob("*.tar"):
-        path.unlink()
-    records = []
-    for shard in plan.shards():
-        samples = [
-            draw_sample(objects[plan.object_of(i).key], plan.sample, plan.seed, i, renderer)
-            for i in range(shard.first, shard.end)
-        ]
-        size, sha256 = write_shard(folder / shard.name, samples)
-        records.append({**asdict(shard), "bytes": size, "sha256": sha256})
-    for planned in document["objects"]:
-        for name in ("file_sha256", "rigid", "repairs"):
-            del planned[name]
-    for name in ("sha256", "strict"):
-        del document[name]
-    splits = {split: {"first": first, "end": end} for split, (first, end) in plan.ranges.items()}
-    document |= {"format": 1, "splits": splits, "shards": records}
-    (folder / "dataset.json").write_text(json.dumps(document))
-    for name in ("conventions", "splits", "shards"):
-        del document[name]
-    (folder / "plan.json").write_text(json.dumps(document))
-
-
-def test_a_dataset_of_format_1_opens_and_verifies_but_is_not_gone_on_with(folder: Path, sources: list[Source]) -> None:
-    in_format_1(folder)
-    dataset = artsim.open_dataset(folder)
-    assert [sample.index for sample in dataset] == list(range(60))
-    for i in (0, 30, 59):
-        assert dataset.object_of(dataset[i]).sha256 == dataset[i].object_sha256
-    assert "format 1" in str(dataset)
-    assert verify(folder, progress=False) == []
-    flip(folder / SHARD)
-    assert [problem.where for problem in verify(folder, progress=False)] == [SHARD]
-    with pytest.raises(DatasetError, match="format 1, which opens but is not gone on with"):
+def test_a_dataset_of_another_format_is_refused(folder: Path, sources: list[Source]) -> None:
+    for name in ("dataset.json", "plan.json"):
+        document = json.loads((folder / name).read_text())
+        (folder / name).write_text(json.dumps({**document, "format": 1}))
+    with pytest.raises(DatasetError, match=r"format 1 is not 2.*read it with the artsim that wrote it"):
+        artsim.open_dataset(folder)
+    with pytest.raises(DatasetError, match="format 1 is not 2"):
         artsim.generate(sources, folder, 60, sample=OPTIONS, shard_size=8, splits=(1, 0, 1), progress=False)
-    with pytest.raises(DatasetError, match="format 1 opens, but is not repaired"):
+    with pytest.raises(DatasetError, match="format 1 is not 2"):
         repair(folder, progress=False)
