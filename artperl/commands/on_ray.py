@@ -9,8 +9,8 @@ from importlib.metadata import version
 from typing import Any, TypeVar
 
 from artsim.common.extras import needs
-from artsim.datasets.ray_pool import connect, version_difference
 from artsim.errors import ArtsimError
+from artsim.runs.ray_pool import connect, version_difference
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

@@ -11,8 +11,9 @@ from types import TracebackType
 from typing import IO, Any
 
 from artsim.common.files import atomic_file, write_error
-from artsim.common.outputs import check_output, locked
+from artsim.common.outputs import check_output
 from artsim.errors import ConfigError
+from artsim.runs.lock import file_lock
 
 
 class Lines:
@@ -48,7 +49,7 @@ class Lines:
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self._file = self._lock.enter_context(self.path.open("a+b"))
-                self._lock.enter_context(locked(self._file, self.path))
+                self._lock.enter_context(file_lock(self._file, self.path))
                 self._file.truncate(self._whole_lines())  # a line that a stop has cut off
             except OSError as error:
                 raise write_error(error, self.path) from error

@@ -22,8 +22,8 @@ from torch.utils.tensorboard import SummaryWriter
 
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artsim.common.files import parse_json, read_bounded, read_json, write_atomic, write_error
-from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import DatasetError
+from artsim.runs.lock import folder_lock
 
 _FORMAT = 3
 _MAX_JSON = 64_000_000

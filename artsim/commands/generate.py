@@ -70,11 +70,11 @@ class Generate(Opened):
 
     def run(self) -> None:
         from artsim.common.names import printable
-        from artsim.common.storage import is_url
         from artsim.datasets.generate import generate
         from artsim.datasets.parts import Part
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
+        from artsim.runs.storage import is_url
 
         part = None if self.part is None else Part.parse(self.part)
         if self.format is not None:  # before hours are spent on a dataset that it does not take

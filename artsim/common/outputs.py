@@ -11,7 +11,7 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import BinaryIO
 
 from artsim.common.files import atomic_file
 from artsim.common.known_files import is_input, refuse_special
@@ -71,33 +71,6 @@ def check_output(path: Path, inputs: Iterable[Path | None] = ()) -> None:
         if (depth and path.exists()) or (not depth and (path.name in _OWN or path.suffix == ".tar")):
             raise ConfigError(f"it belongs to what {folder / mark} describes", path, "name another file to write")
         return
-
-
-@contextlib.contextmanager
-def locked(file: IO[Any], path: Path) -> Iterator[None]:
-    """The one writer of a file, until the block ends or the process does; where the system has no locks, unchecked.
-
-    No other handle of the file may be closed meanwhile: the lock would go with it.
-
-    Raises
-    ------
-    ConfigError
-        When another process has it.
-    """
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        yield
-        return
-    try:
-        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError) as error:
-        raise ConfigError(
-            "another program writes to it", path, "wait for its end, or name another file for --out"
-        ) from error
-    except OSError:  # a file system without locks
-        pass
-    yield
 
 
 def replace_folder(made: Path, folder: Path) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
-from artsim.common.storage import FolderStorage, Place, storage_of
 from artsim.datasets.description import read_description
 from artsim.datasets.padding import PaddedDataset, PaddedStream
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
@@ -26,6 +25,7 @@ from artsim.model.object_file import ObjectCache
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
+from artsim.runs.storage import FolderStorage, Place, storage_of
 
 _OPEN_SHARDS = 64
 """Files that are open at most, of the least recently read shards the first to be closed. Their indices are kept."""

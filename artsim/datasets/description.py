@@ -15,11 +15,11 @@ from typing import Any
 
 from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
 from artsim.common.names import printable
-from artsim.common.storage import FolderStorage, Place, Storage, storage_of
 from artsim.datasets import json_values
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.errors import ConfigError, DatasetError
+from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
 
 PLAN, DESCRIPTION, JOURNAL = "plan.json", "dataset.json", "progress.jsonl"
 

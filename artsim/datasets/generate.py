@@ -14,24 +14,26 @@ from importlib.metadata import version
 from pathlib import Path
 
 from artsim.common.files import write_atomic
-from artsim.common.storage import FolderStorage, Place, is_url, storage_of
 from artsim.datasets.description import DESCRIPTION, JOURNAL, StartedDataset, read_started
 from artsim.datasets.merge import merge
 from artsim.datasets.new_plan import new_plan
 from artsim.datasets.origins import Origins, write_origins
 from artsim.datasets.parts import Part, PartRun
 from artsim.datasets.plan import MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
-from artsim.datasets.ray_pool import RayPool
 from artsim.datasets.restore import journal_line, remove_leftovers, restore
 from artsim.datasets.same_plan import check_same_plan
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares
 from artsim.datasets.state import State, examine, leftover_problems
+from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import PARTS
-from artsim.datasets.worker_pool import WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
+from artsim.runs.lock import folder_lock
+from artsim.runs.pool import WorkerPool
+from artsim.runs.ray_pool import RayPool
+from artsim.runs.storage import FolderStorage, Place, is_url, storage_of
 
 LOAD_LIMIT = 300.0
 """Seconds that an object may take to load: a hundred times what the largest real ones take."""
@@ -184,7 +186,7 @@ def generate(
 
 def _team(place: Place, workers: int, ray: str | None) -> WorkerPool | RayPool:
     """What does the tasks of a run."""
-    return WorkerPool(place, workers) if ray is None else RayPool(place, ray)
+    return WorkerPool(workers, storage_of(place)) if ray is None else RayPool(ray, place, VERSIONS_OF)
 
 
 def _is_sound(folder: Path, begun: StartedDataset, num_samples: int, workers: int, progress: bool) -> bool:

@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from artsim.common.progress import track
-from artsim.common.storage import FolderStorage, Place, Storage, storage_of
 from artsim.datasets.description import (
     DESCRIPTION,
     PLAN,
@@ -23,6 +22,7 @@ from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.restore import remove_leftovers
 from artsim.datasets.worker import PARTS, PREPARED, RECORDS
 from artsim.errors import DatasetError
+from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
 
 _THREADS = 32
 """Requests at once."""

@@ -19,9 +19,9 @@ from artsim.datasets.splits import assign_splits, showing_order, unique_keys
 from artsim.datasets.state import PREPARED_JOURNAL, STAGED
 from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source
-from artsim.datasets.worker_pool import Team, WorkerLost
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
+from artsim.runs.pool import Team, WorkerLost
 
 _MAX_JOURNAL = 1_000_000_000
 _LISTED = 6

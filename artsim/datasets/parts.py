@@ -24,7 +24,6 @@ from typing import Any
 from artsim.common.files import parse_json
 from artsim.common.json_records import from_json_values
 from artsim.common.progress import track
-from artsim.common.storage import Storage
 from artsim.datasets.description import (
     DESCRIPTION,
     PLAN,
@@ -45,9 +44,10 @@ from artsim.datasets.worker import (
     compile_source,
     make_shard,
 )
-from artsim.datasets.worker_pool import Team, WorkerLost
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source
+from artsim.runs.pool import Team, WorkerLost
+from artsim.runs.storage import Storage
 
 _BLOCK = 16
 """Sources of one record: of 100,000 objects there are 6,000, which every machine reads."""

@@ -6,7 +6,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from artsim.common.storage import is_url
+from artsim.runs.storage import is_url
 
 
 @dataclass(frozen=True)

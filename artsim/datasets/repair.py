@@ -12,9 +12,11 @@ from artsim.datasets.origins import Origins
 from artsim.datasets.problems import Problem
 from artsim.datasets.restore import remove_leftovers, restore
 from artsim.datasets.state import examine, leftover_problems, strangers
-from artsim.datasets.worker_pool import WorkerPool, folder_lock
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
+from artsim.runs.lock import folder_lock
+from artsim.runs.pool import WorkerPool
+from artsim.runs.storage import FolderStorage
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
         _check_makeable(folder, begun.plan.artsim_version, begun.plan.sample.views.custom, begun.complete)
     with folder_lock(folder):
         try:
-            with WorkerPool(folder, workers) as team:
+            with WorkerPool(workers, FolderStorage(folder)) as team:
                 restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
         finally:
             remove_leftovers(folder)

@@ -23,9 +23,9 @@ from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem
 from artsim.datasets.state import STAGED, State, leftovers
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source, make_shard
-from artsim.datasets.worker_pool import Team, WorkerLost
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
+from artsim.runs.pool import Team, WorkerLost
 
 _OTHER_MAKER = "another processor, or another version of artsim or of a library, made it"
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from artsim.common.files import atomic_file, open_image, parse_npy
-from artsim.common.storage import FolderStorage, Storage
 from artsim.datasets.tar_index import read_index
 from artsim.errors import DatasetError
 from artsim.observing.sample import Sample
+from artsim.runs.storage import FolderStorage, Storage
 
 _CLOUD = ("points", "part", "npcs")
 _PNG = ("part_mask", "rgb")

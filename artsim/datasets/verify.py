@@ -18,8 +18,6 @@ from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.state import examine, leftover_problems, strangers
-from artsim.datasets.worker import report
-from artsim.datasets.worker_pool import WorkerLost, WorkerPool
 from artsim.errors import ArtsimError, DatasetError
 from artsim.model.camera import Camera
 from artsim.model.draws import Scale
@@ -28,6 +26,8 @@ from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers.raycast import cast, pose
+from artsim.runs.pool import WorkerLost, WorkerPool
+from artsim.runs.worker import report
 
 _TOLERANCE = 1e-4
 """Of the object's diagonal: points are stored in single precision."""
@@ -96,7 +96,7 @@ def _by_several(
 ) -> list[Problem]:
     """What is wrong with shards, in their order, found by several processes."""
     found: dict[str, list[Problem] | WorkerLost] = {}
-    with WorkerPool(folder, workers) as team:
+    with WorkerPool(workers) as team:
         found.update(team.run(_check_shard, ((s.name, (folder, s, unusable)) for s in shards), progress=progress))
     problems = []
     for shard in shards:

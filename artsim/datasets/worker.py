@@ -1,22 +1,13 @@
-"""The worker process of a generation run: loads objects, makes whole shards, and never outlives its parent."""
+"""The tasks of a generation run: to load an object, to make a whole shard."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
-import os
-import signal
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from multiprocessing.connection import Connection
-from typing import Any
 
-from artsim.common.extras import import_failure
-from artsim.common.storage import Storage
 from artsim.datasets.description import read_plan
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.sample_options import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
@@ -26,6 +17,8 @@ from artsim.loading.sources import FamilySource, Source
 from artsim.model.object_file import ObjectCache, object_bytes
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
+from artsim.runs.storage import Storage
+from artsim.runs.worker import StoppedError, report, stop_if_asked, this_worker
 
 _STEP = 16  # samples between two reports
 
@@ -36,23 +29,16 @@ PREPARED, RECORDS = f"{PARTS}/objects", f"{PARTS}/shards"
 """Objects before they have a name in the plan: each is called by the digest of its file. Records of finished shards."""
 
 
-@dataclass
-class Worker:
-    """What a worker process keeps between tasks. The plan is read at the first shard: it may not exist before.
+class DatasetFiles:
+    """What a worker process keeps of a dataset. The plan is read at the first shard: it may not exist before.
 
-    Attributes
+    Parameters
     ----------
     storage : Storage
-        Of the dataset.
-    tell : callable
-        Hears how much more is done.
-    is_stopped : callable
-        Whether the run wishes that work in hand is left as it is.
     """
 
-    storage: Storage
-    tell: Callable[[int], object]
-    is_stopped: Callable[[], bool]
+    def __init__(self, storage: Storage):
+        self.storage = storage
 
     @cached_property
     def plan(self) -> Plan:
@@ -71,67 +57,6 @@ class Worker:
         return make_renderer(self.plan.sample.renderer)
 
 
-_worker: Worker | None = None
-
-
-def serve(connection: Connection, storage: Storage) -> None:
-    """Do what the parent asks for until it says None, or is gone. Ctrl-C is left to the parent."""
-    global _worker
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        while os.getppid() == parent.pid:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
-    # Nothing but a wish to stop comes while there is a task.
-    _worker = Worker(storage, lambda count: connection.send(("progress", count)), connection.poll)
-    try:
-        connection.send(("ready", None))
-        while (task := connection.recv()) is not None:
-            connection.send(answer(*task))
-    except (EOFError, OSError):
-        os._exit(1)  # the parent is gone
-
-
-def become(worker: Worker) -> None:
-    """Let this process work for a run."""
-    global _worker
-    _worker = worker
-
-
-def answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
-    """What becomes of a task: ("done", its result) or ("failed", what it raised)."""
-    try:
-        return "done", work(*arguments)
-    except ArtsimError as error:
-        return "failed", error
-    except ImportError as error:
-        return "failed", import_failure(error, None)
-    except Exception as error:  # whatever it is, the parent has to know; it may not survive a trip between processes
-        return "failed", DatasetError(f"a worker process failed ({type(error).__name__}: {error})")
-
-
-def report(count: int) -> None:
-    """Tell the run that so much more is done."""
-    assert _worker is not None
-    _worker.tell(count)
-
-
-class StoppedError(Exception):
-    """The run was asked to stop."""
-
-
-def stop_if_asked() -> None:
-    """Raise :class:`StoppedError` once the run wishes so: then, work in hand is left as it is."""
-    assert _worker is not None
-    if _worker.is_stopped():
-        raise StoppedError
-
-
 def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> ShardRecord | str | None:
     """Make and write one shard.
 
@@ -148,27 +73,27 @@ def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> Shar
     ShardRecord or str or None
         The other digest, where it is not as wanted; None when asked to stop before the shard is whole.
     """
-    assert _worker is not None
+    dataset = this_worker().kept(DatasetFiles)
     try:
-        size, digest = store_shard(_worker.storage, shard.name, _samples(_worker, shard, prepared), sha256)
+        size, digest = store_shard(dataset.storage, shard.name, _samples(dataset, shard, prepared), sha256)
     except OtherBytesError as other:
         return other.sha256
     except StoppedError:
         return None
-    recipe = _worker.plan.recipe(shard)
+    recipe = dataset.plan.recipe(shard)
     record = ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
     if prepared:
-        _worker.storage.write(f"{RECORDS}/{shard.name}.json", json.dumps(asdict(record)).encode())
+        dataset.storage.write(f"{RECORDS}/{shard.name}.json", json.dumps(asdict(record)).encode())
     return record
 
 
-def _samples(worker: Worker, shard: Shard, prepared: bool) -> Iterator[Sample]:
-    plan, renderer = worker.plan, worker.renderer  # which says itself what it lacks
+def _samples(dataset: DatasetFiles, shard: Shard, prepared: bool) -> Iterator[Sample]:
+    plan, renderer = dataset.plan, dataset.renderer  # which says itself what it lacks
     for made, index in enumerate(plan.indices(shard), start=1):
         stop_if_asked()
         planned = plan.object_of(index)
         try:
-            obj = worker.prepared[planned.file_sha256] if prepared else worker.objects[planned.key]
+            obj = dataset.prepared[planned.file_sha256] if prepared else dataset.objects[planned.key]
             yield draw_sample(obj, plan.sample, plan.seed, index, renderer, PLANNED_ATTEMPTS)
         except ImportError:  # which says what to install
             raise
@@ -176,7 +101,7 @@ def _samples(worker: Worker, shard: Shard, prepared: bool) -> Iterator[Sample]:
             what = error.what if isinstance(error, ArtsimError) else f"{type(error).__name__}: {error}"
             raise DatasetError(
                 f"sample {index} of {planned.source} cannot be made ({what})",
-                worker.storage.place,
+                dataset.storage.place,
                 "generate into a new folder, without this object or with other options",
             ) from error
         if made % _STEP == 0 or made == len(shard):
@@ -233,7 +158,6 @@ def compile_source(
     strict : bool
         Refuse an object that had to be repaired.
     """
-    assert _worker is not None
     try:
         obj = source.load()
         repairs = tuple((r.where, r.what) for r in obj.repairs if not r.note)
@@ -250,7 +174,8 @@ def compile_source(
         return RefusedSource(f"{source.name}: cannot be loaded ({type(error).__name__}: {error})")
     data = object_bytes(obj)
     digest = hashlib.sha256(data).hexdigest()
-    _worker.storage.write(f"{PREPARED}/{digest}.npz" if staged is None else f"objects/{staged}", data)
+    storage: Storage = this_worker().context
+    storage.write(f"{PREPARED}/{digest}.npz" if staged is None else f"objects/{staged}", data)
     return CompiledSource(
         staged or "", identity, obj.category, obj.object_id, obj.sha256, len(obj), obj.is_rigid, repairs, digest
     )

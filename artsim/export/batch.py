@@ -20,12 +20,13 @@ from typing import Any
 from artsim.common.files import read_json, write_atomic, write_error
 from artsim.common.outputs import replace_folder
 from artsim.common.progress import track
-from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import AssetError, ConfigError
 from artsim.export import DEFAULTS, FORMATS, check_formats, export
 from artsim.export.options import ExportOptions
 from artsim.families import FAMILIES, make_constrained
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
+from artsim.runs.lock import folder_lock
+from artsim.runs.pool import WorkerLost, WorkerPool
 
 INDEX = "index.csv"
 _MAX_META = 1_000_000
@@ -98,7 +99,7 @@ def generate_objects(
         missing = [key for key in wanted if key not in found]
         with (
             track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
-            WorkerPool(folder, workers) as team,
+            WorkerPool(workers) as team,
         ):
             tasks = ((key, (folder, *key, tuple(formats), constraints, options)) for key in missing)
             for key, answer in team.run(write_object, tasks):

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
 from artsim.observing.sample import Sample
+from artsim.runs.tasks import Output
 
 FormatName = Literal["webdataset", "bop", "coco", "hdf5", "ply"]
 

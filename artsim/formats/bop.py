@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
 from artsim.formats.base import Piece, require_images
@@ -29,6 +28,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.model.ply import mesh_ply
 from artsim.observing.sample import Sample
 from artsim.renderers.raycast import pose, render_posed
+from artsim.runs.tasks import Output
 
 _MM = 1000.0
 _TARGET_VISIBLE = 0.1

@@ -12,12 +12,12 @@ import orjson
 from numpy.typing import NDArray
 
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key
 from artsim.formats.base import Piece, PlainFormat, require_images
 from artsim.formats.images import grey_depth, png_bytes
 from artsim.observing.sample import Sample
+from artsim.runs.tasks import Output
 
 
 class CocoFormat(PlainFormat):

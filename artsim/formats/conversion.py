@@ -1,6 +1,6 @@
 """dataset -> workers -> files: convert a finished dataset on local processes, resumably.
 
-``conversion.json`` is written last, with the checksum of every file; see :mod:`artsim.datasets.pieces`.
+``conversion.json`` is written last, with the checksum of every file; see :mod:`artsim.runs.tasks`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,7 @@ from typing import Any, get_args
 from artsim.common.files import file_sha256
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.description import DESCRIPTION
-from artsim.datasets.pieces import Answer, Output, Run, Task, run_pieces
 from artsim.datasets.splits import SPLITS
-from artsim.datasets.worker import StoppedError, report, stop_if_asked
 from artsim.errors import ConfigError
 from artsim.formats.base import Format, FormatName, Piece
 from artsim.formats.bop import BopFormat
@@ -26,6 +24,8 @@ from artsim.formats.hdf5 import Hdf5Format
 from artsim.formats.ply import PlyFormat
 from artsim.formats.webdataset import WebDatasetFormat
 from artsim.observing.sample import Sample
+from artsim.runs.tasks import Answer, Output, Run, Task, run_pieces
+from artsim.runs.worker import StoppedError, report, stop_if_asked
 
 FORMATS: dict[FormatName, Format] = {
     "webdataset": WebDatasetFormat(),
@@ -144,7 +144,7 @@ def convert(
         return {}
 
     run = Run(folder, recipe, DONE, "conversion", "sample", progress=progress)
-    result = run_pieces(run, tasks, finish, workers, source.folder)
+    result = run_pieces(run, tasks, finish, workers)
     return ConvertResult(folder, total, result.made, len(result.files), time.perf_counter() - start)
 
 

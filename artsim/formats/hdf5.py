@@ -12,7 +12,6 @@ import orjson
 
 from artsim.common.extras import needs
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.pieces import Output
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key, sample_members
 from artsim.formats.base import Piece, PlainFormat, require_images
@@ -20,6 +19,7 @@ from artsim.formats.pinhole import integer_centre_K
 from artsim.model.frame import BACKGROUND
 from artsim.model.kinematics import invert_transform
 from artsim.observing.sample import Sample
+from artsim.runs.tasks import Output
 
 
 class Hdf5Format(PlainFormat):

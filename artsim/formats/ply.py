@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.pieces import Output
 from artsim.datasets.shards import sample_key
 from artsim.formats.base import Piece, PlainFormat
 from artsim.model.ply import cloud_ply
 from artsim.observing.sample import Sample
+from artsim.runs.tasks import Output
 
 
 class PlyFormat(PlainFormat):

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from artsim.common.files import open_image
 from artsim.datasets.dataset import Dataset
-from artsim.datasets.pieces import Output
 from artsim.datasets.shards import MAX_PIXELS, sample_key, sample_members, write_tar
 from artsim.errors import DatasetError
 from artsim.formats.base import Piece, PlainFormat
 from artsim.formats.images import depth_png
 from artsim.observing.sample import Sample
+from artsim.runs.tasks import Output
 
 
 class WebDatasetFormat(PlainFormat):

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from artsim.common.files import MAX_ARRAY_BYTES, parse_json, parse_npz, read_bounded, write_atomic
 from artsim.common.names import printable
-from artsim.common.storage import Place, storage_of
 from artsim.errors import AssetError, KinematicsError
 from artsim.model.kinematics import LARGEST, Array, KinematicTree
 from artsim.model.objects import MAX_PARTS, ArticulatedObject, Part, Repair
+from artsim.runs.storage import Place, storage_of
 
 _CACHE_BYTES = 250_000_000
 _COMPILED_FORMAT = 1

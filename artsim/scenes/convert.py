@@ -1,6 +1,6 @@
 """Finished scenes in formats of other programs: COCO's instance masks, and BOP's models, poses and masks of parts.
 
-Each scene is a piece of work; see :mod:`artsim.datasets.pieces`.
+Each scene is a piece of work; see :mod:`artsim.runs.tasks`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from typing import Any, Literal
 import numpy as np
 
 from artsim.common.files import file_sha256
-from artsim.datasets.pieces import Answer, Output, Run, Task, run_pieces
-from artsim.datasets.worker import StoppedError, report, stop_if_asked
 from artsim.errors import DatasetError
 from artsim.formats.bop import (
     articulation,
@@ -29,6 +27,8 @@ from artsim.formats.bop import (
 )
 from artsim.formats.coco import mask_record
 from artsim.formats.images import depth_png, grey_depth, mask_png, png_bytes
+from artsim.runs.tasks import Answer, Output, Run, Task, run_pieces
+from artsim.runs.worker import StoppedError, report, stop_if_asked
 from artsim.scenes.dataset import DESCRIPTION, SceneDataset, SceneRecord
 from artsim.scenes.generate import SceneRun
 from artsim.scenes.random_scene import make_scene

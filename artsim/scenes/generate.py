@@ -1,4 +1,4 @@
-"""Scenes on disk: drawn, seen and written by worker processes, resumably; see :mod:`artsim.datasets.pieces`."""
+"""Scenes on disk: drawn, seen and written by worker processes, resumably; see :mod:`artsim.runs.tasks`."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artsim.datasets.pieces import Answer, Output, Run, Task, run_pieces
 from artsim.datasets.sample_options import SensorName
 from artsim.datasets.shards import write_tar
-from artsim.datasets.worker import StoppedError, report, stop_if_asked
 from artsim.errors import ConfigError
 from artsim.loading.sources import find_sources
 from artsim.renderers import RendererName
+from artsim.runs.tasks import Answer, Output, Run, Task, run_pieces
+from artsim.runs.worker import StoppedError, report, stop_if_asked
 from artsim.scenes.dataset import DESCRIPTION, FORMAT
 from artsim.scenes.ground_truth import SceneView, observe_scene, view_files
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera

@@ -23,7 +23,6 @@ from artsim.common.files import read_json, write_error
 from artsim.common.outputs import replace_folder
 from artsim.common.progress import track
 from artsim.common.tables import plural, table
-from artsim.datasets.worker_pool import folder_lock
 from artsim.errors import AssetError, ConfigError
 from artsim.export import FORMATS, check_formats, export
 from artsim.loading.collision_bodies import read_bodies
@@ -32,6 +31,7 @@ from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.objects import ArticulatedObject
+from artsim.runs.lock import folder_lock
 from artsim.variation.operations import OPERATIONS
 from artsim.variation.search import Variation, draw_variation
 from artsim.variation.standard import Standard

@@ -5,15 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import stat
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from artsim.commands.view import Gallery, View
 from artsim.common.files import read_bounded, write_atomic
-from artsim.common.outputs import check_output, locked, write_output
+from artsim.common.outputs import check_output, write_output
 from artsim.datasets.generate import generate
 from artsim.errors import ConfigError
 from artsim.export.batch import generate_objects
@@ -123,15 +121,3 @@ def test_variations_of_a_variation_do_not_take_its_place(laptop: Path, tmp_path:
     with pytest.raises(ConfigError, match="an input is in it"):
         write_variations(tmp_path / "out" / "0", tmp_path / "out", 1, progress=False)
     assert _bytes(tmp_path / "out" / "0") == before
-
-
-def test_a_locked_file_has_one_writer(tmp_path: Path) -> None:
-    program = (
-        "import sys; from pathlib import Path; from artsim.common.outputs import locked; path = Path(sys.argv[1])\n"
-        "with path.open('a+b') as file, locked(file, path): pass"
-    )
-    path = tmp_path / "lines.jsonl"
-    with path.open("a+b") as file, locked(file, path):
-        child = subprocess.run([sys.executable, "-c", program, path], capture_output=True, text=True, check=False)
-        assert "another program writes to it" in child.stderr
-    subprocess.run([sys.executable, "-c", program, path], check=True)

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import artsim
-from artsim.common.storage import UrlStorage
 from artsim.datasets.merge import merge
 from artsim.datasets.parts import Part
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
+from artsim.runs.storage import UrlStorage
 from tests.artsim.datasets.troublesome import digests
 from tests.artsim.object_storage import Faulty, object_storage
 from tests.conftest import in_another_process

@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 
 import artsim
-from artsim.common.storage import FolderStorage
 from artsim.datasets import parts
 from artsim.datasets.description import document_bytes, read_plan_document
 from artsim.datasets.merge import merge
@@ -24,6 +23,7 @@ from artsim.datasets.parts import Part
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
+from artsim.runs.storage import FolderStorage
 from tests.artsim.datasets.troublesome import Troublesome, digests
 from tests.conftest import ROOT
 

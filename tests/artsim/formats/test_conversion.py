@@ -15,12 +15,12 @@ import pytest
 import artsim
 from artsim import Dataset
 from artsim.commands.generate import Generate
-from artsim.datasets.pieces import JOURNAL
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.formats.base import FormatName
 from artsim.formats.conversion import DONE, FORMATS, convert
 from artsim.loading.sources import family_sources
+from artsim.runs.tasks import JOURNAL
 from tests.artsim.formats.conftest import contents
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_workers")]

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 from pycocotools import mask as coco_mask
 
-from artsim.datasets.pieces import JOURNAL
 from artsim.errors import ConfigError, DatasetError
+from artsim.runs.tasks import JOURNAL
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun, generate_scenes, open_scenes
 from artsim.scenes.convert import convert_scenes
 from artsim.scenes.dataset import DESCRIPTION

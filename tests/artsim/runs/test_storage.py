@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from artsim.common import storage as module
-from artsim.common.storage import FolderStorage, Storage, UrlStorage, is_url, storage_of
 from artsim.errors import ConfigError, DatasetError
+from artsim.runs import storage as module
+from artsim.runs.storage import FolderStorage, Storage, UrlStorage, is_url, storage_of
 from tests.artsim.object_storage import object_storage
 from tests.conftest import installed
 

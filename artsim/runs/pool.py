@@ -1,4 +1,4 @@
-"""The worker processes of a run, and the lock that keeps a second run out of its folder."""
+"""The worker processes of a run on this machine."""
 
 from __future__ import annotations
 
@@ -14,14 +14,11 @@ from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, TypeVar
 
-from artsim.common.files import write_error
-from artsim.common.storage import Place, storage_of
-from artsim.datasets.worker import serve
 from artsim.errors import DatasetError
+from artsim.runs.worker import serve
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -66,17 +63,17 @@ class WorkerPool:
 
     Parameters
     ----------
-    place : path, str or Storage
-        Of the dataset.
     workers : int
         Processes at most.
+    context : object, optional
+        What each process gets, once: see :attr:`artsim.runs.worker.Worker.context`.
     """
 
-    def __init__(self, place: Place, workers: int):
+    def __init__(self, workers: int, context: Any = None):
         # Inherited by the processes: with one of them for each core, NumPy's own threads only get in the way.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        self.storage, self.workers = storage_of(place), workers
-        self._context = multiprocessing.get_context("spawn")
+        self.workers, self._context = workers, context
+        self._spawn = multiprocessing.get_context("spawn")
         self._members: list[_Member] = []
 
     def run(
@@ -94,7 +91,7 @@ class WorkerPool:
         Parameters
         ----------
         work : callable
-            A function of a module; it may call ``worker.report(count)``.
+            A function of a module; it may call :func:`artsim.runs.worker.report`.
         tasks : iterable of (key, arguments)
         limit : float, optional
             Seconds that a task may take before its process is killed.
@@ -151,8 +148,7 @@ class WorkerPool:
                     if not member.greeted:
                         raise DatasetError(
                             "a worker process ended as it started (a script without `if __name__ == '__main__'`?)",
-                            self.storage.place,
-                            "start the run from a module, or below `if __name__ == '__main__':`",
+                            fix="start the run from a module, or below `if __name__ == '__main__':`",
                         )
                     if alone:
                         yield task[0], WorkerLost(f"a worker process died of it ({_cause(member.process.exitcode)})")
@@ -178,8 +174,8 @@ class WorkerPool:
 
     def _start(self) -> _Member:
         """A new process; it never hears a Ctrl-C, which is the parent's to answer."""
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=serve, args=(theirs, self.storage))
+        ours, theirs = self._spawn.Pipe()
+        process = self._spawn.Process(target=serve, args=(theirs, self._context))
         if sys.platform == "win32":
             process.start()
         else:
@@ -235,24 +231,3 @@ def _cause(exit_code: int | None) -> str:
     except ValueError:
         name = str(-exit_code)
     return f"{name}: out of memory?" if name == "SIGKILL" else name
-
-
-@contextlib.contextmanager
-def folder_lock(folder: Path) -> Iterator[None]:
-    """Keep a second run out of the folder; the lock goes with the process, however it ends."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / ".lock").open("w")
-    except OSError as error:
-        raise write_error(error, folder) from error
-    with lock:
-        if sys.platform != "win32":
-            import fcntl
-
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise DatasetError("another run is writing here", folder, "wait for it or stop it") from error
-            except OSError as error:
-                raise DatasetError(f"cannot lock ({error.strerror})", folder, "use a folder on a local disk") from error
-        yield

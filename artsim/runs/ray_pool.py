@@ -14,16 +14,16 @@ import threading
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from artsim.common.extras import needs
-from artsim.common.storage import FolderStorage, Place, Storage, storage_of
-from artsim.datasets.versions import VERSIONS_OF
-from artsim.datasets.worker import Worker, answer, become
-from artsim.datasets.worker_pool import WorkerLost
 from artsim.errors import ArtsimError, ConfigError
+from artsim.runs.pool import WorkerLost
+from artsim.runs.storage import FolderStorage, storage_of
+from artsim.runs.worker import Worker, answer, become
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -44,11 +44,13 @@ class RayPool:
 
     Parameters
     ----------
-    place : path, str or Storage
-        Of the dataset. A path is this machine's: other machines get and send its files through this one. A
-        FolderStorage is a folder that every node sees.
     address : str
         "auto" for the cluster that this machine belongs to, "local" to start one here, or HOST:PORT of its head.
+    context : object, optional
+        What each process gets: see :attr:`artsim.runs.worker.Worker.context`. A path or str becomes a storage. Other
+        machines read and write the files of a path through this one; a FolderStorage is a folder that every node sees.
+    packages : sequence of str
+        Every node has to have the driver's versions of these.
 
     Raises
     ------
@@ -56,10 +58,10 @@ class RayPool:
         When Ray is not installed, or there is no cluster.
     """
 
-    def __init__(self, place: Place, address: str):
-        with needs("generation on Ray"):
+    def __init__(self, address: str, context: Any = None, packages: Sequence[str] = ("artsim",)):
+        with needs("work on Ray"):
             import ray
-        self._ray, self.storage = ray, storage_of(place)
+        self._ray = ray
         self._own = not ray.is_initialized()
         if self._own:
             connect(ray, address)
@@ -69,13 +71,14 @@ class RayPool:
         here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
             ray.get_runtime_context().get_node_id(), soft=False
         )
-        hub = ray.remote(num_cpus=0, max_concurrency=8, scheduling_strategy=here)(_Hub)
-        self._hub = hub.remote(_absolute(self.storage))
+        storage = _absolute(storage_of(context) if isinstance(context, str | Path) else context)
+        self._hub = ray.remote(num_cpus=0, max_concurrency=8, scheduling_strategy=here)(_Hub).remote(storage)
         # A cluster that is started here has no other machine.
-        shared = address == "local" or isinstance(place, FolderStorage) or not isinstance(self.storage, FolderStorage)
-        self._seen = _absolute(self.storage) if shared else RelayStorage(self._hub, self.storage.place)
+        if isinstance(context, str | Path) and isinstance(storage, FolderStorage) and address != "local":
+            storage = RelayStorage(self._hub, storage.place)
+        self._context = ray.put(storage)
         self._task = ray.remote(num_cpus=1, max_retries=0)(_do)
-        self._versions = {name: version(name) for name in VERSIONS_OF}
+        self._versions = {name: version(name) for name in packages}
 
     def run(
         self,
@@ -84,7 +87,7 @@ class RayPool:
         limit: float | None = None,
         progress: Callable[[int], object] = lambda count: None,
     ) -> Iterator[tuple[K, T | WorkerLost]]:
-        """Do tasks, in any order; see :meth:`artsim.datasets.worker_pool.WorkerPool.run`.
+        """Do tasks, in any order; see :meth:`artsim.runs.pool.WorkerPool.run`.
 
         A task whose process or node dies is done again, four times at most; the time limit ends its process.
         """
@@ -119,8 +122,8 @@ class RayPool:
         return self._ray.wait(refs, num_returns=len(refs), timeout=0)[0] if first else []
 
     def _give(self, work: Callable[..., Any], task: tuple[Any, tuple[Any, ...], int], limit: float | None) -> None:
-        about = self._run, self._seen, self._hub, self._versions
-        self._pending[self._task.remote(about, work, f"{task[0]}", task[1], limit)] = task
+        about = self._run, self._hub, self._versions
+        self._pending[self._task.remote(about, self._context, work, f"{task[0]}", task[1], limit)] = task
 
     def _cluster(self) -> int:
         """Processors of the cluster: nodes come and go."""
@@ -166,15 +169,15 @@ def connect(ray: Any, address: str) -> None:
         ) from error  # fmt: skip
 
 
-def _absolute(storage: Storage) -> Storage:
+def _absolute(context: Any) -> Any:
     """A folder, wherever the process that uses it runs."""
-    return FolderStorage(storage.folder.absolute()) if isinstance(storage, FolderStorage) else storage
+    return FolderStorage(context.folder.absolute()) if isinstance(context, FolderStorage) else context
 
 
 class _Hub:
     """What nodes ask the driver's machine for; an actor there."""
 
-    def __init__(self, storage: Storage):
+    def __init__(self, storage: Any):
         self.storage = storage
         self._late: dict[str, str] = {}
 
@@ -213,7 +216,7 @@ class RelayStorage:
         return value
 
     def read(self, name: str, most: int) -> bytes:
-        """See :meth:`artsim.common.storage.Storage.read`; likewise below."""
+        """See :meth:`artsim.runs.storage.Storage.read`; likewise below."""
         data: bytes = self._ask("read", name, most)
         return data
 
@@ -249,21 +252,22 @@ _here: tuple[str, Worker] | None = None
 
 
 def _do(
-    about: tuple[str, Storage, Any, dict[str, str]],
+    about: tuple[str, Any, dict[str, str]],
+    context: Any,
     work: Callable[..., Any],
     key: str,
     arguments: tuple[Any, ...],
     limit: float | None,
 ) -> tuple[str, Any, int]:
-    """Do a task in a process of a node: what :func:`artsim.datasets.worker.answer` says, and how much was done."""
+    """Do a task in a process of a node: what :func:`artsim.runs.worker.answer` says, and how much was done."""
     global _here
-    run, storage, hub, versions = about
+    run, hub, versions = about
     counts: list[int] = []
     if _here is None or _here[0] != run:
         difference = version_difference(versions)
         if difference is not None:
             return "failed", difference, 0
-        _here = run, Worker(storage, counts.append, bool)
+        _here = run, Worker(context, counts.append, bool)
     worker = _here[1]
     worker.tell = counts.append
     become(worker)

@@ -17,8 +17,9 @@ import orjson
 
 from artsim.common.files import file_sha256, read_bounded, read_json, write_atomic, write_error
 from artsim.common.progress import track
-from artsim.datasets.worker_pool import WorkerLost, WorkerPool, folder_lock
 from artsim.errors import DatasetError
+from artsim.runs.lock import folder_lock
+from artsim.runs.pool import WorkerLost, WorkerPool
 
 JOURNAL = "progress.jsonl"
 _MAX_JOURNAL = 4_000_000_000
@@ -117,7 +118,6 @@ def run_pieces(
     tasks: Mapping[str, Task],
     finish: Callable[[dict[str, Any], Output], Mapping[str, Any]],
     workers: int,
-    home: Path | None = None,
 ) -> Result:
     """Do the pieces that are not done yet, then write what needs all of them, and the last file.
 
@@ -133,8 +133,6 @@ def run_pieces(
         Gets the value of every piece by name, and may write more files; what it returns goes into the last file.
     workers : int
         Processes.
-    home : Path, optional
-        Folder of the dataset that the workers read; by default where they write.
 
     Raises
     ------
@@ -149,7 +147,7 @@ def run_pieces(
             files = {name: (size, digest) for name, (size, digest) in document["files"].items()}
             return Result(files, 0, {})
         try:
-            with WorkerPool(home or folder, workers) as team:
+            with WorkerPool(workers) as team:
                 answers, made = _work(run, tasks, team, total)
         finally:
             _remove_parts(folder)
