@@ -130,9 +130,8 @@ class Estimate(EstimateOptions):
     def _estimate_all(self, load: Callable[[], Method]) -> None:
         """A line of JSON for each cloud, written as soon as it is known, so that Ctrl-C loses nothing."""
         from artperl.commands.estimate_many import Clouds, Estimating
-        from artperl.commands.on_ray import each_on_ray
         from artperl.commands.resumed_lines import Lines
-        from artperl.core.processes import each
+        from artsim.runs.each import each
 
         options = self.input_options()
         clouds = Clouds.of(self.clouds, options, (self.intrinsics, self.mask, self.out))
@@ -142,11 +141,9 @@ class Estimate(EstimateOptions):
             if done:
                 print(f"note: {len(done)} lines are in {self.out} already", file=sys.stderr)
             asked, told = tee(entry for entry in clouds if line_name(entry.file, entry.sample) not in done)
-            if self.ray is None:
-                records = each(Estimating(load, options), asked, self.workers)
-            else:  # processes of nodes run in folders of their own
-                there = (replace(entry, file=entry.file.absolute()) for entry in asked)
-                records = each_on_ray(Estimating(load, options.absolute()), there, self.ray)
+            if self.ray is not None:  # processes of nodes run in folders of their own
+                options, asked = options.absolute(), (replace(own, file=own.file.absolute()) for own in asked)
+            records = each(Estimating(load, options), asked, self.workers, self.ray)
             with closing(records), track("estimate", total=total, initial=len(done), unit="cloud") as progress:
                 for entry, record in zip(told, records, strict=True):
                     failed += "error" in record

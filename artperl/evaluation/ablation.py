@@ -7,7 +7,6 @@ differences.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -26,13 +25,13 @@ from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS, samples_of
 from artperl.evaluation.scoring import Scored, score
 from artperl.methods.full import Estimator
 from artperl.retrieval.shape_base import ShapeBase
-from artsim.common.files import read_json, write_atomic
 from artsim.common.progress import track
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.model.draws import ViewOptions, ViewPreset
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
+from artsim.runs.kept import read_kept, write_kept
 
 Array = NDArray[np.float64]
 Change = Callable[[Estimator], Estimator]
@@ -141,7 +140,7 @@ def run_ablation(
     ConfigError
         When the file has rows of another number of views.
     """
-    record: Record = {} if out is None or not out.exists() else read_json(out, "ablation", ConfigError)
+    record: Record = read_kept(out)
     for category in categories:
         whole = find_estimator(weights, category)
         variants = {WHOLE: whole} | {name: change(whole) for name, change in stages.items()}
@@ -154,8 +153,7 @@ def run_ablation(
             if missing:
                 samples = samples_of(objects, each, options, VALIDATION_SEEDS)
                 record[row] = done | _score_variants(missing, samples, row, progress)
-                if out is not None:
-                    write_atomic(out, (json.dumps(record) + "\n").encode())
+                write_kept(out, record)
             say("\n".join([row, *loss_lines({row: record[row]})]))
     return record
 

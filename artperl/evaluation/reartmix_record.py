@@ -15,10 +15,9 @@ from artperl.evaluation.average_precision import PosedObject
 from artperl.inputs.detections import Detections
 from artperl.methods.estimator_files import folder_of, weights_sha256
 from artperl.scene.estimator import SceneEstimate, SceneEstimator
-from artsim.common.files import read_json, write_atomic
 from artsim.errors import ConfigError
+from artsim.runs.kept import read_kept, write_kept
 
-_MAX_BYTES = 256_000_000
 _SECONDS = 10.0
 """Between two writes: all images are written each time."""
 
@@ -112,10 +111,7 @@ class Kept:
     def __init__(self, path: Path | None, setup: str):
         self.path, self.setup, self.records = path, setup, dict[str, ImageRecord]()
         self._written = time.monotonic()
-        if path is None or not path.exists():
-            return
-        document = read_json(path, "the file of figures", ConfigError, _MAX_BYTES)
-        unfinished = document.get("unfinished") if isinstance(document, dict) else None
+        unfinished = read_kept(path).get("unfinished")
         if unfinished is None or unfinished.get("setup") != setup:
             return
         try:
@@ -131,8 +127,6 @@ class Kept:
 
     def write(self) -> None:
         """Write what there is."""
-        if self.path is not None:
-            images = {key: record.to_json() for key, record in self.records.items()}
-            document = {"unfinished": {"setup": self.setup, "images": images}}
-            write_atomic(self.path, (json.dumps(document) + "\n").encode())
+        images = {key: record.to_json() for key, record in self.records.items()}
+        write_kept(self.path, {"unfinished": {"setup": self.setup, "images": images}})
         self._written = time.monotonic()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,13 @@ from artperl.evaluation.benchmark import find_estimator
 from artperl.evaluation.conditions import CONDITIONS, condition_samples, find_condition
 from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored, evaluate, object_symmetries
-from artsim.common.files import read_json, write_atomic
 from artsim.errors import ConfigError
 from artsim.model.objects import ArticulatedObject
+from artsim.runs.kept import read_kept, write_kept
 
 SOURCES = ("procedural", "real", "real_all")
 """procedural: 40 unseen ones; real: the test half of ArtImage's split; real_all: both halves."""
 
-_MAX_BYTES = 64_000_000
 _HEAD = (
     f"{'':13s}{'views':>6s}{'right':>7s}{'sym.':>6s}{'AUROC':>7s}{'ECE':>6s}{'conf.':>7s}{'move %':>8s}{'IoU %':>7s}"
     "  turn, deg"
@@ -72,7 +70,7 @@ def run_robustness(
         if source not in SOURCES:
             raise ConfigError(f"there is no source {source!r}", "rows", f"use {', '.join(SOURCES)}")
     options = {"weights": None if weights is None else str(weights), "objects": objects, "views": views}
-    rows, sure = _kept_rows(kept, options), {}
+    rows, sure = dict(read_kept(kept, options=options).get("rows", {})), {}
     for source in sources:
         for category in categories:
             tested = _objects(source, category, partnet, objects)
@@ -87,8 +85,7 @@ def run_robustness(
                     samples = condition_samples(condition, tested, views)
                     scored = evaluate(estimator, samples, progress, object_symmetries(tested))
                     rows[key] = row_figures(scored) | {"objects": len(tested)}
-                    if kept is not None:
-                        write_atomic(kept, (json.dumps({"options": options, "rows": rows}) + "\n").encode())
+                    write_kept(kept, {"options": options, "rows": rows})
                 say(row_line(condition, rows[key]))
             asked = [rows[f"{source}/{category}/{condition}"] for condition in conditions]
             confidence, right = (np.concatenate([row[name] for row in asked]) for name in ("confidence", "is_right"))
@@ -102,15 +99,6 @@ def _objects(source: str, category: str, partnet: Path | None, objects: int) -> 
         return row_objects("procedural", category, partnet, objects)
     test = real_objects(category, "test", partnet)
     return test if source == "real" else [*test, *real_objects(category, "train", partnet)]
-
-
-def _kept_rows(kept: Path | None, options: dict[str, Any]) -> dict[str, Any]:
-    if kept is None or not kept.exists():
-        return {}
-    found = read_json(kept, "the file of figures", ConfigError, _MAX_BYTES)
-    if not isinstance(found, dict) or found.get("options") != options or not isinstance(found.get("rows"), dict):
-        raise ConfigError("it holds figures of other options", kept, "name another file, or remove it")
-    return dict(found["rows"])
 
 
 def row_figures(scored: Sequence[Scored]) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from artperl.core.estimate import Estimate
-from artperl.core.processes import each
 from artperl.methods.protocol import Method
 from artsim.errors import ArtsimError
+from artsim.runs.each import each
 
 UNEXPECTED = (ArithmeticError, IndexError, RuntimeError, ValueError)
 """What a strange cloud may raise that no check has caught: one of a thousand must not lose the others."""

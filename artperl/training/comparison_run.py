@@ -29,12 +29,13 @@ from artperl.training.options import LENGTHS, PRESETS, TrainOptions, preset_of
 from artperl.training.recipes import about_tested
 from artperl.training.run import Training
 from artperl.training.timing import filling, trained_minutes
-from artsim.common.files import read_json, write_atomic
+from artsim.common.files import write_atomic
 from artsim.errors import ArtsimError, ConfigError
 from artsim.export import export
 from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
+from artsim.runs.kept import read_kept, write_kept
 
 Benchmark = Literal["artimage", "robotarm"]
 Preset = Literal["quick", "full"]
@@ -50,7 +51,6 @@ _NOISY, _DEGRADED = 0.5, 0.6
 """Shares of the clouds that trainings for the arm see with a sensor's noise; cut, dirty or sparse, as by bad masks."""
 _ARM_STEPS = 6000
 """Batches that the estimator for any tree learns on from an arm."""
-_MAX_ROW = 4_000_000
 _OVERLAYS = 4
 """Views of a category that are drawn."""
 
@@ -178,8 +178,8 @@ def run_comparison(
     for number, (category, name) in enumerate(steps, 1):
         kept = out / "rows" / f"{category}-{name.replace(SHIPPED, '-shipped')}{options.suffix}.json"
         asked = _asked(options, name)
-        row = _kept_row(kept, asked)
-        if row is None:
+        row = read_kept(kept, options=asked)
+        if not row:
             begun = time.perf_counter()
             estimator, core_minutes = row_estimator(options, category, name, out, workers, progress, say)
             learnt = time.perf_counter() - begun
@@ -192,7 +192,7 @@ def run_comparison(
                 "testing_minutes": (time.perf_counter() - begun - learnt) / 60.0,
                 "record": row_record(scored, samples, core_minutes),
             }  # fmt: skip
-            write_atomic(kept, (json.dumps(row, indent=1) + "\n").encode())
+            write_kept(kept, row, indent=1)
         rows[category][name] = row["record"]
         say(
             f"{number} of {len(steps)}, {name} on {category}: training {row['training_minutes']:.1f} min, test "
@@ -202,7 +202,7 @@ def run_comparison(
     told.pop("partnet")  # a path of this machine
     report = {"options": told, "rows": rows}
     text, name = markdown(options.benchmark, rows, notes(options)), f"report{options.suffix}"
-    write_atomic(out / f"{name}.json", (json.dumps(report, indent=1) + "\n").encode())
+    write_kept(out / f"{name}.json", report, indent=1)
     write_atomic(out / f"{name}.md", text.encode())
     pictures, views = drawn(options, out, say)
     write_atomic(out / f"{name}.html", html_page(text, f"{options.benchmark}, compared", pictures, views).encode())
@@ -223,16 +223,6 @@ def _asked(options: ComparisonOptions, name: str) -> dict[str, Any]:
     own["method"] = name
     own["arm"] = load(Path(options.arm)).sha256 if options.arm else ""
     return dict(json.loads(json.dumps(own)))
-
-
-def _kept_row(path: Path, asked: dict[str, Any]) -> dict[str, Any] | None:
-    """A row that was measured before; None if there is none."""
-    if not path.is_file():
-        return None
-    row = read_json(path, "the row of the report", ConfigError, _MAX_ROW)
-    if not isinstance(row, dict) or row.get("options") != asked or not isinstance(row.get("record"), dict):
-        raise ConfigError("it holds figures of other options", path, "name another --out, or remove it")
-    return row
 
 
 def training_options(options: ComparisonOptions, category: str, method: StoredMethod, out: Path) -> TrainOptions:

@@ -23,6 +23,7 @@ from torch.utils.tensorboard import SummaryWriter
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artsim.common.files import parse_json, read_bounded, read_json, write_atomic, write_error
 from artsim.errors import DatasetError
+from artsim.runs import recipe
 from artsim.runs.lock import folder_lock
 
 _FORMAT = 3
@@ -205,18 +206,12 @@ class RunFolder:
 
 def differences(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
     """Names of options whose values differ, at every depth, each with the value that the run was begun with."""
-    found = list(_differences(begun, asked, ""))
+    found = [
+        f"{name} ({json.dumps(old):.40} there, {json.dumps(new):.40} asked for)"
+        for name, old, new in recipe.differences(begun, {**dict.fromkeys(begun), **asked})
+    ]
     more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
     return ", ".join(found[:_SHOWN]) + more
-
-
-def _differences(begun: Mapping[str, Any], asked: Mapping[str, Any], above: str) -> Iterator[str]:
-    for name in {**begun, **asked}:
-        old, new = begun.get(name), asked.get(name)
-        if isinstance(old, dict) and isinstance(new, dict):
-            yield from _differences(old, new, f"{above}{name}.")
-        elif old != new:
-            yield f"{above}{name} ({json.dumps(old):.40} there, {json.dumps(new):.40} asked for)"
 
 
 def _digest(state: Mapping[str, Any]) -> str:

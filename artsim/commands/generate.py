@@ -52,8 +52,8 @@ class Generate(Opened):
     ray: str | None = None
     """Use a Ray cluster instead: auto (the one that this machine belongs to), local (starts one), or HOST:PORT. Nodes
     need the same artsim, and no disk in common."""
-    part: Annotated[str | None, tyro.conf.arg(metavar="I/N")] = None
-    """Do the part of machine I of N, from 0/N on, that share --out: for array jobs. Then artsim merge completes it."""
+    share: Annotated[str | None, tyro.conf.arg(metavar="I/N", aliases=("--part",))] = None
+    """Do the share of machine I of N, from 0/N on, of one --out: for array jobs. Then artsim merge completes it."""
     sample: Annotated[SampleOptions, tyro.conf.arg(name="")] = field(default_factory=SampleOptions)
     splits: tuple[float, float, float] = (0.8, 0.1, 0.1)
     """Shares of each category's objects in train, val and test: by object, never by view."""
@@ -71,16 +71,16 @@ class Generate(Opened):
     def run(self) -> None:
         from artsim.common.names import printable
         from artsim.datasets.generate import generate
-        from artsim.datasets.parts import Part
+        from artsim.datasets.shares import Share
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
         from artsim.runs.storage import is_url
 
-        part = None if self.part is None else Part.parse(self.part)
+        share = None if self.share is None else Share.parse(self.share)
         if self.format is not None:  # before hours are spent on a dataset that it does not take
             from artsim.formats.conversion import FORMATS
 
-            if is_url(self.out) or part is not None:
+            if is_url(self.out) or share is not None:
                 raise ConfigError("a whole dataset in a folder is converted", "format", "leave --format out")
             FORMATS[self.format].check(self.sample, Path(self.out))
         sources: list[Source] = [*find_sources(self.objects, self.package_root, self.body)]
@@ -104,15 +104,15 @@ class Generate(Opened):
                 strict=self.strict,
                 load_limit=self.load_limit,
                 ray=self.ray,
-                part=part,
+                share=share,
             )
         except KeyboardInterrupt:
             print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")
             raise
         for reason in result.left_out:
             print(f"left out: {printable(reason, 1000)}")
-        if part is not None:
-            print(f"{result.folder}: part {part} is done, {result.made} samples made now")
+        if share is not None:
+            print(f"{result.folder}: share {share} is done, {result.made} samples made now")
             print(f"when all are: artsim merge {result.folder}")
             return
         for line in object_lines(str(result.folder), result.objects):

@@ -84,15 +84,15 @@ class Repair:
 
 @dataclass(frozen=True)
 class Merge:
-    """Complete a dataset that several machines made with generate.py --part.
+    """Complete a dataset that several machines made with generate.py --share.
 
-    Nothing is complete before: shards that are missing are named, with the parts to run again.
+    Nothing is complete before: shards that are missing are named, with the shares to run again.
 
     Example: artsim merge s3://bucket/first --check
     """
 
     path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER|URL")]
-    """Folder or URL that the parts wrote to."""
+    """Folder or URL that the shares wrote to."""
     check: bool = False
     """Read every file again, and compare its checksum; otherwise sizes alone are compared."""
 

@@ -6,6 +6,7 @@ all that ``plan.json`` holds, so that the one is restored from the other.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -13,15 +14,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from artsim.common.files import MAX_JSON_BYTES, parse_json, read_bounded, read_json, write_atomic
+from artsim.common.files import MAX_JSON_BYTES, parse_json, read_json, write_atomic
 from artsim.common.names import printable
 from artsim.datasets import json_values
 from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.errors import ConfigError, DatasetError
+from artsim.runs.journal import JOURNAL, Journal
 from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
 
-PLAN, DESCRIPTION, JOURNAL = "plan.json", "dataset.json", "progress.jsonl"
+PLAN, DESCRIPTION = "plan.json", "dataset.json"
 
 CONVENTIONS = (
     "Metres, radians. Camera frame OpenCV (x right, y down, z forward); depth is z-depth, 0 = no return; pixel centres "
@@ -35,7 +37,6 @@ _PLAN_KEYS = (
 )  # fmt: skip
 _MORE_KEYS = ("conventions", "splits", "shards")
 _SEAL = "sha256"
-_MAX_JOURNAL = 1_000_000_000
 
 
 def plan_part(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -251,23 +252,13 @@ def read_started(folder: Path) -> StartedDataset | None:
 def _shards_of_journal(folder: Path) -> list[ShardRecord]:
     """Shards that a damaged ``dataset.json`` and the journal of a stopped run speak of."""
     entries: list[Any] = []
-    try:
+    with contextlib.suppress(DatasetError, KeyError, TypeError, IndexError):  # there may be none, or nothing left of it
         shards = read_json(folder / DESCRIPTION, DESCRIPTION, DatasetError)["shards"]
         entries += shards if isinstance(shards, list) else []
-    except (DatasetError, KeyError, TypeError, IndexError):
-        pass  # there is none, or nothing is left of it
-    try:
-        for line in read_bounded(folder / JOURNAL, _MAX_JOURNAL, JOURNAL, DatasetError).splitlines():
-            try:
-                entries.append(json.loads(line))
-            except (ValueError, RecursionError):
-                continue  # the last line of a killed run may be cut short; its shard is made again
-    except DatasetError:
-        pass
+    with contextlib.suppress(DatasetError):
+        entries += Journal(folder / JOURNAL).lines()
     records = []
     for entry in entries:
-        try:
+        with contextlib.suppress(ValueError, KeyError):
             records.append(ShardRecord.from_dict(entry))
-        except (ValueError, KeyError):
-            continue
     return records

@@ -9,30 +9,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
-from artsim.common.files import write_atomic
-from artsim.datasets.description import DESCRIPTION, JOURNAL, StartedDataset, read_started
+from artsim.datasets.description import DESCRIPTION, StartedDataset, read_started
+from artsim.datasets.inventory import Inventory, examine, leftover_problems
 from artsim.datasets.merge import merge
 from artsim.datasets.new_plan import new_plan
 from artsim.datasets.origins import Origins, write_origins
-from artsim.datasets.parts import Part, PartRun
 from artsim.datasets.plan import MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
-from artsim.datasets.restore import journal_line, remove_leftovers, restore
+from artsim.datasets.restore import remove_leftovers, restore
 from artsim.datasets.same_plan import check_same_plan
 from artsim.datasets.sample_options import SampleOptions
+from artsim.datasets.shares import Share, ShareRun
 from artsim.datasets.splits import check_shares
-from artsim.datasets.state import State, examine, leftover_problems
 from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import PARTS
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
+from artsim.runs.journal import JOURNAL, Journal
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool
 from artsim.runs.ray_pool import RayPool
+from artsim.runs.recipe import check_counts, check_seed
 from artsim.runs.storage import FolderStorage, Place, is_url, storage_of
 
 LOAD_LIMIT = 300.0
@@ -46,7 +47,7 @@ class GenerateResult:
     Attributes
     ----------
     folder : Path or str
-        A str is the URL, or the place of a part.
+        A str is the URL, or the place of a share.
     num_samples : int
         Of the whole dataset.
     made : int
@@ -86,7 +87,7 @@ def generate(
     strict: bool = False,
     load_limit: float = LOAD_LIMIT,
     ray: str | None = None,
-    part: Part | None = None,
+    share: Share | None = None,
 ) -> GenerateResult:
     """Generate a dataset, or go on with one that was stopped, extend it, or repair it.
 
@@ -121,8 +122,8 @@ def generate(
     ray : str, optional
         Use a Ray cluster instead of processes of this machine: "auto", "local", or HOST:PORT of its head. The result
         does not depend on it.
-    part : Part, optional
-        Do the part of one of several machines that share the folder or URL; :func:`artsim.datasets.merge.merge`
+    share : Share, optional
+        Do the share of one of several machines that share the folder or URL; :func:`artsim.datasets.merge.merge`
         completes the dataset.
 
     Returns
@@ -144,16 +145,16 @@ def generate(
     folder = Path(out)
     asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), (), strict, version("artsim"))
     _check_options(asked, workers, load_limit, sources)
-    if is_url(out) or part is not None:
-        storage, share = storage_of(out), part or Part()
+    if is_url(out) or share is not None:
+        storage = storage_of(out)
         with _team(storage, workers, ray) as team:
-            run = PartRun(storage, asked, sources, share, team, skip_broken, load_limit, progress)
+            run = ShareRun(storage, asked, sources, share or Share(), team, skip_broken, load_limit, progress)
             plan, document, made = run.run()
         if isinstance(storage, FolderStorage):
             write_origins(storage.folder, sources)
-        if part is None:
+        if share is None:
             merge(storage, progress=progress)
-        return _result(storage.place, StartedDataset(document, plan, (), part is None, ()), made, start)
+        return _result(storage.place, StartedDataset(document, plan, (), share is None, ()), made, start)
     if (folder / DESCRIPTION).exists():  # else it is not complete, and perhaps another run is at it
         begun = _start(folder, asked, sources)
         if begun is not None and _is_sound(folder, begun, num_samples, workers, progress):
@@ -171,9 +172,9 @@ def generate(
                     grown_from = begun.plan.num_samples
                     begun = _extend(folder, begun, num_samples)
                 write_origins(folder, sources)
-                state = examine(folder, begun, workers, progress)
-                damaged = _damaged_files(folder, begun, state) if grown_from is None else set()
-                restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
+                inventory = examine(folder, begun, workers, progress)
+                damaged = _damaged_files(folder, begun, inventory) if grown_from is None else set()
+                restored = restore(folder, begun, inventory, Origins(folder, sources), team, progress)
         finally:
             remove_leftovers(folder)
     if restored.failed:
@@ -202,21 +203,17 @@ def _result(folder: Path | str, begun: StartedDataset, made: int, start: float) 
     return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
 
 
-def _damaged_files(folder: Path, begun: StartedDataset, state: State) -> set[str]:
+def _damaged_files(folder: Path, begun: StartedDataset, inventory: Inventory) -> set[str]:
     """Files that were there before, or were said to be, and have to be made again."""
     finished = {record.name for record in begun.records}
-    shards = {shard.name for shard in state.shards if shard.name in finished}
+    shards = {shard.name for shard in inventory.shards if shard.name in finished}
     descriptions = {problem.where for problem in begun.problems}
-    return shards | {planned.file for planned in state.objects} | descriptions
+    return shards | {planned.file for planned in inventory.objects} | descriptions
 
 
 def _check_options(asked: Plan, workers: int, load_limit: float, sources: Sequence[Source]) -> None:
-    counts = (("num_samples", asked.num_samples), ("shard_size", asked.shard_size), ("workers", workers))
-    for name, value in counts:
-        if value < 1:
-            raise ConfigError(f"{value} is not a count", name, "use 1 or more")
-    if asked.seed < 0:
-        raise ConfigError(f"{asked.seed} is not a seed", "seed", "use 0 or more")
+    check_counts(num_samples=asked.num_samples, shard_size=asked.shard_size, workers=workers)
+    check_seed(asked.seed)
     if not load_limit > 0:
         raise ConfigError(f"{load_limit} is no time", "load_limit", "use some seconds, such as 300")
     check_shares(asked.fractions)
@@ -245,7 +242,7 @@ def _start(folder: Path, asked: Plan, sources: Sequence[Source]) -> StartedDatas
     if not folder.is_dir():
         raise ConfigError("cannot write (it is a file)", folder, "choose another folder")
     if (folder / PARTS).exists():
-        raise DatasetError("several machines are making it in parts", folder, "artsim merge completes it, then go on")
+        raise DatasetError("several machines are making it in shares", folder, "artsim merge completes it, then go on")
     begun = read_started(folder)
     if begun is None:
         _refuse_strangers(folder)
@@ -267,6 +264,6 @@ def _extend(folder: Path, begun: StartedDataset, num_samples: int) -> StartedDat
     """The plan with more samples. What is finished of the smaller one is noted, before nothing else says so."""
     document = {**begun.document, "num_samples": num_samples}
     plan = replace(begun.plan, num_samples=num_samples)
-    write_atomic(folder / JOURNAL, b"".join(map(journal_line, begun.records)))
+    Journal(folder / JOURNAL).start(map(asdict, begun.records))
     (folder / DESCRIPTION).unlink(missing_ok=True)
     return StartedDataset(document, plan, begun.records, False, ())

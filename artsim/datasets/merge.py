@@ -17,9 +17,9 @@ from artsim.datasets.description import (
     read_description,
     read_plan_document,
 )
-from artsim.datasets.parts import read_records
 from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.restore import remove_leftovers
+from artsim.datasets.shares import read_records
 from artsim.datasets.worker import PARTS, PREPARED, RECORDS
 from artsim.errors import DatasetError
 from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
@@ -27,7 +27,7 @@ from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
 _THREADS = 32
 """Requests at once."""
 _BLOCK_BYTES = 1 << 22
-_AGAIN = "delete it, and run its part again"
+_AGAIN = "delete it, and run its share again"
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class MergeResult:
 
 
 def merge(place: Place, check: bool = False, progress: bool = True) -> MergeResult:
-    """Complete a dataset whose parts are done.
+    """Complete a dataset whose shares are done.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def merge(place: Place, check: bool = False, progress: bool = True) -> MergeResu
     Raises
     ------
     DatasetError
-        When shards are missing, with the parts that have not finished, or a file is not as it was written.
+        When shards are missing, with the shares that have not finished, or a file is not as it was written.
     """
     storage = storage_of(place)
     files = storage.sizes()
@@ -88,20 +88,20 @@ def _records(storage: Storage, plan: Plan, files: dict[str, int]) -> list[ShardR
         raise DatasetError(
             f"{len(lacking)} of {len(shards)} shards are not there, such as {lacking[0]}",
             storage.place,
-            _unfinished_parts(storage),
+            _unfinished_shares(storage),
         )
     return [records[shard.name] for shard in shards]
 
 
-def _unfinished_parts(storage: Storage) -> str:
+def _unfinished_shares(storage: Storage) -> str:
     """What to run again."""
     done = [re.fullmatch(r"(\d+)-of-(\d+)\.json", name) for name in storage.sizes(PARTS)]
     counts = {int(found[2]) for found in done if found}
     if len(counts) != 1:
-        return "run every part again: what is there is not made again"
+        return "run every share again: what is there is not made again"
     count = counts.pop()
     left = sorted(set(range(count)) - {int(found[1]) for found in done if found}) or range(count)
-    named = ", ".join(f"--part {number}/{count}" for number in left[:6])
+    named = ", ".join(f"--share {number}/{count}" for number in left[:6])
     return f"run again: {named}" + (f" and {len(left) - 6} more" if len(left) > 6 else "")
 
 
@@ -110,7 +110,7 @@ def _place_objects(storage: Storage, plan: Plan, check: bool, progress: bool) ->
     prepared, there = storage.sizes(PREPARED), storage.sizes("objects")
     for planned in plan.objects:
         if f"{planned.file_sha256}.npz" not in prepared and f"{planned.key}.npz" not in there:
-            raise DatasetError("is missing", f"{storage.place}/{planned.file}", "run every part again")
+            raise DatasetError("is missing", f"{storage.place}/{planned.file}", "run every share again")
     if check:
         names = [(f"{PREPARED}/{p.file_sha256}.npz", p.file_sha256) for p in plan.objects]
         _compare(storage, [pair for pair in names if pair[0].rpartition("/")[2] in prepared], progress)

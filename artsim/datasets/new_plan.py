@@ -11,19 +11,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artsim.common.files import append, file_sha256, parse_json, read_bounded, write_error
+from artsim.common.files import file_sha256, write_error
 from artsim.common.json_records import from_json_values
 from artsim.common.progress import track
+from artsim.datasets.inventory import PREPARED_JOURNAL, STAGED
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
-from artsim.datasets.state import PREPARED_JOURNAL, STAGED
 from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
+from artsim.runs.journal import Journal
 from artsim.runs.pool import Team, WorkerLost
 
-_MAX_JOURNAL = 1_000_000_000
 _LISTED = 6
 """Reasons that an error gives; the others are counted."""
 
@@ -71,7 +71,9 @@ def new_plan(
         raise write_error(error, staging) from error
     recipes = {f"{STAGED}{i}.npz": preparation(asked, [source]) for i, source in enumerate(sources)}
     names = list(recipes)
-    known = _prepared(folder, recipes)
+    journal = Journal(folder / PREPARED_JOURNAL)
+    known = _prepared(folder, journal, recipes)
+    journal.start(_entry(recipes, answer) for answer in known.values())
     answers: dict[int, CompiledSource | RefusedSource] = {i: known[n] for i, n in enumerate(names) if n in known}
     tasks = (
         (i, (source, names[i], asked.seed, asked.sample, asked.strict))
@@ -81,8 +83,7 @@ def new_plan(
         for i, answer in team.run(compile_source, tasks, load_limit):
             answers[i] = RefusedSource(f"{sources[i].name}: {answer.why}") if isinstance(answer, WorkerLost) else answer
             if isinstance(answer, CompiledSource):
-                line = json.dumps({"recipe": recipes[names[i]], "answer": asdict(answer)})
-                append(folder / PREPARED_JOURNAL, f"\n{line}".encode())  # behind what a killed run left of a line
+                journal.add(_entry(recipes, answer))
             bar.update()
     document, files = plan_document(asked, sources, [answers[i] for i in range(len(sources))], skip_broken)
     for staged, file in files:
@@ -97,15 +98,16 @@ def preparation(asked: Plan, sources: Sequence[Source]) -> str:
     return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
 
 
-def _prepared(folder: Path, recipes: Mapping[str, str]) -> dict[str, CompiledSource]:
+def _entry(recipes: Mapping[str, str], answer: CompiledSource) -> dict[str, Any]:
+    """What the journal says of an object that is loaded."""
+    return {"recipe": recipes[answer.staged], "answer": asdict(answer)}
+
+
+def _prepared(folder: Path, journal: Journal, recipes: Mapping[str, str]) -> dict[str, CompiledSource]:
     """Objects that a stopped run has loaded, by their files; damaged lines and files count for nothing."""
     found: dict[str, CompiledSource] = {}
-    journal = folder / PREPARED_JOURNAL
-    if not journal.is_file():
-        return found
-    for line in read_bounded(journal, _MAX_JOURNAL, "journal").splitlines():
+    for entry in journal.lines():
         with contextlib.suppress(ValueError, KeyError, TypeError, OSError):
-            entry = parse_json(line)
             answer = from_json_values(CompiledSource, entry["answer"])
             file = folder / "objects" / answer.staged
             if recipes.get(answer.staged) == entry["recipe"] and file_sha256(file) == answer.file_sha256:

@@ -8,10 +8,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from artsim.datasets.description import read_started
+from artsim.datasets.inventory import examine, leftover_problems, strangers
 from artsim.datasets.origins import Origins
 from artsim.datasets.problems import Problem
 from artsim.datasets.restore import remove_leftovers, restore
-from artsim.datasets.state import examine, leftover_problems, strangers
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 from artsim.runs.lock import folder_lock
@@ -61,7 +61,7 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     Raises
     ------
     DatasetError
-        When there is no dataset, or nothing is left that says what it was.
+        When inventory is no dataset, or nothing is left that says what it was.
     ConfigError
         When the folder cannot be written to.
     KeyboardInterrupt
@@ -71,16 +71,16 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     begun = read_started(folder)
     if begun is None:
         raise DatasetError("no dataset here", folder, "name a folder that generate.py wrote")
-    state = examine(folder, begun, workers, progress)
+    inventory = examine(folder, begun, workers, progress)
     foreign = strangers(folder, begun)
-    if not state and begun.complete and not begun.problems and not leftover_problems(folder, begun):
+    if not inventory and begun.complete and not begun.problems and not leftover_problems(folder, begun):
         return RepairResult(folder, (), tuple(foreign))
-    if state.shards:
+    if inventory.shards:
         _check_makeable(folder, begun.plan.artsim_version, begun.plan.sample.views.custom, begun.complete)
     with folder_lock(folder):
         try:
             with WorkerPool(workers, FolderStorage(folder)) as team:
-                restored = restore(folder, begun, state, Origins(folder, sources), team, progress)
+                restored = restore(folder, begun, inventory, Origins(folder, sources), team, progress)
         finally:
             remove_leftovers(folder)
     return RepairResult(folder, tuple(restored.files), (*restored.failed, *foreign))

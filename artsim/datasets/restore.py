@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from artsim.common.files import append, write_atomic, write_error
+from artsim.common.files import write_error
 from artsim.common.progress import track
 from artsim.datasets.description import (
     DESCRIPTION,
-    JOURNAL,
     PLAN,
     StartedDataset,
     document_bytes,
     full_description,
     write_if_other,
 )
+from artsim.datasets.inventory import STAGED, Inventory, leftovers
 from artsim.datasets.origins import Origins
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem
-from artsim.datasets.state import STAGED, State, leftovers
 from artsim.datasets.worker import CompiledSource, RefusedSource, compile_source, make_shard
-from artsim.errors import DatasetError
 from artsim.loading.sources import Source
-from artsim.runs.pool import Team, WorkerLost
+from artsim.runs.journal import JOURNAL, Journal
+from artsim.runs.pool import Team, WorkerLost, results
 
 _OTHER_MAKER = "another processor, or another version of artsim or of a library, made it"
 
@@ -49,7 +47,7 @@ class RestoreResult:
 
 
 def restore(
-    folder: Path, begun: StartedDataset, state: State, origins: Origins, team: Team, progress: bool
+    folder: Path, begun: StartedDataset, inventory: Inventory, origins: Origins, team: Team, progress: bool
 ) -> RestoreResult:
     """Make all that is missing or damaged, and complete the dataset if nothing is left to do.
 
@@ -61,7 +59,7 @@ def restore(
         Locked by this process.
     begun : StartedDataset
         What the dataset has to be.
-    state : State
+    inventory : Inventory
         What it is.
     origins : Origins
         Where its objects come from.
@@ -73,8 +71,8 @@ def restore(
     remove_leftovers(folder)
     if write_if_other(folder / PLAN, document_bytes(begun.document)):
         restored.files.append(PLAN)
-    lost = _make_objects(folder, begun, state, origins, team, progress, restored)
-    records = {**state.kept, **_make_shards(folder, begun, state, lost, team, progress, restored)}
+    lost = _make_objects(folder, begun, inventory, origins, team, progress, restored)
+    records = {**inventory.kept, **_make_shards(folder, begun, inventory, lost, team, progress, restored)}
     if not restored.failed:
         if _complete(folder, begun, records):
             restored.files.append(DESCRIPTION)
@@ -91,7 +89,7 @@ def remove_leftovers(folder: Path) -> None:
 def _make_objects(
     folder: Path,
     begun: StartedDataset,
-    state: State,
+    inventory: Inventory,
     origins: Origins,
     team: Team,
     progress: bool,
@@ -100,7 +98,7 @@ def _make_objects(
     """Load damaged and missing objects again; those that could not be."""
     attempts: dict[str, tuple[PlannedObject, Source, int]] = {}
     why: dict[PlannedObject, str] = {}
-    for planned, reason in state.objects.items():
+    for planned, reason in inventory.objects.items():
         in_the_way = _in_the_way(folder / planned.file)
         sources = origins.of(planned)
         if in_the_way is not None or not sources:
@@ -120,13 +118,13 @@ def _make_objects(
             else:
                 why[planned] = problem
             bar.update()
-    restored.files += [planned.file for planned in state.objects if planned in done]
-    for planned in state.objects:
+    restored.files += [planned.file for planned in inventory.objects if planned in done]
+    for planned in inventory.objects:
         if planned not in done:
             fix = "say where its source is: artsim repair --objects PATH"
             restored.failed.append(Problem(planned.file, f"cannot be restored: {why[planned]}", fix))
     remove_leftovers(folder)
-    return {planned for planned in state.objects if planned not in done}
+    return {planned for planned in inventory.objects if planned not in done}
 
 
 def _plan_difference(planned: PlannedObject, answer: CompiledSource | RefusedSource | WorkerLost) -> str | None:
@@ -166,16 +164,17 @@ def _clear(path: Path) -> None:
 def _make_shards(
     folder: Path,
     begun: StartedDataset,
-    state: State,
+    inventory: Inventory,
     lost: set[PlannedObject],
     team: Team,
     progress: bool,
     restored: RestoreResult,
 ) -> dict[str, ShardRecord]:
     """Make damaged and missing shards, writing down each as it is done."""
+    journal = Journal(folder / JOURNAL)
     wanted = {record.name: record.sha256 for record in begun.records} if begun.complete else {}
     missing: list[Shard] = []
-    for shard, reason in state.shards.items():
+    for shard, reason in inventory.shards.items():
         problem = _in_the_way(folder / shard.name)
         if problem is None and lost:
             shown = {begun.plan.object_of(index) for index in begun.plan.indices(shard)}
@@ -186,7 +185,7 @@ def _make_shards(
         else:
             restored.failed.append(Problem(shard.name, f"cannot be restored: {problem}"))
     if not begun.complete:  # else the description itself is the journal
-        write_atomic(folder / JOURNAL, b"".join(map(journal_line, state.kept.values())))
+        journal.start(map(asdict, inventory.kept.values()))
         (folder / DESCRIPTION).unlink(missing_ok=True)
     for shard in missing:
         _clear(folder / shard.name)
@@ -195,34 +194,25 @@ def _make_shards(
     made: dict[str, ShardRecord] = {}
     total = begun.plan.num_samples if not begun.complete else sum(map(len, missing))
     done = total - sum(map(len, missing))
-    tasks = ((shard, (shard, wanted.get(shard.name))) for shard in missing)
+    tasks = ((shard.name, (shard, wanted.get(shard.name))) for shard in missing)
     with track("samples", total=total, initial=done, unit="sample", shown=progress) as bar:
-        for shard, answer in team.run(make_shard, tasks, progress=bar.update):
-            if isinstance(answer, WorkerLost):
-                raise DatasetError(
-                    f"{answer.why} while {shard.name} was made", folder, "use fewer --workers; the same command resumes"
-                )
+        for name, answer in results(team.run(make_shard, tasks, progress=bar.update), folder):
             if isinstance(answer, ShardRecord):
-                made[shard.name] = answer
+                made[name] = answer
                 if not begun.complete:
-                    append(folder / JOURNAL, journal_line(answer))
+                    journal.add(asdict(answer))
             elif answer is not None:
                 what = f"cannot be restored: made again, it has another checksum ({_OTHER_MAKER})"
-                restored.failed.append(Problem(shard.name, what, "generate the dataset again, into another folder"))
+                restored.failed.append(Problem(name, what, "generate the dataset again, into another folder"))
     restored.files += [shard.name for shard in missing if shard.name in made]
     restored.samples = sum(map(len, made.values()))
     return made
 
 
-def journal_line(record: ShardRecord) -> bytes:
-    """What the journal says of a finished shard."""
-    return json.dumps(asdict(record)).encode() + b"\n"
-
-
 def _complete(folder: Path, begun: StartedDataset, records: Mapping[str, ShardRecord]) -> bool:
-    """Write ``dataset.json`` unless it is there, and remove the journal; whether it was written."""
+    """Write ``dataset.json`` unless it is inventory, and remove the journal; whether it was written."""
     shards: Iterable[Shard] = begun.plan.shards()
     description = full_description(begun.document, begun.plan, [records[shard.name] for shard in shards])
     written = write_if_other(folder / DESCRIPTION, document_bytes(description))
-    (folder / JOURNAL).unlink(missing_ok=True)
+    Journal(folder / JOURNAL).remove()
     return written

@@ -8,6 +8,7 @@ from typing import Any
 from artsim.datasets.plan import Plan
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
+from artsim.runs.recipe import differences
 
 
 def check_same_plan(
@@ -36,7 +37,7 @@ def check_same_plan(
     del wanted["objects"]
     if grows and asked.num_samples > document["num_samples"]:
         del wanted["num_samples"]
-    differing = _differences(wanted, document)
+    differing = [name for name, _, _ in differences(document, wanted)]
     have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
     if have != {(s.name, s.sha256) for s in sources}:
         differing.append("objects")
@@ -48,15 +49,3 @@ def check_same_plan(
         raise DatasetError(
             f"the folder holds a dataset of another plan (different: {', '.join(differing)})", place, fix
         )
-
-
-def _differences(wanted: Mapping[str, Any], stored: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Names of the entries of ``wanted`` that are stored otherwise, such as 'sample.views.fov'."""
-    names: list[str] = []
-    for name, value in wanted.items():
-        there = stored.get(name)
-        if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
-            names += _differences(value, there, f"{prefix}{name}.")
-        elif value != there:
-            names.append(prefix + name)
-    return names

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.progress import track
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.description import DESCRIPTION, read_description, read_started
+from artsim.datasets.inventory import examine, leftover_problems, strangers
 from artsim.datasets.plan import Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.shards import ShardReader, sample_key
-from artsim.datasets.state import examine, leftover_problems, strangers
 from artsim.errors import ArtsimError, DatasetError
 from artsim.model.camera import Camera
 from artsim.model.draws import Scale
@@ -64,24 +64,24 @@ def verify(folder: str | Path, progress: bool = True, workers: int = 1) -> list[
     if begun is None or not (begun.complete or (folder / DESCRIPTION).exists()):
         read_description(folder)  # raises
     assert begun is not None
-    state = examine(folder, begun, progress=progress)
+    inventory = examine(folder, begun, progress=progress)
     problems = [
         *begun.problems,
         *_share_problems(begun.plan),
-        *state.problems(folder),
+        *inventory.problems(folder),
         *strangers(folder, begun),
         *leftover_problems(folder, begun),
     ]
     if not begun.complete:
         return problems
     dataset = Dataset(folder)
-    unusable = {planned.file for planned in state.objects}
+    unusable = {planned.file for planned in inventory.objects}
     found = list(_object_problems(dataset, unusable))
     problems += found
     unusable |= {problem.where for problem in found}
     with track("verify", total=len(dataset), unit="sample", shown=progress) as bar:
         # Of another shard, nothing more needs to be known: it is to be made again.
-        shards = [shard for shard in dataset.shards if shard.name in state.kept]
+        shards = [shard for shard in dataset.shards if shard.name in inventory.kept]
         bar.update(len(dataset) - sum(map(len, shards)))
         workers = min(workers, len(shards), 1 + sum(map(len, shards)) // _WORTH_A_PROCESS)
         if workers > 1:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import os
-import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -17,19 +15,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artsim.common.files import read_json, write_atomic, write_error
-from artsim.common.outputs import replace_folder
+from artsim.common.files import write_atomic
 from artsim.common.progress import track
 from artsim.errors import AssetError, ConfigError
-from artsim.export import DEFAULTS, FORMATS, check_formats, export
+from artsim.export import DEFAULTS, check_formats, export
+from artsim.export.folders import new_folder, remove_unfinished, whole_meta
 from artsim.export.options import ExportOptions
 from artsim.families import FAMILIES, make_constrained
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
 from artsim.runs.lock import folder_lock
-from artsim.runs.pool import WorkerLost, WorkerPool
+from artsim.runs.pool import WorkerPool, results
+from artsim.runs.recipe import check_counts, check_seed
 
 INDEX = "index.csv"
-_MAX_META = 1_000_000
 _COLUMNS = ("folder", "category", "object_id", "parts", "joints", "free_joints", "mass_kg", "size_m", "sha256")
 
 
@@ -94,7 +92,7 @@ def generate_objects(
     folder = Path(out)
     wanted = [(category, number) for category in dict.fromkeys(categories) for number in range(seed, seed + count)]
     with folder_lock(folder):
-        _remove_leftovers(folder)
+        remove_unfinished(folder)
         found = {key: meta for key in wanted if (meta := _whole(folder, key, formats, constraints, options))}
         missing = [key for key in wanted if key not in found]
         with (
@@ -102,10 +100,8 @@ def generate_objects(
             WorkerPool(workers) as team,
         ):
             tasks = ((key, (folder, *key, tuple(formats), constraints, options)) for key in missing)
-            for key, answer in team.run(write_object, tasks):
-                if isinstance(answer, WorkerLost):
-                    raise AssetError(answer.why, f"{key[0]} {key[1]}", "use fewer --workers; the same command resumes")
-                found[key] = answer
+            for key, meta in results(team.run(write_object, tasks), folder):
+                found[key] = meta
                 bar.update()
         write_atomic(folder / INDEX, _index_text([(key, found[key]) for key in wanted]).encode())
     return ObjectsResult(folder, len(wanted), len(missing), time.perf_counter() - start)
@@ -116,63 +112,36 @@ def _check_options(categories: Sequence[str], count: int, seed: int, workers: in
     if unknown or not categories:
         known = ", ".join(sorted(FAMILIES))
         raise ConfigError(f"there is no category {', '.join(map(repr, unknown))}", "category", f"use some of {known}")
-    for name, value in (("count", count), ("workers", workers)):
-        if value < 1:
-            raise ConfigError(f"{value} is not a count", name, "use 1 or more")
-    if seed < 0:
-        raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
-
-
-def _folder(out: Path, category: str, seed: int) -> Path:
-    return out / category / str(seed)
-
-
-def _remove_leftovers(out: Path) -> None:
-    """Remove folders that killed runs did not finish."""
-    for leftover in out.glob("*/.*.part"):
-        shutil.rmtree(leftover, ignore_errors=True)
+    check_counts(count=count, workers=workers)
+    check_seed(seed)
 
 
 def _whole(
     out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints, options: ExportOptions
 ) -> dict[str, Any] | None:
-    """Content of an object's ``meta.json`` if this version of artsim wrote it so in these formats.
+    """Content of an object's ``meta.json`` if this version of artsim wrote it so in these formats."""
 
-    A folder is whole if it is there at all.
-    """
-    folder = _folder(out, *key)
-    try:
-        meta: dict[str, Any] = read_json(folder / "meta.json", "meta.json", max_bytes=_MAX_META)
-        own = meta["artsim"]
-        same = own["version"] == version("artsim") and set(own["formats"]) == set(formats)
-        same = same and meta.get("constraints", "") == str(constraints)
-        same = same and asdict(options).items() <= own.items()
+    def is_same(meta: dict[str, Any]) -> bool:
         _row(key, meta)  # what index.csv takes from it
-    except (AssetError, ValueError, KeyError, TypeError):
-        return None
-    return meta if same and all((folder / FORMATS[name]).is_file() for name in formats) else None
+        same = meta["artsim"]["version"] == version("artsim") and meta.get("constraints", "") == str(constraints)
+        return same and asdict(options).items() <= meta["artsim"].items()
+
+    return whole_meta(out / key[0] / str(key[1]), formats, is_same)
 
 
 def write_object(
     out: Path, category: str, seed: int, formats: tuple[str, ...], constraints: Constraints, options: ExportOptions
 ) -> dict[str, Any]:
     """Make an object and write its folder; returns the content of its ``meta.json``."""
-    folder = _folder(out, category, seed)
-    part = folder.with_name(f".{seed}.{os.getpid()}.part")
     try:
         obj = make_constrained(category, seed, constraints)
     except ConfigError:
         raise
     except Exception as error:  # whatever a family stumbles on, the seed is what one needs to know
         raise AssetError(f"cannot be made ({type(error).__name__}: {error})", f"{category} {seed}") from error
-    try:
-        meta = export(obj, part, formats, {"constraints": str(constraints)} if constraints else {}, options)
-        replace_folder(part, folder)  # of another version, or in other formats
-    except OSError as error:
-        raise write_error(error, folder) from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-    return meta
+    notes = {"constraints": str(constraints)} if constraints else {}
+    with new_folder(out / category / str(seed)) as folder:
+        return export(obj, folder, formats, notes, options)
 
 
 def _index_text(objects: Sequence[tuple[tuple[str, int], dict[str, Any]]]) -> str:

@@ -24,8 +24,9 @@ from artsim.formats.hdf5 import Hdf5Format
 from artsim.formats.ply import PlyFormat
 from artsim.formats.webdataset import WebDatasetFormat
 from artsim.observing.sample import Sample
-from artsim.runs.tasks import Answer, Output, Run, Task, run_pieces
-from artsim.runs.worker import StoppedError, report, stop_if_asked
+from artsim.runs.recipe import check_counts
+from artsim.runs.tasks import Output, Run, Task, run_tasks
+from artsim.runs.worker import report, stop_if_asked
 
 FORMATS: dict[FormatName, Format] = {
     "webdataset": WebDatasetFormat(),
@@ -115,9 +116,7 @@ def convert(
         raise ConfigError(f"there is no format {to!r:.40}", "to", f"use one of {', '.join(FORMATS)}")
     if split not in (None, *SPLITS):
         raise ConfigError(f"there is no split {split!r:.40}", "split", f"use one of {', '.join(SPLITS)}")
-    for name, value in (("group", group), ("workers", workers)):
-        if value < 1:
-            raise ConfigError(f"{value} is not a count", name, "use 1 or more")
+    check_counts(group=group, workers=workers)
     folder = Path(out)
     if folder.resolve().is_relative_to(source.folder.resolve()):
         raise ConfigError("lies within the dataset", folder, "choose a folder outside of it")
@@ -133,19 +132,16 @@ def convert(
     }
     total = sum(len(piece.members) for piece in pieces if piece.split)
     tasks = {
-        piece.name: Task(
-            convert_piece, (source.folder, folder.absolute(), to, piece), len(piece.members) if piece.split else 0
-        )
+        piece.name: Task(convert_piece, (source.folder, to, piece), len(piece.members) if piece.split else 0)
         for piece in pieces
     }
 
-    def finish(values: dict[str, Any], output: Output) -> dict[str, Any]:
+    def finish(values: dict[str, Any], output: Output) -> None:
         FORMATS[to].finish(source, [(piece, values[piece.name]) for piece in pieces], output)
-        return {}
 
     run = Run(folder, recipe, DONE, "conversion", "sample", progress=progress)
-    result = run_pieces(run, tasks, finish, workers)
-    return ConvertResult(folder, total, result.made, len(result.files), time.perf_counter() - start)
+    files, made = run_tasks(run, tasks, workers, finish)
+    return ConvertResult(folder, total, made, len(files), time.perf_counter() - start)
 
 
 def _pieces(source: Dataset, to: FormatName, split: str | None, samples: Sequence[int], group: int) -> list[Piece]:
@@ -185,17 +181,12 @@ def _opened(folder: Path) -> Dataset:
     return Dataset(folder)
 
 
-def convert_piece(source: Path, out: Path, to: FormatName, piece: Piece) -> Answer | None:
-    """Write the files of a piece, in a worker; None when asked to stop before all are written."""
-    dataset, output = _opened(source), Output(out)
-    try:
-        if piece.split:
-            value = FORMATS[to].write_samples(dataset, piece, _read(dataset, piece), output)
-        else:
-            value = FORMATS[to].write_objects(dataset, piece, output)
-    except StoppedError:
-        return None
-    return Answer(output.files, value)
+def convert_piece(output: Output, source: Path, to: FormatName, piece: Piece) -> Any:
+    """The task of a piece: write its files."""
+    dataset = _opened(source)
+    if piece.split:
+        return FORMATS[to].write_samples(dataset, piece, _read(dataset, piece), output)
+    return FORMATS[to].write_objects(dataset, piece, output)
 
 
 def _read(dataset: Dataset, piece: Piece) -> Iterator[Sample]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, TypeVar
 
@@ -51,7 +52,7 @@ class Team(Protocol):
     def run(
         self,
         work: Callable[..., T],
-        tasks: Iterable[tuple[K, tuple[Any, ...]]],
+        tasks: Iterable[tuple[K, tuple[Any, ...]] | None],
         limit: float | None = None,
         progress: Callable[[int], object] = lambda count: None,
     ) -> Iterator[tuple[K, T | WorkerLost]]:
@@ -79,7 +80,7 @@ class WorkerPool:
     def run(
         self,
         work: Callable[..., T],
-        tasks: Iterable[tuple[K, tuple[Any, ...]]],
+        tasks: Iterable[tuple[K, tuple[Any, ...]] | None],
         limit: float | None = None,
         progress: Callable[[int], object] = lambda count: None,
     ) -> Iterator[tuple[K, T | WorkerLost]]:
@@ -92,7 +93,8 @@ class WorkerPool:
         ----------
         work : callable
             A function of a module; it may call :func:`artsim.runs.worker.report`.
-        tasks : iterable of (key, arguments)
+        tasks : iterable of (key, arguments), or None
+            None: no more until one of those that are handed out is done.
         limit : float, optional
             Seconds that a task may take before its process is killed.
         progress : callable
@@ -119,10 +121,12 @@ class WorkerPool:
                     break
                 self._give(work, task, fresh=alone)
             busy = self._busy()
-            if not busy and not again:
+            if not busy and not again and not alone:
                 return
-            if not busy:  # all others are done
-                alone = True
+            if (
+                not busy
+            ):  # all others are done; or the last of those that were lost is, and others may have waited for it
+                alone = bool(again)
                 continue
             ready = wait([m.connection for m in busy] + [m.process.sentinel for m in busy], timeout=0.2)
             for member in busy:
@@ -211,6 +215,29 @@ class WorkerPool:
                 _messages(member.connection)  # a process whose answer nobody takes cannot end
                 member.process.join(0.02)
             self._end(member)
+
+
+def results(answers: Iterable[tuple[K, T | WorkerLost]], where: str | Path) -> Iterator[tuple[K, T]]:
+    """Answers of tasks none of which may be lost.
+
+    Parameters
+    ----------
+    answers : iterable
+        As :meth:`WorkerPool.run` gives them.
+    where : path or str
+        What is made, for messages.
+
+    Raises
+    ------
+    DatasetError
+        When the process of a task was lost.
+    """
+    for key, answer in answers:
+        if isinstance(answer, WorkerLost):
+            name = " ".join(map(str, key)) if isinstance(key, tuple) else key
+            fix = "use fewer --workers; the same command resumes"
+            raise DatasetError(f"{answer.why} while {name} was made", where, fix)
+        yield key, answer
 
 
 def _messages(connection: Connection) -> list[tuple[str, Any]]:

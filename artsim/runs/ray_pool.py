@@ -83,7 +83,7 @@ class RayPool:
     def run(
         self,
         work: Callable[..., T],
-        tasks: Iterable[tuple[K, tuple[Any, ...]]],
+        tasks: Iterable[tuple[K, tuple[Any, ...]] | None],
         limit: float | None = None,
         progress: Callable[[int], object] = lambda count: None,
     ) -> Iterator[tuple[K, T | WorkerLost]]:
@@ -94,10 +94,12 @@ class RayPool:
         waiting, again = iter(tasks), deque[tuple[Any, tuple[Any, ...], int]]()
         while True:
             while len(self._pending) < _QUEUED * self._cluster():
-                task = again.popleft() if again else next(((*task, 1) for task in waiting), None)
-                if task is None:
+                if again:
+                    self._give(work, again.popleft(), limit)
+                elif (task := next(waiting, None)) is not None:
+                    self._give(work, (*task, 1), limit)
+                else:
                     break
-                self._give(work, task, limit)
             if not self._pending:
                 return
             for ref in self._finished():

@@ -1,6 +1,6 @@
-"""Work in pieces, on local processes, resumably: each piece writes files of its own, and is finished or done again.
+"""Tasks that write files, resumably: file name -> function -> digest. Each is finished, or done again.
 
-A folder under construction holds ``progress.jsonl``: a line that says what is made, then one for each finished piece.
+A folder under construction holds ``progress.jsonl``: a line that says what is made, then one for each finished task.
 A last file, written at the end, holds the checksum of every file: its presence means that all is there.
 """
 
@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import orjson
 
-from artsim.common.files import file_sha256, read_bounded, read_json, write_atomic, write_error
+from artsim.common.files import read_json, write_atomic
 from artsim.common.progress import track
 from artsim.errors import DatasetError
+from artsim.runs.checksums import check_files
+from artsim.runs.journal import JOURNAL, Journal
 from artsim.runs.lock import folder_lock
-from artsim.runs.pool import WorkerLost, WorkerPool
-
-JOURNAL = "progress.jsonl"
-_MAX_JOURNAL = 4_000_000_000
+from artsim.runs.pool import WorkerPool, results
+from artsim.runs.recipe import differences
+from artsim.runs.worker import StoppedError
 
 Files = dict[str, tuple[int, str]]
 """Size and SHA-256 of files, by their paths within a folder."""
@@ -30,7 +31,7 @@ Files = dict[str, tuple[int, str]]
 
 @dataclass
 class Output:
-    """The folder that work is written to, and which files were written to it.
+    """The folder that a task writes to, and which files it has written.
 
     Attributes
     ----------
@@ -49,27 +50,20 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a worker did: the files that it wrote, and, in JSON's terms, what the end of the run wants to know."""
-
-    files: Files
-    value: Any
-
-
-@dataclass(frozen=True)
 class Task:
     """A piece of work.
 
     Attributes
     ----------
     work : callable
-        A function of a module that gives an :class:`Answer`, or None when it was asked to stop before all was written.
+        A function of a module. It gets an :class:`Output` and the arguments, and returns, in JSON's terms, what the end
+        of the run wants to know. It may call :func:`artsim.runs.worker.stop_if_asked`.
     arguments : tuple
     size : int
         What it counts for on the progress bar: as much as ``work`` reports.
     """
 
-    work: Callable[..., Answer | None]
+    work: Callable[..., Any]
     arguments: tuple[Any, ...]
     size: int = 1
 
@@ -90,7 +84,7 @@ class Run:
     unit : str
         What is counted.
     grows : str
-        Name of a number of the recipe that may become larger later: finished pieces are kept. Empty for none.
+        Name of a number of the recipe that may become larger later: finished tasks are kept. Empty for none.
     progress : bool
         Show progress bars.
     """
@@ -105,21 +99,17 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Result:
-    """What a call of :func:`run_pieces` did: all files, how much was made by it, and each piece's value."""
+class _Answer:
+    """What a task has written and returned."""
 
     files: Files
-    made: int
-    values: dict[str, Any]
+    value: Any
 
 
-def run_pieces(
-    run: Run,
-    tasks: Mapping[str, Task],
-    finish: Callable[[dict[str, Any], Output], Mapping[str, Any]],
-    workers: int,
-) -> Result:
-    """Do the pieces that are not done yet, then write what needs all of them, and the last file.
+def run_tasks(
+    run: Run, tasks: Mapping[str, Task], workers: int, finish: Callable[[dict[str, Any], Output], None] | None = None
+) -> tuple[Files, int]:
+    """Do the tasks that are not done yet, then write what needs all of them, and the last file.
 
     The same bytes come out whatever the number of workers and however often the run was stopped. A complete run is
     checked and left alone; one with damaged or missing files is made again.
@@ -128,81 +118,75 @@ def run_pieces(
     ----------
     run : Run
     tasks : mapping
-        Pieces by name, in order.
-    finish : callable
-        Gets the value of every piece by name, and may write more files; what it returns goes into the last file.
+        By name, in order.
     workers : int
         Processes.
+    finish : callable, optional
+        Gets the value of every task by name, and may write more files.
+
+    Returns
+    -------
+    files : dict
+    made : int
+        Size of the tasks that were done now.
 
     Raises
     ------
     DatasetError
         When the folder holds something else or is in use, or a process was lost.
     """
-    folder, total = run.folder, sum(task.size for task in tasks.values())
-    with folder_lock(folder):
-        _remove_parts(folder)
-        document = _complete(run)
-        if document is not None:
-            files = {name: (size, digest) for name, (size, digest) in document["files"].items()}
-            return Result(files, 0, {})
+    with folder_lock(run.folder):
+        _remove_unfinished(run.folder)
+        files = _complete_files(run)
+        if files is not None:
+            return files, 0
         try:
-            with WorkerPool(workers) as team:
-                answers, made = _work(run, tasks, team, total)
+            answers, made = _work(run, tasks, workers)
         finally:
-            _remove_parts(folder)
-        return Result(*_finish(run, tasks, answers, finish, made))
+            _remove_unfinished(run.folder)
+        last = Output(run.folder)
+        values = {name: answers[name].value for name in tasks}
+        if finish is not None:
+            finish(values, last)
+        files = {name: entry for task in tasks for name, entry in answers[task].files.items()} | last.files
+        pieces = {"pieces": [[name, list(answers[name].files), values[name]] for name in tasks]} if run.grows else {}
+        document = {**run.recipe, **pieces, "files": files}
+        data = orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
+        write_atomic(run.folder / run.done, data)
+        Journal(run.folder / JOURNAL).remove()
+        return files, made
 
 
-def _work(run: Run, tasks: Mapping[str, Task], team: WorkerPool, total: int) -> tuple[dict[str, Answer], int]:
-    """Do what is not done yet; answers of all pieces by name, and how much was done now."""
-    folder = run.folder
-    answers = _journal(run, tasks)
-    write_atomic(folder / JOURNAL, b"".join([_line(run.recipe), *(_entry(name, a) for name, a in answers.items())]))
-    (folder / run.done).unlink(missing_ok=True)
+def _work(run: Run, tasks: Mapping[str, Task], workers: int) -> tuple[dict[str, _Answer], int]:
+    """Do what is not done yet; answers of all tasks by name, and how much was done now."""
+    answers, journal = _finished(run, tasks), Journal(run.folder / JOURNAL)
+    journal.start([run.recipe, *([name, own.files, own.value] for name, own in answers.items())])
+    (run.folder / run.done).unlink(missing_ok=True)
     missing = {name: task for name, task in tasks.items() if name not in answers}
-    left = sum(task.size for task in missing.values())
-    jobs = ((name, (task.work, task.arguments)) for name, task in missing.items())
-    with track(f"{run.unit}s", total=total, initial=total - left, unit=run.unit, shown=run.progress) as bar:
-        for name, answer in team.run(_do, jobs, progress=bar.update):
-            if isinstance(answer, WorkerLost):
-                raise DatasetError(
-                    f"{answer.why} while {name} was made", folder, "use fewer --workers; the same command resumes"
-                )
+    total, left = (sum(task.size for task in some.values()) for some in (tasks, missing))
+    jobs = ((name, (run.folder.absolute(), task)) for name, task in missing.items())
+    with (
+        WorkerPool(workers) as team,
+        track(f"{run.unit}s", total=total, initial=total - left, unit=run.unit, shown=run.progress) as bar,
+    ):
+        for name, answer in results(team.run(_do, jobs, progress=bar.update), run.folder):
             if answer is not None:
                 answers[name] = answer
-                try:
-                    with (folder / JOURNAL).open("ab") as file:
-                        file.write(_entry(name, answer))
-                except OSError as error:
-                    raise write_error(error, folder / JOURNAL) from error
+                journal.add([name, answer.files, answer.value])
     return answers, left
 
 
-def _do(work: Callable[..., Answer | None], arguments: tuple[Any, ...]) -> Answer | None:
-    return work(*arguments)
+def _do(folder: Path, task: Task) -> _Answer | None:
+    """Do a task, in a worker; None when asked to stop before all is written."""
+    output = Output(folder)
+    try:
+        return _Answer(output.files, task.work(output, *task.arguments))
+    except StoppedError:
+        return None
 
 
-def _finish(
-    run: Run,
-    tasks: Mapping[str, Task],
-    answers: Mapping[str, Answer],
-    finish: Callable[[dict[str, Any], Output], Mapping[str, Any]],
-    made: int,
-) -> tuple[Files, int, dict[str, Any]]:
-    """Write what needs all pieces, then the list of files."""
-    last, values = Output(run.folder), {name: answers[name].value for name in tasks}
-    told = finish(values, last)
-    files = {name: entry for piece in tasks for name, entry in answers[piece].files.items()} | last.files
-    pieces = {"pieces": [[name, list(answers[name].files), values[name]] for name in tasks]} if run.grows else {}
-    document = {**run.recipe, **told, **pieces, "files": files}
-    write_atomic(run.folder / run.done, orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY))
-    (run.folder / JOURNAL).unlink(missing_ok=True)
-    return files, made, values
-
-
-def _complete(run: Run) -> dict[str, Any] | None:
-    """The last file of a run that is complete and whole; None when there is something to do.
+def _complete_files(run: Run) -> Files | None:
+    """Files of a run that is complete and whole; None when there is something to do.
 
     Raises
     ------
@@ -216,7 +200,11 @@ def _complete(run: Run) -> dict[str, Any] | None:
             _take_up(run, document)
             return None
         _refuse_other(run, document)
-        return document if _are_whole(run, document.get("files")) else None
+        try:
+            files = {name: (size, sha256) for name, (size, sha256) in document["files"].items()}
+        except (KeyError, TypeError, ValueError, AttributeError):
+            return None
+        return files if all(_whole(run, files).values()) else None
     if not (folder / JOURNAL).exists():
         found = sorted(path.name for path in folder.iterdir() if path.name != ".lock")
         if found:
@@ -228,44 +216,30 @@ def _is_smaller(run: Run, found: object) -> bool:
     """Whether what was made is less of the same."""
     if not run.grows or not isinstance(found, dict) or not isinstance(found.get(run.grows), int):
         return False
-    return (
-        bool(found[run.grows] < run.recipe[run.grows])
-        and _differing({**found, run.grows: run.recipe[run.grows]}, run) == []
-    )
+    return bool(found[run.grows] < run.recipe[run.grows]) and _differing(run, found) == [run.grows]
 
 
 def _take_up(run: Run, document: Mapping[str, Any]) -> None:
-    """Note the finished pieces of a smaller run, before nothing else says so."""
+    """Note the finished tasks of a smaller run, before nothing else says so."""
     try:
         files = document["files"]
-        lines = [_line([name, {file: files[file] for file in own}, value]) for name, own, value in document["pieces"]]
+        lines = [[name, {file: files[file] for file in own}, value] for name, own, value in document["pieces"]]
     except (KeyError, TypeError, ValueError) as error:
         raise DatasetError(f"{run.done} is damaged", run.folder, "choose another --out folder") from error
-    write_atomic(run.folder / JOURNAL, b"".join([_line(run.recipe), *lines]))
+    Journal(run.folder / JOURNAL).start([run.recipe, *lines])
     (run.folder / run.done).unlink()
 
 
-def _differing(found: Mapping[str, Any], run: Run) -> list[str]:
+def _differing(run: Run, found: Mapping[str, Any]) -> list[str]:
     """Names of what differs, such as 'scene.count'."""
-    return _differences(json.loads(orjson.dumps(run.recipe)), found, "")
-
-
-def _differences(wanted: Mapping[str, Any], found: Mapping[str, Any], prefix: str) -> list[str]:
-    names: list[str] = []
-    for name, value in wanted.items():
-        there = found.get(name)
-        if isinstance(value, dict) and isinstance(there, dict) and value.keys() == there.keys():
-            names += _differences(value, there, f"{prefix}{name}.")
-        elif there != value:
-            names.append(prefix + name)
-    return names
+    return [name for name, _, _ in differences(found, json.loads(orjson.dumps(run.recipe)))]
 
 
 def _refuse_other(run: Run, found: object) -> None:
-    """Refuse to go on with another run."""
+    """Refuse to resume another run."""
     if not isinstance(found, dict):
         raise DatasetError(f"the folder holds no {run.what} of this kind", run.folder, "choose another --out folder")
-    differing = _differing(found, run)
+    differing = _differing(run, found)
     if differing:
         raise DatasetError(
             f"the folder holds another {run.what} (different: {', '.join(differing)})",
@@ -274,24 +248,7 @@ def _refuse_other(run: Run, found: object) -> None:
         )
 
 
-def _are_whole(run: Run, files: object) -> bool:
-    """Whether all files that are listed have the content that they had."""
-    if not isinstance(files, dict):
-        return False
-    for name, entry in track("check", list(files.items()), unit="file", shown=run.progress, leave=False):
-        if not isinstance(entry, list | tuple) or len(entry) != 2 or not _is_whole(run.folder / name, *entry):
-            return False
-    return True
-
-
-def _is_whole(path: Path, size: object, sha256: object) -> bool:
-    try:
-        return path.is_file() and path.stat().st_size == size and file_sha256(path) == sha256
-    except OSError:
-        return False
-
-
-def _journal(run: Run, names: Iterable[str]) -> dict[str, Answer]:
+def _finished(run: Run, tasks: Mapping[str, Task]) -> dict[str, _Answer]:
     """What a run that was stopped has finished.
 
     Raises
@@ -299,37 +256,31 @@ def _journal(run: Run, names: Iterable[str]) -> dict[str, Answer]:
     DatasetError
         When it was another run.
     """
-    path = run.folder / JOURNAL
-    if not path.exists():
+    lines = Journal(run.folder / JOURNAL).lines()
+    if not lines:
         return {}
-    lines = read_bounded(path, _MAX_JOURNAL, JOURNAL, DatasetError, fix="remove it").splitlines()
-    try:
-        begun = json.loads(lines[0]) if lines else {}
-        if not _is_smaller(run, begun):
-            _refuse_other(run, begun)
-    except ValueError as error:
-        raise DatasetError(f"{JOURNAL} is damaged", run.folder, "choose another --out folder") from error
-    known, answers = set(names), {}
-    for line in track("check", lines[1:], unit="piece", shown=run.progress, leave=False):
+    begun = lines[0]
+    if not _is_smaller(run, begun):
+        _refuse_other(run, begun)
+    answers: dict[str, _Answer] = {}
+    for line in lines[1:]:
         try:
-            name, files, value = json.loads(line)
-            answer = Answer({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
+            name, files, value = line
+            answers[name] = _Answer({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
         except (ValueError, TypeError, AttributeError):
-            continue  # the last line of a killed run may be cut short: its piece is done again
-        if name in known and all(_is_whole(run.folder / file, *entry) for file, entry in answer.files.items()):
-            answers[name] = answer
-    return answers
+            continue
+    answers = {name: answer for name, answer in answers.items() if name in tasks}
+    whole = _whole(run, {file: entry for answer in answers.values() for file, entry in answer.files.items()})
+    return {name: answer for name, answer in answers.items() if all(whole[file] for file in answer.files)}
 
 
-def _entry(name: str, answer: Answer) -> bytes:
-    return _line([name, answer.files, answer.value])
+def _whole(run: Run, files: Mapping[str, tuple[int, str]]) -> dict[str, bool]:
+    """Whether each file has the content that it had."""
+    found = check_files(run.folder, {name: [sha256] for name, (_, sha256) in files.items()}, progress=run.progress)
+    return {name: problem is None for name, (problem, _) in found.items()}
 
 
-def _line(content: Any) -> bytes:
-    return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n"
-
-
-def _remove_parts(folder: Path) -> None:
+def _remove_unfinished(folder: Path) -> None:
     """Remove files that killed runs did not finish."""
     for part in folder.rglob(".*.part"):
         part.unlink(missing_ok=True)

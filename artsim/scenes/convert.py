@@ -27,8 +27,8 @@ from artsim.formats.bop import (
 )
 from artsim.formats.coco import mask_record
 from artsim.formats.images import depth_png, grey_depth, mask_png, png_bytes
-from artsim.runs.tasks import Answer, Output, Run, Task, run_pieces
-from artsim.runs.worker import StoppedError, report, stop_if_asked
+from artsim.runs.tasks import Output, Run, Task, run_tasks
+from artsim.runs.worker import report, stop_if_asked
 from artsim.scenes.dataset import DESCRIPTION, SceneDataset, SceneRecord
 from artsim.scenes.generate import SceneRun
 from artsim.scenes.random_scene import make_scene
@@ -68,17 +68,13 @@ def convert_scenes(
             first[entry.scene] = following
             following += sum(obj.parts for obj in entry.objects)
     work = {"coco": write_coco, "bop": write_bop}[to]
-    tasks = {
-        f"{scene:06d}": Task(work, (folder.absolute(), out.absolute(), run, scene, start))
-        for scene, start in first.items()
-    }
+    tasks = {f"{scene:06d}": Task(work, (folder.absolute(), run, scene, start)) for scene, start in first.items()}
 
-    def finish(values: dict[str, Any], output: Output) -> dict[str, Any]:
+    def finish(values: dict[str, Any], output: Output) -> None:
         (_finish_coco if to == "coco" else _finish_bop)(source, values, output)
-        return {}
 
     recipe = {"format": to, "version": _VERSION, "scenes": file_sha256(folder / DESCRIPTION)}
-    run_pieces(Run(out, recipe, _DONE, "conversion", "scene", progress=progress), tasks, finish, workers)
+    run_tasks(Run(out, recipe, _DONE, "conversion", "scene", progress=progress), tasks, workers, finish)
     return out
 
 
@@ -92,33 +88,30 @@ def _views(source: SceneDataset, scene: int) -> list[tuple[int, SceneRecord]]:
     return [(n, source[n]) for n, entry in enumerate(source.entries) if entry.scene == scene]
 
 
-def write_coco(folder: Path, out: Path, run: SceneRun, scene: int, start: int) -> Answer | None:
-    """Write the images of a scene, in a worker; the answer has an entry for each."""
-    source, output = _opened(folder), Output(out)
+def write_coco(output: Output, folder: Path, run: SceneRun, scene: int, start: int) -> list[dict[str, Any]]:
+    """The task of a scene: write its images; an entry for each."""
+    source = _opened(folder)
     entries = []
-    try:
-        for number, record in _views(source, scene):
-            stop_if_asked()
-            key, camera = record.entry.key, record.camera
-            # Whole millimetres, which every reader takes 16 bits for.
-            depth = png_bytes(np.rint(1000.0 * record.depth).clip(0, 65535).astype(np.uint16))
-            picture = grey_depth(record.depth) if record.rgb is None else record.rgb
-            K = {"K": camera.K.tolist(), "width": camera.width, "height": camera.height}
-            output.write(f"images/{key}.png", png_bytes(picture))
-            output.write(f"depth/{key}.png", depth)
-            output.write(f"intrinsics/{key}.json", json_bytes(K))
-            image = {"id": number, "file_name": f"{key}.png", "width": camera.width, "height": camera.height}
-            objects = []
-            for i, obj in enumerate(record.entry.objects):
-                mask = record.instance_ids == i
-                if mask.any():
-                    told = {"instance": i, "visible_fraction": obj.visible_fraction, "category": obj.category}
-                    objects.append({**mask_record(mask), "iscrowd": 0, **told})
-            entries.append({"image": image, "objects": objects})
-        report(1)
-    except StoppedError:
-        return None
-    return Answer(output.files, entries)
+    for number, record in _views(source, scene):
+        stop_if_asked()
+        key, camera = record.entry.key, record.camera
+        # Whole millimetres, which every reader takes 16 bits for.
+        depth = png_bytes(np.rint(1000.0 * record.depth).clip(0, 65535).astype(np.uint16))
+        picture = grey_depth(record.depth) if record.rgb is None else record.rgb
+        K = {"K": camera.K.tolist(), "width": camera.width, "height": camera.height}
+        output.write(f"images/{key}.png", png_bytes(picture))
+        output.write(f"depth/{key}.png", depth)
+        output.write(f"intrinsics/{key}.json", json_bytes(K))
+        image = {"id": number, "file_name": f"{key}.png", "width": camera.width, "height": camera.height}
+        objects = []
+        for i, obj in enumerate(record.entry.objects):
+            mask = record.instance_ids == i
+            if mask.any():
+                told = {"instance": i, "visible_fraction": obj.visible_fraction, "category": obj.category}
+                objects.append({**mask_record(mask), "iscrowd": 0, **told})
+        entries.append({"image": image, "objects": objects})
+    report(1)
+    return entries
 
 
 def _finish_coco(source: SceneDataset, values: dict[str, Any], output: Output) -> None:
@@ -139,9 +132,9 @@ def _finish_coco(source: SceneDataset, values: dict[str, Any], output: Output) -
     output.write("annotations/instances.json", json_bytes(document))
 
 
-def write_bop(folder: Path, out: Path, run: SceneRun, scene: int, start: int) -> Answer | None:
-    """Write a scene and the models of its objects, in a worker."""
-    source, output = _opened(folder), Output(out)
+def write_bop(output: Output, folder: Path, run: SceneRun, scene: int, start: int) -> dict[str, Any]:
+    """The task of a scene: write it and the models of its objects."""
+    source = _opened(folder)
     things = make_scene(run.scene, scene).instances
     first = np.cumsum([start, *(len(thing.obj) for thing in things)]).tolist()
     cameras: dict[str, Any] = {}
@@ -150,51 +143,48 @@ def write_bop(folder: Path, out: Path, run: SceneRun, scene: int, start: int) ->
     articulations: dict[str, list[Any]] = {}
     answer: dict[str, Any] = {"camera": None, "targets": [], "models": {}}
     where = f"test/{scene:06d}"
-    try:
-        for i, thing in enumerate(things):
+    for i, thing in enumerate(things):
+        for k in np.flatnonzero(thing.obj.has_surface).tolist():
+            output.write(*model_file(thing.obj, k, first[i] + k))
+            answer["models"][str(first[i] + k)] = model_info(thing.obj, k)
+    for _, record in _views(source, scene):
+        stop_if_asked()
+        image = record.entry.view
+        depth, unit = depth_png(record.depth)
+        output.write(f"{where}/depth/{image:06d}.png", depth)
+        if record.rgb is not None:
+            output.write(f"{where}/rgb/{image:06d}.png", png_bytes(record.rgb))
+        truths[str(image)], infos[str(image)], articulations[str(image)] = [], [], []
+        for i, (thing, sample) in enumerate(zip(things, record.samples, strict=True)):
+            if sample is None:
+                continue
+            if sample.object_sha256 != thing.obj.sha256:
+                raise DatasetError(
+                    f"object {i} of scene {scene} is not what its options make", folder,
+                    "use the options and the version of artsim that the scenes were made with",
+                )  # fmt: skip
+            sample = replace(sample, depth=record.depth)
+            whole = whole_masks(thing.obj, sample, thing.T_world_object)
+            assert sample.part_mask is not None
             for k in np.flatnonzero(thing.obj.has_surface).tolist():
-                output.write(*model_file(thing.obj, k, first[i] + k))
-                answer["models"][str(first[i] + k)] = model_info(thing.obj, k)
-        for _, record in _views(source, scene):
-            stop_if_asked()
-            image = record.entry.view
-            depth, unit = depth_png(record.depth)
-            output.write(f"{where}/depth/{image:06d}.png", depth)
-            if record.rgb is not None:
-                output.write(f"{where}/rgb/{image:06d}.png", png_bytes(record.rgb))
-            truths[str(image)], infos[str(image)], articulations[str(image)] = [], [], []
-            for i, (thing, sample) in enumerate(zip(things, record.samples, strict=True)):
-                if sample is None:
-                    continue
-                if sample.object_sha256 != thing.obj.sha256:
-                    raise DatasetError(
-                        f"object {i} of scene {scene} is not what its options make", folder,
-                        "use the options and the version of artsim that the scenes were made with",
-                    )  # fmt: skip
-                sample = replace(sample, depth=record.depth)
-                whole = whole_masks(thing.obj, sample, thing.T_world_object)
-                assert sample.part_mask is not None
-                for k in np.flatnonzero(thing.obj.has_surface).tolist():
-                    name = f"{image:06d}_{len(truths[str(image)]):06d}.png"
-                    output.write(f"{where}/mask/{name}", mask_png(whole[k]))
-                    output.write(f"{where}/mask_visib/{name}", mask_png(sample.part_mask == k))
-                    truths[str(image)].append({**model_pose(sample.T_camera_part[k]), "obj_id": first[i] + k})
-                    info = truth_info(thing.obj, sample, k, whole[k])
-                    infos[str(image)].append(info)
-                    if info["visib_fract"] >= _TARGET_VISIBLE:
-                        target = {"im_id": image, "inst_count": 1, "obj_id": first[i] + k, "scene_id": scene}
-                        answer["targets"].append(target)
-                articulations[str(image)].append(articulation(thing.obj, sample, first[i]))
-                cameras[str(image)] = camera_record(sample, unit)
-                answer["camera"] = answer["camera"] or shared_camera(sample, unit)
-        report(1)
-    except StoppedError:
-        return None
+                name = f"{image:06d}_{len(truths[str(image)]):06d}.png"
+                output.write(f"{where}/mask/{name}", mask_png(whole[k]))
+                output.write(f"{where}/mask_visib/{name}", mask_png(sample.part_mask == k))
+                truths[str(image)].append({**model_pose(sample.T_camera_part[k]), "obj_id": first[i] + k})
+                info = truth_info(thing.obj, sample, k, whole[k])
+                infos[str(image)].append(info)
+                if info["visib_fract"] >= _TARGET_VISIBLE:
+                    target = {"im_id": image, "inst_count": 1, "obj_id": first[i] + k, "scene_id": scene}
+                    answer["targets"].append(target)
+            articulations[str(image)].append(articulation(thing.obj, sample, first[i]))
+            cameras[str(image)] = camera_record(sample, unit)
+            answer["camera"] = answer["camera"] or shared_camera(sample, unit)
+    report(1)
     for name, content in (
         ("camera", cameras), ("gt", truths), ("gt_info", infos), ("articulation", articulations)
     ):  # fmt: skip
         output.write(f"{where}/scene_{name}.json", json_bytes(content))
-    return Answer(output.files, answer)
+    return answer
 
 
 def _finish_bop(source: SceneDataset, values: dict[str, Any], output: Output) -> None:

@@ -11,11 +11,11 @@ from typing import Any
 
 from artsim.datasets.sample_options import SensorName
 from artsim.datasets.shards import write_tar
-from artsim.errors import ConfigError
 from artsim.loading.sources import find_sources
 from artsim.renderers import RendererName
-from artsim.runs.tasks import Answer, Output, Run, Task, run_pieces
-from artsim.runs.worker import StoppedError, report, stop_if_asked
+from artsim.runs.recipe import check_counts
+from artsim.runs.tasks import Output, Run, Task, run_tasks
+from artsim.runs.worker import report, stop_if_asked
 from artsim.scenes.dataset import DESCRIPTION, FORMAT
 from artsim.scenes.ground_truth import SceneView, observe_scene, view_files
 from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions, make_scene, scene_camera
@@ -132,12 +132,8 @@ def generate_scenes(
         On Ctrl-C, after the workers have stopped; the same call goes on.
     """
     start = time.perf_counter()
-    for name, value, least in (
-        ("scenes", scenes, 1), ("views", run.views, 1), ("workers", workers, 1), ("seed", seed, 0),
-        ("shard_size", shard_size, 0), ("overviews", extra_scenes, 0),
-    ):  # fmt: skip
-        if value < least:
-            raise ConfigError(f"{value} is not a count", name, f"use {least} or more")
+    check_counts(scenes=scenes, views=run.views, workers=workers)
+    check_counts(0, seed=seed, shard_size=shard_size, overviews=extra_scenes)
     folder = Path(out)
     recipe = {
         "format": FORMAT, "artsim_version": version("artsim"), "scenes": scenes, "seed": seed,
@@ -147,27 +143,21 @@ def generate_scenes(
     tasks = {
         f"{first:06d}-{min(first + step, seed + scenes):06d}": Task(
             write_scenes,
-            (folder.absolute(), run, first, min(first + step, seed + scenes), (first - seed) // step, shard_size > 0,
+            (run, first, min(first + step, seed + scenes), (first - seed) // step, shard_size > 0,
              extra, seed + extra_scenes),
             min(first + step, seed + scenes) - first,
         )
         for first in range(seed, seed + scenes, step)
     }  # fmt: skip
-    made = run_pieces(
-        Run(folder, recipe, DESCRIPTION, "set of scenes", "scene", "scenes", progress), tasks, _nothing_more, workers
-    ).made
+    _, made = run_tasks(Run(folder, recipe, DESCRIPTION, "set of scenes", "scene", "scenes", progress), tasks, workers)
     return ScenesResult(folder, scenes, made, time.perf_counter() - start)
 
 
-def _nothing_more(values: Mapping[str, Any], output: Output) -> dict[str, Any]:
-    return {}
-
-
 def write_scenes(
-    folder: Path, run: SceneRun, first: int, end: int, number: int, as_shard: bool, extra: Extra | None, until: int
-) -> Answer | None:
-    """Write some scenes, in a worker; None when asked to stop before all are written."""
-    output, entries = Output(folder), list[dict[str, Any]]()
+    output: Output, run: SceneRun, first: int, end: int, number: int, as_shard: bool, extra: Extra | None, until: int
+) -> list[dict[str, Any]]:
+    """The task of some scenes: write them; what the description says of their views."""
+    entries = list[dict[str, Any]]()
     where = f"scenes-{number:06d}.tar"
 
     def views() -> Iterator[tuple[str, dict[str, bytes]]]:
@@ -180,16 +170,13 @@ def write_scenes(
                 yield key, view_files(view) | dict(extra(view) if extra is not None and seed < until else {})
             report(1)
 
-    try:
-        if as_shard:
-            output.files[where] = write_tar(folder / where, views())
-        else:
-            for key, files in views():
-                for name, content in files.items():
-                    output.write(f"{key}/{name}", content)
-    except StoppedError:
-        return None
-    return Answer(output.files, entries)
+    if as_shard:
+        output.files[where] = write_tar(output.folder / where, views())
+    else:
+        for key, files in views():
+            for name, content in files.items():
+                output.write(f"{key}/{name}", content)
+    return entries
 
 
 def _objects(view: SceneView) -> list[dict[str, Any]]:

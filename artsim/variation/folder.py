@@ -7,8 +7,6 @@ whole. Its ``meta.json`` says from what and how it was varied.
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,12 +17,11 @@ from typing import Any
 import numpy as np
 
 from artsim.checks.strict_urdf import convex_collision_geometry, strict_inertia, strict_urdf
-from artsim.common.files import read_json, write_error
-from artsim.common.outputs import replace_folder
 from artsim.common.progress import track
 from artsim.common.tables import plural, table
-from artsim.errors import AssetError, ConfigError
-from artsim.export import FORMATS, check_formats, export
+from artsim.errors import AssetError
+from artsim.export import check_formats, export
+from artsim.export.folders import new_folder, remove_unfinished, whole_meta
 from artsim.loading.collision_bodies import read_bodies
 from artsim.loading.object_files import find_urdf, is_urdf
 from artsim.loading.sources import find_sources
@@ -32,11 +29,11 @@ from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.objects import ArticulatedObject
 from artsim.runs.lock import folder_lock
+from artsim.runs.recipe import check_counts, check_seed
 from artsim.variation.operations import OPERATIONS
 from artsim.variation.search import Variation, draw_variation
 from artsim.variation.standard import Standard
 
-_MAX_META = 10_000_000
 _FILE_GATES: dict[str, Callable[[Path, Mapping[str, Path] | None], list[str]]] = {
     "strict URDF": strict_urdf,
     "convex collision geometry": convex_collision_geometry,
@@ -146,10 +143,8 @@ def write_variations(
     KeyboardInterrupt
         On Ctrl-C; the same call resumes.
     """
-    if count < 1:
-        raise ConfigError(f"{count} is not a count", "count", "use 1 or more")
-    if seed < 0:
-        raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
+    check_counts(count=count)
+    check_seed(seed)
     check_formats(formats)
     obj, file_gates = load_with_bodies(path, package_roots)
     if obj.is_rigid:
@@ -165,8 +160,7 @@ def write_variations(
         "others": hashlib.sha256(" ".join(donor.sha256 for donor in donors).encode()).hexdigest() if donors else "",
     }
     with folder_lock(folder), track("variations", total=count, unit="object", shown=progress) as bar:
-        for leftover in folder.glob(".*.part"):
-            shutil.rmtree(leftover, ignore_errors=True)
+        remove_unfinished(folder)
         for number in range(seed, seed + count):
             notes = _whole(folder / str(number), origin, number, formats)
             if notes is None:
@@ -239,15 +233,14 @@ def _load_others(
 
 def _whole(folder: Path, origin: dict[str, Any], seed: int, formats: Sequence[str]) -> dict[str, Any] | None:
     """What a variation's ``meta.json`` says, if this version of artsim made it of the same objects and seed."""
-    try:
-        meta: dict[str, Any] = read_json(folder / "meta.json", "meta.json", max_bytes=_MAX_META)
-        notes: dict[str, Any] = meta["variation"]
-        same = (notes["of"], notes["seed"], notes["version"]) == (origin, seed, version("artsim"))
-        same = same and set(meta["artsim"]["formats"]) == set(formats)
+
+    def is_same(meta: dict[str, Any]) -> bool:
+        notes = meta["variation"]
         VariationSummary(folder, ()).count(notes)  # what the summary takes from it
-    except (AssetError, ValueError, KeyError, TypeError):
-        return None
-    return notes if same and all((folder / FORMATS[name]).is_file() for name in formats) else None
+        return (notes["of"], notes["seed"], notes["version"]) == (origin, seed, version("artsim"))
+
+    meta = whole_meta(folder, formats, is_same)
+    return None if meta is None else dict(meta["variation"])
 
 
 def _write(
@@ -263,17 +256,10 @@ def _write(
     """Make a variation and write its folder; returns what its ``meta.json`` says of it."""
     variation = draw_variation(obj, seed, others, standard)
     notes = describe_variation(variation, origin, seed)
-    folder, part = out / str(seed), out / f".{seed}.{os.getpid()}.part"
-    try:
-        write_variation(variation, part, formats, notes)
-        problems = (
-            [problem for name in file_gates for problem in _FILE_GATES[name](part, None)] if "urdf" in formats else []
-        )
+    with new_folder(out / str(seed)) as folder:
+        write_variation(variation, folder, formats, notes)
+        gates = file_gates if "urdf" in formats else ()
+        problems = [problem for name in gates for problem in _FILE_GATES[name](folder, None)]
         if problems:
             raise AssetError(f"its file is not as strict as that of the original: {problems[0]}", f"variation {seed}")
-        replace_folder(part, folder)  # of another version, or of other objects
-    except OSError as error:
-        raise write_error(error, folder) from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return notes

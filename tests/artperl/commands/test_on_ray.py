@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from artperl.commands.estimate import Estimate
-from artperl.commands.on_ray import each_on_ray
 from artperl.evaluation.samples import frozen_samples
 from artsim.errors import ArtsimError, ConfigError
+from artsim.runs.each import each
 from tests.conftest import installed
 
 pytestmark = pytest.mark.slow
@@ -51,9 +51,9 @@ class Squaring:
 
 
 def test_results_come_in_order_and_what_a_dead_process_had_is_done_again(tmp_path: Path) -> None:
-    assert list(each_on_ray(Squaring(tmp_path), range(12), "auto")) == [n * n for n in range(12)]
+    assert list(each(Squaring(tmp_path), range(12), ray="auto")) == [n * n for n in range(12)]
     assert (tmp_path / "died").exists()
-    found = each_on_ray(Squaring(tmp_path), range(8, 40), "auto")
+    found = each(Squaring(tmp_path), range(8, 40), ray="auto")
     with pytest.raises(ArtsimError, match="has no square"):
         list(found)
 

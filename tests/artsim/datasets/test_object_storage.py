@@ -12,8 +12,8 @@ import pytest
 
 import artsim
 from artsim.datasets.merge import merge
-from artsim.datasets.parts import Part
 from artsim.datasets.sample_options import SampleOptions
+from artsim.datasets.shares import Share
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
 from artsim.runs.storage import UrlStorage
@@ -78,13 +78,13 @@ def test_a_url_holds_what_a_folder_does(bucket: tuple[str, Faulty], local: Path)
 
 def test_parts_make_what_one_process_does(bucket: tuple[str, Faulty], local: Path) -> None:
     url, _ = bucket
-    assert make(url, part=Part(1, 2)).made == 60
-    with pytest.raises(DatasetError, match=r"6 of 12 shards are not there, such as .*Fix: run again: --part 0/2$"):
+    assert make(url, share=Share(1, 2)).made == 60
+    with pytest.raises(DatasetError, match=r"6 of 12 shards are not there, such as .*Fix: run again: --share 0/2$"):
         merge(url, progress=False)
     with pytest.raises(DatasetError, match="the dataset is not complete"):
         artsim.open_dataset(url)
-    assert make(url, part=Part(0, 2)).made == 60
-    assert make(url, part=Part(0, 2)).made == 0
+    assert make(url, share=Share(0, 2)).made == 60
+    assert make(url, share=Share(0, 2)).made == 0
     damaged = UrlStorage(url).read("train-000000.tar", 1 << 30)
     UrlStorage(url).write("train-000000.tar", damaged[::-1])
     with pytest.raises(DatasetError, match=r"train-000000\.tar: has another checksum than its record"):

@@ -12,7 +12,7 @@ from PIL import Image
 from pycocotools import mask as coco_mask
 
 from artsim.errors import ConfigError, DatasetError
-from artsim.runs.tasks import JOURNAL
+from artsim.runs.journal import JOURNAL
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun, generate_scenes, open_scenes
 from artsim.scenes.convert import convert_scenes
 from artsim.scenes.dataset import DESCRIPTION

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from artsim.common.files import file_sha256
-from artsim.common.progress import track
-from artsim.datasets.description import DESCRIPTION, JOURNAL, PLAN, StartedDataset
+from artsim.datasets.description import DESCRIPTION, PLAN, StartedDataset
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
+from artsim.runs.checksums import check_files
+from artsim.runs.journal import JOURNAL
 
 STAGED = "_staged_"
 PREPARED_JOURNAL = "objects/.prepared.jsonl"
@@ -24,7 +21,7 @@ _MOVE = "move it out of the folder, or delete it"
 
 
 @dataclass(frozen=True)
-class State:
+class Inventory:
     """What is there, and what is not.
 
     Attributes
@@ -53,7 +50,7 @@ class State:
         ]
 
 
-def examine(folder: Path, begun: StartedDataset, workers: int = 2, progress: bool = True) -> State:
+def examine(folder: Path, begun: StartedDataset, workers: int = 2, progress: bool = True) -> Inventory:
     """Compare the checksums of all files with those in the descriptions.
 
     Parameters
@@ -70,63 +67,26 @@ def examine(folder: Path, begun: StartedDataset, workers: int = 2, progress: boo
     for record in begun.records:
         claims[record.name, record.recipe].append(record)
 
-    def object_problem(planned: PlannedObject) -> str | None:
-        return _file_problem(folder / planned.file, [planned.file_sha256] if planned.file_sha256 else [])[0]
-
-    def shard_state(shard: Shard) -> tuple[str | None, ShardRecord | None]:
-        records = [record for record in claims[shard.name, begun.plan.recipe(shard)] if record.shard == shard]
-        if not records:
-            return "is another one than the plan makes" if begun.complete else "is not finished", None
-        problem, digest = _file_problem(folder / shard.name, [record.sha256 for record in records])
-        return problem, next((record for record in records if record.sha256 == digest), None)
-
-    objects: dict[PlannedObject, str] = {}
+    digests: dict[str, list[str]] = {
+        planned.file: [planned.file_sha256] if planned.file_sha256 else [] for planned in begun.plan.objects
+    }
+    known: dict[Shard, list[ShardRecord]] = {}
+    for shard in shards:
+        known[shard] = [record for record in claims[shard.name, begun.plan.recipe(shard)] if record.shard == shard]
+        if known[shard]:
+            digests[shard.name] = [record.sha256 for record in known[shard]]
+    found = check_files(folder, digests, workers, progress)
+    objects = {p: problem for p in begun.plan.objects if (problem := found[p.file][0]) is not None}
+    unknown = "is another one than the plan makes" if begun.complete else "is not finished"
     broken: dict[Shard, str] = {}
     kept: dict[str, ShardRecord] = {}
-    with (
-        _readers(workers) as pool,
-        track("check", total=len(shards) + len(begun.plan.objects), unit="file", shown=progress, leave=False) as bar,
-    ):
-        for planned, problem in zip(begun.plan.objects, pool.map(object_problem, begun.plan.objects), strict=True):
-            if problem is not None:
-                objects[planned] = problem
-            bar.update()
-        for shard, (problem, found) in zip(shards, pool.map(shard_state, shards), strict=True):
-            if found is None:
-                broken[shard] = problem or "is not finished"
-            else:
-                kept[shard.name] = found
-            bar.update()
-    return State(objects, broken, kept)
-
-
-@contextlib.contextmanager
-def _readers(workers: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that a Ctrl-C stops after the files that they are at, not after all."""
-    pool = ThreadPoolExecutor(workers)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _file_problem(path: Path, digests: Sequence[str]) -> tuple[str | None, str]:
-    """What is wrong with a file that has to have one of some digests (any, when there are none), and its digest."""
-    if path.is_symlink():
-        return "is a link to somewhere else", ""
-    if path.is_dir():
-        return "is a folder", ""
-    if not path.exists():
-        return "is missing", ""
-    if not path.is_file():
-        return "is no regular file", ""
-    try:
-        digest = file_sha256(path)
-    except OSError as error:
-        return f"cannot be read ({error.strerror})", ""
-    if digests and digest not in digests:
-        return "has another checksum than when it was written", digest
-    return None, digest
+    for shard in shards:
+        problem, digest = found.get(shard.name, (unknown, ""))
+        if problem is not None:
+            broken[shard] = problem
+        else:
+            kept[shard.name] = next(record for record in known[shard] if record.sha256 == digest)
+    return Inventory(objects, broken, kept)
 
 
 def strangers(folder: Path, begun: StartedDataset) -> list[Problem]:

@@ -16,11 +16,11 @@ from typing import Any
 import pytest
 
 import artsim
-from artsim.datasets import parts
+from artsim.datasets import shares
 from artsim.datasets.description import document_bytes, read_plan_document
 from artsim.datasets.merge import merge
-from artsim.datasets.parts import Part
 from artsim.datasets.sample_options import SampleOptions
+from artsim.datasets.shares import Share
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
 from artsim.runs.storage import FolderStorage
@@ -38,20 +38,20 @@ def make(out: Path, sources: list[Source] = SOURCES, **more: Any) -> artsim.data
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "_PATIENCE", 0.5)
-    monkeypatch.setattr(parts, "_LOOK", 0.1)
+    monkeypatch.setattr(shares, "_PATIENCE", 0.5)
+    monkeypatch.setattr(shares, "_LOOK", 0.1)
 
 
 @quick
 def test_one_machine_of_three_is_gone_and_its_objects_are_prepared_by_others(tmp_path: Path) -> None:
     make(tmp_path / "local")
     for number in (2, 0):
-        assert make(tmp_path / "out", part=Part(number, 3)).made > 40
-    with pytest.raises(DatasetError, match=r"such as .*\. Fix: run again: --part 1/3$"):
+        assert make(tmp_path / "out", share=Share(number, 3)).made > 40
+    with pytest.raises(DatasetError, match=r"such as .*\. Fix: run again: --share 1/3$"):
         merge(tmp_path / "out", progress=False)
-    with pytest.raises(DatasetError, match=r"several machines are making it in parts\. Fix: artsim merge"):
+    with pytest.raises(DatasetError, match=r"several machines are making it in shares\. Fix: artsim merge"):
         make(tmp_path / "out")
-    make(tmp_path / "out", part=Part(1, 3))
+    make(tmp_path / "out", share=Share(1, 3))
     merge(tmp_path / "out", check=True, progress=False)
     assert digests(tmp_path / "out") == digests(tmp_path / "local")
     assert not (tmp_path / "out" / "parts").exists()
@@ -59,31 +59,31 @@ def test_one_machine_of_three_is_gone_and_its_objects_are_prepared_by_others(tmp
 
 @quick
 def test_other_options_and_objects_are_refused(tmp_path: Path) -> None:
-    make(tmp_path / "out", part=Part(0, 1))
+    make(tmp_path / "out", share=Share(0, 1))
     for change, named in (
         ({"seed": 1}, "seed"),
         ({"sources": SOURCES[:3]}, "objects"),
         ({"shard_size": 9}, "shard_size"),
     ):
         with pytest.raises(DatasetError, match=rf"another plan \(different: {named}\)"):
-            make(tmp_path / "out", part=Part(0, 1), **change)
+            make(tmp_path / "out", share=Share(0, 1), **change)
     shutil.copytree(tmp_path / "out" / "parts" / "objects", tmp_path / "begun" / "parts" / "objects")
     with pytest.raises(DatasetError, match="its objects were prepared with other options"):
-        make(tmp_path / "begun", part=Part(0, 1), seed=1)
+        make(tmp_path / "begun", share=Share(0, 1), seed=1)
     (tmp_path / "strange").mkdir()
     (tmp_path / "strange" / "thesis.txt").touch()
     with pytest.raises(DatasetError, match=r"already holds 'thesis\.txt'"):
-        make(tmp_path / "strange", part=Part(0, 2))
+        make(tmp_path / "strange", share=Share(0, 2))
     with pytest.raises(ConfigError, match=r"cannot write \(Not a directory\)"):
-        make(tmp_path / "strange" / "thesis.txt" / "out", part=Part(0, 2))
+        make(tmp_path / "strange" / "thesis.txt" / "out", share=Share(0, 2))
 
 
 @quick
 def test_an_object_of_no_use_stops_a_machine_or_is_left_out_by_all(tmp_path: Path) -> None:
     bad: list[Source] = [*SOURCES[:2], Troublesome("leaves")]  # type: ignore[list-item]
     with pytest.raises(AssetError, match=r"1 of 3 objects do not load: leaves: cannot be loaded \(SystemExit: 3\)"):
-        make(tmp_path / "out", bad, part=Part(0, 1))
-    made = make(tmp_path / "out", bad, part=Part(0, 1), skip_broken=True)
+        make(tmp_path / "out", bad, share=Share(0, 1))
+    made = make(tmp_path / "out", bad, share=Share(0, 1), skip_broken=True)
     assert [reason.partition(":")[0] for reason in made.left_out] == ["leaves"]
     merge(tmp_path / "out", progress=False)
     assert len(artsim.open_dataset(tmp_path / "out").plan.objects) == 2
@@ -93,21 +93,21 @@ def test_an_object_of_no_use_stops_a_machine_or_is_left_out_by_all(tmp_path: Pat
 def test_a_plan_whose_objects_have_other_bytes_is_not_gone_on_with(tmp_path: Path) -> None:
     """As another kind of processor may make them."""
     storage = FolderStorage(tmp_path / "out")
-    make(tmp_path / "out", part=Part(0, 1))
+    make(tmp_path / "out", share=Share(0, 1))
     document = read_plan_document(storage)
     assert document is not None
     document["objects"][0]["file_sha256"] = "0" * 64
     storage.write("plan.json", document_bytes(document))
     with pytest.raises(DatasetError, match=r"sample \d+ of laptop:\d+ cannot be made"):
-        make(tmp_path / "out", part=Part(0, 1))
+        make(tmp_path / "out", share=Share(0, 1))
 
 
-def test_a_part_is_named_as_schedulers_count() -> None:
-    assert Part.parse("0/8") == Part(0, 8)
+def test_a_share_is_named_as_schedulers_count() -> None:
+    assert Share.parse("0/8") == Share(0, 8)
     for text in ("8/8", "-1/8", "1", "1/0", "one/two"):
         with pytest.raises(ConfigError, match="write 0/8 to 7/8"):
-            Part.parse(text)
-    assert str(replace(Part(3, 8), number=4)) == "4/8"
+            Share.parse(text)
+    assert str(replace(Share(3, 8), number=4)) == "4/8"
 
 
 @pytest.mark.slow
@@ -119,7 +119,7 @@ def test_sigterm_in_each_phase_costs_the_work_in_hand_alone(tmp_path: Path) -> N
     ]  # fmt: skip
 
     def stop(when: Callable[[], bool]) -> None:
-        process = subprocess.Popen([*command, str(out), "--part", "0/1"], stderr=subprocess.DEVNULL)
+        process = subprocess.Popen([*command, str(out), "--share", "0/1"], stderr=subprocess.DEVNULL)
         for _ in range(6000):
             if when() or process.poll() is not None:
                 break
@@ -132,7 +132,7 @@ def test_sigterm_in_each_phase_costs_the_work_in_hand_alone(tmp_path: Path) -> N
     stop(lambda: len(list(out.glob("parts/shards/*.json"))) >= 20)
     kept = {path.name: path.stat().st_mtime_ns for path in out.glob("*.tar")}
     assert 20 <= len(kept) < 60
-    subprocess.run([*command, str(out), "--part", "0/1"], check=True, capture_output=True)
+    subprocess.run([*command, str(out), "--part", "0/1"], check=True, capture_output=True)  # its name before
     assert all((out / name).stat().st_mtime_ns == written for name, written in kept.items())
     merge(out, progress=False)
     subprocess.run([*command, str(tmp_path / "local")], check=True, capture_output=True)
@@ -148,7 +148,7 @@ _SMALL_FILES = (
 
 
 @pytest.mark.slow
-def test_a_disk_that_fills_up_under_a_part_and_clocks_that_jump_leave_no_trace(tmp_path: Path) -> None:
+def test_a_disk_that_fills_up_under_a_share_and_clocks_that_jump_leave_no_trace(tmp_path: Path) -> None:
     """A limit on the size of files is a full disk: the same call fails. Each clock is a day off, now and then."""
     (tmp_path / "sitecustomize.py").write_text(
         "import itertools, time\n"
@@ -163,16 +163,20 @@ def test_a_disk_that_fills_up_under_a_part_and_clocks_that_jump_leave_no_trace(t
     jumping = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
     whole, out = [sys.executable, str(ROOT / "generate.py"), *options], tmp_path / "out"
     for number in range(2):
-        part = [str(out), "--part", f"{number}/2"]
+        own = [str(out), "--share", f"{number}/2"]
         full = subprocess.run(
-            [sys.executable, "-c", _SMALL_FILES, *options, *part], env=jumping, capture_output=True, text=True, cwd=ROOT
+            [sys.executable, "-c", _SMALL_FILES, *options, *own],
+            env=jumping,
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
         )
         assert full.returncode == 2, full.stderr
         assert "cannot write (File too large)" in full.stderr
         assert not list(out.rglob("*.part"))
         assert not list(out.glob("*.tar"))
     for number in range(2):
-        subprocess.run([*whole, str(out), "--part", f"{number}/2"], env=jumping, check=True, capture_output=True)
+        subprocess.run([*whole, str(out), "--share", f"{number}/2"], env=jumping, check=True, capture_output=True)
     merge(out, check=True, progress=False)
     subprocess.run([*whole, str(tmp_path / "local")], check=True, capture_output=True)
     assert digests(out) == digests(tmp_path / "local")

@@ -7,7 +7,7 @@ storage can do none of it. Until the dataset is merged, its folder ``parts`` hol
     objects/<block>.json     what became of some sources
     objects/<sha256>.npz     their objects, before the plan names them
     shards/<shard>.json      the record of each finished shard
-    <i>-of-<n>.json          that a machine has done its part
+    <i>-of-<n>.json          that a machine has done its share
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -46,7 +46,7 @@ from artsim.datasets.worker import (
 )
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source
-from artsim.runs.pool import Team, WorkerLost
+from artsim.runs.pool import Team, WorkerLost, results
 from artsim.runs.storage import Storage
 
 _BLOCK = 16
@@ -63,7 +63,7 @@ _Answer = CompiledSource | RefusedSource
 
 
 @dataclass(frozen=True)
-class Part:
+class Share:
     """The share of one machine.
 
     Attributes
@@ -78,8 +78,8 @@ class Part:
     count: int = 1
 
     @staticmethod
-    def parse(text: str) -> Part:
-        """The part that a text such as ``3/8`` names.
+    def parse(text: str) -> Share:
+        """The share that a text such as ``3/8`` names.
 
         Raises
         ------
@@ -87,8 +87,8 @@ class Part:
         """
         found = re.fullmatch(r"([0-9]{1,7})/([0-9]{1,7})", text)
         if found is None or not int(found[1]) < int(found[2]):
-            raise ConfigError(f"{text!r} is no part", "part", "write 0/8 to 7/8 for eight machines")
-        return Part(int(found[1]), int(found[2]))
+            raise ConfigError(f"{text!r} is no share", "share", "write 0/8 to 7/8 for eight machines")
+        return Share(int(found[1]), int(found[2]))
 
     def __str__(self) -> str:
         return f"{self.number}/{self.count}"
@@ -100,20 +100,20 @@ class Part:
 
 
 @dataclass(frozen=True)
-class PartRun:
+class ShareRun:
     """A run of one machine; ``asked`` is the plan without objects."""
 
     storage: Storage
     asked: Plan
     sources: Sequence[Source]
-    part: Part
+    share: Share
     team: Team
     skip_broken: bool
     load_limit: float
     progress: bool
 
     def run(self) -> tuple[Plan, dict[str, Any], int]:
-        """Do what is left of the part.
+        """Do what is left of the share.
 
         Returns
         -------
@@ -137,10 +137,10 @@ class PartRun:
             document = self._plan()
         check_same_plan(self.storage.place, document, self.asked, self.sources, grows=False)
         plan = Plan.from_dict(document)
-        own = plan.shards()[self.part.number :: self.part.count]
+        own = plan.shards()[self.share.number :: self.share.count]
         missing = self._unfinished(plan, own, files)
-        made = self._make([(shard, (shard, None, True)) for shard in missing], sum(map(len, own)))
-        self.storage.write(self.part.marker, json.dumps({"shards": len(own)}).encode())
+        made = self._make({shard: (shard, None, True) for shard in missing}, sum(map(len, own)))
+        self.storage.write(self.share.marker, json.dumps({"shards": len(own)}).encode())
         return plan, document, made
 
     def _repair(self, files: dict[str, int]) -> tuple[Plan, dict[str, Any], int]:
@@ -148,7 +148,7 @@ class PartRun:
         plan, records, document = read_description(self.storage)
         check_same_plan(self.storage.place, document, self.asked, self.sources, grows=False)
         lost = [record for record in records if files.get(record.name) != record.bytes]
-        return plan, document, self._make([(r.shard, (r.shard, r.sha256)) for r in lost], sum(map(len, lost)))
+        return plan, document, self._make({r.shard: (r.shard, r.sha256) for r in lost}, sum(map(len, lost)))
 
     def _refuse_strangers(self, files: dict[str, int]) -> None:
         found = sorted(name for name in files if not name.startswith("."))
@@ -178,13 +178,13 @@ class PartRun:
             raise DatasetError(
                 "another machine makes another plan of the same objects",
                 self.storage.place,
-                "use one kind of processor, and one version of artsim and its libraries, for all parts",
+                "use one kind of processor, and one version of artsim and its libraries, for all shares",
             )
         return there
 
     def _prepare(self) -> bool:
         """Have every object prepared; False when another machine wrote the plan meanwhile."""
-        start, own = time.monotonic(), range(len(self._blocks))[self.part.number :: self.part.count]
+        start, own = time.monotonic(), range(len(self._blocks))[self.share.number :: self.share.count]
         self._prepare_blocks([number for number in own if number not in self._prepared()])
         patience = _PATIENCE + time.monotonic() - start
         most, since = -1, time.monotonic()
@@ -198,7 +198,7 @@ class PartRun:
             if len(self._blocks) - len(missing) > most:
                 most, since = len(self._blocks) - len(missing), now
             if now > since + patience:  # whoever had these is late, or gone
-                first = len(missing) * self.part.number // self.part.count  # others begin elsewhere
+                first = len(missing) * self.share.number // self.share.count  # others begin elsewhere
                 self._prepare_blocks([*missing[first:], *missing[:first]])
             else:
                 time.sleep(_LOOK)
@@ -270,21 +270,16 @@ class PartRun:
         records = read_records(self.storage, plan, told)
         return [shard for shard in shards if (r := records.get(shard.name)) is None or files.get(shard.name) != r.bytes]
 
-    def _make(self, tasks: Sequence[tuple[Shard, tuple[Any, ...]]], total: int) -> int:
+    def _make(self, shards: Mapping[Shard, tuple[Any, ...]], total: int) -> int:
         """Make shards; their samples."""
-        left = sum(len(shard) for shard, _ in tasks)
+        left, place = sum(map(len, shards)), self.storage.place
+        tasks = ((shard.name, arguments) for shard, arguments in shards.items())
         with track("samples", total=total, initial=total - left, unit="sample", shown=self.progress) as bar:
-            for shard, answer in self.team.run(make_shard, tasks, progress=bar.update):
-                if isinstance(answer, WorkerLost):
-                    raise DatasetError(
-                        f"{answer.why} while {shard.name} was made",
-                        self.storage.place,
-                        "use fewer --workers; the same command resumes",
-                    )
+            for name, answer in results(self.team.run(make_shard, tasks, progress=bar.update), place):
                 if isinstance(answer, str):
                     raise DatasetError(
                         "made again, it has another checksum: another processor or library made it",
-                        f"{self.storage.place}/{shard.name}",
+                        f"{place}/{name}",
                         "generate the dataset again, elsewhere",
                     )
         return left
