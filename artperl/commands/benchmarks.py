@@ -9,10 +9,10 @@ from typing import Literal
 
 import tyro
 
-from artperl.commands.evaluate import write_figures
 from artsim.common.outputs import check_output
 from artsim.common.progress import say
 from artsim.errors import ConfigError
+from artsim.runs.kept import write_kept
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class ArtImage(_Tested):
                 rows, categories, self.estimators, self.real_weights, self.partnet, self.objects,
                 self.views or VIEWS, self.num_points, True, say, self.seen_from,
             )  # fmt: skip
-        write_figures(self.json, figures)
+        write_kept(self.json, figures, indent=1)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Robustness(_Tested):
             sources, categories, self.conditions or tuple(CONDITIONS), self.estimators, self.partnet, self.objects,
             self.views, self.json, True, say,
         )  # fmt: skip
-        write_figures(self.json, figures)
+        write_kept(self.json, figures, indent=1)
 
 
 @dataclass(frozen=True)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import tyro
 
-from artsim.common.files import write_atomic
 from artsim.common.outputs import check_output
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.model.draws import StateMode, StateOptions, ViewOptions, ViewPreset
+from artsim.runs.kept import write_kept
 
 
 @dataclass(frozen=True)
@@ -89,10 +88,4 @@ class Evaluate:
             samples = frozen_samples(categories, self.objects, self.views, options, parts=parts)
         figures = summary(evaluate(estimator, samples, True, object_symmetries(objects)))
         print(table(figures))
-        write_figures(self.json, figures)
-
-
-def write_figures(path: Path | None, figures: Any) -> None:
-    """Write figures as JSON, if a file is named. It may have been read before: a stopped run continues from it."""
-    if path is not None:
-        write_atomic(path, (json.dumps(figures, indent=1) + "\n").encode())
+        write_kept(self.json, figures, indent=1)

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from artperl.commands.estimators import named_estimators
-from artperl.commands.evaluate import write_figures
 from artperl.detection import SHIPPED
 from artsim.common.outputs import check_output
 from artsim.common.program import cores
 from artsim.common.progress import say
 from artsim.errors import ConfigError
+from artsim.runs.kept import write_kept
 
 _FOLDER = Path("out/reartmix")
 
@@ -73,4 +73,4 @@ class ReArtMix:
         named: dict[str, str | Path] = {"drawer": "any", **named_estimators(self.estimators)}
         estimator = SceneEstimator(named, self.detector or SHIPPED, apart=self.apart, **told)
         figures = run_reartmix(images, detections, estimator, True, say, self.picture, self.json)
-        write_figures(self.json, figures)
+        write_kept(self.json, figures, indent=1)

@@ -1,4 +1,4 @@
-"""A file of JSON lines, one for each file that was worked on, that the same command goes on with."""
+"""A file of JSON lines, one for each file that was worked on, that the same command resumes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Lines:
     path : Path or None
         None for standard output.
     setup : dict
-        Everything that the lines depend on, but for the files. Lines of another setup are not gone on with.
+        Everything that the lines depend on, but for the files. Lines of another setup are refused.
 
     Raises
     ------

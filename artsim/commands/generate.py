@@ -71,7 +71,7 @@ class Generate(Opened):
     def run(self) -> None:
         from artsim.common.names import printable
         from artsim.datasets.generate import generate
-        from artsim.datasets.shares import Share
+        from artsim.datasets.preparing import Share
         from artsim.datasets.summary import object_lines
         from artsim.loading.sources import Source, family_sources, find_sources
         from artsim.runs.storage import is_url

@@ -126,7 +126,7 @@ def read_description(place: Place) -> tuple[Plan, list[ShardRecord], dict[str, A
         raise DatasetError(
             "the dataset is not complete" if begun else f"no dataset here (no {DESCRIPTION})",
             storage.place,
-            f"run the same generate command again, or {repair_command(storage.place)}: it goes on"
+            f"run the same generate command again, or {repair_command(storage.place)}: it resumes"
             if begun
             else "name a folder that generate.py wrote",
         )

@@ -15,17 +15,17 @@ from pathlib import Path
 
 from artsim.datasets.description import DESCRIPTION, StartedDataset, read_started
 from artsim.datasets.inventory import Inventory, examine, leftover_problems
-from artsim.datasets.merge import merge
-from artsim.datasets.new_plan import new_plan
+from artsim.datasets.merge import merge, place_objects
 from artsim.datasets.origins import Origins, write_origins
 from artsim.datasets.plan import MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
-from artsim.datasets.restore import remove_leftovers, restore
+from artsim.datasets.preparing import Preparation, Share
+from artsim.datasets.restore import Restoration, remove_leftovers
 from artsim.datasets.same_plan import check_same_plan
 from artsim.datasets.sample_options import SampleOptions
-from artsim.datasets.shares import Share, ShareRun
+from artsim.datasets.shares import ShareRun
 from artsim.datasets.splits import check_shares
 from artsim.datasets.versions import VERSIONS_OF
-from artsim.datasets.worker import PARTS
+from artsim.datasets.worker import PARTS, PREPARED_BY_ONE
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
@@ -89,7 +89,7 @@ def generate(
     ray: str | None = None,
     share: Share | None = None,
 ) -> GenerateResult:
-    """Generate a dataset, or go on with one that was stopped, extend it, or repair it.
+    """Generate a dataset, or resume one that was stopped, extend it, or repair it.
 
     On the folder of a dataset, the same options and sources make what is missing or damaged, and a larger
     ``num_samples`` extends it: the result has the same bytes as if it had been generated at once. A complete dataset is
@@ -148,8 +148,8 @@ def generate(
     if is_url(out) or share is not None:
         storage = storage_of(out)
         with _team(storage, workers, ray) as team:
-            run = ShareRun(storage, asked, sources, share or Share(), team, skip_broken, load_limit, progress)
-            plan, document, made = run.run()
+            objects = Preparation(storage, asked, sources, share or Share(), team, skip_broken, load_limit, progress)
+            plan, document, made = ShareRun(objects).run()
         if isinstance(storage, FolderStorage):
             write_origins(storage.folder, sources)
         if share is None:
@@ -166,15 +166,19 @@ def generate(
             grown_from = None
             with _team(folder, workers, ray) as team:
                 if begun is None:
-                    document = new_plan(folder, asked, sources, team, skip_broken, load_limit, progress)
+                    storage = FolderStorage(folder)
+                    objects = Preparation(storage, asked, sources, None, team, skip_broken, load_limit, progress)
+                    document = objects.by_one()
                     begun = StartedDataset(document, Plan.from_dict(document), (), False, ())
+                    place_objects(storage, begun.plan, PREPARED_BY_ONE)
                 elif num_samples > begun.plan.num_samples:
                     grown_from = begun.plan.num_samples
                     begun = _extend(folder, begun, num_samples)
                 write_origins(folder, sources)
                 inventory = examine(folder, begun, workers, progress)
                 damaged = _damaged_files(folder, begun, inventory) if grown_from is None else set()
-                restored = restore(folder, begun, inventory, Origins(folder, sources), team, progress)
+                restored = Restoration(folder, begun, inventory, Origins(folder, sources), team, progress)
+                restored.run()
         finally:
             remove_leftovers(folder)
     if restored.failed:

@@ -9,13 +9,9 @@ from pathlib import Path
 from artsim.datasets.description import DESCRIPTION, PLAN, StartedDataset
 from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
+from artsim.datasets.worker import PREPARED_BY_ONE
 from artsim.runs.checksums import check_files
 from artsim.runs.journal import JOURNAL
-
-STAGED = "_staged_"
-PREPARED_JOURNAL = "objects/.prepared.jsonl"
-"""A line for each object that is loaded, until there is a plan."""
-"""What the names of objects begin with that are not yet part of a plan."""
 
 _MOVE = "move it out of the folder, or delete it"
 
@@ -105,7 +101,9 @@ def leftovers(folder: Path) -> list[Path]:
     """Files that killed runs did not finish; what they have prepared is none as long as there is no plan."""
     found = [*folder.glob(".*.part"), *folder.glob("objects/.*.part")]
     if (folder / PLAN).exists() or (folder / DESCRIPTION).exists():
-        found += [*folder.glob(f"objects/{STAGED}*.npz"), *folder.glob(PREPARED_JOURNAL)]
+        # Versions before December 2026 wrote the two last ones.
+        for pattern in (f"{PREPARED_BY_ONE}/*", "objects/_staged_*.npz", "objects/.prepared.jsonl"):
+            found += folder.glob(pattern)
     return [path for path in found if path.is_symlink() or not path.is_dir()]
 
 

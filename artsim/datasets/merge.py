@@ -18,14 +18,13 @@ from artsim.datasets.description import (
     read_plan_document,
 )
 from artsim.datasets.plan import Plan, ShardRecord
+from artsim.datasets.preparing import READERS
 from artsim.datasets.restore import remove_leftovers
 from artsim.datasets.shares import read_records
 from artsim.datasets.worker import PARTS, PREPARED, RECORDS
 from artsim.errors import DatasetError
 from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
 
-_THREADS = 32
-"""Requests at once."""
 _BLOCK_BYTES = 1 << 22
 _AGAIN = "delete it, and run its share again"
 
@@ -70,7 +69,7 @@ def merge(place: Place, check: bool = False, progress: bool = True) -> MergeResu
     records = _records(storage, plan, files)
     if check:
         _compare(storage, [(r.name, r.sha256) for r in records], progress)
-    _place_objects(storage, plan, check, progress)
+    place_objects(storage, plan, PREPARED, check, progress)
     storage.write(DESCRIPTION, document_bytes(full_description(document, plan, records)))
     _clean(storage)
     return MergeResult(storage.place, plan.num_samples, len(records), False)
@@ -78,12 +77,9 @@ def merge(place: Place, check: bool = False, progress: bool = True) -> MergeResu
 
 def _records(storage: Storage, plan: Plan, files: dict[str, int]) -> list[ShardRecord]:
     """The records of all shards."""
-    shards, told = plan.shards(), storage.sizes(RECORDS)
-    records = read_records(storage, plan, [shard for shard in shards if f"{shard.name}.json" in told])
-    lacking = [
-        shard.name for shard in shards
-        if (r := records.get(shard.name)) is None or files.get(shard.name) != r.bytes
-    ]  # fmt: skip
+    shards = plan.shards()
+    records = read_records(storage, plan, shards, files)
+    lacking = [shard.name for shard in shards if shard.name not in records]
     if lacking:
         raise DatasetError(
             f"{len(lacking)} of {len(shards)} shards are not there, such as {lacking[0]}",
@@ -105,21 +101,23 @@ def _unfinished_shares(storage: Storage) -> str:
     return f"run again: {named}" + (f" and {len(left) - 6} more" if len(left) > 6 else "")
 
 
-def _place_objects(storage: Storage, plan: Plan, check: bool, progress: bool) -> None:
-    """Let every object lie under its name."""
-    prepared, there = storage.sizes(PREPARED), storage.sizes("objects")
+def place_objects(
+    storage: Storage, plan: Plan, folder: str = PREPARED, check: bool = False, progress: bool = False
+) -> None:
+    """Let every object of a folder of prepared ones be there under its name, too."""
+    prepared, there = storage.sizes(folder), storage.sizes("objects")
     for planned in plan.objects:
         if f"{planned.file_sha256}.npz" not in prepared and f"{planned.key}.npz" not in there:
             raise DatasetError("is missing", f"{storage.place}/{planned.file}", "run every share again")
     if check:
-        names = [(f"{PREPARED}/{p.file_sha256}.npz", p.file_sha256) for p in plan.objects]
+        names = [(f"{folder}/{p.file_sha256}.npz", p.file_sha256) for p in plan.objects]
         _compare(storage, [pair for pair in names if pair[0].rpartition("/")[2] in prepared], progress)
     left = [
-        (f"{PREPARED}/{p.file_sha256}.npz", p.file) for p in plan.objects
+        (f"{folder}/{p.file_sha256}.npz", p.file) for p in plan.objects
         if (size := prepared.get(f"{p.file_sha256}.npz")) is not None and there.get(f"{p.key}.npz") != size
     ]  # fmt: skip
     with (
-        ThreadPoolExecutor(_THREADS) as pool,
+        ThreadPoolExecutor(READERS) as pool,
         track("objects", total=len(left), unit="object", shown=progress) as bar,
     ):
         for _ in pool.map(lambda names: storage.copy(*names), left):

@@ -11,7 +11,7 @@ from artsim.datasets.description import read_started
 from artsim.datasets.inventory import examine, leftover_problems, strangers
 from artsim.datasets.origins import Origins
 from artsim.datasets.problems import Problem
-from artsim.datasets.restore import remove_leftovers, restore
+from artsim.datasets.restore import Restoration, remove_leftovers
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 from artsim.runs.lock import folder_lock
@@ -61,11 +61,11 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     Raises
     ------
     DatasetError
-        When inventory is no dataset, or nothing is left that says what it was.
+        When there is no dataset, or nothing is left that says what it was.
     ConfigError
         When the folder cannot be written to.
     KeyboardInterrupt
-        On Ctrl-C, after the workers have stopped; the same call goes on.
+        On Ctrl-C, after the workers have stopped; the same call resumes.
     """
     folder = Path(folder)
     begun = read_started(folder)
@@ -80,7 +80,8 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     with folder_lock(folder):
         try:
             with WorkerPool(workers, FolderStorage(folder)) as team:
-                restored = restore(folder, begun, inventory, Origins(folder, sources), team, progress)
+                restored = Restoration(folder, begun, inventory, Origins(folder, sources), team, progress)
+                restored.run()
         finally:
             remove_leftovers(folder)
     return RepairResult(folder, tuple(restored.files), (*restored.failed, *foreign))

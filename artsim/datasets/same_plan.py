@@ -14,7 +14,7 @@ from artsim.runs.recipe import differences
 def check_same_plan(
     place: str, document: Mapping[str, Any], asked: Plan, sources: Sequence[Source], grows: bool = True
 ) -> None:
-    """Refuse to go on with a dataset of another plan.
+    """Refuse to resume a dataset of another plan.
 
     Parameters
     ----------

@@ -27,6 +27,8 @@ PARTS = "parts"
 """Folder of what several machines have done of a dataset that is not complete."""
 PREPARED, RECORDS = f"{PARTS}/objects", f"{PARTS}/shards"
 """Objects before they have a name in the plan: each is called by the digest of its file. Records of finished shards."""
+PREPARED_BY_ONE = "objects/.prepared"
+"""The same objects where one machine makes the dataset."""
 
 
 class DatasetFiles:
@@ -110,12 +112,10 @@ def _samples(dataset: DatasetFiles, shard: Shard, prepared: bool) -> Iterator[Sa
 
 @dataclass(frozen=True)
 class CompiledSource:
-    """What the plan needs to know of a source, and the name of its compiled file.
+    """What the plan needs to know of a source that is loaded.
 
     Attributes
     ----------
-    staged : str
-        Name of its file, below ``objects``.
     identity : str
         Digest of what it is named by: category and seed of a procedural object, the bytes of the files of a loaded one.
         Splits follow from it.
@@ -123,7 +123,6 @@ class CompiledSource:
         As in :class:`artsim.datasets.plan.PlannedObject`.
     """
 
-    staged: str
     identity: str
     category: str
     object_id: str
@@ -142,15 +141,15 @@ class RefusedSource:
 
 
 def compile_source(
-    source: Source, staged: str | None, seed: int, options: SampleOptions | None, strict: bool = False
+    source: Source, folder: str, seed: int, options: SampleOptions | None, strict: bool = False
 ) -> CompiledSource | RefusedSource:
-    """Load a source and keep it compiled in the dataset's folder, under a provisional name.
+    """Load a source and keep it compiled, as the digest of its file.
 
     Parameters
     ----------
     source : Source
-    staged : str or None
-        Name of the file; None where several machines prepare objects.
+    folder : str
+        Of prepared objects, in the storage of the dataset.
     seed : int
         Of the dataset.
     options : SampleOptions or None
@@ -175,7 +174,5 @@ def compile_source(
     data = object_bytes(obj)
     digest = hashlib.sha256(data).hexdigest()
     storage: Storage = this_worker().context
-    storage.write(f"{PREPARED}/{digest}.npz" if staged is None else f"objects/{staged}", data)
-    return CompiledSource(
-        staged or "", identity, obj.category, obj.object_id, obj.sha256, len(obj), obj.is_rigid, repairs, digest
-    )
+    storage.write(f"{folder}/{digest}.npz", data)
+    return CompiledSource(identity, obj.category, obj.object_id, obj.sha256, len(obj), obj.is_rigid, repairs, digest)

@@ -52,7 +52,7 @@ def generate_objects(
     constraints: Constraints = NO_CONSTRAINTS,
     options: ExportOptions = DEFAULTS,
 ) -> ObjectsResult:
-    """Write procedural objects as files, or go on with a run that was stopped.
+    """Write procedural objects as files, or resume a run that was stopped.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def convert(
     workers: int = 2,
     progress: bool = True,
 ) -> ConvertResult:
-    """Convert a finished dataset, or go on with a conversion that was stopped.
+    """Convert a finished dataset, or resume a conversion that was stopped.
 
     The same bytes come out whatever the number of workers and however often the run was stopped. A complete conversion
     is checked and left alone; one with damaged or missing files is made again.

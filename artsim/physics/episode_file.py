@@ -21,7 +21,7 @@ from artsim.common.files import read_json, write_atomic, write_error
 from artsim.common.names import safe_name
 from artsim.common.progress import track
 from artsim.datasets.shards import ShardReader, sample_key, write_shard
-from artsim.errors import ConfigError, DatasetError
+from artsim.errors import DatasetError
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import Array, invert_transform, transform_points
 from artsim.model.object_file import load_object, save_object
@@ -29,6 +29,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions
 from artsim.physics.world import engine_of
+from artsim.runs.recipe import check_counts, check_seed
 
 FORMAT = 1
 _GOAL_SECONDS = 2.0  # a joint heads for a goal for so long, then for another
@@ -123,11 +124,8 @@ def record(
         When the folder already holds something.
     """
     options, folder = options or EpisodeOptions(), Path(out)
-    for name, value in (("motions", motions), ("frames", frames)):
-        if value < 1:
-            raise ConfigError(f"{value} is not a count", name, "use 1 or more")
-    if seed < 0:
-        raise ConfigError(f"{seed} is not a seed", "seed", "use 0 or more")
+    check_counts(motions=motions, frames=frames)
+    check_seed(seed)
     episode = Episode(options)
     try:
         if folder.exists() and any(folder.iterdir()):

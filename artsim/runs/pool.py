@@ -16,13 +16,22 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from artsim.errors import DatasetError
 from artsim.runs.worker import serve
 
 K = TypeVar("K")
 T = TypeVar("T")
+
+Tasks: TypeAlias = "Iterable[tuple[K, tuple[Any, ...]] | None]"
+"""Keys and arguments of tasks. None: no more until one of those that are handed out is done."""
+Progress: TypeAlias = "Callable[[int], object]"
+
+
+def ignore(count: int) -> None:
+    """Nobody hears of progress."""
+
 
 _PATIENCE = 10.0
 """Seconds that a process has to leave what it is at once the run is over."""
@@ -50,11 +59,7 @@ class Team(Protocol):
     """What does the tasks of a run: processes of this machine, or of a cluster."""
 
     def run(
-        self,
-        work: Callable[..., T],
-        tasks: Iterable[tuple[K, tuple[Any, ...]] | None],
-        limit: float | None = None,
-        progress: Callable[[int], object] = lambda count: None,
+        self, work: Callable[..., T], tasks: Tasks[K], limit: float | None = None, progress: Progress = ignore
     ) -> Iterator[tuple[K, T | WorkerLost]]:
         """See :meth:`WorkerPool.run`."""
 
@@ -78,11 +83,7 @@ class WorkerPool:
         self._members: list[_Member] = []
 
     def run(
-        self,
-        work: Callable[..., T],
-        tasks: Iterable[tuple[K, tuple[Any, ...]] | None],
-        limit: float | None = None,
-        progress: Callable[[int], object] = lambda count: None,
+        self, work: Callable[..., T], tasks: Tasks[K], limit: float | None = None, progress: Progress = ignore
     ) -> Iterator[tuple[K, T | WorkerLost]]:
         """Do tasks, in any order.
 
@@ -93,8 +94,7 @@ class WorkerPool:
         ----------
         work : callable
             A function of a module; it may call :func:`artsim.runs.worker.report`.
-        tasks : iterable of (key, arguments), or None
-            None: no more until one of those that are handed out is done.
+        tasks : Tasks
         limit : float, optional
             Seconds that a task may take before its process is killed.
         progress : callable

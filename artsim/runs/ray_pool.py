@@ -14,16 +14,16 @@ import threading
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from artsim.common.extras import needs
 from artsim.errors import ArtsimError, ConfigError
-from artsim.runs.pool import WorkerLost
+from artsim.runs.pool import Progress, Tasks, WorkerLost, ignore
 from artsim.runs.storage import FolderStorage, storage_of
-from artsim.runs.worker import Worker, answer, become
+from artsim.runs.worker import Worker, outcome, set_worker
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -81,11 +81,7 @@ class RayPool:
         self._versions = {name: version(name) for name in packages}
 
     def run(
-        self,
-        work: Callable[..., T],
-        tasks: Iterable[tuple[K, tuple[Any, ...]] | None],
-        limit: float | None = None,
-        progress: Callable[[int], object] = lambda count: None,
+        self, work: Callable[..., T], tasks: Tasks[K], limit: float | None = None, progress: Progress = ignore
     ) -> Iterator[tuple[K, T | WorkerLost]]:
         """Do tasks, in any order; see :meth:`artsim.runs.pool.WorkerPool.run`.
 
@@ -185,7 +181,7 @@ class _Hub:
 
     def do(self, method: str, *arguments: Any) -> tuple[str, Any]:
         """Call a method of the storage."""
-        return answer(getattr(self.storage, method), arguments)
+        return outcome(getattr(self.storage, method), arguments)
 
     def is_late(self, key: str, why: str) -> None:
         """Note why a task is given up."""
@@ -197,7 +193,7 @@ class _Hub:
 
 
 class RelayStorage:
-    """A storage that another machine has access to.
+    """A storage that another machine has access to; see :class:`artsim.runs.storage.Storage`.
 
     Parameters
     ----------
@@ -209,44 +205,25 @@ class RelayStorage:
     def __init__(self, hub: Any, place: str):
         self._hub, self.place = hub, place
 
-    def _ask(self, method: str, *arguments: Any) -> Any:
-        import ray
+    def __getattr__(self, method: str) -> Callable[..., Any]:
+        """A method of the storage, done by the hub."""
+        if method.startswith("_"):
+            raise AttributeError(method)
 
-        kind, value = ray.get(self._hub.do.remote(method, *arguments))
-        if kind == "failed":
-            raise value
-        return value
+        def ask(*arguments: Any) -> Any:
+            import ray
 
-    def read(self, name: str, most: int) -> bytes:
-        """See :meth:`artsim.runs.storage.Storage.read`; likewise below."""
-        data: bytes = self._ask("read", name, most)
-        return data
+            kind, value = ray.get(self._hub.do.remote(method, *arguments))
+            if kind == "failed":
+                raise value
+            return value
+
+        return ask
 
     def open(self, name: str) -> tuple[BinaryIO, int]:
-        """The whole file, in memory."""
+        """The whole file, in memory: what the hub opens cannot be sent."""
         data = self.read(name, _WHOLE_FILE)
         return io.BytesIO(data), len(data)
-
-    def write(self, name: str, data: bytes) -> None:
-        """Write a whole file."""
-        self._ask("write", name, data)
-
-    def write_new(self, name: str, data: bytes) -> None:
-        """Write a whole file unless there is one."""
-        self._ask("write_new", name, data)
-
-    def sizes(self, below: str = "") -> dict[str, int]:
-        """Names and sizes of the files in a folder."""
-        found: dict[str, int] = self._ask("sizes", below)
-        return found
-
-    def copy(self, source: str, target: str) -> None:
-        """Let a file be there under another name, too."""
-        self._ask("copy", source, target)
-
-    def remove(self, names: Iterable[str]) -> None:
-        """Remove files."""
-        self._ask("remove", list(names))
 
 
 _here: tuple[str, Worker] | None = None
@@ -261,7 +238,7 @@ def _do(
     arguments: tuple[Any, ...],
     limit: float | None,
 ) -> tuple[str, Any, int]:
-    """Do a task in a process of a node: what :func:`artsim.runs.worker.answer` says, and how much was done."""
+    """Do a task in a process of a node: what :func:`artsim.runs.worker.outcome` says, and how much was done."""
     global _here
     run, hub, versions = about
     counts: list[int] = []
@@ -272,9 +249,9 @@ def _do(
         _here = run, Worker(context, counts.append, bool)
     worker = _here[1]
     worker.tell = counts.append
-    become(worker)
+    set_worker(worker)
     with _within(limit, lambda why: hub.is_late.remote(key, why)):
-        kind, value = answer(work, arguments)
+        kind, value = outcome(work, arguments)
     return kind, value, sum(counts)
 
 

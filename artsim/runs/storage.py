@@ -180,7 +180,7 @@ class FolderStorage:
             folders.add((self.folder / name).parent)
         for folder in sorted(folders - {self.folder}, key=lambda path: -len(path.parts)):
             for empty in (folder, *folder.parents):
-                if empty == self.folder or any(empty.iterdir()):
+                if empty == self.folder or not empty.is_dir() or any(empty.iterdir()):
                     break
                 empty.rmdir()
 

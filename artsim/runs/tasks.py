@@ -99,7 +99,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class _Answer:
+class _Record:
     """What a task has written and returned."""
 
     files: Files
@@ -141,15 +141,15 @@ def run_tasks(
         if files is not None:
             return files, 0
         try:
-            answers, made = _work(run, tasks, workers)
+            records, made = _work(run, tasks, workers)
         finally:
             _remove_unfinished(run.folder)
         last = Output(run.folder)
-        values = {name: answers[name].value for name in tasks}
+        values = {name: records[name].value for name in tasks}
         if finish is not None:
             finish(values, last)
-        files = {name: entry for task in tasks for name, entry in answers[task].files.items()} | last.files
-        pieces = {"pieces": [[name, list(answers[name].files), values[name]] for name in tasks]} if run.grows else {}
+        files = {name: entry for task in tasks for name, entry in records[task].files.items()} | last.files
+        pieces = {"pieces": [[name, list(records[name].files), values[name]] for name in tasks]} if run.grows else {}
         document = {**run.recipe, **pieces, "files": files}
         data = orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
         write_atomic(run.folder / run.done, data)
@@ -157,30 +157,30 @@ def run_tasks(
         return files, made
 
 
-def _work(run: Run, tasks: Mapping[str, Task], workers: int) -> tuple[dict[str, _Answer], int]:
-    """Do what is not done yet; answers of all tasks by name, and how much was done now."""
-    answers, journal = _finished(run, tasks), Journal(run.folder / JOURNAL)
-    journal.start([run.recipe, *([name, own.files, own.value] for name, own in answers.items())])
+def _work(run: Run, tasks: Mapping[str, Task], workers: int) -> tuple[dict[str, _Record], int]:
+    """Do what is not done yet; records of all tasks by name, and how much was done now."""
+    records, journal = _finished(run, tasks), Journal(run.folder / JOURNAL)
+    journal.start([run.recipe, *([name, own.files, own.value] for name, own in records.items())])
     (run.folder / run.done).unlink(missing_ok=True)
-    missing = {name: task for name, task in tasks.items() if name not in answers}
+    missing = {name: task for name, task in tasks.items() if name not in records}
     total, left = (sum(task.size for task in some.values()) for some in (tasks, missing))
     jobs = ((name, (run.folder.absolute(), task)) for name, task in missing.items())
     with (
         WorkerPool(workers) as team,
         track(f"{run.unit}s", total=total, initial=total - left, unit=run.unit, shown=run.progress) as bar,
     ):
-        for name, answer in results(team.run(_do, jobs, progress=bar.update), run.folder):
-            if answer is not None:
-                answers[name] = answer
-                journal.add([name, answer.files, answer.value])
-    return answers, left
+        for name, record in results(team.run(_do, jobs, progress=bar.update), run.folder):
+            if record is not None:
+                records[name] = record
+                journal.add([name, record.files, record.value])
+    return records, left
 
 
-def _do(folder: Path, task: Task) -> _Answer | None:
+def _do(folder: Path, task: Task) -> _Record | None:
     """Do a task, in a worker; None when asked to stop before all is written."""
     output = Output(folder)
     try:
-        return _Answer(output.files, task.work(output, *task.arguments))
+        return _Record(output.files, task.work(output, *task.arguments))
     except StoppedError:
         return None
 
@@ -248,7 +248,7 @@ def _refuse_other(run: Run, found: object) -> None:
         )
 
 
-def _finished(run: Run, tasks: Mapping[str, Task]) -> dict[str, _Answer]:
+def _finished(run: Run, tasks: Mapping[str, Task]) -> dict[str, _Record]:
     """What a run that was stopped has finished.
 
     Raises
@@ -262,16 +262,16 @@ def _finished(run: Run, tasks: Mapping[str, Task]) -> dict[str, _Answer]:
     begun = lines[0]
     if not _is_smaller(run, begun):
         _refuse_other(run, begun)
-    answers: dict[str, _Answer] = {}
+    records: dict[str, _Record] = {}
     for line in lines[1:]:
         try:
             name, files, value = line
-            answers[name] = _Answer({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
+            records[name] = _Record({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
         except (ValueError, TypeError, AttributeError):
             continue
-    answers = {name: answer for name, answer in answers.items() if name in tasks}
-    whole = _whole(run, {file: entry for answer in answers.values() for file, entry in answer.files.items()})
-    return {name: answer for name, answer in answers.items() if all(whole[file] for file in answer.files)}
+    records = {name: record for name, record in records.items() if name in tasks}
+    whole = _whole(run, {file: entry for record in records.values() for file, entry in record.files.items()})
+    return {name: record for name, record in records.items() if all(whole[file] for file in record.files)}
 
 
 def _whole(run: Run, files: Mapping[str, tuple[int, str]]) -> dict[str, bool]:

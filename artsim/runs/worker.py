@@ -54,7 +54,7 @@ def this_worker() -> Worker:
     return _worker
 
 
-def become(worker: Worker) -> None:
+def set_worker(worker: Worker) -> None:
     """Let this process work for a run."""
     global _worker
     _worker = worker
@@ -73,16 +73,16 @@ def serve(connection: Connection, context: Any) -> None:
 
     threading.Thread(target=follow, daemon=True).start()
     # Nothing but a wish to stop comes while there is a task.
-    become(Worker(context, lambda count: connection.send(("progress", count)), connection.poll))
+    set_worker(Worker(context, lambda count: connection.send(("progress", count)), connection.poll))
     try:
         connection.send(("ready", None))
         while (task := connection.recv()) is not None:
-            connection.send(answer(*task))
+            connection.send(outcome(*task))
     except (EOFError, OSError):
         os._exit(1)  # the parent is gone
 
 
-def answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+def outcome(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
     """What becomes of a task: ("done", its result) or ("failed", what it raised)."""
     try:
         return "done", work(*arguments)

@@ -43,7 +43,7 @@ _TARGET_VISIBLE = 0.1
 def convert_scenes(
     run: SceneRun, folder: Path, to: SceneFormat, workers: int = 2, out: Path | None = None, progress: bool = True
 ) -> Path:
-    """Write finished scenes in another format, or go on with a conversion that was stopped.
+    """Write finished scenes in another format, or resume a conversion that was stopped.
 
     Parameters
     ----------

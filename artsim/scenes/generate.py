@@ -99,7 +99,7 @@ def generate_scenes(
     extra_scenes: int = 0,
     progress: bool = True,
 ) -> ScenesResult:
-    """Write scenes, or go on with a run that was stopped, or add to one that is complete.
+    """Write scenes, or resume a run that was stopped, or add to one that is complete.
 
     The same bytes come out whatever the number of workers and however often the run was stopped. A complete dataset is
     checked and left alone; damaged files are made again.
@@ -129,7 +129,7 @@ def generate_scenes(
     DatasetError
         When the folder holds something else, or is in use.
     KeyboardInterrupt
-        On Ctrl-C, after the workers have stopped; the same call goes on.
+        On Ctrl-C, after the workers have stopped; the same call resumes.
     """
     start = time.perf_counter()
     check_counts(scenes=scenes, views=run.views, workers=workers)

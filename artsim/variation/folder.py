@@ -111,7 +111,7 @@ def write_variations(
     package_roots: Mapping[str, Path] | None = None,
     progress: bool = True,
 ) -> VariationSummary:
-    """Write variations of an object as files, or go on with a run that was stopped.
+    """Write variations of an object as files, or resume a run that was stopped.
 
     Parameters
     ----------

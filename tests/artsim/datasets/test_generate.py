@@ -240,9 +240,10 @@ def test_unwritable_places_are_clear_errors(sources: list[Source], tmp_path: Pat
 
 def test_an_object_that_cannot_be_written_is_not_a_broken_one(sources: list[Source], tmp_path: Path) -> None:
     """A full disk while objects are compiled must never end in a dataset without them."""
-    in_the_way = tmp_path / "out" / "objects" / "_staged_1.npz"
+    digest = make(sources, tmp_path / "straight").objects[1].file_sha256
+    in_the_way = tmp_path / "out" / "objects" / ".prepared" / f"{digest}.npz"
     in_the_way.mkdir(parents=True)
-    with pytest.raises(ConfigError, match=r"_staged_1\.npz: it is a folder"):
+    with pytest.raises(ConfigError, match=r"npz: it is a folder"):
         make(sources, tmp_path / "out", skip_broken=True)
     in_the_way.rmdir()
     make(sources, tmp_path / "out", skip_broken=True)
@@ -373,18 +374,22 @@ def test_folders_are_searched_for_objects(sources: list[Source], tmp_path: Path)
 def test_objects_that_a_killed_run_has_prepared_are_not_loaded_again(sources: list[Source], tmp_path: Path) -> None:
     """A run of real files is killed after some objects; the next one loads the others, and makes the same bytes."""
     straight, out = tmp_path / "straight", tmp_path / "out"
-    make(sources, straight)
-    (out / "objects" / "_staged_2.npz").mkdir(parents=True)  # the last object cannot be written
-    with pytest.raises(ConfigError, match=r"_staged_2\.npz: it is a folder"):
+    files = {planned.source: planned.file_sha256 for planned in make(sources, straight).objects}
+    first, second, last = (f"{files[source.name]}.npz" for source in sources)
+    prepared = out / "objects" / ".prepared"
+    (prepared / last).mkdir(parents=True)  # the last object cannot be written
+    with pytest.raises(ConfigError, match=rf"{last}: it is a folder"):
         make(sources, out, workers=1)
-    (out / "objects" / "_staged_2.npz").rmdir()
-    journal = out / "objects" / ".prepared.jsonl"
-    lines = journal.read_bytes().split(b"\n")[1:]
-    assert [json.loads(line)["answer"]["staged"] for line in lines] == ["_staged_0.npz", "_staged_1.npz"]
-    journal.write_bytes(b"\n" + lines[0] + b"\n" + lines[1][:50])  # killed within the second line
-    times = {path.name: path.stat().st_mtime_ns for path in (out / "objects").glob("*.npz")}
+    (prepared / last).rmdir()
+    records = sorted(prepared.glob("*.json"))
+    assert [json.loads(record.read_text())["answers"][0]["file_sha256"] for record in records] == [
+        first[:-4],
+        second[:-4],
+    ]
+    records[1].write_bytes(records[1].read_bytes()[:50])
+    times = {path.name: path.stat().st_mtime_ns for path in prepared.glob("*.npz")}
     for planned in make(sources, out).objects:
         compiled = (out / planned.file).stat().st_mtime_ns
-        assert (compiled == times["_staged_0.npz"]) == (planned.source == sources[0].name)
-    assert not journal.exists()
+        assert (compiled == times[first]) == (planned.source == sources[0].name)
+    assert not prepared.exists()
     assert digests(out) == digests(straight)

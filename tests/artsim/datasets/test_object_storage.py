@@ -12,8 +12,8 @@ import pytest
 
 import artsim
 from artsim.datasets.merge import merge
+from artsim.datasets.preparing import Share
 from artsim.datasets.sample_options import SampleOptions
-from artsim.datasets.shares import Share
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
 from artsim.runs.storage import UrlStorage

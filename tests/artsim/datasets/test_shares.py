@@ -16,11 +16,11 @@ from typing import Any
 import pytest
 
 import artsim
-from artsim.datasets import shares
+from artsim.datasets import preparing
 from artsim.datasets.description import document_bytes, read_plan_document
 from artsim.datasets.merge import merge
+from artsim.datasets.preparing import Share
 from artsim.datasets.sample_options import SampleOptions
-from artsim.datasets.shares import Share
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source, family_sources
 from artsim.runs.storage import FolderStorage
@@ -38,8 +38,8 @@ def make(out: Path, sources: list[Source] = SOURCES, **more: Any) -> artsim.data
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shares, "_PATIENCE", 0.5)
-    monkeypatch.setattr(shares, "_LOOK", 0.1)
+    monkeypatch.setattr(preparing, "_PATIENCE", 0.5)
+    monkeypatch.setattr(preparing, "_LOOK", 0.1)
 
 
 @quick

@@ -1,0 +1,231 @@
+"""The objects of a new dataset: every source is loaded once, and kept compiled until the plan gives it a name.
+
+``<digest>.npz`` is an object, ``<block>.json`` the record of some sources: a stopped run loads what has no record.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from artsim.common.files import parse_json
+from artsim.common.json_records import from_json_values
+from artsim.common.progress import track
+from artsim.datasets.description import PLAN
+from artsim.datasets.new_plan import plan_document, unusable
+from artsim.datasets.plan import Plan
+from artsim.datasets.worker import PARTS, PREPARED, PREPARED_BY_ONE, CompiledSource, RefusedSource, compile_source
+from artsim.errors import ConfigError, DatasetError
+from artsim.loading.sources import Source
+from artsim.runs.pool import Team, WorkerLost
+from artsim.runs.storage import Storage
+
+READERS = 32
+"""Requests at once: one to object storage takes some ten milliseconds, of which the machine waits nearly all."""
+_BLOCK = 16
+"""Sources of one record of several machines: of 100,000 objects there are 6,000, which every machine reads."""
+_MAX_RECORD = 10_000_000
+_PATIENCE = 10.0
+"""Seconds, beside those that its own blocks took, that a machine waits for the others' before it prepares them, too."""
+_LOOK = 1.0
+"""Seconds between two looks at what others have prepared."""
+
+Answer = CompiledSource | RefusedSource
+
+
+@dataclass(frozen=True)
+class Share:
+    """The share of one machine.
+
+    Attributes
+    ----------
+    number : int
+        From 0 on.
+    count : int
+        Of machines.
+    """
+
+    number: int = 0
+    count: int = 1
+
+    @staticmethod
+    def parse(text: str) -> Share:
+        """The share that a text such as ``3/8`` names.
+
+        Raises
+        ------
+        ConfigError
+        """
+        found = re.fullmatch(r"([0-9]{1,7})/([0-9]{1,7})", text)
+        if found is None or not int(found[1]) < int(found[2]):
+            raise ConfigError(f"{text!r} is no share", "share", "write 0/8 to 7/8 for eight machines")
+        return Share(int(found[1]), int(found[2]))
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    @property
+    def marker(self) -> str:
+        """File that says that it is done."""
+        return f"{PARTS}/{self.number}-of-{self.count}.json"
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """Loads the sources of a dataset.
+
+    Attributes
+    ----------
+    storage : Storage
+    asked : Plan
+        Without objects.
+    sources : sequence of Source
+    share : Share or None
+        None: no other machine has a share.
+    team : WorkerPool or RayPool
+    skip_broken : bool
+        Leave out what is of no use, instead of stopping.
+    load_limit : float
+        Seconds that an object may take to load.
+    progress : bool
+    """
+
+    storage: Storage
+    asked: Plan
+    sources: Sequence[Source]
+    share: Share | None
+    team: Team
+    skip_broken: bool
+    load_limit: float
+    progress: bool
+    _known: dict[int, list[Answer]] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> str:
+        """Where prepared objects lie."""
+        return PREPARED_BY_ONE if self.share is None else PREPARED
+
+    def by_one(self) -> dict[str, Any]:
+        """Content of ``plan.json``, where no other machine prepares objects; each source has a record of its own.
+
+        Raises
+        ------
+        AssetError
+            Naming the sources that cannot be used.
+        """
+        blocks = [range(i, i + 1) for i in range(len(self.sources))]
+        files = self.storage.sizes(self.folder)
+        for number in self._recorded() & set(range(len(blocks))):
+            answers = self._read(number, blocks[number]) or []
+            if any(isinstance(own, CompiledSource) and f"{own.file_sha256}.npz" in files for own in answers):
+                self._known[number] = answers
+        self._prepare(blocks, [number for number in range(len(blocks)) if number not in self._known])
+        return self._document(blocks)
+
+    def by_several(self) -> dict[str, Any] | None:
+        """The same, where others have shares, too; None when another machine wrote ``plan.json`` meanwhile.
+
+        Raises
+        ------
+        AssetError
+            Naming a source that cannot be used.
+        DatasetError
+            When objects were prepared with other options.
+        """
+        share, total = self.share or Share(), len(self.sources)
+        blocks = [range(first, min(first + _BLOCK, total)) for first in range(0, total, _BLOCK)]
+        start, recorded = time.monotonic(), self._recorded()
+        self._prepare(blocks, [own for own in range(len(blocks))[share.number :: share.count] if own not in recorded])
+        patience = _PATIENCE + time.monotonic() - start
+        most, since = -1, time.monotonic()
+        while missing := sorted(set(range(len(blocks))) - self._recorded()):
+            if PLAN in self.storage.sizes():
+                return None
+            now = time.monotonic()
+            if len(blocks) - len(missing) > most:
+                most, since = len(blocks) - len(missing), now
+            if now > since + patience:  # whoever had these is late, or gone
+                first = len(missing) * share.number // share.count  # others begin elsewhere
+                self._prepare(blocks, [*missing[first:], *missing[:first]])
+            else:
+                time.sleep(_LOOK)
+        return self._document(blocks)
+
+    def _document(self, blocks: Sequence[range]) -> dict[str, Any]:
+        def known(number: int) -> list[Answer]:
+            answers = self._known.get(number) or self._read(number, blocks[number])
+            if answers is None:
+                raise DatasetError(
+                    "its objects were prepared with other options, or a record is damaged",
+                    self.storage.place,
+                    f"choose another --out, or the options it was begun with, or delete its folder {PARTS}",
+                )
+            return answers
+
+        with ThreadPoolExecutor(READERS) as pool:
+            answers = [answer for block in pool.map(known, range(len(blocks))) for answer in block]
+        return plan_document(self.asked, self.sources, answers, self.skip_broken)
+
+    def _recorded(self) -> set[int]:
+        """Numbers of the blocks that are recorded."""
+        names = self.storage.sizes(self.folder)
+        return {int(name[:-5]) for name in names if re.fullmatch(r"[0-9]{6,}\.json", name)}
+
+    def _prepare(self, blocks: Sequence[range], numbers: Sequence[int]) -> None:
+        """Load the sources of some blocks, and record each block once all of it is loaded."""
+        answers: dict[int, dict[int, Answer]] = {number: {} for number in numbers}
+        asked, total = self.asked, sum(len(blocks[number]) for number in numbers)
+        tasks = (
+            ((number, i), (self.sources[i], self.folder, asked.seed, asked.sample, asked.strict))
+            for number in numbers
+            for i in blocks[number]
+        )
+        with track("objects", total=total, unit="object", shown=self.progress and total > 0) as bar:
+            for (number, i), answer in self.team.run(compile_source, tasks, self.load_limit):
+                if isinstance(answer, WorkerLost):
+                    answer = RefusedSource(f"{self.sources[i].name}: {answer.why}")
+                if isinstance(answer, RefusedSource) and self.share is not None and not self.skip_broken:
+                    why = {"source": self.sources[i].name, "why": answer.why}
+                    raise unusable([why], len(self.sources), asked.strict)
+                answers[number][i] = answer
+                if len(answers[number]) == len(blocks[number]):
+                    self._record(number, blocks[number], [answers[number][i] for i in blocks[number]])
+                bar.update()
+
+    def _record(self, number: int, block: range, answers: list[Answer]) -> None:
+        content = {"recipe": self._recipe(block), "answers": [asdict(answer) for answer in answers]}
+        name, data = f"{self.folder}/{number:06d}.json", json.dumps(content).encode()
+        if self.share is None:
+            self.storage.write(name, data)
+            self._known[number] = answers
+        else:  # of several machines, the first one is right
+            self.storage.write_new(name, data)
+
+    def _recipe(self, block: range) -> str:
+        """Digest of all that the loading of some sources follows from."""
+        named = [(source.name, source.sha256) for source in (self.sources[i] for i in block)]
+        asked = self.asked
+        made_of = [asked.artsim_version, asked.seed, asked.strict, asdict(asked.sample), named]
+        return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+
+    def _read(self, number: int, block: range) -> list[Answer] | None:
+        """What became of the sources of a block; None where they were prepared with other options."""
+        try:
+            content = parse_json(self.storage.read(f"{self.folder}/{number:06d}.json", _MAX_RECORD))
+            answers = list(map(_answer, content["answers"]))
+            return answers if content["recipe"] == self._recipe(block) and len(answers) == len(block) else None
+        except (ValueError, KeyError, TypeError):
+            return None
+
+
+def _answer(entry: dict[str, Any]) -> Answer:
+    if "why" in entry:
+        return from_json_values(RefusedSource, entry)
+    entry.pop("staged", None)  # versions before December 2026 wrote it
+    return from_json_values(CompiledSource, entry)
