@@ -51,7 +51,7 @@ def test_an_extended_dataset_has_the_bytes_of_a_large_one(large: Path, tmp_path:
         make(out, 50)
 
 
-@pytest.mark.parametrize("where", ["restore", "examine", "_extend"])
+@pytest.mark.parametrize("where", ["Restoration", "examine", "_extend"])
 def test_an_extension_that_is_killed_goes_on(
     where: str, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
