@@ -123,9 +123,7 @@ class WorkerPool:
             busy = self._busy()
             if not busy and not again and not alone:
                 return
-            if (
-                not busy
-            ):  # all others are done; or the last of those that were lost is, and others may have waited for it
+            if not busy:  # all others are done; once what was lost is done again, tasks may come that waited for it
                 alone = bool(again)
                 continue
             ready = wait([m.connection for m in busy] + [m.process.sentinel for m in busy], timeout=0.2)
