@@ -41,7 +41,7 @@ def build(rng: np.random.Generator) -> Assembly:
     shape = str(rng.choice(SHAPES, p=[0.1, 0.08, 0.12, 0.16, 0.08, 0.07, 0.12, 0.1, 0.09, 0.08]))
     wide_mouth = shape == "jar" and closure in (_screw_cap, _flip_top, _stopper, _cup, _bail)
     body, mouth = _body(rng, shape, wide_mouth, 0.022 if closure in (_pump, _sprayer, _bail) else 0.012)
-    bottle = Assembly()
+    bottle = Assembly(density=DENSITY)
     closure(rng, bottle, body, mouth)
     return bottle
 
@@ -200,8 +200,8 @@ def _screw_cap(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: M
         lid += tube(path, 0.16 * radius, 8)
     if rng.random() < 0.3:  # a bead below the cap
         body += ring((0, 0, mouth.foot - 0.0005), UP, 0.6 * mouth.bore, 1.12 * radius, 0.001, 20)
-    bottle.add("body", body, density=DENSITY)
-    bottle.add("lid", lid, _closing(rng, mouth, high - low), density=DENSITY)
+    bottle.add("body", body)
+    bottle.add("lid", lid, _closing(rng, mouth, high - low))
 
 
 def _stopper(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -227,8 +227,8 @@ def _stopper(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mou
         lid += cylinder((0, 0, rim), (0, 0, rim + 0.25 * r), 1.15 * r)
         lid += cylinder((0, 0, rim), (0, 0, rim + 1.1 * r), 0.35 * r) + ellipsoid((0, 0, rim + 1.4 * r), 0.6 * r, 12)
     depth = mouth.rim - low
-    bottle.add("body", body, density=DENSITY)
-    bottle.add("lid", lid, prismatic("body", UP, 0.0, depth * rng.uniform(1.0, 3.0), (0, 0, rim)), density=DENSITY)
+    bottle.add("body", body)
+    bottle.add("lid", lid, prismatic("body", UP, 0.0, depth * rng.uniform(1.0, 3.0), (0, 0, rim)))
 
 
 def _flip_top(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -258,12 +258,12 @@ def _flip_top(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mo
     limit = np.deg2rad(rng.uniform(80, 135 if tall < 0.6 * (high - low) else 95))
     turning = rng.random() < 0.35
     if turning:
-        bottle.add("body", body, density=DENSITY)
-        bottle.add("collar", collar, _closing(rng, mouth, high - low), density=DENSITY)
+        bottle.add("body", body)
+        bottle.add("collar", collar, _closing(rng, mouth, high - low))
     else:
-        bottle.add("body", body + collar, density=DENSITY)
+        bottle.add("body", body + collar)
     joint = revolute("collar" if turning else "body", (0, 1, 0), (x, 0, z), 0.0, limit)
-    bottle.add("lid", lid, joint, density=DENSITY)
+    bottle.add("lid", lid, joint)
 
 
 def _pump(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -283,10 +283,10 @@ def _pump(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth)
     head += 0.25 * reach if reach > radius else 0.0
     down = head - high + 0.0035
     solid = pump_head(rng, head, stem, size, reach, down)
-    bottle.add("body", body, density=DENSITY)
-    bottle.add("collar", collar, _closing(rng, mouth, high - low), density=DENSITY)
+    bottle.add("body", body)
+    bottle.add("collar", collar, _closing(rng, mouth, high - low))
     pressed = prismatic("collar", -UP, 0.0, stroke, (0, 0, head))
-    bottle.add("pump", solid, pressed, density=DENSITY)
+    bottle.add("pump", solid, pressed)
 
 
 def _sprayer(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -312,9 +312,9 @@ def _sprayer(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mou
     # Pulled, its tip comes no nearer than the collar.
     room = (abs(x) - 1.05 * radius - 0.003) / length
     limit = min(rng.uniform(0.25, 0.6), max(0.8 * room, 0.08))
-    bottle.add("body", body, density=DENSITY)
-    bottle.add("head", head, _closing(rng, mouth, high - low), density=DENSITY)
-    bottle.add("trigger", trigger, revolute("head", (0, -1, 0), (x, 0, z), 0.0, limit), density=DENSITY)
+    bottle.add("body", body)
+    bottle.add("head", head, _closing(rng, mouth, high - low))
+    bottle.add("trigger", trigger, revolute("head", (0, -1, 0), (x, 0, z), 0.0, limit))
 
 
 def _cup(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -337,10 +337,10 @@ def _cup(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) 
                          (1.5 * radius, mouth.rim), (0.97 * radius, mouth.rim - 0.002)], 0.15 * radius,
                         0.06 * radius)  # fmt: skip
         cup += ear.turned(UP, side * rng.uniform(0.0, 0.5))
-    bottle.add("body", body, density=DENSITY)
-    bottle.add("stopper", stopper, screw("body", UP, (0, 0, rim), 0.0, turns, 0.95 * depth / turns), density=DENSITY)
+    bottle.add("body", body)
+    bottle.add("stopper", stopper, screw("body", UP, (0, 0, rim), 0.0, turns, 0.95 * depth / turns))
     lift = (top - mouth.foot) * rng.uniform(1.0, 1.8)
-    bottle.add("cup", cup, prismatic("body", UP, 0.0, lift, (0, 0, top)), density=DENSITY)
+    bottle.add("cup", cup, prismatic("body", UP, 0.0, lift, (0, 0, top)))
 
 
 def _bail(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -360,9 +360,9 @@ def _bail(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth)
     for s in (-1.0, 1.0):
         y = s * (half + 0.0006 + 0.8 * r)
         body += tube([(0.9 * mouth.radius, y, low), (x, y, low), (x, y, z)], 0.7 * r, 8)
-    bottle.add("body", body, density=DENSITY)
+    bottle.add("body", body)
     limit = np.deg2rad(rng.uniform(80, 110))
-    bottle.add("lid", lid, revolute("body", (0, 1, 0), (x, 0, z), 0.0, limit), density=DENSITY)
+    bottle.add("lid", lid, revolute("body", (0, 1, 0), (x, 0, z), 0.0, limit))
     wire = 0.5 * r
     drop = low - mouth.foot - 2.5 * wire
     if rng.random() < 0.7 and drop > 0.004:  # the wire that locks it, before the neck
@@ -371,5 +371,4 @@ def _bail(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth)
         bow = tube([(out, -wide, low), (out, -0.8 * wide, low - drop), (out, 0.8 * wide, low - drop),
                     (out, wide, low)], wire, 8)  # fmt: skip
         bow += tube([(out, -wide, low), (out, wide, low)], wire, 8)
-        bottle.add("latch", bow, revolute("body", (0, 1, 0), (out, 0, low), 0.0, np.deg2rad(rng.uniform(60, 120))),
-                   density=DENSITY)  # fmt: skip
+        bottle.add("latch", bow, revolute("body", (0, 1, 0), (out, 0, low), 0.0, np.deg2rad(rng.uniform(60, 120))))

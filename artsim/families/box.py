@@ -44,10 +44,10 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     grips = _side_handles(rng, x, y, height) if height > 0.12 and rng.random() < 0.25 else Solid()
     body += grips
 
-    chest = Assembly()
+    chest = Assembly(density=700.0)
     halves = rng.random() < 0.12 and radius == 0.0
     if halves:  # two lids, hinged at the left and the right
-        chest.add("body", body, density=700.0)
+        chest.add("body", body)
         chest.record(handles=True)
         limit = np.deg2rad(rng.uniform(80.0, 175.0))
         thick = wall * rng.uniform(0.6, 1.2)
@@ -58,7 +58,6 @@ def _rigid(rng: np.random.Generator) -> Assembly:
                 f"lid_{number}",
                 lid,
                 revolute("body", axis, (0, sign * (y + band + 0.001), seam), 0.0, limit),
-                density=700.0,
             )
         return chest
     lid, top, domed = _lid(rng, x, y, seam, height, wall, radius, band == 0.0)
@@ -72,13 +71,13 @@ def _rigid(rng: np.random.Generator) -> Assembly:
         # A board below that stands out at the back, under the open lid, so that the box does not tip.
         behind = depth * rng.uniform(0.015, 0.065)
         body += box((x - wall, -0.95 * (y - radius), 0.0), (axis_x + behind, 0.95 * (y - radius), 0.6 * wall))
-    chest.add("body", body, density=700.0)
+    chest.add("body", body)
     spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
     for first, last in spans:
         lid += cylinder((axis_x, first * y, seam), (axis_x, last * y, seam), barrel, sections=12)
         lid += box((x - wall, first * y, seam + 0.0003), (axis_x, last * y, seam + 0.9 * barrel))
     limit = np.deg2rad(rng.choice([rng.uniform(75.0, 115.0), rng.uniform(115.0, 170.0)]))
-    chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit), density=700.0)
+    chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit))
     if top - seam > 0.02 and rng.random() < 0.2:
         _latches(rng, chest, max(x + band, -float(lid.bounds()[0, 0])), y, seam, top)
     return chest

@@ -61,8 +61,7 @@ def build(rng: np.random.Generator) -> Assembly:
         body, bail = (solid.turned((0, 0, 1), turn) for solid in (body, bail))
         origin = (ahead * cos(turn), ahead * sin(turn), pivot)
         joint = revolute("body", (-sin(turn), cos(turn), 0), origin, -low, high)
-    bucket = Assembly()
-    bucket.add("body", body, density=1500.0)
+    bucket = Assembly("body", body, 1500.0)
     bucket.add("handle", bail, joint, density=3000.0)
     return bucket
 

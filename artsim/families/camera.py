@@ -44,17 +44,16 @@ def build(rng: np.random.Generator) -> Assembly:
     if kind == "swivel":
         return _swivel(rng)
     shell = _shell(rng, kind)
-    camera = Assembly()
     body, top = _body(rng, shell, kind)
     styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
     style = str(rng.choice(styles.get(kind, ["tubes", "prime", "zoom", "zoom"])))
     lens = Lens(rng, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
     seats, controls = _top_controls(rng, shell, top, kind)
-    camera.add("body", body + lens.fixed + seats, density=DENSITY)
+    camera = Assembly("body", body + lens.fixed + seats, DENSITY)
     lens.add_to(camera)
     for name, solid, joint in controls:
         label = "button" if name.endswith("button") else name.partition("_")[0]
-        camera.add(name, solid, joint, label=label, density=DENSITY)
+        camera.add(name, solid, joint, label=label)
     _back(rng, camera, shell)
     if kind != "compact" and top[1] - top[0] > 0.01 and rng.random() < 0.5:
         _flash(rng, camera, shell, top)
@@ -201,17 +200,16 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
     x = depth + GAP
     screen = rounded_box((x, y0, z0), (x + thick, y1, z1), 0.003, axis=0)
     if kind == "swing":
-        joint = revolute("body", -UP, (x + thick, y0, z0), 0.0, rng.uniform(1.2, 3.0))
-        camera.add("screen", screen, joint, density=DENSITY)
+        camera.add("screen", screen, revolute("body", -UP, (x + thick, y0, z0), 0.0, rng.uniform(1.2, 3.0)))
     elif kind == "tilt":
         upward = rng.random() < 0.5  # about its upper edge
         joint = revolute("body", (0, -1 if upward else 1, 0), (x + thick, 0, z1 if upward else z0), 0.0,
                          rng.uniform(0.5, 1.5))  # fmt: skip
-        camera.add("screen", screen, joint, density=DENSITY)
+        camera.add("screen", screen, joint)
     elif kind == "back":  # the whole back of a film camera opens
         leaf = rounded_box((x, -0.97 * half, 0.06 * height), (x + thick, 0.97 * half, 0.92 * height), 0.002, axis=0)
         camera.add("back", leaf, revolute("body", -UP, (x + thick, -0.97 * half, 0), 0.0, rng.uniform(1.2, 2.2)),
-                   label="door", density=DENSITY)  # fmt: skip
+                   label="door")  # fmt: skip
     if kind in ("fixed", "swing", "tilt", "none"):
         room = half - y1
         size = min(0.2 * room, 0.08 * height, 0.006)
@@ -220,21 +218,20 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
         if style == "pad" and size > 0.001:
             z = 0.4 * height
             wheel = ring((x + 0.3 * size, y, z), (1, 0, 0), 1.1 * size, 1.9 * size, 0.6 * size, 16)
-            camera.add("wheel", wheel, continuous("body", (1, 0, 0), (x, y, z)), label="dial", density=DENSITY)
+            camera.add("wheel", wheel, continuous("body", (1, 0, 0), (x, y, z)), label="dial")
             button = cylinder((x + 0.0012, y, z), (x + 0.0012 + 0.6 * size, y, z), 0.8 * size, sections=14)
-            camera.add("button", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)), density=DENSITY)
+            camera.add("button", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
         elif style == "row" and size > 0.001:
             for number in range(int(rng.integers(1, 4))):
                 z = height * (0.2 + 0.2 * number)
                 button = cylinder((x + 0.0012, y, z), (x + 0.0012 + 0.5 * size, y, z), size, sections=14)
-                camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)), density=DENSITY)
+                camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
     if rng.random() < 0.2:  # a door at the right side
         y, t = half + 0.001, 0.0025
         door = rounded_box(
             (0.2 * shell.depth, y, 0.2 * height), (0.8 * shell.depth, y + t, 0.75 * height), 0.002, axis=1
         )
-        joint = revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2))
-        camera.add("door", door, joint, density=DENSITY)
+        camera.add("door", door, revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2)))
 
 
 def _flash(rng: np.random.Generator, camera: Assembly, shell: Shell, span: tuple[float, float, float]) -> None:
@@ -248,7 +245,7 @@ def _flash(rng: np.random.Generator, camera: Assembly, shell: Shell, span: tuple
         joint = revolute("body", (0, 1, 0), (x1, 0, low), 0.0, rng.uniform(0.5, 1.3))
     else:
         joint = prismatic("body", UP, 0.0, tall * rng.uniform(0.5, 1.2), (x1, 0, low))
-    camera.add("flash", flash, joint, density=DENSITY)
+    camera.add("flash", flash, joint)
 
 
 # --- other kinds -----------------------------------------------------------------------------------------------------
@@ -262,7 +259,6 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
     body = rounded_box((0, -half, 0), (depth, half, height), rng.uniform(0.1, 0.6) * half,
                        axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
     lens = Lens(rng, (0.0, 0.0, shell.lens_z), shell.lens_radius, str(rng.choice(["tubes", "prime", "zoom"])))
-    camera = Assembly()
     if rng.random() < 0.5:  # a handle on top
         x0, x1, z = 0.1 * depth, 0.85 * depth, height + rng.uniform(0.02, 0.04)
         r = rng.uniform(0.004, 0.008)
@@ -286,28 +282,27 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
     if back:
         body += rounded_box((depth - 0.004, -0.7 * half, 0.05 * height), (depth + rng.uniform(0.008, 0.03), 0.7 * half,
                                                                          0.62 * height), 0.004)  # fmt: skip
-    camera.add("body", body + lens.fixed, density=DENSITY)
+    camera = Assembly("body", body + lens.fixed, DENSITY)
     lens.add_to(camera)
     if rng.random() < 0.85:
         thick = rng.uniform(0.004, 0.009)
         y = -half - GAP
         x0, x1 = depth * rng.uniform(0.06, 0.2), depth * rng.uniform(0.65, 0.95)
         screen = rounded_box((x0, y - thick, 0.15 * height), (x1, y, 0.88 * height), 0.003, axis=1)
-        joint = revolute("body", -UP, (x0, y - thick, 0), 0.0, rng.uniform(1.2, 2.0))
-        camera.add("screen", screen, joint, density=DENSITY)
+        camera.add("screen", screen, revolute("body", -UP, (x0, y - thick, 0), 0.0, rng.uniform(1.2, 2.0)))
     if rng.random() < 0.5:
         z = 0.85 * height
         r = 0.22 * height * rng.uniform(0.6, 1.0)
         eye = cylinder((depth + 0.001 + r, 0, z), (depth + rng.uniform(0.03, 0.06), 0, z), 0.8 * r, r, 16)
         eye += cylinder((depth + 0.001 + r, -0.6 * half, z), (depth + 0.001 + r, 0.6 * half, z), r, sections=14)
         tilt = revolute("body", (0, -1, 0), (depth + 0.001 + r, 0, z), 0.0, rng.uniform(0.4, 1.2))
-        camera.add("viewfinder", eye, tilt, density=DENSITY)
+        camera.add("viewfinder", eye, tilt)
     for number, x in enumerate((0.3, 0.9)[: int(rng.integers(0, 3))]):
         size = 0.25 * half
         at = (x * depth, 0.55 * half, height + GAP)
         button = rounded_box((at[0] - size, at[1] - 0.6 * size, at[2] + 0.0012), (at[0] + size, at[1] + 0.6 * size,
                                                                                 at[2] + 0.004), 0.001)  # fmt: skip
-        camera.add(f"button_{number}", button, prismatic("body", -UP, 0.0, 0.001, at), density=DENSITY)
+        camera.add(f"button_{number}", button, prismatic("body", -UP, 0.0, 0.001, at))
     return camera
 
 
@@ -345,13 +340,12 @@ def _swivel(rng: np.random.Generator) -> Assembly:
         tall = r * (rng.uniform(0.2, 0.5) if kind == "disc" else rng.uniform(1.0, 3.0))
         base = cylinder((0, 0, foot - tall), (0, 0, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
         base += cylinder((0, 0, foot - tall - 0.2 * r), (0, 0, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
-    camera = Assembly()
-    camera.add("body", base, density=DENSITY)
+    camera = Assembly("body", base, DENSITY)
     pan = continuous("body", UP, (0, 0, foot))
     if rng.random() < 0.5:
         limit = rng.uniform(0.8, 3.0)
         pan = revolute("body", UP, (0, 0, foot), -limit, limit)
-    camera.add("fork", fork, pan, density=DENSITY)
+    camera.add("fork", fork, pan)
     limit = rng.uniform(0.3, 1.2)
-    camera.add("head", head, revolute("fork", (0, 1, 0), (0, 0, 0), -limit, limit), density=DENSITY)
+    camera.add("head", head, revolute("fork", (0, 1, 0), (0, 0, 0), -limit, limit))
     return camera

@@ -45,8 +45,7 @@ def _platform_trolley(rng: np.random.Generator) -> Assembly:
     spread = half - 1.6 * wheels.radius - 0.5 * wheels.wide
     swivels = int(rng.choice([2, 4], p=[0.7, 0.3]))
     spots = [(x_back, -spread), (x_back, spread), (x_front, -spread), (x_front, spread)]
-    for x, y in spots[swivels:]:
-        body += wheels.bracket(x, y, floor + 0.004)
+    body += union(wheels.bracket(x, y, floor + 0.004) for x, y in spots[swivels:])
     r = rng.uniform(0.01, 0.016)
     rise = rng.uniform(0.7, 0.95)
     wide = half - 2.5 * r
@@ -105,30 +104,26 @@ def _hand_truck(rng: np.random.Generator) -> Assembly:
         y = s * (inner - r)
         body += tube([(x, y, 0.35 * height), (axle_x, y, wheels.radius + 0.02), (axle_x, y, wheels.radius)], 0.8 * r, 8)
         body += tube([(axle_x, y, wheels.radius), (x, y, 0.06)], 0.8 * r, 8)
-    for z in (0.06, 0.35 * height):
-        body += bar((x, -half, z), (x, half, z), 0.8 * r)
+    body += union(bar((x, -half, z), (x, half, z), 0.8 * r) for z in (0.06, 0.35 * height))
     body += cylinder((axle_x, -inner, wheels.radius), (axle_x, inner, wheels.radius), 0.7 * r, sections=10)
     folding = rng.random() < 0.45
     toe_x, toe = x - r - 0.006, rng.uniform(0.12, 0.3)
     wide = half * rng.uniform(0.9, 1.3)
-    cart = Assembly()
     plate = rounded_box((toe_x - toe, -wide, 0.0), (toe_x if folding else x + r, wide, 0.006), 0.02, axis=2)
     top = _truck_handle(rng, shape, x, half, height, r, slides)
     if not folding:
         body += plate + box((x - r, -wide, 0.0), (x + r, wide, 0.03))
     if not slides:
         body += top
-    cart.add("body", body, density=STEEL)
+    cart = Assembly("body", body, STEEL)
     if folding:
         plate += cylinder((toe_x, -0.7 * half, 0.006), (toe_x, 0.7 * half, 0.006), 0.0058, sections=12)
         turn = revolute("body", (0, 1, 0), (toe_x, 0, 0.006), 0.0, rng.uniform(1.2, 0.5 * np.pi))
-        cart.add("toe_plate", plate, turn, label="plate", density=STEEL)
+        cart.add("toe_plate", plate, turn, label="plate")
     for s in (-1.0, 1.0):
         wheels.add(cart, (axle_x, s * (inner + 0.5 * wheels.wide + r), wheels.radius))
     if slides:
-        cart.add(
-            "handle", top, prismatic("body", UP, 0.0, rng.uniform(0.15, 0.4) * height, (x, 0, height)), density=STEEL
-        )
+        cart.add("handle", top, prismatic("body", UP, 0.0, rng.uniform(0.15, 0.4) * height, (x, 0, height)))
     return cart
 
 
@@ -163,7 +158,6 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
     posts = rng.uniform(0.008, 0.016)
     body = Solid()
     closed = rng.random() < 0.5
-    cart = Assembly()
     moving: list[tuple[str, Solid, JointSpec]] = []
     if closed:
         wall = rng.uniform(0.006, 0.015)
@@ -214,9 +208,9 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
         r = max(0.8 * posts, 0.007)
         y = 0.9 * half if closed else half - posts
         body += tube([(depth - 0.01, -y, z - 0.03), (out, -y, z), (out, y, z), (depth - 0.01, y, z - 0.03)], r, 10)
-    cart.add("body", body, density=500.0)
+    cart = Assembly("body", body, 500.0)
     for name, solid, joint in moving:
-        cart.add(name, solid, joint, density=500.0)
+        cart.add(name, solid, joint)
     reach = 1.7 * wheels.radius
     for sx, sy in ((1, -1), (1, 1), (-1, -1), (-1, 1)):
         wheels.add_caster(cart, sx * (depth - reach), sy * (half - reach), base)
@@ -304,11 +298,10 @@ def _wheelbarrow(rng: np.random.Generator) -> Assembly:
             r,
             8,
         )
-    cart = Assembly()
     spots = [0.0]
     if twin:
         spots = [s * 0.5 * (wheels.wide + GAP) for s in (-1.0, 1.0)]
-    cart.add("body", body, density=STEEL)
+    cart = Assembly("body", body, STEEL)
     for y in spots:
         wheels.add(cart, (axle_x, y, wheels.radius))
     return cart

@@ -28,8 +28,8 @@ def carton(rng: np.random.Generator) -> Assembly:
         depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.14, 0.18, 0.06)).tolist()
     wall = rng.uniform(0.003, 0.005)
     x, y = depth / 2, width / 2
-    result = Assembly()
-    result.add("body", _carton_body(rng, x, y, height, wall), density=150.0)
+    result = Assembly(density=150.0)
+    result.add("body", _carton_body(rng, x, y, height, wall))
     kind = str(rng.choice(["one", "two", "mitred", "long", "short", "wheel", "inner"],
                           p=[0.12, 0.25, 0.14, 0.16, 0.11, 0.1, 0.12]))  # fmt: skip
     flaps = _flaps(rng, kind, x, y, wall, height)
@@ -37,12 +37,12 @@ def carton(rng: np.random.Generator) -> Assembly:
     for number, (side, inward, outline) in enumerate(flaps):
         z = height + GAP + (0.0007 if side in ("left", "right") else 0.0)
         if inward:
-            result.add(f"flap_{number}", *_inner_flap(side, outline, x, y, height, wall), density=150.0)
+            result.add(f"flap_{number}", *_inner_flap(side, outline, x, y, height, wall))
             continue
         own_limit = limit if rng.random() < 0.7 else np.deg2rad(_limit(rng, 95.0))
         lip = rng.uniform(0.03, 0.08) if kind == "one" and rng.random() < 0.5 else 0.0
         solid, joint = _outer_flap(side, outline, x, y, z, wall, own_limit, min(lip, 0.6 * height))
-        result.add(f"flap_{number}", solid, joint, density=150.0)
+        result.add(f"flap_{number}", solid, joint)
     return result
 
 

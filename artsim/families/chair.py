@@ -35,12 +35,11 @@ def build(rng: np.random.Generator) -> Assembly:
     travel = 0.6 * (sleeve - hub)
     seat_low = sleeve + rng.uniform(0.05, 0.1)
 
-    chair = Assembly()
-    chair.record(legs=True)
     base = _star(rng, legs, span, floor, hub, column, piston, sleeve, castors)
     if not lifted:
         base += cylinder((0, 0, hub - 0.01), (0, 0, seat_low - 0.002), column, sections=18)
-    chair.add("base", base, density=1500.0)
+    chair = Assembly("base", base, 1500.0)
+    chair.record(legs=True)
     if castors:
         _castors(rng, chair, legs, span, floor, wheel)
     rod = cylinder((0, 0, sleeve - travel - 0.03), (0, 0, seat_low - 0.002), piston, sections=18)
@@ -94,8 +93,7 @@ def _sliding_arms(rng: np.random.Generator, chair: Assembly, depth: float, width
     for number, side in enumerate((-1, 1)):
         arm = rounded_box((-fore, side * y - half, z), (aft, side * y + half, z + 0.03), 0.012)
         arm += box((-0.016, side * y - 0.006, z - travel - 0.03), (0.016, side * y + 0.006, z + 0.01))
-        joint = prismatic("seat", UP, 0.0, travel, (0.0, side * y, z))
-        chair.add(f"arm_{number}", arm, joint, density=500.0)
+        chair.add(f"arm_{number}", arm, prismatic("seat", UP, 0.0, travel, (0.0, side * y, z)), density=500.0)
 
 
 def _controls(rng: np.random.Generator, chair: Assembly, width: float, low: float) -> None:
@@ -106,8 +104,7 @@ def _controls(rng: np.random.Generator, chair: Assembly, width: float, low: floa
         start, tip = np.array([-0.06, side * (0.09 + GAP), z]), np.array([-0.06, side * (0.09 + reach), z - 0.01])
         lever = cylinder(start, tip, 0.006, sections=12)
         lever += cylinder(start + 0.6 * (tip - start), tip, 0.011, 0.009, 12)
-        joint = revolute("seat", (-side, 0, 0), start, 0.0, rng.uniform(0.1, 0.3))
-        chair.add("lever", lever, joint, density=1200.0)
+        chair.add("lever", lever, revolute("seat", (-side, 0, 0), start, 0.0, rng.uniform(0.1, 0.3)), density=1200.0)
     if rng.random() < 0.3:
         foot = np.array([0.055, -side * (0.09 + GAP), low - 0.01])
         knob = cylinder(foot, foot - (0, side * 0.03, 0), 0.006, sections=10)

@@ -167,8 +167,7 @@ def _longcase_clock(rng: np.random.Generator) -> Assembly:
         body += rounded_box((-0.035, -1.1 * foot, bottom - plinth), (deep, 1.1 * foot, bottom - 0.75 * plinth), 0.006)
     top = low - 0.05
     body += box((0.5 * deep, -0.006, top + 0.002), (deep - 0.005, 0.006, top + 0.004))
-    clock = Assembly()
-    clock.add("body", body, density=DENSITY)
+    clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
     room = trunk - 0.025
     solid, swing = pendulum(rng, 0.6 * deep, top, (top - bottom) * rng.uniform(0.65, 0.9) - 0.02, room)
@@ -261,7 +260,6 @@ def _watch(rng: np.random.Generator) -> Assembly:
     body += ring((0.0015 - 0.5 * rise, 0, 0), FRONT, 1.005 * radius, half, rise, 28)
     neck = half + 0.12 * radius
     body += cylinder((0.3 * deep, 0, 0.95 * half), (0.3 * deep, 0, neck), 0.1 * radius, sections=12)
-    clock = Assembly()
     x = 0.3 * deep
     crown = cylinder((x, 0, neck + 0.0004), (x, 0, neck + 0.22 * radius), 0.14 * radius, sections=14)
     bow = tube([(x, 0.34 * radius * cos(a), neck + 0.05 * radius + 0.42 * radius * sin(a))
@@ -269,14 +267,13 @@ def _watch(rng: np.random.Generator) -> Assembly:
     fixed = rng.random() < 0.5
     ears = union(cylinder((x, s * 0.08 * radius, neck - 0.08 * radius), (x, s * 0.3 * radius, neck - 0.18 * radius),
                           0.05 * radius, sections=8) for s in (-1.0, 1.0))  # fmt: skip
-    clock.add("body", body + bow + ears if fixed else body, density=3000.0)
-    joint = continuous("body", (0, 0, 1), (x, 0, neck))
-    clock.add("crown", crown, joint, label="knob", density=3000.0)
+    clock = Assembly("body", body + bow + ears if fixed else body, 3000.0)
+    clock.add("crown", crown, continuous("body", (0, 0, 1), (x, 0, neck)), label="knob")
     front = add_hands(rng, clock, 0.0, center, 0.9 * radius, "body")
     if rng.random() < 0.55:
         edge = min(front, 0.0015 - rise) - 0.0004
         lid = cylinder((edge, 0, 0), (edge - 0.12 * radius, 0, 0), half, 0.85 * half, 30)
         left = rng.random() < 0.5
         y = half * (1.0 if left else -1.0)
-        clock.add("lid", lid, side_hinge(edge - 0.06 * radius, 1.02 * y, rng.uniform(1.2, 2.2), left), density=3000.0)
+        clock.add("lid", lid, side_hinge(edge - 0.06 * radius, 1.02 * y, rng.uniform(1.2, 2.2), left))
     return clock

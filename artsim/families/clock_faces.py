@@ -70,8 +70,7 @@ def add_hands(rng: np.random.Generator, clock: Assembly, x: float, center: Array
         solid = cylinder((low, 0, 0), (high, 0, 0), hub * (1.0 - 0.2 * number), sections=14)
         solid += _hand("bar" if thin else kind, low, high, w, long, tail)
         turned = solid.turned(CLOCKWISE, rng.uniform(0.0, 2.0 * np.pi)).moved(center)
-        joint = continuous(parent, CLOCKWISE, center + (low, 0, 0))
-        clock.add(name, turned, joint, label="hand", density=2000.0)
+        clock.add(name, turned, continuous(parent, CLOCKWISE, center + (low, 0, 0)), label="hand", density=2000.0)
         x = low
     return x
 

@@ -83,8 +83,7 @@ def _espresso(rng: np.random.Generator) -> Assembly:
     wand_side = float(rng.choice([-1.0, 1.0])) if rng.random() < 0.7 and y > 0.11 else 0.0
     group = np.array([-x + 0.5 * front, -0.25 * wand_side * y, head_low])
     body += cylinder(group + (0, 0, 0.002), group - (0, 0, 0.014), 0.036, sections=24)
-    machine = Assembly()
-    machine.add("body", body, density=900.0)
+    machine = Assembly("body", body, 900.0)
     _drip_tray(rng, machine, -x - 0.001, front - 0.003, tray_y, 0.01, base)
 
     # The portafilter turns away from the wand.
@@ -169,10 +168,9 @@ def _drip(rng: np.random.Generator) -> Assembly:
     body += cylinder((center, 0, base - 0.002), (center, 0, base + 0.003), 0.8 * pot)
     if rng.random() < 0.5:  # gauge of the water tank
         body += box((x - 0.01, -y - 0.002, base + 0.03), (x + 0.004, -y + 0.002, head_low - 0.02))
-    machine = Assembly()
     plain = rng.random() < 0.35  # nothing but the lid moves
     carafe = _carafe(rng, center, pot, base + 0.003 + GAP, head_low - GAP)
-    machine.add("body", body + carafe.moved((0, 0, -GAP - 0.0005)) if plain else body, density=700.0)
+    machine = Assembly("body", body + carafe.moved((0, 0, -GAP - 0.0005)) if plain else body, 700.0)
     if not plain:
         draw = prismatic("body", OUT, 0.0, rng.uniform(1.0, 2.4) * pot, (center, 0, base))
         machine.add("carafe", carafe, draw, density=1500.0)
@@ -185,7 +183,7 @@ def _drip(rng: np.random.Generator) -> Assembly:
         joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.02, 0.2), (0.5 * (reach + hinge), 0, seam))
     else:
         joint = revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, np.deg2rad(rng.uniform(50.0, 115.0)))
-    machine.add("lid", lid, joint, density=700.0)
+    machine.add("lid", lid, joint)
     if plain:
         return machine
     z = 0.5 * (height + head_low)
@@ -222,8 +220,7 @@ def _percolator(rng: np.random.Generator) -> Assembly:
         (radius - 0.002, 0, top - 0.02),
     ]
     body += tube(np.array(grip), r, 10).turned((0, 0, 1), turn)
-    machine = Assembly()
-    machine.add("body", body, density=900.0)
+    machine = Assembly("body", body, 900.0)
     seam, rise = top + GAP, rng.uniform(0.006, 0.03)
     lid = cylinder((0, 0, seam), (0, 0, seam + rise), radius + 0.003, rng.uniform(0.5, 1.0) * radius)
     knob_top = seam + rise + rng.uniform(0.008, 0.03)
@@ -234,7 +231,7 @@ def _percolator(rng: np.random.Generator) -> Assembly:
     else:
         hinge = (radius + 0.004, 0.0, seam)
         joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
-    machine.add("lid", lid, joint, density=900.0)
+    machine.add("lid", lid, joint)
     return machine
 
 
@@ -280,8 +277,7 @@ def _pod(rng: np.random.Generator) -> Assembly:
     body += cylinder(
         (-x + 0.5 * front, 0, height - head - 0.018), (-x + 0.5 * front, 0, height - head + 0.002), 0.012, 0.02, 16
     )
-    machine = Assembly()
-    machine.add("body", body, density=700.0)
+    machine = Assembly("body", body, 700.0)
     _drip_tray(rng, machine, -x - 0.001, front - 0.003, y - 0.01, 0.01, base)
     # The lever lies on the head and turns up about an axis above its back.
     pivot = (tank_x - 0.04, 0.0, height + 0.012)
@@ -339,8 +335,7 @@ def _urn(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.6:  # a handle at the back
         body += tube([(0.9 * x, 0, 0.8 * height), (x + 0.35 * x, 0, 0.75 * height), (x + 0.35 * x, 0, 0.4 * height),
                       (0.7 * x, 0, 0.35 * height)], 0.007, 10)  # fmt: skip
-    machine = Assembly()
-    machine.add("body", body, density=700.0)
+    machine = Assembly("body", body, 700.0)
 
     share, seam = rng.uniform(0.6, 1.0), height + GAP
     rise = x * rng.uniform(0.08, 0.45)
@@ -362,7 +357,7 @@ def _urn(rng: np.random.Generator) -> Assembly:
         lid += box((side_x - 0.3 * x, -half, seam), (hinge[0], half, seam + 0.004))
         lid += cylinder((hinge[0], -half, hinge[2]), (hinge[0], half, hinge[2]), 0.002, sections=10)
         joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
-    machine.add("lid", lid, joint, density=700.0)
+    machine.add("lid", lid, joint)
     if niche and rng.random() < 0.6:
         _controls(rng, machine, -x, 0.5 * (y - radius) if radius < 0.7 * y else 0.001, height - head, height)
     return machine

@@ -35,9 +35,8 @@ def build(rng: np.random.Generator) -> Assembly:
     sheet = 0.0014
     roof = channel + sheet + GAP
     inner = blade_half + GAP
-    cutter = Assembly()
     body = _body(rng, front, end, half, height, inner, slot + GAP, channel - GAP, roof, nose, wall, capped)
-    cutter.add("body", body, density=1100.0)
+    cutter = Assembly("body", body, 1100.0)
 
     blade_end = end - max(wall + 0.002, 0.005) - length * rng.uniform(0.0, 0.1)
     blade = _blade(rng, front + rng.uniform(0.0005, 0.003), blade_end, blade_half, channel, sheet)
@@ -61,7 +60,7 @@ def build(rng: np.random.Generator) -> Assembly:
             cylinder((at + x, y, top + 0.001), (at + x, y, top + 0.0034), 0.14 * radius, sections=6)
             for x, y in ((radius * cos(a), radius * sin(a)) for a in np.arange(12) * np.pi / 6)
         )
-        cutter.add("wheel", wheel, continuous("blade", (0, 0, 1), (at, 0, top)), density=1100.0)
+        cutter.add("wheel", wheel, continuous("blade", (0, 0, 1), (at, 0, top)))
     return cutter
 
 

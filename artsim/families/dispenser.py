@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, UP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -44,14 +44,11 @@ def _pump_bottle(rng: np.random.Generator) -> Assembly:
     one += neck(radius, 0.75 * radius, height - 0.0005, rim)
     spacing = 2.0 * half * rng.uniform(1.04, 1.2) + 0.002
     places = [(k - 0.5 * (count - 1)) * spacing for k in range(count)]
-    body = Solid()
-    for y in places:
-        body += one.moved((0, y, 0))
+    body = union(one.moved((0, y, 0)) for y in places)
     if count > 1 or rng.random() < 0.12:
         wide = half + places[-1] + 0.006
         body += rounded_box((-depth - 0.006, -wide, -0.006), (depth + 0.006, wide, 0.004), 0.006, axis=2)
         body += rounded_box((0.55 * depth, -wide, 0), (depth + 0.006, wide, height * rng.uniform(0.3, 0.8)), 0.004)
-    dispenser = Assembly()
     wall = max(0.14 * radius, 0.0016)
     outer = 1.02 * radius + GAP + wall
     low, high = height + GAP, rim + GAP + wall
@@ -71,7 +68,7 @@ def _pump_bottle(rng: np.random.Generator) -> Assembly:
     if turning == "fixed":
         for y in places:
             body += collar.moved((0, y, 0)) + cylinder((0, y, low - GAP), (0, y, low + wall), 0.99 * outer)
-    dispenser.add("body", body, density=DENSITY)
+    dispenser = Assembly("body", body, DENSITY)
     for number, y in enumerate(places):
         parent, tail = "body", f"_{number}" if count > 1 else ""
         at = np.array([0.0, y, rim])
@@ -84,9 +81,8 @@ def _pump_bottle(rng: np.random.Generator) -> Assembly:
                 # Neighbours' nozzles may not meet: they turn a little only.
                 limit = min(0.8, 0.3 * spacing / reach)
                 turn = revolute("body", UP, at, -limit, limit)
-            dispenser.add(parent, collar.moved((0, y, 0)), turn, density=DENSITY)
-        press = prismatic(parent, -UP, 0.0, stroke, (0, y, head))
-        dispenser.add(f"pump{tail}", pump.moved((0, y, 0)), press, density=DENSITY)
+            dispenser.add(parent, collar.moved((0, y, 0)), turn)
+        dispenser.add(f"pump{tail}", pump.moved((0, y, 0)), prismatic(parent, -UP, 0.0, stroke, (0, y, head)))
     return dispenser
 
 
@@ -121,7 +117,6 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
     body += box((front * 0.5, -0.6 * half, low - 0.006), (depth - thick - 0.01, 0.6 * half, low + 0.03))
     nozzle = front * 0.4
     body += cylinder((nozzle, 0, 0.3 * low), (nozzle, 0, 0.12 * low), 0.008, 0.006, 14)
-    dispenser = Assembly()
     face = front - CLEAR
     cover = rounded_tray((face - thick, -half, low + 0.002 + CLEAR), (face, half, height), 0.003, radius,
                          ((0.0, rng.uniform(0.0, 0.25) * half), (0.35, 0.0), (1.0, 0.0)), axis=0, side=1)  # fmt: skip
@@ -133,15 +128,13 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
             axis=0,
         )
         cover += body_window
-    dispenser.add("body", body, density=DENSITY)
+    dispenser = Assembly("body", body, DENSITY)
     style = str(rng.choice(["bar", "lever", "button", "twin", "sensor"]))
     if style == "sensor":  # nothing to press, and the cover swings down
         down_at = (face - 0.005, 0.0, low + 0.001)  # before the foot of the box
-        down = revolute("body", (0, -1, 0), down_at, 0.0, rng.uniform(0.6, 1.5))
-        dispenser.add("lid", cover, down, density=DENSITY)
+        dispenser.add("lid", cover, revolute("body", (0, -1, 0), down_at, 0.0, rng.uniform(0.6, 1.5)))
         return dispenser
-    up = revolute("body", (0, 1, 0), (face, 0, height), 0.0, rng.uniform(0.6, 1.6))
-    dispenser.add("lid", cover, up, density=DENSITY)
+    dispenser.add("lid", cover, revolute("body", (0, 1, 0), (face, 0, height), 0.0, rng.uniform(0.6, 1.6)))
     room = face - thick
     if style == "lever":  # an elbow lever below, to press back
         pivot = (front - 0.004 - CLEAR - 0.004, 0.0, 0.65 * low)
@@ -155,8 +148,7 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
               for (x, _, z), w in ((path[1], 0.006), (path[2], wide)))
         )  # fmt: skip
         solid += cylinder((pivot[0], -0.4 * wide, pivot[2]), (pivot[0], 0.4 * wide, pivot[2]), r, sections=12)
-        turn = revolute("body", (0, -1, 0), pivot, 0.0, rng.uniform(0.1, 0.3))
-        dispenser.add("lever", solid, turn, density=DENSITY)
+        dispenser.add("lever", solid, revolute("body", (0, -1, 0), pivot, 0.0, rng.uniform(0.1, 0.3)))
         return dispenser
     wide = half * rng.uniform(0.5, 0.78)
     back = front - 0.004 - 0.012
@@ -166,7 +158,7 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
     bottom = 0.35 * low
     if style == "bar":
         solid = rounded_box((tip, -wide, bottom), (back, wide, top), 0.005)
-        dispenser.add("bar", solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, 0, bottom)), density=DENSITY)
+        dispenser.add("bar", solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, 0, bottom)))
         return dispenser
     spots = [0.0] if style == "button" else [-0.4 * half, 0.4 * half]
     r = min(0.45 * (top - bottom), 0.3 * half)
@@ -175,7 +167,7 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
         solid = cylinder((back, y, z), (back - 0.012, y, z), r) + cylinder((back - 0.011, y, z), (back - 0.016, y, z),
                                                                            0.95 * r, 0.6 * r)  # fmt: skip
         name = f"button_{number}" if len(spots) > 1 else "button"
-        dispenser.add(name, solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, y, z)), density=DENSITY)
+        dispenser.add(name, solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, y, z)))
     return dispenser
 
 
@@ -212,7 +204,6 @@ def _drink_jar(rng: np.random.Generator) -> Assembly:
         body += cylinder((-0.4 * wide, y, z), (out, y, z), r, sections=16)
         body += cylinder((out, y, z - 0.035), (out, y, z + rise), 1.15 * r, sections=16)
         body += ring((-0.985 * wide, y, z), (1, 0, 0), 0.5 * r, 1.9 * r, 0.01, 16)
-    dispenser = Assembly()
     radius = mouth * half
     lid = cylinder((0, 0, top + CLEAR), (0, 0, top + CLEAR + 0.012), radius * rng.uniform(0.95, 1.05), 0.93 * radius)
     lid += dome(0.9 * radius, top + CLEAR + 0.0115, radius * rng.uniform(0.05, 0.45))
@@ -225,7 +216,7 @@ def _drink_jar(rng: np.random.Generator) -> Assembly:
         x, w = 1.05 * radius + 0.006, 0.3 * radius
         lid += cylinder((x, -w, top + CLEAR + 0.004), (x, w, top + CLEAR + 0.004), 0.004, sections=12)
         lid += box((0.8 * radius, -w, top + CLEAR), (x, w, top + CLEAR + 0.004))
-    dispenser.add("body", body, density=DENSITY)
+    dispenser = Assembly("body", body, DENSITY)
     if hinged:
         joint = revolute("body", (0, 1, 0), (x, 0, top + CLEAR + 0.004), 0.0, rng.uniform(0.8, 1.55))
     elif rng.random() < 0.3:
@@ -233,13 +224,13 @@ def _drink_jar(rng: np.random.Generator) -> Assembly:
         joint = screw("body", UP, (0, 0, top), 0.0, turns, rng.uniform(0.008, 0.03) / turns)
     else:
         joint = prismatic("body", UP, 0.0, radius * rng.uniform(0.3, 1.2), (0, 0, top))
-    dispenser.add("lid", lid, joint, density=DENSITY)
+    dispenser.add("lid", lid, joint)
     style = str(rng.choice(["lever", "wing", "flip"]))
     long = rng.uniform(0.03, 0.06)
     for number, y in enumerate(spots):
         at = np.array([out, y, z + rise + 0.001])
         solid, joint = _tap_handle(style, at, r, min(long, 0.28 * wide if count > 1 else long), rng)
-        dispenser.add(f"tap_{number}" if count > 1 else "tap", solid, joint, label="lever", density=DENSITY)
+        dispenser.add(f"tap_{number}" if count > 1 else "tap", solid, joint, label="lever")
     return dispenser
 
 
@@ -303,7 +294,6 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
     else:
         body += rounded_box((-depth, -half, 0.0), (depth, half, shelf), 0.02, axis=2)
     body += rounded_box((-depth - 0.02, -0.6 * half, shelf - 0.015), (niche + 0.01, 0.6 * half, shelf + 0.008), 0.006)
-    cooler = Assembly()
     count = int(rng.choice([2, 3], p=[0.75, 0.25]))
     spots = (np.linspace(-1.0, 1.0, count) * 0.4 * half).tolist()
     style = str(rng.choice(["lever", "button", "tap"]))
@@ -331,7 +321,7 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
                 axis=0,
             )
             taps.append((button, prismatic("body", (1, 0, 0), 0.0, 0.002, (face, y, middle))))
-    cooler.add("body", body, density=250.0)
+    cooler = Assembly("body", body, 250.0)
     name = {"lever": "lever", "tap": "tap", "button": "button"}[style]
     for number, (solid, joint) in enumerate(taps):
         cooler.add(f"{name}_{number}", solid, joint, label="button" if style == "button" else "lever", density=900.0)
@@ -345,8 +335,7 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
         panel += front_handle(str(rng.choice(["bar", "bow", "flat"])), (face - thick, y, 0.5 * shelf),
                               (face - thick, y, 0.8 * shelf), 0.025, 0.005)  # fmt: skip
         edge = (half - 0.004) * (1.0 if left else -1.0)
-        hinge = side_hinge(face - thick, edge, rng.uniform(1.2, 1.9), left)
-        cooler.add("door", panel, hinge, density=300.0)
+        cooler.add("door", panel, side_hinge(face - thick, edge, rng.uniform(1.2, 1.9), left), density=300.0)
     return cooler
 
 

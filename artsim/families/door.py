@@ -47,7 +47,7 @@ def build(rng: np.random.Generator) -> Assembly:
     height = rng.uniform(1.6, 3.0)
     depth, jamb = with_tails(rng, (0.07, 0.42), (0.07, 0.75), 0.15), rng.uniform(0.03, 0.25)
     style = _style(rng, kind)
-    door = Assembly()
+    door = Assembly(density=700.0)
     door.record(handles=True)
     if kind == "sliding":
         depth = max(depth, 2 * style.thickness + 0.025)
@@ -55,7 +55,7 @@ def build(rng: np.random.Generator) -> Assembly:
     if kind == "sliding":
         _sliding(rng, door, body, width, height, depth, style)
         return door
-    door.add("frame", body, density=700.0)
+    door.add("frame", body)
     limit = float(np.deg2rad(rng.uniform(60.0, 175.0)))
     ajar = rng.uniform(0.1, 0.75) * limit if rng.random() < 0.25 else 0.0
     both = rng.random() < 0.5
@@ -96,7 +96,7 @@ def _sliding(
     travel = width / 2 - overlap - 0.006
     if fixed:
         body += leaves.pop()[0] + box((-depth / 2 + 0.02, -width / 2 - 0.002, -0.001), (depth / 2 - 0.02, 0, 0.001))
-    door.add("frame", body, density=700.0)
+    door.add("frame", body)
     for number, (leaf, side, center) in enumerate(leaves):
         name = "door" if fixed else f"door_{number}"
         door.add(name, leaf, prismatic("frame", (0, -side, 0), 0.0, travel, tuple(center)), label="door", density=500.0)
@@ -293,5 +293,4 @@ def _turning_handle(
             handle += tube(path, radius, 10)
         lower, upper = 0.0, float(np.deg2rad(rng.uniform(30.0, 50.0)))
     name = "handle" if leaf == "door" else leaf.replace("door", "handle")
-    joint = revolute(leaf, (-side, 0, 0), (front, y, z), lower, upper)
-    door.add(name, handle, joint, label="handle", density=2500.0)
+    door.add(name, handle, revolute(leaf, (-side, 0, 0), (front, y, z), lower, upper), label="handle", density=2500.0)

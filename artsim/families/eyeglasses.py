@@ -117,10 +117,9 @@ def build(rng: np.random.Generator) -> Assembly:
         axis = (0.0, -side * sin(tilt), -side * cos(tilt))
         solid = arm.moved(place) + moving.turned((1, 0, 0), -tilt).moved(place)
         parts[name] = solid, revolute("frame", axis, place, 0.0, limit)
-    glasses = Assembly()
-    glasses.add("frame", frame, density=1200.0)
+    glasses = Assembly("frame", frame, 1200.0)
     for name, (solid, joint) in parts.items():
-        glasses.add(name, solid, joint, density=1200.0)
+        glasses.add(name, solid, joint)
     return glasses
 
 

@@ -183,8 +183,7 @@ def _box_fan(rng: np.random.Generator) -> Assembly:
     with_knob = rng.random() < 0.5
     if with_knob:
         base += rounded_box(corner - (0, 0.03, 0.03), corner + (half, 0.03, 0.03), 0.006, axis=0)
-    fan = Assembly()
-    fan.add("base", base, density=500.0)
+    fan = Assembly("base", base, 500.0)
     blades = _blades(rng, cage, 1.5 * half) + cylinder((0, 0, 0), (back - GAP, 0, 0), 0.03 * cage, sections=10)
     fan.add("blades", blades, continuous("base", FRONT, (0, 0, 0)), density=1200.0)
     if with_knob:
@@ -213,8 +212,7 @@ def _ceiling_fan(rng: np.random.Generator) -> Assembly:
     arm = box((-root - 0.06, -0.02, -0.0055), (-0.8 * body, 0.02, 0.0055))
     blade = (paddle + arm).turned(FRONT, pitch).moved((0, 0, z))
     rotor += union(blade.turned(UP, 2.0 * np.pi * k / count) for k in range(count))
-    fan = Assembly()
-    fan.add("base", mount, density=1500.0)
+    fan = Assembly("base", mount, 1500.0)
     fan.add("blades", rotor, continuous("base", UP, (0, 0, -drop)), density=900.0)
     return fan
 

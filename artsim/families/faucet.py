@@ -52,17 +52,16 @@ def _basin_mixer(rng: np.random.Generator) -> Assembly:
         path = np.stack([-reach * s, 0 * s, z], axis=1)
         body += tube(path, (np.linspace(1.0, 0.75, 9) * r).tolist(), 14)
         body += _nozzle(rng, path[-1] + 0.2 * (path[-2] - path[-1]), path[-1] - path[-2], 0.85 * r, 0.9 * r)
-    tap = Assembly()
     # A leaning axis stands on a stub, so that the hub's rim clears the body's top.
     lean = rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.5) if rng.random() < 0.35 else 0.0
     axis, start = (cos(lean) * UP + sin(lean) * FRONT, cos(lean) * FRONT - sin(lean) * UP)
     pivot = np.array([0.0, 0.0, top]) + 2.0 * radius * sin(abs(lean)) * axis
     if lean:
         body += cylinder(pivot - 2.5 * radius * sin(abs(lean)) * axis, pivot, 0.9 * radius)
-    tap.add("base", body, density=BRASS)
+    tap = Assembly("base", body, BRASS)
     handle = _handle(rng, pivot, axis, start, radius * rng.uniform(0.9, 1.0), rng.uniform(0.05, 0.12), True)
     low, high = (-0.5 * np.pi, 0.5 * np.pi) if rng.random() < 0.7 and lean <= 0 else (0.0, rng.uniform(0.8, 1.9))
-    tap.add("handle", handle, revolute("base", axis, pivot, low, high), density=BRASS)
+    tap.add("handle", handle, revolute("base", axis, pivot, low, high))
     return tap
 
 
@@ -124,12 +123,11 @@ def _three_piece(rng: np.random.Generator) -> Assembly:
     length = min(rng.uniform(0.05, 0.08), spread - foot_radius - 0.012)
     tip = foot_height + 0.06 + with_tails(rng, (0.0, 0.06), (0.0, 0.3), 0.2)
     spout = _gooseneck(rng, np.array([0.0, 0.0, column]), r, reach, tip)
-    tap = Assembly()
     turning = rng.random() < 0.6
-    tap.add("base", base if turning else base + spout.moved((0, 0, -GAP - 0.001)), density=BRASS)
+    tap = Assembly("base", base if turning else base + spout.moved((0, 0, -GAP - 0.001)), BRASS)
     if turning:
         joint = continuous("base", UP, (0, 0, column)) if rng.random() < 0.6 else _swing(rng, (0, 0, column))
-        tap.add("spout", spout, joint, density=BRASS)
+        tap.add("spout", spout, joint)
     style = int(rng.integers(1 << 30))
     outward = rng.random() < 0.6
     for number, side in enumerate((-1.0, 1.0)):
@@ -138,7 +136,7 @@ def _three_piece(rng: np.random.Generator) -> Assembly:
         alike = np.random.default_rng(style)
         handle = _handle(alike, pivot, UP, start, taper * foot_radius, length, False)
         turn = -side if outward else side
-        tap.add(f"handle_{number}", handle, revolute("base", turn * UP, pivot, 0.0, 1.57), density=BRASS)
+        tap.add(f"handle_{number}", handle, revolute("base", turn * UP, pivot, 0.0, 1.57))
     return tap
 
 
@@ -155,12 +153,11 @@ def _pillar_tap(rng: np.random.Generator) -> Assembly:
         rng, path[-1] + (0, 0, 0.004), -UP, 0.95 * r, r
     )
     body += cylinder((0, 0, top - 0.002), (0, 0, top + 0.02), 0.45 * radius, sections=16)
-    tap = Assembly()
-    tap.add("base", body, density=BRASS)
+    tap = Assembly("base", body, BRASS)
     pivot = np.array([0.0, 0.0, top + 0.02])
     knob = _knob(rng, pivot, UP, radius * rng.uniform(1.2, 1.7))
     turns = rng.uniform(0.5, 2.5) * 2.0 * np.pi
-    tap.add("handle", knob, screw("base", UP, pivot, 0.0, turns, 0.0005), density=BRASS)
+    tap.add("handle", knob, screw("base", UP, pivot, 0.0, turns, 0.0005))
     return tap
 
 
@@ -181,16 +178,15 @@ def _wall_tap(rng: np.random.Generator) -> Assembly:
     path = np.stack([bend * (cos(s) - 1), 0 * s, low - 0.7 * r - bend * sin(s)], axis=1)
     path = np.concatenate([[[0, 0, low]], path, path[-1:] + [[-reach, 0, rng.uniform(-0.1, 0.25) * reach]]])
     spout = tube(path, r, 14) + _nozzle(rng, path[-1] + (r, 0, 0), -UP, 0.8 * r, 1.4 * r)
-    tap = Assembly()
-    tap.add("base", body, density=BRASS)
+    tap = Assembly("base", body, BRASS)
     limit = min(arcsin(min((half - 0.03) / (reach + bend + 2 * r), 1.0)), 1.2)
-    tap.add("spout", spout, revolute("base", UP, (0, 0, low), -limit, limit), density=BRASS)
+    tap.add("spout", spout, revolute("base", UP, (0, 0, low), -limit, limit))
     style = int(rng.integers(1 << 30))
     size, turn = radius * rng.uniform(1.3, 2.2), min(with_tails(rng, (1.57, 3.0), (0.8, 3.4), 0.4), np.pi)
     for number, side in enumerate((-1.0, 1.0)):
         pivot, out = np.array([0.0, side * half, 0.0]), np.array([0.0, side, 0.0])
         knob = _knob(np.random.default_rng(style), pivot, out, size)
-        tap.add(f"handle_{number}", knob, revolute("base", out, pivot, 0.0, turn), density=BRASS)
+        tap.add(f"handle_{number}", knob, revolute("base", out, pivot, 0.0, turn))
     return tap
 
 

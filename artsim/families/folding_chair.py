@@ -123,8 +123,7 @@ def _crossed(rng: np.random.Generator) -> Assembly:
     tall = (above - back_low) * rng.uniform(0.5, 1.0)
     panel = _panel(rng, np.array([-0.5 * thick, -half, above - tall]), np.array([0.5 * thick, half, above]), 2)
     frame_solid += panel.turned(SIDE, lean - bend).moved(joint_at)
-    chair = Assembly()
-    chair.add("frame", frame_solid, density=900.0)
+    chair = Assembly("frame", frame_solid, 900.0)
 
     # Rear legs: inside the front ones, from behind the frame's foot to below the seat's front.
     inner = half - apart
@@ -152,7 +151,7 @@ def _crossed(rng: np.random.Generator) -> Assembly:
     reach = min(float(norm(front - pivot)), float(norm(back_bar - pivot)))
     limit = max(closing - 2.6 * thick_bar / reach - 0.06, 0.15)
     # A turn about +Y lifts the legs' upper end, which is at -X, towards the front legs' upper end.
-    chair.add("legs", legs, revolute("frame", SIDE, pivot, 0.0, limit), density=900.0)
+    chair.add("legs", legs, revolute("frame", SIDE, pivot, 0.0, limit))
 
     seat_half = inner - bar.thick - GAP
     hinge_at = np.array([joint_at[0] - 0.012 - bar.deep, 0.0, seat_low + 0.5 * seat_thick])
@@ -187,7 +186,6 @@ def _under(rng: np.random.Generator) -> Assembly:
     )
     for s in (-1, 1):
         seat += bar.between((x0, s * half, seat_z + 0.5 * thick), (x1, s * half, seat_z + 0.5 * thick))
-    chair = Assembly()
     under = seat_z - rail - GAP
     knee = under - rail
     legs = []
@@ -202,7 +200,7 @@ def _under(rng: np.random.Generator) -> Assembly:
         legs.append((name, solid, way, (x, 0.0, knee), length, ahead * slant))
         for t in (-1, 1):  # lugs
             seat += box((x - 0.02, t * y - bar.thick, under + 0.001), (x + 0.02, t * y + bar.thick, seat_z + 0.002))
-    chair.add("seat", seat, density=600.0)
+    chair = Assembly("seat", seat, 600.0)
     for name, solid, way, at, length, slope in legs:
         # They stop a little below the seat; those in front fold back, those behind fold forward, to the inside.
         stop = np.pi / 2 + way * float(arctan2(slope, 1.0)) * -1.0 - 0.12 - 2.0 * rail / length
@@ -266,7 +264,6 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
             )
         body += rounded_box((x0 + 0.02, a - 0.006, arm_z - 0.002), (x1 + 0.04, b + 0.006, arm_z + 0.03), 0.01)
     hinge_x = x1 - 0.04
-    chair = Assembly()
     seats = []
     lift = seat_z + thick + 0.02
     for k in range(count):
@@ -282,7 +279,7 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
         room = x1 + 0.01 - hinge_x
         limit = np.pi / 2 - max(0.0, (0.5 * thick + 0.006 - room)) / 0.1 - 0.05
         seats.append((seat, revolute("frame", SIDE, at, 0.0, min(limit, 1.45) * rng.uniform(0.9, 1.0))))
-    chair.add("frame", body, density=700.0)
+    chair = Assembly("frame", body, 700.0)
     for k, (seat, joint) in enumerate(seats):
         chair.add(f"seat_{k}" if count > 1 else "seat", seat, joint, density=400.0)
     return chair
@@ -313,9 +310,8 @@ def _stool(rng: np.random.Generator) -> Assembly:
     length = float(norm(a_head - pivot))
     # The second frame's foot swings up to the first one's head, so that nothing rises under the seat.
     limit = 2.0 * float(arctan2(0.5 * height, spread)) - 3.0 * rail / length - 0.1
-    stool = Assembly()
-    stool.add("frame", outer, density=900.0)
-    stool.add("legs", inner, revolute("frame", -SIDE, pivot, 0.0, max(limit, 0.2)), density=900.0)
+    stool = Assembly("frame", outer, 900.0)
+    stool.add("legs", inner, revolute("frame", -SIDE, pivot, 0.0, max(limit, 0.2)))
     if rng.random() < 0.8:
         low = height + rail + GAP + 0.006
         hinge = np.array([spread + 0.02, 0.0, low + 0.5 * thick])

@@ -31,7 +31,6 @@ def build(rng: np.random.Generator) -> Assembly:
     pitch = sheet + 2 * GAP + liner
     ends = np.array([-0.5 * length + half, 0.5 * length - half])
 
-    knife = Assembly()
     handle = Solid()
     bow = 0.0 if many else half * rng.uniform(-0.8, 1.0)
     swell = rng.uniform(0.0, 0.3)
@@ -49,7 +48,7 @@ def build(rng: np.random.Generator) -> Assembly:
     back = _back(outline, spine, ends - np.array([-1.0, 1.0]) * (pin + 2 * GAP))
     handle += union(prism(piece, low - 0.0005, thick + 0.0005) for piece in back)
     pins = np.column_stack([ends, [float(np.interp(x, outline[0, :, 0], outline.mean(axis=0)[:, 1])) for x in ends]])
-    knife.add("handle", handle + _details(rng, outline, pins, thick + scale), density=1600.0)
+    knife = Assembly("handle", handle + _details(rng, outline, pins, thick + scale), 1600.0)
 
     edge = min(float(piece[:, 1].min()) for piece in back) - pins[0, 1] - 2 * GAP
     open_to = rng.uniform(165.0, 180.0)

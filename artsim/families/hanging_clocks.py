@@ -41,15 +41,13 @@ def wall_clock(rng: np.random.Generator) -> Assembly:
             body += prism(outline(kind, 1.06 * around * radius, tall), 0.4 * deep, 0.9 * deep, 0)
     body += rim(rng, 0.003, center, 1.005 * radius, radius * rng.uniform(0.03, min(0.3, edge - 0.99)),
                 0.003 + radius * rng.uniform(0.05, 0.2))  # fmt: skip
-    clock = Assembly()
-    clock.add("body", body, density=DENSITY)
+    clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
     if rng.random() < 0.15 and deep > 0.02:
         knob = cylinder((0.5 * deep, 0, 0), (0.5 * deep, 0, 0.012), 0.3 * deep, sections=14)
         lift = max(outline(kind if kind != "rays" else "round", 1.2 * edge * radius, tall)[:, 1]) + GAP
         if kind != "rays":
-            joint = continuous("body", (0, 0, 1), (0.5 * deep, 0, lift))
-            clock.add("knob", knob.moved((0, 0, lift)), joint, density=DENSITY)
+            clock.add("knob", knob.moved((0, 0, lift)), continuous("body", (0, 0, 1), (0.5 * deep, 0, lift)))
     return clock
 
 
@@ -132,10 +130,9 @@ def cuckoo_clock(rng: np.random.Generator) -> Assembly:
     body += rim(rng, 0.003, center, 1.005 * radius, 0.1 * radius, 0.006)
     top, wide = eaves + 0.25 * (ridge - eaves), 0.22 * half
     base = radius * 1.15
-    clock = Assembly()
     length = radius * rng.uniform(1.5, 3.0)
     body += box((0.35 * deep, -0.004, low - 0.0025), (0.45 * deep, 0.004, low + 0.01))
-    clock.add("body", body, density=DENSITY)
+    clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
     two = rng.random() < 0.5
     thin = 0.003
@@ -146,7 +143,7 @@ def cuckoo_clock(rng: np.random.Generator) -> Assembly:
         leaf = box((0.002 - GAP - thin, across[0], base), (0.002 - GAP, across[1], max(top, base + 1.5 * wide)))
         edge = across[1] if left else across[0]
         joint = side_hinge(0.002 - GAP - thin, edge, rng.uniform(1.2, 2.0), left)
-        clock.add(f"door_{number}" if two else "door", leaf, joint, density=DENSITY)
+        clock.add(f"door_{number}" if two else "door", leaf, joint)
     solid, swing = pendulum(rng, 0.4 * deep, low - 0.004, length, 0.9 * half)
     clock.add("pendulum", solid, revolute("body", FRONT, (0.4 * deep, 0, low - 0.004), -swing, swing), density=1500.0)
     if rng.random() < 0.7:

@@ -47,7 +47,6 @@ def build(rng: np.random.Generator) -> Assembly:
     body = moulded(pot.levels, outline)
     spout, mouth = _spout(rng, kind, pot)
     body += spout
-    kettle = Assembly()
     bow = kind != "electric" and rng.random() < (0.75 if kind == "stove" else 0.25)
     swinging = bow and rng.random() < 0.6
     over = np.inf
@@ -75,9 +74,9 @@ def build(rng: np.random.Generator) -> Assembly:
     switch = _switch(rng, pot) if kind == "electric" else None
     if switch is not None:
         body += switch[0]
-    kettle.add("body", body, density=DENSITY)
+    kettle = Assembly("body", body, DENSITY)
     free = min(room - knob_top, over - pot.top - 0.02) if bow else np.inf
-    kettle.add("lid", lid, _lid_joint(rng, lid_joint, pot, free), density=DENSITY)
+    kettle.add("lid", lid, _lid_joint(rng, lid_joint, pot, free))
     if swinging:
         _swinging_bow(rng, kettle, pins, pot)
     if mouth is not None and kind == "stove" and rng.random() < 0.6:
@@ -169,8 +168,7 @@ def _whistle(rng: np.random.Generator, kettle: Assembly, mouth: tuple[Array, Arr
     pivot = near + 1.15 * radius * up
     lift = tube([near + 0.9 * radius * up + 0.15 * radius * ahead, pivot + radius * (0.8 * up + 0.3 * ahead)],
                 0.18 * radius, 8)  # fmt: skip
-    turn = revolute("body", (0, 1, 0), pivot, 0.0, rng.uniform(0.6, 1.5))
-    kettle.add("whistle", cover + lift, turn, density=1500.0)
+    kettle.add("whistle", cover + lift, revolute("body", (0, 1, 0), pivot, 0.0, rng.uniform(0.6, 1.5)), density=1500.0)
 
 
 def _lid(rng: np.random.Generator, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
@@ -341,7 +339,7 @@ def _base(rng: np.random.Generator, kettle: Assembly, pot: Pot) -> None:
         base += rounded_box((radius * 0.5, -0.3 * radius, 0.0), (1.35 * radius, 0.3 * radius, 0.6 * tall), 0.004)
     at = np.array([0.0, 0.0, tall])
     joint = continuous("body", UP, at) if rng.random() < 0.5 else prismatic("body", -UP, 0.0, rng.uniform(0.03, 0.15))
-    kettle.add("base", base, joint, density=DENSITY)
+    kettle.add("base", base, joint)
 
 
 def _switch(rng: np.random.Generator, pot: Pot) -> tuple[Solid, str, Solid, JointSpec]:

@@ -65,7 +65,7 @@ def build(rng: np.random.Generator) -> Assembly:
     kinds = ["full", "compact", "numbers", "macro", "pivot", "folding", "angled"]
     kind = str(rng.choice(kinds, p=[0.2, 0.2, 0.16, 0.16, 0.1, 0.08, 0.1]))
     caps = _draw_caps(rng)
-    keyboard = Assembly()
+    keyboard = Assembly(density=900.0)
     if kind in ("pivot", "folding", "angled"):
         {"pivot": _pivot, "folding": _folding, "angled": _angled}[kind](rng, keyboard, caps)
         return keyboard
@@ -91,7 +91,7 @@ def build(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.3:
         body += _rim(face, low, high, min(0.6 * float(margin.min()), 0.003), 0.6 * caps.height)
     body += _trimmings(rng, face, low, high, pads + 0.5 * thick)
-    keyboard.add("body", body, density=900.0)
+    keyboard.add("body", body)
     _add_keys(keyboard, "body", face, groups, caps)
     _controls(rng, keyboard, face, low, high, margin[3], 0.5 * size[1])
     if feet:
@@ -139,7 +139,7 @@ def _add_keys(
             solid += shapes[shape].moved(offset)
         at = caps.pitch * (np.array(group[0][:2]) - middle)
         label = "key" if len(group) == 1 else "keys"
-        keyboard.add(f"{label}_{number}", solid, press(face, parent, at[0], at[1], caps.travel), density=900.0)
+        keyboard.add(f"{label}_{number}", solid, press(face, parent, at[0], at[1], caps.travel))
 
 
 def _plate(rng: np.random.Generator, face: Face, low: Array, high: Array, bottom: float) -> Solid:
@@ -282,9 +282,8 @@ def _pivot(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
         arm = sorted((side * (gap + 0.2 * radius), side * (gap + 1.6 * radius)))
         body += box((half[1] - 0.003, arm[0], low), (pivot[0] + 0.3 * radius, arm[1], high))
         bodies.append((body, face))
-    keyboard.add("left", bodies[0][0], density=900.0)
-    swing = revolute("left", (0, 0, 1), (*pivot, thick), 0.0, rng.uniform(0.3, 0.9))
-    keyboard.add("right", bodies[1][0], swing, density=900.0)
+    keyboard.add("left", bodies[0][0])
+    keyboard.add("right", bodies[1][0], revolute("left", (0, 0, 1), (*pivot, thick), 0.0, rng.uniform(0.3, 0.9)))
     _add_keys(keyboard, "left", bodies[0][1], groups, caps)
     _add_keys(keyboard, "right", bodies[1][1], groups, caps, len(groups))
 
@@ -343,6 +342,6 @@ def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
         inside = face.raised(np.array([(-side * half[0], v) for v in (-half[1], half[1])]), 0.0)
         edges += [inside * (1, 1, 0), inside * (1, 1, 0.95)]
     body += hull(np.concatenate(edges))  # the bridge
-    keyboard.add("body", body, density=900.0)
+    keyboard.add("body", body)
     for number, face in enumerate(faces):
         _add_keys(keyboard, "body", face, groups, caps, number * len(groups))

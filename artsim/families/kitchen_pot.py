@@ -37,7 +37,7 @@ def build(rng: np.random.Generator) -> Assembly:
     mouth = float(np.interp(height - 0.009, profile[:, 1], profile[:, 0])) - wall  # clear radius where a lid dips in
     lid, lid_radius, top = _lid(rng, radius, height, wall, mouth, hinged)
 
-    assembly = Assembly()
+    assembly = Assembly(density=STEEL)
     assembly.record(handles=True)
     if hinged:
         r = 0.005
@@ -51,13 +51,13 @@ def build(rng: np.random.Generator) -> Assembly:
                 cylinder((x, y0, z), (x, y1, z), r, sections=16), box((x - r, y0, height - 0.02), (x + r, y1, height))
             )
             pot += lug + box((radius - wall, y0, height - 0.02), (x, y1, height - 0.008))
-        assembly.add("pot", pot, density=STEEL)
+        assembly.add("pot", pot)
         joint = revolute("pot", (0, 1, 0), (x, 0, z), 0.0, np.deg2rad(rng.uniform(80, 105)))
     else:
-        assembly.add("pot", pot, density=STEEL)
+        assembly.add("pot", pot)
         share = rng.uniform(0.15, 1.0)  # cubed, as lids of real files rise by 1 % of the diagonal, those in use by half
         joint = prismatic("pot", (0, 0, 1), 0.0, 1.3 * share * share * share * radius, (0, 0, top))
-    assembly.add("lid", lid, joint, density=STEEL)
+    assembly.add("lid", lid, joint)
     return assembly
 
 

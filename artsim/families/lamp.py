@@ -16,7 +16,7 @@ from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, continuous, revolute
-from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube
+from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -35,9 +35,9 @@ def _desk(rng: np.random.Generator) -> Assembly:
         links, half, r, foot = _links(rng)
         if narrow_limits(links, 0.02):
             break
-    lamp = Assembly()
+    lamp = Assembly(density=1200.0)
     for link in links:
-        lamp.add(link.name, link.solid, link.joint, density=1200.0)
+        lamp.add(link.name, link.solid, link.joint)
     if foot is not None:
         _parallel_rod(lamp, links, foot, half, r)
     return lamp
@@ -131,8 +131,7 @@ def _arm(
     across = np.cross(SIDE, along)
     rod = 0.8 * half
     if double:
-        for s in (-0.6, 0.6):
-            link.solid += tube([at + s * r * across, end + s * r * across], 0.75 * rod, 10)
+        link.solid += union(tube([at + s * r * across, end + s * r * across], 0.75 * rod, 10) for s in (-0.6, 0.6))
     else:
         link.solid += tube([at, end], rod, 12)
     if sprung:
@@ -197,7 +196,5 @@ def _parallel_rod(lamp: Assembly, links: list[Link], foot: Array, half: float, r
     start, end = links[k].capsules[-1][:3], links[k].capsules[-1][3:6]
     tip = foot + 0.93 * (end - start)
     solid = tube([foot, tip], 0.55 * half, 10)
-    for point in (foot, tip):
-        solid += cylinder(point - half * SIDE, point + half * SIDE, 0.7 * r, sections=16)
-    hinge = revolute(links[k - 1].name, SIDE, foot, joint.lower, joint.upper, mimic=("lower_arm", 1.0))
-    lamp.add("rod", solid, hinge, density=1200.0)
+    solid += union(cylinder(point - half * SIDE, point + half * SIDE, 0.7 * r, sections=16) for point in (foot, tip))
+    lamp.add("rod", solid, revolute(links[k - 1].name, SIDE, foot, joint.lower, joint.upper, mimic=("lower_arm", 1.0)))

@@ -40,12 +40,11 @@ class _Shape:
 def build(rng: np.random.Generator) -> Assembly:
     """A laptop, closed at rest. The lid opens about the Y axis at the back."""
     shape = _shape(rng)
-    laptop = Assembly()
-    laptop.add("base", _propped(rng, shape) if shape.tilt else _base(rng, shape), density=1400.0)
+    laptop = Assembly("base", _propped(rng, shape) if shape.tilt else _base(rng, shape), 1400.0)
     opening = np.deg2rad(rng.uniform(88.0, 180.0) if rng.random() < 0.9 else rng.uniform(42.0, 88.0))
     hinge = (shape.hinge_x, 0, shape.hinge_z)
     lid = _lid(rng, shape) + _hinges(rng, shape)
-    laptop.add("lid", lid, revolute("base", (0, 1, 0), hinge, 0.0, opening), density=1400.0)
+    laptop.add("lid", lid, revolute("base", (0, 1, 0), hinge, 0.0, opening))
     return laptop
 
 

@@ -89,13 +89,12 @@ def _pocket(rng: np.random.Generator) -> Assembly:
         ((x0 + x1) / 2, 0, height - 0.001), ((x0 + x1) / 2, 0, chimney_high - 0.003), 0.25 * room_y, sections=10
     )
     body += _fork(wheel_center, wheel_half + GAP, 0.3 * room_y, height - 0.001, 0.7 * wheel_radius)
-    lighter = Assembly()
     hinge_x = half_x + 0.0012
     low = height + GAP
     knuckle = 0.0012
     body += cylinder((hinge_x, -0.5 * half_y, height), (hinge_x, 0.5 * half_y, height), 0.8 * knuckle, sections=10)
     body += box((half_x - 0.001, -0.45 * half_y, height - 0.004), (hinge_x, 0.45 * half_y, height - 0.0001))
-    lighter.add("body", body, density=4000.0)
+    lighter = Assembly("body", body, 4000.0)
     # The lid is a cap with walls, open at the bottom.
     lid = Solid()
     outline = rounded_box((-half_x, -half_y, 0), (half_x, half_y, 1), corner, axis=2).union()[0]
@@ -239,8 +238,7 @@ def _long(rng: np.random.Generator) -> Assembly:
     body += cylinder(end, path[2] + 0.02 * tip, 1.25 * radius, sections=14)
     if rng.random() < 0.3:  # a ring to hang it up
         body += ring((0, 0, -0.006), (0, 1, 0), 0.004, 0.0065, 0.003, 16)
-    lighter = Assembly()
-    lighter.add("body", body, density=1100.0)
+    lighter = Assembly("body", body, 1100.0)
     wide = 0.5 * half_y
     travel = min(depth * 0.5, out * 0.9)
     z0, z1 = slot_low + GAP, slot_high - GAP
@@ -261,13 +259,13 @@ def _long(rng: np.random.Generator) -> Assembly:
         )
         turn = min(0.7 * travel / long, 0.5)
         joint = revolute("body", (0, -1, 0), pivot, 0.0, max(turn, 0.05))
-    lighter.add("trigger", trigger, joint, density=1100.0)
+    lighter.add("trigger", trigger, joint)
     if rng.random() < 0.55:  # a safety catch on the back, which slides
         z = rng.uniform(slot_high + 0.01, handle - 0.012) if handle - slot_high > 0.026 else 0.3 * handle
         share = float(np.interp(z, [0.1 * handle, 0.35 * handle, slot_low, slot_high, handle], [1, waist, 1, 1, neck]))
         x = max(share, 0.0) * half_x + 0.0025
         catch = rounded_box((x, -0.4 * half_y, z - 0.004), (x + 0.003, 0.4 * half_y, z + 0.004), 0.001)
-        lighter.add("switch", catch, prismatic("body", (0, 0, 1), 0.0, 0.005, (x, 0, z)), density=1100.0)
+        lighter.add("switch", catch, prismatic("body", (0, 0, 1), 0.0, 0.005, (x, 0, z)))
     return lighter
 
 

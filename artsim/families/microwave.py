@@ -43,8 +43,7 @@ def build(rng: np.random.Generator) -> Assembly:
     hollow_high = np.array([depth - wall, half - wall, foot + height - wall])
     body = _body(rng, panel_low[1], half, foot, foot + height, depth, hollow_low, hollow_high)
     if low[2] > foot and not drops:
-        for z in (foot, high[2] + GAP):
-            body += box((-thick, -half, z), (0.01, half, z + wall - GAP))
+        body += union(box((-thick, -half, z), (0.01, half, z + wall - GAP)) for z in (foot, high[2] + GAP))
     oven = Assembly()
     has_panel = strip > 0
     if has_panel:

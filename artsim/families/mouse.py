@@ -200,8 +200,7 @@ def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
     parts.add("body", body)
     for name, span in spans:
         solid = dome.between(front, edge, span, floor + room)
-        joint = revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle)
-        parts.add(name, solid, joint)
+        parts.add(name, solid, revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle))
     if wheel is not None:
         x, z, radius, wide = wheel
         solid = cylinder((x, drift - wide, z), (x, drift + wide, z), radius, sections=20)

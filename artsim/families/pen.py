@@ -152,14 +152,13 @@ def _capped(rng: np.random.Generator, section: _Section, length: float, radius: 
         band = max(outer, widest) * 1.08
         cap += section.sleeve(inner, [(band, covered - GAP - 0.4 * radius), (band, covered - GAP)])
     travel = covered * rng.uniform(1.0, 1.3) + radius
-    pen = Assembly()
     over = rng.random() < 0.5
 
     def place(solid: Solid) -> Solid:
         return solid.turned((1, 0, 0), np.pi) if over else solid
 
     down = (0.0, 0.0, 1.0 if over else -1.0)
-    pen.add("body", place(body), density=1100.0)
+    pen = Assembly("body", place(body), 1100.0)
     if turning:
         turns = 2.0 * np.pi * rng.uniform(1.0, 4.0)
         joint = screw("body", down, (0.0, 0.0, 0.0), 0.0, turns, travel / turns)
@@ -191,10 +190,9 @@ def _double(rng: np.random.Generator, section: _Section, length: float, radius: 
         travel = covered + radius
         body += half if side < 0 else half.mirrored(2)
         caps.append((cap if side < 0 else cap.mirrored(2), (0.0, 0.0, float(side)), travel))
-    pen = Assembly()
-    pen.add("body", body, density=1000.0)
+    pen = Assembly("body", body, 1000.0)
     for number, (cap, direction, travel) in enumerate(caps):
-        pen.add(f"cap_{number}", cap, prismatic("body", direction, 0.0, travel), density=1000.0)
+        pen.add(f"cap_{number}", cap, prismatic("body", direction, 0.0, travel))
     return pen
 
 
@@ -226,8 +224,7 @@ def _clicked(rng: np.random.Generator, section: _Section, length: float, radius:
     collar = rng.uniform(0.3, 1.5) * radius
     shell += _clip(rng, section, radius, length, length * rng.uniform(0.2, 0.45))
     shell += section.sleeve(push + GAP, [(radius, length - 0.0002), (radius * rng.uniform(0.85, 1.0), length + collar)])
-    pen = Assembly()
-    pen.add("body", shell, density=1100.0)
+    pen = Assembly("body", shell, 1100.0)
     # The button stands in the collar with room below for its travel.
     reach = max(collar - travel - GAP, 0.0) if collar > travel + 2 * GAP else 0.0
     low = length + collar - reach if reach > 0 else length + travel + GAP
@@ -263,13 +260,12 @@ def _twisted(rng: np.random.Generator, section: _Section, length: float, radius:
         [(last, length - 0.0002), (last * rng.uniform(0.3, 1.0), length + rng.uniform(0.1, 2.0) * radius)]
     )
     upper += _clip(rng, section, radius, length, (length - split) * rng.uniform(0.5, 0.9))
-    pen = Assembly()
-    pen.add("body", body, density=1100.0)
+    pen = Assembly("body", body, 1100.0)
     if rng.random() < 0.5:
         joint = continuous("body", UP, (0, 0, split))
     else:
         joint = revolute("body", UP, (0, 0, split), 0.0, rng.uniform(1.5, 2.0 * np.pi))
-    pen.add("barrel", upper, joint, density=1100.0)
+    pen.add("barrel", upper, joint)
     return pen
 
 
@@ -289,8 +285,7 @@ def _sliders(rng: np.random.Generator, length: float, radius: float) -> Assembly
         rib = box((-0.98 * radius, -0.4 * half, start - 0.001), (0.0, 0.4 * half, length - 0.2 * radius))
         body += rib.turned(UP, 2.0 * np.pi * (k + 0.5) / count)
     body += _clip(rng, section, radius, length + 0.3 * radius, (length - start) * 0.9).turned(UP, np.pi / count)
-    pen = Assembly()
-    pen.add("body", body, density=1100.0)
+    pen = Assembly("body", body, 1100.0)
     room = length - 0.4 * radius - start - 2 * GAP
     size = room * rng.uniform(0.3, 0.5)
     for k in range(count):

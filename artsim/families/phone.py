@@ -32,7 +32,7 @@ KINDS = ("bar", "flip", "slider", "swivel", "fold", "smartphone", "cordless", "d
 def build(rng: np.random.Generator) -> Assembly:
     """A telephone; closed, its handset in place and no key pressed at rest."""
     kind = str(rng.choice(KINDS, p=[0.15, 0.17, 0.12, 0.07, 0.08, 0.1, 0.11, 0.2]))
-    phone = Assembly()
+    phone = Assembly(density=1300.0)
     if kind == "desk":
         desk_set(rng, phone)
     elif kind == "cordless":
@@ -106,8 +106,7 @@ def _stand(rng: np.random.Generator, phone: Assembly, half: float, x: float, len
     thick, z = 0.0015, length * rng.uniform(0.4, 0.65)
     wide, low = half * rng.uniform(0.3, 0.8), length * rng.uniform(0.03, 0.2)
     leaf = rounded_box((x + GAP, -wide, low), (x + GAP + thick, wide, z), 0.004, axis=0, steps=2)
-    hinge = revolute("body", (0, -1, 0), (x + GAP, 0, z), 0.0, rng.uniform(0.5, 1.5))
-    phone.add("stand", leaf, hinge, density=1500.0)
+    phone.add("stand", leaf, revolute("body", (0, -1, 0), (x + GAP, 0, z), 0.0, rng.uniform(0.5, 1.5)), density=1500.0)
 
 
 def _bar(rng: np.random.Generator, phone: Assembly) -> None:
@@ -120,7 +119,7 @@ def _bar(rng: np.random.Generator, phone: Assembly) -> None:
     if rng.random() < 0.35:  # a stub of an antenna
         y, top = rng.choice([-0.6, 0.6]) * half, length * rng.uniform(1.08, 1.35)
         body += cylinder((0.5 * thick, y, 0.9 * length), (0.5 * thick, y, top), 0.3 * thick, 0.22 * thick, 12)
-    phone.add("body", body, density=1300.0)
+    phone.add("body", body)
     height = rng.uniform(0.0011, 0.0026)
     add_keypad(rng, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
     _side_keys(rng, phone, "body", half, 0.5 * thick, (0.0, length), thick)
@@ -151,7 +150,7 @@ def _flip(rng: np.random.Generator, phone: Assembly) -> None:
         first, last = sorted((s * (span + GAP), s * half * 0.98))
         body += cylinder((plane, first, pivot), (plane, last, pivot), radius, sections=16)
         body += box((plane + 0.0003, first, top - 4.0 * radius), (max(lower * 0.5, knuckle), last, pivot))
-    phone.add("body", body, density=1300.0)
+    phone.add("body", body)
     bottom = rng.uniform(0.0, 0.45) * top if rng.random() < 0.3 else 0.0
     lid = _slab(rng, half, (plane - upper, plane), (bottom, pivot - radius - GAP), -1)
     lid += cylinder((plane, GAP - span, pivot), (plane, span - GAP, pivot), radius * 0.9, sections=16)
@@ -162,7 +161,7 @@ def _flip(rng: np.random.Generator, phone: Assembly) -> None:
         lid += rounded_box(
             (plane - upper - 0.0008, -size, z - size), (plane - 0.5 * upper, size, z + size), 0.3 * size, 0, 2
         )
-    phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)), density=1300.0)
+    phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
 
@@ -186,12 +185,12 @@ def _slider(rng: np.random.Generator, phone: Assembly) -> None:
         body += union(box((plane + GAP, y - 0.05 * half, 0.55 * length), (0.001, y + 0.05 * half, 0.95 * length))
                       for y in (-0.7 * half, 0.7 * half))  # fmt: skip
         keys = (0.06 * length, 0.47 * length)
-    phone.add("body", body, density=1300.0)
+    phone.add("body", body)
     upper = thick - lower
     lid = _slab(rng, half, (plane - upper, plane), (0.0, length), -1)
     lid += box((plane - upper - 0.0005, -0.75 * half, 0.35 * length), (plane - 0.5 * upper, 0.75 * half, 0.88 * length))
     axis = (0, float(rng.choice([-1.0, 1.0])), 0) if sideways else (0, 0, 1)
-    phone.add("lid", lid, prismatic("body", axis, 0.0, travel, (plane, 0, 0)), density=1300.0)
+    phone.add("lid", lid, prismatic("body", axis, 0.0, travel, (plane, 0, 0)))
     number = add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, keys, height)
     front = front_face(plane - upper)
     add_function_keys(rng, phone, "lid", front, 0.7 * half, (0.08 * length, 0.24 * length), 0.0014, number)
@@ -207,13 +206,12 @@ def _swivel(rng: np.random.Generator, phone: Assembly) -> None:
     pivot = length - half * rng.uniform(0.8, 1.0)
     body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
     body += cylinder((plane + GAP, 0, pivot), (0.001, 0, pivot), 0.7 * half, sections=20)
-    phone.add("body", body, density=1300.0)
+    phone.add("body", body)
     upper = thick - lower
     lid = _slab(rng, half, (plane - upper, plane), (0.0, length), -1)
     lid += cylinder((plane - upper - 0.0006, 0, pivot), (plane, 0, pivot), 0.5 * half, sections=20)
     side = float(rng.choice([-1.0, 1.0]))
-    turn = revolute("body", (side, 0, 0), (plane, 0, pivot), 0.0, rng.uniform(1.57, 3.2))
-    phone.add("lid", lid, turn, density=1300.0)
+    phone.add("lid", lid, revolute("body", (side, 0, 0), (plane, 0, pivot), 0.0, rng.uniform(1.57, 3.2)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
 
@@ -238,8 +236,7 @@ def _fold(rng: np.random.Generator, phone: Assembly) -> None:
     lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
     lid += cylinder((0, y, first[1] + GAP), (0, y, first[4] - GAP), radius, sections=16)
     lid += box((-0.5 * leaf - 0.25 * gap, reach[0], first[1] + GAP), (-0.5 * gap, reach[1], first[4] - GAP))
-    turn = revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1))
-    phone.add("lid", lid, turn, density=1500.0)
+    phone.add("lid", lid, revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1)), density=1500.0)
     _side_keys(rng, phone, "body", half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
 
 

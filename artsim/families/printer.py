@@ -72,7 +72,6 @@ def build(rng: np.random.Generator) -> Assembly:
     radius = min(x, y) * rng.choice([rng.uniform(0.01, 0.1), rng.uniform(0.1, 0.35)])
     case = _Case(x, y, rounded_rectangle((-x, -y), (x, y), radius, 3))
     foot = rng.uniform(0.02, 0.05) if kind == "copier" else rng.uniform(0.002, 0.012)
-    printer = Assembly()
     bands = _bands(rng, kind, min(x, y))
     levels = foot + SHELF + np.concatenate([[0.0], np.cumsum([band.height + SHELF for band in bands])])
     body = case.block(foot, foot + SHELF) + _feet(case, foot, kind == "copier")
@@ -91,7 +90,7 @@ def build(rng: np.random.Generator) -> Assembly:
     rise = x * rng.uniform(0.15, 0.4)
     if slopes:
         body += _slope(case, top, rise, y * rng.uniform(0.75, 0.9))
-    printer.add("body", body, density=350.0)
+    printer = Assembly("body", body, 350.0)
     for number, (band, low) in enumerate(zip(bands, levels[:-1], strict=True)):
         _fill(rng, printer, case, band, number, float(low), half, cavity)
     if slopes:
@@ -172,8 +171,7 @@ def _fill(
         z = low + GAP
         solid = box((front, -0.9 * wide, z), (front + depth, 0.9 * wide, z + 0.004))
         solid += box((front, -0.9 * wide, z), (front + 0.005, 0.9 * wide, z + min(0.3 * band.height, 0.014)))
-        slide = prismatic("body", OUT, 0.0, 0.85 * depth, (front, 0, low))
-        printer.add(f"tray_{number}", solid, slide, density=900.0)
+        printer.add(f"tray_{number}", solid, prismatic("body", OUT, 0.0, 0.85 * depth, (front, 0, low)), density=900.0)
     elif band.kind == "tilting panel":
         solid = rounded_box((front, -wide, low + GAP), (front + thick, wide, high - GAP), 0.03 * wide, axis=0, steps=2)
         hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, rng.uniform(0.4, 1.2))
@@ -275,8 +273,7 @@ def _lid(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, to
         lid += rounded_box(
             (front + 0.15 * case.x, y0, crown - 0.002), (edge - 0.1 * case.x, y1, crown + rise), 0.3 * rise, axis=0
         )
-    hinge = revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, rng.uniform(0.7, 1.5))
-    printer.add("lid", lid, hinge, density=300.0)
+    printer.add("lid", lid, revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, rng.uniform(0.7, 1.5)), density=300.0)
     if feeder:
         z, wide = crown + GAP, 0.6 * (edge - front) * rng.uniform(0.5, 0.9)
         x = 0.5 * (front + edge)

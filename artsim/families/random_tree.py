@@ -17,7 +17,7 @@ import numpy as np
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.making.assembly import Assembly, JointSpec
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -145,9 +145,7 @@ def _shape(rng: np.random.Generator, size: Array) -> Solid:
     if kind == "frame":
         bars = [(np.array([x, thin, thin]), np.array([0, s * (y - thin), 0])) for s in (-1, 1)]
         bars += [(np.array([thin, y, thin]), np.array([s * (x - thin), 0, 0])) for s in (-1, 1)]
-        solid = Solid()
-        for extent, middle in bars:
-            solid += box(middle - extent, middle + extent)
+        solid = union(box(middle - extent, middle + extent) for extent, middle in bars)
         return solid + box((-x + thin, -0.5 * thin, -0.8 * thin), (x - thin, 0.5 * thin, 0.8 * thin))
     if kind == "ring":  # with a spoke, to carry stubs
         radius = min(x, y)

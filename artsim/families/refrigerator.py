@@ -73,9 +73,8 @@ def build(rng: np.random.Generator) -> Assembly:
         lower = np.linspace(foot, split, int(rng.integers(2, 4)) if layout == "french" else 1)
         fronts += [(0, -half, half, a, b) for a, b in pairwise(lower)]
 
-    fridge = Assembly()
+    fridge = Assembly("body", _body(rng, half, depth, foot, top, style, fronts, small), 120.0)
     fridge.record(handles=style.handle != "none")
-    fridge.add("body", _body(rng, half, depth, foot, top, style, fronts, small), density=120.0)
     opening = np.deg2rad(rng.uniform(90.0, 179.0))
     doors = drawers = 0
     dispenser = layout in ("beside", "french") and rng.random() < 0.5

@@ -50,7 +50,7 @@ class _Body:
 def build(rng: np.random.Generator) -> Assembly:
     """A remote control; no key is pressed and all covers are closed at rest."""
     body = _draw_body(rng)
-    remote = Assembly()
+    remote = Assembly(density=1100.0)
     covered = _battery_cover(rng, remote, body)
     if not covered:
         remote.add("body", body.between(body.levels[0], body.levels[-1]), density=900.0)
@@ -153,7 +153,7 @@ def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
         if band == "slider":
             outline, start = key_outline("pill", (min(half, 1.6 * pitch), 0.8 * pitch), 8), top - deep + 0.5 * pitch
             slide = prismatic("body", (0, 0, 1), 0.0, deep - pitch, tuple(face.at(0.0, start)))
-            remote.add("slider", key(face, 0.0, start, outline, 0.0004, height + 0.0006), slide, density=1100.0)
+            remote.add("slider", key(face, 0.0, start, outline, 0.0004, height + 0.0006), slide)
             top -= deep + gap
             continue
         size = np.array([min(fill * 2.0 * half / columns, 1.9 * pitch), fill * deep / rows])
@@ -166,7 +166,7 @@ def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
                 tilt = 0.8 * (height - 0.0004) / float(size[1])
                 solid = key(face, u, v, outline, 0.5 * height, height + 0.0004, shrink)
                 hinge = revolute("body", (0, 1, 0), face.at(u, v, 0.5 * height), -0.6 * tilt, 0.6 * tilt)
-                remote.add(name, solid, hinge, density=1100.0)
+                remote.add(name, solid, hinge)
                 tallest = max(tallest, 1.8 * height)
             else:
                 add_key(remote, "body", name, face, (u, v), outline, height, travel, shrink)
@@ -204,7 +204,7 @@ def _pad(
     if rng.random() < 0.2:
         reach = max(height + 0.001, 0.004)
         solid = dial(center, (-1, 0, 0), reach, radius, 20)
-        remote.add("dial", solid, continuous("body", (-1, 0, 0), center), density=1100.0)
+        remote.add("dial", solid, continuous("body", (-1, 0, 0), center))
         return reach
     inner = radius * rng.uniform(0.38, 0.55)
     low, high = travel + 0.0003, max(height, travel + 0.0008) * rng.uniform(0.8, 1.3)
@@ -212,7 +212,7 @@ def _pad(
     for k in range(4):
         turn = k * 0.5 * np.pi
         solid = ring(middle, (-1, 0, 0), inner + 0.0004, radius, high - low, 3, (turn - 0.7, turn + 0.7))
-        remote.add(f"arrow_{k}", solid, prismatic("body", (1, 0, 0), 0.0, travel, middle), density=1100.0)
+        remote.add(f"arrow_{k}", solid, prismatic("body", (1, 0, 0), 0.0, travel, middle))
     outline = key_outline("round", (1.7 * inner, 1.7 * inner), 14)
     add_key(remote, "body", "select", face, (0.0, v), outline, height, travel)
     return max(high, height)

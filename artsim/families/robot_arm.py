@@ -151,9 +151,9 @@ def build(rng: np.random.Generator) -> Assembly:
         if narrow_limits(chain.links, 0.025 * reach):
             break
 
-    arm = Assembly()
+    arm = Assembly(density=1800.0)
     for link in chain.links:
-        arm.add(link.name, link.solid, link.joint, density=1800.0)
+        arm.add(link.name, link.solid, link.joint)
     if spread is not None:
         _fingers(arm, chain, spread)
     return arm
@@ -340,5 +340,4 @@ def _fingers(arm: Assembly, chain: _Chain, half: float) -> None:
         finger += block((inner, inner + 0.8 * thick), length - 0.5 * r * tip, length + 0.05 * r, 0.3 * r)
         travel = half - inner - 1.6 * thick
         mimic = ("finger_0", 1.0) if number else None
-        joint = prismatic(chain.name, side * u, 0.0, travel, chain.at, mimic=mimic)
-        arm.add(f"finger_{number}", finger, joint, density=1800.0)
+        arm.add(f"finger_{number}", finger, prismatic(chain.name, side * u, 0.0, travel, chain.at, mimic=mimic))

@@ -79,16 +79,15 @@ def build(rng: np.random.Generator) -> Assembly:
     def placed(solid: Solid) -> Solid:
         return solid if left else solid.mirrored(1)
 
-    safe = Assembly()
+    safe = Assembly("body", placed(_body(rng, shape)), 2500.0)
     safe.record(handles=True)
-    safe.add("body", placed(_body(rng, shape)), density=2500.0)
     x, y = shape.hinge
     upper = np.deg2rad(rng.uniform(100.0, 176.0))
     face = shape.door[0][0]
     opener = str(rng.choice(["lever", "wheel", "pull"], p=[0.45, 0.3, 0.25]))
     combination = bool(rng.random() < 0.6)
     door = _door(rng, shape, combination, opener)
-    safe.add("door", placed(door), side_hinge(x, sign * y, upper, left), density=2500.0)
+    safe.add("door", placed(door), side_hinge(x, sign * y, upper, left))
 
     low, high = shape.door
     size = min(high[1] - low[1], high[2] - low[2])

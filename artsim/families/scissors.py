@@ -83,11 +83,10 @@ def build(rng: np.random.Generator) -> Assembly:
             (0, 0, face - 0.5 * outward * sheet), (0, 0, face + outward * button), pivot, 0.85 * pivot, 20
         )
         blades.append(solid.rotated(_POINTS_TO_Y))
-    scissors = Assembly()
+    scissors = Assembly(density=4500.0)
     # The upper blade is the root: its ring is the one towards -X.
-    scissors.add("blade_1", blades[1], label="blade", density=4500.0)
-    joint = revolute("blade_1", (0, 0, 1), (0, 0, middle), 0.0, opening)
-    scissors.add("blade_2", blades[0], joint, label="blade", density=4500.0)
+    scissors.add("blade_1", blades[1], label="blade")
+    scissors.add("blade_2", blades[0], revolute("blade_1", (0, 0, 1), (0, 0, middle), 0.0, opening), label="blade")
     return scissors
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.families.wheels import STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 
@@ -73,23 +73,19 @@ def shopping_cart(rng: np.random.Generator) -> Assembly:
                                                                       (front, track * narrow, base), tubes)  # fmt: skip
     if rng.random() < 0.5:
         rack = 0.7 * narrow * track
-        for y in np.linspace(-rack, rack, 5).tolist():
-            body += bar((front, y, base), (back, y, base), 0.005, 4)
+        body += union(bar((front, y, base), (back, y, base), 0.005, 4) for y in np.linspace(-rack, rack, 5).tolist())
     grip = high + rng.uniform(0.02, 0.1)
     reach = 0.5 * length + rng.uniform(0.06, 0.14)
-    for s in (-1.0, 1.0):
-        body += bar((0.5 * length - 0.02, s * half, high), (reach, s * half, grip), tubes)
+    body += union(bar((0.5 * length - 0.02, s * half, high), (reach, s * half, grip), tubes) for s in (-1.0, 1.0))
     body += cylinder((reach, -half - 0.02, grip), (reach, half + 0.02, grip), 1.3 * tubes, sections=14)
     spots = [(front, -track * narrow), (front, track * narrow), (back, -track), (back, track)]
     swivels = int(rng.choice([2, 4], p=[0.6, 0.4]))
-    for x, y in spots[swivels:]:
-        body += wheels.bracket(x, y, base - 0.5 * tubes)
+    body += union(wheels.bracket(x, y, base - 0.5 * tubes) for x, y in spots[swivels:])
     seat = rng.random() < 0.5
     seat_x, hinge_z = 0.5 * length - 0.05 - 0.3 * lean, high - 0.03
     if seat:
         body += bar((seat_x, -0.97 * half, hinge_z + 0.008), (seat_x, 0.97 * half, hinge_z + 0.008), 0.005)
-    cart = Assembly()
-    cart.add("body", body, density=STEEL)
+    cart = Assembly("body", body, STEEL)
     for number, (x, y) in enumerate(spots):
         if number < swivels:
             wheels.add_caster(cart, x, y, base - tubes)

@@ -25,7 +25,6 @@ def standing(rng: np.random.Generator) -> Assembly:
     foot = str(rng.choice(["disc", "square", "legs", "vase"], p=[0.35, 0.2, 0.25, 0.2]))
     thick = rng.uniform(0.012, 0.03)
     base, floor = _foot(rng, foot, wide, thick, height, radius)
-    lamp = Assembly()
     slides = foot in ("disc", "square") and rng.random() < 0.35
     parent = "base"
     travel = 0.0
@@ -37,9 +36,9 @@ def standing(rng: np.random.Generator) -> Assembly:
     else:
         base += cylinder((0, 0, floor - 0.004), (0, 0, height), radius, sections=14)
     button = rng.random() < 0.35 and foot in ("disc", "square")
-    lamp.add("base", base, density=2500.0)
+    lamp = Assembly("base", base, 2500.0)
     if slides:
-        lamp.add("pole", pole, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)), density=2500.0)
+        lamp.add("pole", pole, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)))
         parent = "pole"
     rim = rng.uniform(0.08, 0.19) * (1.0 if height < 0.7 else 1.4)
     tall = rim * rng.uniform(0.8, 1.9)
@@ -149,8 +148,7 @@ def spotlight(rng: np.random.Generator) -> Assembly:
         base, _ = _foot(rng, "legs", wide, 0.02, high, 0.012)
     if mount != "disc":
         base += cylinder((0, 0, 0.01 if mount == "pole" else 0.2 * high), (0, 0, high), 0.011, sections=14)
-    lamp = Assembly()
-    lamp.add("base", base, density=2500.0)
+    lamp = Assembly("base", base, 2500.0)
     low = high + GAP
     center = np.array([0.0, 0.0, low + thick + reach])
     half = radius + 0.006
@@ -161,7 +159,7 @@ def spotlight(rng: np.random.Generator) -> Assembly:
             box((-0.012, a, low), (0.012, b, low + thick)),
             cylinder((0, a, center[2]), (0, b, center[2]), 0.012, sections=14),
         )
-    lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)), density=2500.0)
+    lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)))
     # The front of the head looks to -X.
     rim = radius * rng.uniform(0.75, 1.0)
     back = radius * rng.uniform(0.3, 0.95)

@@ -80,8 +80,7 @@ def build(rng: np.random.Generator) -> Assembly:
     arm_width = max(width * rng.uniform(1.25, 2.6), 2 * lay.inside)
     if rng.random() < 0.15:  # short and wide, like those for a schoolbag
         arm_width = min(arm_width * rng.uniform(1.4, 2.1), 0.5 * length)
-    stapler = Assembly()
-    stapler.add("base", _base(rng, lay, arm_width), density=2500.0)
+    stapler = Assembly("base", _base(rng, lay, arm_width), 2500.0)
     magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
     widest = _opening(arm, lay)
     wide = min(np.deg2rad(with_tails(rng, (80, 125), (80, 206), 0.45)), widest)
@@ -92,7 +91,7 @@ def build(rng: np.random.Generator) -> Assembly:
         stapler.add("arm", arm, revolute("magazine", axis, origin, 0.0, wide - lift), density=2000.0)
     else:
         joined = box((-0.9 * length, -0.3 * width, lay.magazine - 0.001), (0, 0.3 * width, lay.magazine + 0.002))
-        stapler.add("arm", magazine + joined + arm, revolute("base", axis, origin, 0.0, wide), density=2500.0)
+        stapler.add("arm", magazine + joined + arm, revolute("base", axis, origin, 0.0, wide))
     return stapler
 
 

@@ -50,14 +50,14 @@ def build(rng: np.random.Generator) -> Assembly:
             inside, parts = fronts.shelves(rng, cell, style)
         body += inside
         moving += parts
-    furniture = Assembly()
+    furniture = Assembly(density=650.0)
     body += _carcass(rng, kind, width, depth, height, stand, style, furniture)
     furniture.record(handles=style.handle != "none")
-    furniture.add("body", body, density=650.0)
+    furniture.add("body", body)
     count: dict[str, int] = {}
     for label, solid, joint in moving:
         number = count[label] = count.get(label, -1) + 1
-        furniture.add(f"{label}_{number}", solid, joint, density=650.0)
+        furniture.add(f"{label}_{number}", solid, joint)
     return furniture
 
 

@@ -76,7 +76,6 @@ def _trolley(rng: np.random.Generator) -> Assembly:
     wheel_x = x - 0.05
     front_x = -wheel_x if seam == 0.0 else seam + 0.04
     spinner = rng.random() < 0.7 and wheel_x - front_x > 0.09  # four casters that clear one another
-    case = Assembly()
     if spinner:
         places = [(wheel_x, s * (y - 0.05), "body") for s in (-1, 1)]
         places += [(front_x, s * (y - 0.05), "lid" if front_x < seam else "body") for s in (-1, 1)]
@@ -96,9 +95,9 @@ def _trolley(rng: np.random.Generator) -> Assembly:
                     (wheel_x - 0.02, s * (y - 0.04) + cheek - 0.004, 0.022),
                     (wheel_x + 0.022, s * (y - 0.04) + cheek + 0.004, lift + 0.01),
                 )
-    case.add("body", back, density=300.0)
+    case = Assembly("body", back, 300.0)
     limit = np.deg2rad(rng.uniform(60.0, 175.0))
-    case.add("lid", front, revolute("body", (0, 0, -side), (seam, hinge_y, high / 2), 0.0, limit), density=300.0)
+    case.add("lid", front, revolute("body", (0, 0, -side), (seam, hinge_y, high / 2), 0.0, limit))
     _telescope(rng, case, x, half, lift, high)
     for number, (px, py, parent) in enumerate(places):
         _caster(case, number, px, py, lift - 0.003, parent)
@@ -183,11 +182,10 @@ def _briefcase(rng: np.random.Generator) -> Assembly:
         back += union(
             cylinder((0.6 * x, s * 0.8 * y, -0.008), (0.6 * x, s * 0.8 * y, 0.003), 0.008, 0.01, 12) for s in (-1, 1)
         )
-    case = Assembly()
     fixed = rng.random() < 0.35  # the handle
-    case.add("body", back + lugs + handle if fixed else back + lugs, density=300.0)
+    case = Assembly("body", back + lugs + handle if fixed else back + lugs, 300.0)
     limit = np.deg2rad(rng.uniform(45.0, 175.0))
-    case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, -barrel - 0.001), 0.0, limit), density=300.0)
+    case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, -barrel - 0.001), 0.0, limit))
     if not fixed:
         most = rng.uniform(0.9, 1.35)
         case.add("handle", handle, revolute("body", (0, 1, 0), (middle, 0, z + 0.0085), -most, most), density=900.0)

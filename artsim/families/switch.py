@@ -36,7 +36,6 @@ def build(rng: np.random.Generator) -> Assembly:
     inner = np.array([[-width / 2 + border, -height / 2 + border], [width / 2 - border, height / 2 - border]])
     cells = _cells(inner, count, 1 if upright else 0, bar)
 
-    switch = Assembly()
     plate = _plate(rng, width, height, depth, kind != "rocker" or border > 0.013)
     if kind == "rocker":
         half = 0.5 * np.array([width, height]) - 0.004
@@ -74,9 +73,9 @@ def build(rng: np.random.Generator) -> Assembly:
             buttons.append((solid, joint))
         else:
             plate += solid
-    switch.add("frame", plate, density=1200.0)
+    switch = Assembly("frame", plate, 1200.0)
     for number, (solid, joint) in enumerate(buttons):
-        switch.add(f"button_{number}", solid, joint, density=1200.0)
+        switch.add(f"button_{number}", solid, joint)
     return switch
 
 

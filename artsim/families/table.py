@@ -29,12 +29,11 @@ def build(rng: np.random.Generator) -> Assembly:
     table = Table()
     kinds = (_apron, _pedestals, _case, _column)
     kinds[rng.choice(4, p=[0.36, 0.27, 0.25, 0.12])](rng, table)
-    assembly = Assembly()
-    assembly.add("body", table.body, density=650.0)
+    assembly = Assembly("body", table.body, 650.0)
     count: dict[str, int] = {}
     for label, solid, joint in table.moving:
         number = count[label] = count.get(label, -1) + 1
-        assembly.add(f"{label}_{number}", solid, joint, density=650.0)
+        assembly.add(f"{label}_{number}", solid, joint)
     return assembly
 
 
@@ -188,8 +187,7 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
         keyboard_tray(rng, table, front, near, far, top, 0.6 * deep)
     if rng.random() < 0.15:  # shelves on the top
         rise, back = rng.uniform(0.2, 0.5), x - rng.uniform(0.18, 0.3)
-        for yy in (-y, y - 0.02):
-            table.body += box((back, yy, height - 0.001), (x, yy + 0.02, height + rise))
+        table.body += union(box((back, yy, height - 0.001), (x, yy + 0.02, height + rise)) for yy in (-y, y - 0.02))
         table.body += box((back, -y, height + rise - 0.02), (x, y, height + rise))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
@@ -51,10 +51,8 @@ class Table:
         board = style.board
         style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)
         solid = box((style.back, low[1], low[2]), high)
-        for z in (low[2], high[2] - board):
-            solid += box((style.face, low[1], z), (high[0], high[1], z + board))
-        for y in (low[1], high[1] - board):
-            solid += box((style.face, y, low[2]), (high[0], y + board, high[2]))
+        solid += union(box((style.face, low[1], z), (high[0], high[1], z + board)) for z in (low[2], high[2] - board))
+        solid += union(box((style.face, y, low[2]), (high[0], y + board, high[2])) for y in (low[1], high[1] - board))
         whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
                      (free[0], True), (free[1], True))  # fmt: skip
         columns, boards = _divided(rng, whole, 0, grid[0], style)
@@ -142,8 +140,7 @@ def four_legs(rng: np.random.Generator, x: float, y: float, low: float, high: fl
     if kind == "loops":
         for s in (-1, 1):
             a, b = sorted((s * y, s * (y - size)))
-            for u in (-x, x - size):
-                solid += box((u, a, low), (u + size, b, high))
+            solid += union(box((u, a, low), (u + size, b, high)) for u in (-x, x - size))
             solid += box((-x, a, low), (x, b, low + 0.7 * size))
         return solid
     for sx in (-1, 1):

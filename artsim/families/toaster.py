@@ -175,6 +175,4 @@ def _bun_rack(length: float, half: float, z: float) -> Solid:
     for y in (-0.6 * half, 0.6 * half):
         path = [(0.06, y, z - 0.006), (0.07, y, lift), (length - 0.07, y, lift), (length - 0.06, y, z - 0.006)]
         solid += tube(path, 0.002, 8)
-    for x in (0.08, length - 0.08):
-        solid += tube([(x, -0.6 * half, lift), (x, 0.6 * half, lift)], 0.002, 8)
-    return solid
+    return solid + union(tube([(x, -0.6 * half, lift), (x, 0.6 * half, lift)], 0.002, 8) for x in (0.08, length - 0.08))

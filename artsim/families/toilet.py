@@ -53,7 +53,6 @@ def build(rng: np.random.Generator) -> Assembly:
     lean = rng.uniform(0.0, 0.2)  # beyond upright
     # Behind the axis there is room for the lid as it stands up, and for a lever on the cistern.
     back = 0.5 * length + cover.over + cover.axis + cover.rise + 0.045 + lean * (length + 0.05)
-    toilet = Assembly()
     body = _bowl(rng, length, width, height, power, back, hung)
     moving: list[tuple[str, Solid, JointSpec]] = []
     if tank == "low":
@@ -63,7 +62,7 @@ def build(rng: np.random.Generator) -> Assembly:
     else:
         body += _wall(rng, moving, back, width, height, hung)
     fixed, covers = _seat_and_lid(rng, length, width, height, power, cover, np.pi / 2 + lean)
-    toilet.add("body", body + fixed, density=2300.0)
+    toilet = Assembly("body", body + fixed, 2300.0)
     for name, solid, joint in covers + moving:
         toilet.add(name, solid, joint, density=1200.0)
     return toilet

@@ -178,8 +178,7 @@ def _wheelie(rng: np.random.Generator) -> Assembly:
         body += tube([(x - 0.004, s * 0.7 * y, grip_z - 0.02), (grip_x, s * 0.7 * y, grip_z)], 0.011, 10)
     body += cylinder((grip_x, -0.75 * y, grip_z), (grip_x, 0.75 * y, grip_z), 0.014, sections=16)
 
-    can = Assembly()
-    can.add("body", body, density=600.0)
+    can = Assembly("body", body, 600.0)
     seam = height + GAP
     hinge = (x + 0.012, 0.0, seam)
     rise = rng.uniform(0.03, 0.07)
@@ -188,7 +187,7 @@ def _wheelie(rng: np.random.Generator) -> Assembly:
     lid += box((x - 0.02, -0.6 * y, seam), (hinge[0], 0.6 * y, seam + 0.009))
     lid += cylinder((hinge[0], -0.6 * y, seam + 0.002), (hinge[0], 0.6 * y, seam + 0.002), 0.008, sections=12)
     limit = np.deg2rad(rng.uniform(75.0, 108.0) if rng.random() < 0.6 else rng.uniform(108.0, 205.0))
-    can.add("lid", lid, revolute("body", (0, 1, 0), hinge, 0.0, limit), density=600.0)
+    can.add("lid", lid, revolute("body", (0, 1, 0), hinge, 0.0, limit))
     for number, s in enumerate((1.0, -1.0)):
         near, far = s * inner, s * (inner + wide)
         tyre = cylinder((axle[0], near, wheel), (axle[0], far, wheel), wheel, sections=28)

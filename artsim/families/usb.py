@@ -61,7 +61,7 @@ def build(rng: np.random.Generator) -> Assembly:
     length = plug.reach * rng.uniform(1.1, 4.2)
     stick = _Stick(length, half, thick, plug)
     kind = str(rng.choice(["cap", "two caps", "swivel", "sleeve", "slider"], p=[0.3, 0.1, 0.28, 0.14, 0.18]))
-    usb = Assembly()
+    usb = Assembly(density=1200.0)
     if kind == "slider":
         _retracting(rng, usb, stick)
     else:
@@ -158,7 +158,7 @@ def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: 
 def _capped(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     """A cap that pulls off to -X."""
     body = _body(rng, stick, 0.0, stick.length) + _plug(stick.plug, 0.0)
-    usb.add("body", body + _eyelet(rng, stick, stick.length), density=1200.0)
+    usb.add("body", body + _eyelet(rng, stick, stick.length))
     _cap(rng, usb, stick, "cap", 0.0, -1.0)
     _bail(rng, usb, stick)
     _switch(rng, usb, stick)
@@ -167,7 +167,7 @@ def _capped(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
 def _two_caps(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     """A connector and a cap at either end."""
     body = _body(rng, stick, 0.0, stick.length)
-    usb.add("body", body + _plug(stick.plug, 0.0) + _plug(stick.plug, stick.length, 1.0), density=1200.0)
+    usb.add("body", body + _plug(stick.plug, 0.0) + _plug(stick.plug, stick.length, 1.0))
     _cap(rng, usb, stick, "cap_0", 0.0, -1.0)
     _cap(rng, usb, stick, "cap_1", stick.length, 1.0)
 
@@ -271,7 +271,7 @@ def _retracting(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     top = np.array([(y, z) for y in (-slot - 1e-4, slot + 1e-4) for z in (inner[1], thick)])
     solid += prism(top, 0.0, max(first, 0.0005), 0) + prism(top, last, back, 0)
     solid += prism(rim, back - 1e-4, length, 0)
-    usb.add("body", solid + _eyelet(rng, _Stick(length, half, thick, plug), length), density=1200.0)
+    usb.add("body", solid + _eyelet(rng, _Stick(length, half, thick, plug), length))
     slider = _plug(plug, plug.reach)
     low = inner - GAP
     slider += box((plug.reach, *-low), (plug.reach + carriage, *low))
@@ -310,4 +310,4 @@ def _switch(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     x, top = 0.2 * stick.length, 1.12 * stick.thick + 0.4 * stick.half + GAP
     size = 0.1 * stick.length
     knob = rounded_box((x, -0.6 * size, top), (x + size, 0.6 * size, top + 0.001), 0.0003, 2)
-    usb.add("switch", knob, prismatic("body", (1, 0, 0), 0.0, size, (x, 0, top)), density=1200.0)
+    usb.add("switch", knob, prismatic("body", (1, 0, 0), 0.0, size, (x, 0, top)))

@@ -30,7 +30,6 @@ def build(rng: np.random.Generator) -> Assembly:
     half = 0.5 * count * spacing * (1.0 if count > 1 else rng.uniform(0.55, 0.9))
     body = tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(rng, half, pipe)
     style, joint_style = int(rng.integers(1 << 30)), int(rng.integers(1 << 30))
-    valve = Assembly()
     parts = []
     for k in range(count):
         y = (k - 0.5 * (count - 1)) * spacing
@@ -39,7 +38,7 @@ def build(rng: np.random.Generator) -> Assembly:
         fixed, moving, pivot, height = make(alike, pipe, room)
         body += fixed.moved((0, y, 0))
         parts.append((moving.moved((0, y, 0)), pivot + (0, y, 0), height))
-    valve.add("body", body, density=IRON)
+    valve = Assembly("body", body, IRON)
     rises = rng.random() < 0.75
     direction = float(rng.choice([-1.0, 1.0]))
     for k, (solid, pivot, travel) in enumerate(parts):
@@ -50,7 +49,7 @@ def build(rng: np.random.Generator) -> Assembly:
             joint = screw("body", UP, pivot, 0.0, turns, travel / turns)
         else:
             joint = continuous("body", direction * UP, pivot)
-        valve.add(f"{'lever' if lever else 'handwheel'}_{k}", solid, joint, density=IRON)
+        valve.add(f"{'lever' if lever else 'handwheel'}_{k}", solid, joint)
     return valve
 
 

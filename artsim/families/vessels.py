@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull_of, loft, ring, rounded_box, tube
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull_of, loft, ring, rounded_box, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -183,7 +183,4 @@ def grip_loop(points: ArrayLike, wide: float, thick: float) -> Solid:
     path = np.asarray(points, dtype=np.float64)
     knots = [rounded_box((x - thick, -wide, z - thick), (x + thick, wide, z + thick), 0.8 * thick, axis=1)
              for x, z in path.tolist()]  # fmt: skip
-    solid = Solid()
-    for a, b in pairwise(knots):
-        solid += hull_of(a, b)
-    return solid
+    return union(hull_of(a, b) for a, b in pairwise(knots))

@@ -44,8 +44,7 @@ def wagon(rng: np.random.Generator) -> Assembly:
     z = wheels.radius
     body += box((x_back - 0.02, -inner + 0.03, z - 0.015), (x_back + 0.02, inner - 0.03, floor + 0.002))
     body += cylinder((x_back, -inner, z), (x_back, inner, z), 0.012, sections=12)
-    cart = Assembly()
-    cart.add("body", body, density=500.0)
+    cart = Assembly("body", body, 500.0)
     top = floor - GAP
     axle = cylinder((x_front, 0, top), (x_front, 0, top - 0.015), 0.4 * half, sections=20)
     axle += box((x_front - 0.02, -0.35 * half, z - 0.015), (x_front + 0.02, 0.35 * half, top - 0.005))
@@ -75,8 +74,7 @@ def wagon(rng: np.random.Generator) -> Assembly:
             6,
             closed=True,
         )
-    joint = revolute("axle", (0, 1, 0), pivot, -0.8 * start, steepest - start)
-    cart.add("handle", drawbar, joint, density=STEEL)
+    cart.add("handle", drawbar, revolute("axle", (0, 1, 0), pivot, -0.8 * start, steepest - start), density=STEEL)
     for x, parent in ((x_front, "axle"), (x_back, "body")):
         for s in (-1.0, 1.0):
             wheels.add(cart, (x, s * track, z), parent)
@@ -141,13 +139,12 @@ def hand_cart(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.5:  # a prop on which it stands level
         for s in (-1.0, 1.0):
             body += tube([(front + 0.1, s * 0.6 * half, under), (front + 0.08, s * 0.6 * half, 0.8 * r)], 0.8 * r, 8)
-    cart = Assembly()
-    cart.add("body", body, density=500.0)
+    cart = Assembly("body", body, 500.0)
     if gate:
         x = back + GAP
         leaf = box((x, -half + 0.004, low + 0.004), (x + wall, half - 0.004, low + tall))
         hinge = revolute("body", (0, 1, 0), (x + wall, 0, low + 0.004), 0.0, rng.uniform(1.0, 2.4))
-        cart.add("tailgate", leaf, hinge, label="door", density=500.0)
+        cart.add("tailgate", leaf, hinge, label="door")
     for s in (-1.0, 1.0):
         wheels.add(cart, (x_axle, s * y_wheel, z))
     return cart

@@ -60,8 +60,7 @@ class Wheels:
 
     def add(self, cart: Assembly, center: Vector, parent: str = "body") -> None:
         """A wheel that turns on its axle."""
-        joint = continuous(parent, ROLL, center)
-        cart.add(f"wheel_{self.count}", self.solid(center), joint, density=900.0)
+        cart.add(f"wheel_{self.count}", self.solid(center), continuous(parent, ROLL, center), density=900.0)
         self.count += 1
 
     def add_caster(self, cart: Assembly, x: float, y: float, top: float) -> None:

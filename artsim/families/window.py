@@ -40,7 +40,7 @@ def build(rng: np.random.Generator) -> Assembly:
         depth = max(depth, (count if kind == "sliding" else 2) * (sash + GAP) + 0.015)
     glazing = int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])), int(rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))
     rail = rng.uniform(0.035, 0.065)
-    window = Assembly()
+    window = Assembly(density=900.0)
     body = _frame(rng, width, height, depth, bar)
     if kind == "hinged":
         _hinged(rng, window, body, width, height, depth, sash, rail, count, glazing)
@@ -145,7 +145,7 @@ def _leaf(
     origin[0], origin[across] = low[0] - 0.001, edge
     stay, most = swing_limits(abs(foot[across] - edge) - 0.12, 0.05)  # whichever way the lever points
     angle = min(limit, most if outer else stay)
-    window.add(name, solid, revolute("frame", axis, tuple(origin), 0.0, angle), label="sash", density=900.0)
+    window.add(name, solid, revolute("frame", axis, tuple(origin), 0.0, angle), label="sash")
 
     if not lever_turns:
         return
@@ -183,7 +183,7 @@ def _sliding(
         joint = prismatic(
             "frame", (0, 1, 0), min(0.0, -(first + width / 2 - GAP)), max(0.0, -left), tuple(0.5 * (low + high))
         )
-        window.add(f"sash_{k}", solid, joint, density=900.0)
+        window.add(f"sash_{k}", solid, joint)
 
 
 def _hung(
@@ -213,12 +213,10 @@ def _hung(
         "sash_0" if both else "sash",
         solids[0][0],
         prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1]),
-        density=900.0,
     )
     if both:
         window.add(
             "sash_1",
             solids[1][0],
             prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1]),
-            density=900.0,
         )

@@ -59,22 +59,39 @@ class Assembly:
 
     The frame is the family's own choice as long as Z is up and the front faces -X; :meth:`build` moves the origin to
     the centre of the rest-state box.
+
+    Parameters
+    ----------
+    root : str, optional
+        Name of the root; it may be added later, as any part.
+    solid : Solid
+        Of the root.
+    density : float
+        kg/m^3: of the root, and of each part that is added without one.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, root: str | None = None, solid: Solid | None = None, density: float = 600.0) -> None:
+        self.density = density
         self._names: list[str] = []
         self._labels: list[str] = []
         self._solids: list[Solid] = []
         self._densities: list[float] = []
         self._joints: list[JointSpec | None] = []
         self._features: dict[str, bool] = {}
+        if root is not None:
+            self.add(root, solid or Solid())
 
     def record(self, **features: bool) -> None:
         """Note whether the object has handles or legs, which are no parts of their own: ``record(handles=True)``."""
         self._features.update(features)
 
     def add(
-        self, name: str, solid: Solid, joint: JointSpec | None = None, label: str | None = None, density: float = 600.0
+        self,
+        name: str,
+        solid: Solid,
+        joint: JointSpec | None = None,
+        label: str | None = None,
+        density: float | None = None,
     ) -> str:
         """Add a part.
 
@@ -88,8 +105,8 @@ class Assembly:
             None for the root.
         label : str, optional
             Semantic name; the name without a trailing number by default.
-        density : float
-            kg/m^3.
+        density : float, optional
+            kg/m^3; that of the assembly by default.
 
         Returns
         -------
@@ -111,7 +128,7 @@ class Assembly:
         self._names.append(name)
         self._labels.append(label or (stem if number.isdigit() else name))
         self._solids.append(solid)
-        self._densities.append(density)
+        self._densities.append(self.density if density is None else density)
         self._joints.append(joint)
         return name
 
