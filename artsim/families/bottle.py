@@ -16,7 +16,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
 
 UP = np.array([0.0, 0.0, 1.0])
 DENSITY = 300.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -242,15 +242,15 @@ def _flip_top(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mo
     lid = cap(0.98 * radius, wall, base, base + tall, top=0.98 * radius * rng.uniform(0.75, 1.0))
     z = base + r
     lid += cylinder((x, -half, z), (x, half, z), r, sections=12)
-    lid += box((0.8 * radius, -half, base), (x, half, base + 1.6 * r))
+    lid += box((0.8 * radius, x), half, (base, base + 1.6 * r))
     for s in (-1.0, 1.0):  # lugs at both ends of the barrel
         y0, y1 = sorted((s * (half + 0.0006), s * (half + 0.0006 + 1.5 * r)))
         collar += hull_of(cylinder((x, y0, z), (x, y1, z), r, sections=10),
                           box((0.7 * radius, y0, high - 2.5 * r), (x, y1, high - r)))  # fmt: skip
     if rng.random() < 0.6:  # a thumb rest at the front
         tip = 0.98 * radius
-        lid += rounded_box((-tip - 0.2 * radius, -0.3 * radius, base + 0.05 * tall),
-                           (-0.9 * tip, 0.3 * radius, base + 0.3 * tall), 0.1 * tall)  # fmt: skip
+        lid += box((-tip - 0.2 * radius, -0.3 * radius, base + 0.05 * tall),
+                           (-0.9 * tip, 0.3 * radius, base + 0.3 * tall), fillet=0.1 * tall)  # fmt: skip
     spout = 0.6 * (0.98 * radius - wall)
     if tall > 0.35 * radius:
         collar += cylinder((0, 0, high - 0.0005), (0, 0, high + 0.4 * tall), 0.5 * spout, 0.35 * spout, 14)
@@ -298,7 +298,7 @@ def _sprayer(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mou
     deck = high + 0.45 * tall  # the trigger hangs below it
     head += hull_of(cylinder((0, 0, high - 0.001), (0, 0, high + 0.001), 0.8 * radius, sections=16),
                     box((-0.35 * radius, -0.8 * wide, deck), (0.9 * radius, 0.8 * wide, deck + 0.001)))  # fmt: skip
-    head += rounded_box((-reach, -wide, deck), (radius * rng.uniform(1.0, 1.9), wide, top), 0.35 * wide)
+    head += box((-reach, radius * rng.uniform(1.0, 1.9)), wide, (deck, top), fillet=0.35 * wide)
     nozzle = 0.55 * min(wide, 0.5 * (top - deck))
     middle = 0.5 * (deck + top)
     head += cylinder((-reach - 0.35 * radius, 0, middle), (-reach + 0.002, 0, middle), nozzle, 1.2 * nozzle, 6)
@@ -354,7 +354,7 @@ def _bail(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth)
     lid = cylinder((0, 0, rim), (0, 0, rim + tall), radius, 0.92 * radius)
     if rng.random() < 0.6:
         lid += dome(0.85 * radius, rim + tall - 1e-4, rng.uniform(0.1, 0.45) * radius)
-    lid += cylinder((x, -half, z), (x, half, z), r, sections=12) + box((0.7 * radius, -half, rim), (x, half, rim + r))
+    lid += cylinder((x, -half, z), (x, half, z), r, sections=12) + box((0.7 * radius, x), half, (rim, rim + r))
     low = 0.5 * (mouth.foot + mouth.rim)
     body += ring((0, 0, low), UP, 0.98 * mouth.radius, mouth.radius + r, 1.6 * r, 20)
     for s in (-1.0, 1.0):

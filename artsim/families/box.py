@@ -13,7 +13,7 @@ from artsim.families.carton import LEAST_SHARES, MOST_SHARES, carton
 from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, rounded_box, tray, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, tray, union
 
 GAP = 0.0015
 
@@ -52,7 +52,7 @@ def _rigid(rng: np.random.Generator) -> Assembly:
         limit = np.deg2rad(rng.uniform(80.0, 175.0))
         thick = wall * rng.uniform(0.6, 1.2)
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
-            lid = box((-x, min(sign * y, sign * GAP), seam), (x, max(sign * y, sign * GAP), seam + thick))
+            lid = box(x, (min(sign * y, sign * GAP), max(sign * y, sign * GAP)), (seam, seam + thick))
             lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)
             chest.add(
                 f"lid_{number}",
@@ -70,12 +70,12 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     if not domed and top - seam + 0.2 * min(x, y) < 0.7 * height and rng.random() < 0.25:
         # A board below that stands out at the back, under the open lid, so that the box does not tip.
         behind = depth * rng.uniform(0.015, 0.065)
-        body += box((x - wall, -0.95 * (y - radius), 0.0), (axis_x + behind, 0.95 * (y - radius), 0.6 * wall))
+        body += box((x - wall, axis_x + behind), 0.95 * (y - radius), (0.0, 0.6 * wall))
     chest.add("body", body)
     spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
     for first, last in spans:
         lid += cylinder((axis_x, first * y, seam), (axis_x, last * y, seam), barrel, sections=12)
-        lid += box((x - wall, first * y, seam + 0.0003), (axis_x, last * y, seam + 0.9 * barrel))
+        lid += box((x - wall, axis_x), (first * y, last * y), (seam + 0.0003, seam + 0.9 * barrel))
     limit = np.deg2rad(rng.choice([rng.uniform(75.0, 115.0), rng.uniform(115.0, 170.0)]))
     chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit))
     if top - seam > 0.02 and rng.random() < 0.2:
@@ -108,7 +108,7 @@ def _bands(
         for share in ((-0.6, 0.6), (-0.7, 0.0, 0.7))[int(rng.integers(2))]:
             middle = share * (y - inner)
             for side in (-x - band, x - 0.8 * wall):
-                solid += box((side, middle - half, low), (side + band + 0.8 * wall, middle + half, high))
+                solid += box((side, side + band + 0.8 * wall), (middle - half, middle + half), (low, high))
     return solid
 
 
@@ -120,9 +120,9 @@ def _interior(rng: np.random.Generator, x: float, y: float, height: float, wall:
     top = height * rng.uniform(0.4, 0.9)
     solid = Solid()
     for edge in np.linspace(-y, y, int(rng.integers(2, 5)) + 1)[1:-1]:
-        solid += box((-x + wall / 2, edge - thin, wall / 2), (x - wall / 2, edge + thin, top))
+        solid += box(x - wall / 2, (edge - thin, edge + thin), (wall / 2, top))
     for edge in np.linspace(-x, x, int(rng.integers(1, 4)) + 1)[1:-1]:
-        solid += box((edge - thin, -y + wall / 2, wall / 2), (edge + thin, y - wall / 2, top))
+        solid += box((edge - thin, edge + thin), y - wall / 2, (wall / 2, top))
     return solid
 
 
@@ -136,7 +136,7 @@ def _feet(rng: np.random.Generator, x: float, y: float, wall: float) -> Solid:
         return frame((-x - out, -y - out, -drop), (x, y + out, wall), [2 * wall + out] * 4, 0, 1)
     if kind == "blocks":
         return union(
-            box((a - 1.9 * wall, b - 1.9 * wall, -drop), (a + 1.9 * wall, b + 1.9 * wall, 0.5 * wall))
+            box((a - 1.9 * wall, a + 1.9 * wall), (b - 1.9 * wall, b + 1.9 * wall), (-drop, 0.5 * wall))
             for a, b in corners
         )
     if kind == "balls":
@@ -153,16 +153,14 @@ def _lid(
         thick = wall * rng.uniform(0.7, 1.5)
         over = rng.choice([0.0, rng.uniform(0.5, 1.2) * wall])
         low, high = (-x - over, -y - over, seam), (x, y + over, seam + thick)
-        solid = rounded_box(low, high, radius, axis=2) if radius > 0 else rounded_box(low, high, 0.2 * thick, steps=2)
+        solid = box(low, high, fillet=radius, axis=2) if radius > 0 else box(low, high, fillet=0.2 * thick, steps=2)
         inner = 0.6 * over
         if plain and radius == 0.0 and inner > GAP and over - inner > 0.0015 and rng.random() < 0.6:
             skirt = min(rng.uniform(0.5, 3.0) * wall, 0.18 * height)  # on three sides, outside the body
             widths = [over - inner, 0.0, over - inner, over - inner]
             solid += frame((-x - over, -y - over, seam - skirt), (x, y + over, seam + 0.6 * thick), widths, 0, 1)
         elif rng.random() < 0.4:  # a raised board on top
-            solid += rounded_box(
-                (-0.75 * x, -0.85 * y, seam + 0.5 * thick), (0.75 * x, 0.85 * y, seam + 1.4 * thick), 0.3 * thick
-            )
+            solid += box(0.75 * x, 0.85 * y, (seam + 0.5 * thick, seam + 1.4 * thick), fillet=0.3 * thick)
         return solid, seam + thick, False
     if kind == "hollow":
         rise = height * with_tails(rng, (0.15, 0.9), (0.08, 1.6), 0.2)
@@ -221,8 +219,8 @@ def _latches(rng: np.random.Generator, chest: Assembly, front: float, y: float, 
         axis_x = -front - 2.2 * pin
         z = seam + upper
         solid = cylinder((axis_x, middle - width, z), (axis_x, middle + width, z), pin, sections=12)
-        solid += rounded_box(
-            (axis_x - 0.002, middle - width, seam - 1.4 * upper), (axis_x + 0.001, middle + width, z), 0.001
+        solid += box(
+            (axis_x - 0.002, axis_x + 0.001), (middle - width, middle + width), (seam - 1.4 * upper, z), fillet=0.001
         )
         chest.add(
             f"latch_{number}",

@@ -131,7 +131,7 @@ def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float
     """Plate or boss from the wall outward, with the pin that the bail hangs on; ``span`` holds where they end in Y."""
     wall, outer, tip = (side * y for y in span)
     if boxy:
-        solid = box((-half, min(wall, outer), pivot - 1.3 * half), (half, max(wall, outer), pivot + half))
+        solid = box(half, (min(wall, outer), max(wall, outer)), (pivot - 1.3 * half, pivot + half))
     else:
         solid = cylinder((0, wall, pivot), (0, outer, pivot), 1.2 * half, 0.9 * half, 20)
     solid += cylinder((0, outer - side * 0.001, pivot), (0, tip, pivot), 0.85 * pin, sections=12)

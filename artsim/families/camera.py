@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rounded_box, tube
+from artsim.making.solids import Solid, about, box, cylinder, ellipsoid, hull_of, prism, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -79,17 +79,15 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
     half, depth, height = shell.half, shell.depth, shell.height
     r = min(rng.uniform(0.05, 0.45) * depth, 0.4 * height)
     axis = [None, 2, 1, 0][int(rng.integers(4))]
-    body = rounded_box((0, -half, 0), (depth, half, height), r, axis=axis)
+    body = box((0, depth), half, (0, height), fillet=r, axis=axis)
     if rng.random() < 0.4:  # covering between two metal plates
-        body += rounded_box(
-            (-0.001, -half - 0.0005, 0.16 * height), (depth + 0.001, half + 0.0005, 0.8 * height), r, axis=2
-        )
+        body += box((-0.001, depth + 0.001), half + 0.0005, (0.16 * height, 0.8 * height), fillet=r, axis=2)
     if kind in ("reflex", "compact") and rng.random() < (0.85 if kind == "reflex" else 0.4):  # grip of the right hand
         deep = depth * (rng.uniform(0.2, 0.6) if kind == "reflex" else rng.uniform(0.05, 0.2))
         room = max(half - shell.lens_y - shell.lens_radius - 0.004, 0.008)
         wide = min(rng.uniform(0.25, 0.5) * half, room)
-        body += rounded_box(
-            (-deep, half - wide, 0.02 * height), (0.6 * depth, half, 0.97 * height), 0.45 * wide, axis=2
+        body += box(
+            (-deep, 0.6 * depth), (half - wide, half), (0.02 * height, 0.97 * height), fillet=0.45 * wide, axis=2
         )
     span = (0.0, 0.0, height)
     if kind == "reflex":
@@ -99,32 +97,33 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
         low = [(y - wide, height - 0.002), (y + wide, height - 0.002)]
         crest = [(y + wide * rng.uniform(0.4, 0.85), height + rise), (y - wide * rng.uniform(0.4, 0.85), height + rise)]
         body += prism(low + crest, rng.uniform(-0.15, 0.2) * depth, rng.uniform(0.8, 1.1) * depth, 0)
-        body += rounded_box(
-            (depth - 0.004, y - 0.5 * wide, height - 0.2 * rise),
-            (1.15 * depth, y + 0.5 * wide, height + 0.7 * rise),
-            0.004,
+        body += box(
+            (depth - 0.004, 1.15 * depth),
+            (y - 0.5 * wide, y + 0.5 * wide),
+            (height - 0.2 * rise, height + 0.7 * rise),
+            fillet=0.004,
         )
         span = (y - 0.4 * wide, y + 0.4 * wide, height + rise)
     elif kind == "rangefinder":
         if rng.random() < 0.6:  # a raised deck
             y0, y1 = sorted(rng.uniform(-0.95, 0.95, 2) * half)
-            body += rounded_box((0.05 * depth, y0, height - 0.003), (0.95 * depth, y1, height + 0.06 * height), 0.002)
+            body += box((0.05 * depth, 0.95 * depth), (y0, y1), (height - 0.003, height + 0.06 * height), fillet=0.002)
         for y, size in ((-0.75, 0.1), (0.3, 0.07)):  # windows
-            body += box((-0.0012, (y - size) * half, 0.8 * height), (0.002, (y + size) * half, 0.93 * height))
+            body += box((-0.0012, 0.002), ((y - size) * half, (y + size) * half), (0.8 * height, 0.93 * height))
     elif kind == "instant":
         rise = height * rng.uniform(0.1, 0.35)
         wide = half * rng.uniform(0.3, 0.98)
         body += hull_of(
-            box((0.2 * depth, -wide, height - 0.002), (depth, wide, height)),
-            box((0.4 * depth, -0.9 * wide, height + rise - 0.002), (depth, 0.9 * wide, height + rise)),
+            box((0.2 * depth, depth), wide, (height - 0.002, height)),
+            box((0.4 * depth, depth), 0.9 * wide, (height + rise - 0.002, height + rise)),
         )
         slot = min(0.18 * height, shell.lens_z - shell.lens_radius - 0.002)  # where pictures come out
-        body += rounded_box((-0.3 * depth, -half, 0), (0.1 * depth, half, slot), 0.004)
+        body += box((-0.3 * depth, 0.1 * depth), half, (0, slot), fillet=0.004)
         span = (-0.6 * wide, 0.6 * wide, height + rise)
     if kind in ("compact", "instant"):
         y = half * rng.uniform(0.3, 0.7) * rng.choice([-1.0, 1.0])
-        body += rounded_box(
-            (-0.0012, y - 0.14 * half, 0.8 * height), (0.003, y + 0.14 * half, 0.93 * height), 0.002, axis=0
+        body += box(
+            (-0.0012, 0.003), (y - 0.14 * half, y + 0.14 * half), (0.8 * height, 0.93 * height), fillet=0.002, axis=0
         )
     if kind in ("reflex", "rangefinder") and rng.random() < 0.4:  # lugs for a strap
         for s in (-1.0, 1.0):
@@ -168,8 +167,10 @@ def _top_controls(
         at = np.array([0.5 * depth, 0.5 * (left - half), z])
         crank = _dial(rng, at, size)
         if rng.random() < 0.4:
-            crank += rounded_box(
-                at + (-0.15 * size, -0.9 * size, 0.8 * size), at + (0.15 * size, 0.9 * size, 1.2 * size), 0.1 * size
+            crank += box(
+                at + (-0.15 * size, -0.9 * size, 0.8 * size),
+                at + (0.15 * size, 0.9 * size, 1.2 * size),
+                fillet=0.1 * size,
             )
         seats += seat(at, size)
         parts.append(("knob", crank, continuous("body", UP, at)))
@@ -198,7 +199,7 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
     z0, z1 = height * rng.uniform(0.08, 0.14), height * rng.uniform(0.68, 0.8)
     thick = rng.uniform(0.002, 0.006)
     x = depth + GAP
-    screen = rounded_box((x, y0, z0), (x + thick, y1, z1), 0.003, axis=0)
+    screen = box((x, x + thick), (y0, y1), (z0, z1), fillet=0.003, axis=0)
     if kind == "swing":
         camera.add("screen", screen, revolute("body", -UP, (x + thick, y0, z0), 0.0, rng.uniform(1.2, 3.0)))
     elif kind == "tilt":
@@ -207,7 +208,7 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
                          rng.uniform(0.5, 1.5))  # fmt: skip
         camera.add("screen", screen, joint)
     elif kind == "back":  # the whole back of a film camera opens
-        leaf = rounded_box((x, -0.97 * half, 0.06 * height), (x + thick, 0.97 * half, 0.92 * height), 0.002, axis=0)
+        leaf = box((x, x + thick), 0.97 * half, (0.06 * height, 0.92 * height), fillet=0.002, axis=0)
         camera.add("back", leaf, revolute("body", -UP, (x + thick, -0.97 * half, 0), 0.0, rng.uniform(1.2, 2.2)),
                    label="door")  # fmt: skip
     if kind in ("fixed", "swing", "tilt", "none"):
@@ -228,8 +229,8 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
                 camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
     if rng.random() < 0.2:  # a door at the right side
         y, t = half + 0.001, 0.0025
-        door = rounded_box(
-            (0.2 * shell.depth, y, 0.2 * height), (0.8 * shell.depth, y + t, 0.75 * height), 0.002, axis=1
+        door = box(
+            (0.2 * shell.depth, 0.8 * shell.depth), (y, y + t), (0.2 * height, 0.75 * height), fillet=0.002, axis=1
         )
         camera.add("door", door, revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2)))
 
@@ -240,7 +241,7 @@ def _flash(rng: np.random.Generator, camera: Assembly, shell: Shell, span: tuple
     low = z + GAP
     tall = shell.height * rng.uniform(0.06, 0.2)
     x0, x1 = 0.42 * shell.depth, 0.78 * shell.depth
-    flash = rounded_box((x0, y0, low), (x1, y1, low + tall), 0.3 * tall)
+    flash = box((x0, x1), (y0, y1), (low, low + tall), fillet=0.3 * tall)
     if rng.random() < 0.7:
         joint = revolute("body", (0, 1, 0), (x1, 0, low), 0.0, rng.uniform(0.5, 1.3))
     else:
@@ -256,7 +257,7 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
     half, height = rng.uniform(0.022, 0.045), rng.uniform(0.05, 0.085)
     depth = rng.uniform(0.09, 0.2)
     shell = Shell(half, depth, height, 0.0, height * rng.uniform(0.5, 0.62), min(half, 0.38 * height) * 0.92)
-    body = rounded_box((0, -half, 0), (depth, half, height), rng.uniform(0.1, 0.6) * half,
+    body = box((0, -half, 0), (depth, half, height), fillet=rng.uniform(0.1, 0.6) * half,
                        axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
     lens = Lens(rng, (0.0, 0.0, shell.lens_z), shell.lens_radius, str(rng.choice(["tubes", "prime", "zoom"])))
     if rng.random() < 0.5:  # a handle on top
@@ -272,23 +273,24 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
         for k in range(4):
             ends = [
                 box(
-                    (xs[i] - 0.001, ys[i] - 0.001, 0.5 * height - wide),
-                    (xs[i] + 0.001, ys[i] + 0.001, 0.5 * height + wide),
+                    (xs[i] - 0.001, xs[i] + 0.001),
+                    (ys[i] - 0.001, ys[i] + 0.001),
+                    (0.5 * height - wide, 0.5 * height + wide),
                 )
                 for i in (k, k + 1)
             ]
             body += hull_of(*ends)
     back = rng.random() < 0.5
     if back:
-        body += rounded_box((depth - 0.004, -0.7 * half, 0.05 * height), (depth + rng.uniform(0.008, 0.03), 0.7 * half,
-                                                                         0.62 * height), 0.004)  # fmt: skip
+        body += box((depth - 0.004, -0.7 * half, 0.05 * height), (depth + rng.uniform(0.008, 0.03), 0.7 * half,
+                                                                         0.62 * height), fillet=0.004)  # fmt: skip
     camera = Assembly("body", body + lens.fixed, DENSITY)
     lens.add_to(camera)
     if rng.random() < 0.85:
         thick = rng.uniform(0.004, 0.009)
         y = -half - GAP
         x0, x1 = depth * rng.uniform(0.06, 0.2), depth * rng.uniform(0.65, 0.95)
-        screen = rounded_box((x0, y - thick, 0.15 * height), (x1, y, 0.88 * height), 0.003, axis=1)
+        screen = box((x0, x1), (y - thick, y), (0.15 * height, 0.88 * height), fillet=0.003, axis=1)
         camera.add("screen", screen, revolute("body", -UP, (x0, y - thick, 0), 0.0, rng.uniform(1.2, 2.0)))
     if rng.random() < 0.5:
         z = 0.85 * height
@@ -300,8 +302,7 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
     for number, x in enumerate((0.3, 0.9)[: int(rng.integers(0, 3))]):
         size = 0.25 * half
         at = (x * depth, 0.55 * half, height + GAP)
-        button = rounded_box((at[0] - size, at[1] - 0.6 * size, at[2] + 0.0012), (at[0] + size, at[1] + 0.6 * size,
-                                                                                at[2] + 0.004), 0.001)  # fmt: skip
+        button = box(about(at[0], size), about(at[1], 0.6 * size), (at[2] + 0.0012, at[2] + 0.004), fillet=0.001)
         camera.add(f"button_{number}", button, prismatic("body", -UP, 0.0, 0.001, at))
     return camera
 
@@ -318,11 +319,11 @@ def _swivel(rng: np.random.Generator) -> Assembly:
         long = r * rng.uniform(1.4, 2.6)
         head = cylinder((-long, 0, 0), (0.8 * long, 0, 0), r, sections=22)
         if rng.random() < 0.6:
-            head += rounded_box((-1.25 * long, -0.9 * r, 0.75 * r), (0.7 * long, 0.9 * r, 1.1 * r), 0.1 * r)
+            head += box((-1.25 * long, 0.7 * long), 0.9 * r, (0.75 * r, 1.1 * r), fillet=0.1 * r)
         front, low = long, 1.3 * long + r
     else:
         long = r * rng.uniform(0.9, 2.0)
-        head = rounded_box((-long, -r, -0.8 * r), (long, r, 0.8 * r), 0.2 * r)
+        head = box(long, r, 0.8 * r, fillet=0.2 * r)
         front, low = long, 1.3 * long + r
     head += cylinder((-0.8 * front, 0, 0), (-front - 0.12 * r, 0, 0), 0.6 * r, sections=20)
     head += ring((-front - 0.18 * r, 0, 0), FRONT, 0.45 * r, 0.6 * r, 0.16 * r, 20)
@@ -334,8 +335,7 @@ def _swivel(rng: np.random.Generator) -> Assembly:
     foot = -sink - thick - GAP
     kind = str(rng.choice(["disc", "column", "clip"]))
     if kind == "clip":
-        base = box((-0.8 * r, -r, foot - 0.01), (0.8 * r, r, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r),
-                                                                        (0.6 * r, 0.7 * r, foot))  # fmt: skip
+        base = box(0.8 * r, r, (foot - 0.01, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r), (0.6 * r, 0.7 * r, foot))
     else:
         tall = r * (rng.uniform(0.2, 0.5) if kind == "disc" else rng.uniform(1.0, 3.0))
         base = cylinder((0, 0, foot - tall), (0, 0, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)

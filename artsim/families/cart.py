@@ -17,7 +17,7 @@ from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tray, tube, union
+from artsim.making.solids import Solid, box, cylinder, hull_of, tray, tube, union
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -37,10 +37,12 @@ def _platform_trolley(rng: np.random.Generator) -> Assembly:
     floor = wheels.caster_height + 0.006
     thick = rng.uniform(0.02, 0.05)
     top = floor + thick
-    body = rounded_box((-0.5 * length, -half, floor), (0.5 * length, half, top), rng.uniform(0.01, 0.06), axis=2)
+    body = box(0.5 * length, half, (floor, top), fillet=rng.uniform(0.01, 0.06), axis=2)
     if rng.random() < 0.5:
         for y in np.linspace(-0.8, 0.8, int(rng.integers(3, 7))).tolist():
-            body += box((-0.46 * length, y * half - 0.006, top - 0.001), (0.4 * length, y * half + 0.006, top + 0.002))
+            body += box(
+                (-0.46 * length, 0.4 * length), (y * half - 0.006, y * half + 0.006), (top - 0.001, top + 0.002)
+            )
     x_front, x_back = -0.5 * length + 2.0 * wheels.radius, 0.5 * length - 2.0 * wheels.radius
     spread = half - 1.6 * wheels.radius - 0.5 * wheels.wide
     swivels = int(rng.choice([2, 4], p=[0.7, 0.3]))
@@ -65,7 +67,7 @@ def _platform_trolley(rng: np.random.Generator) -> Assembly:
         handle += cylinder((x, -wide, foot), (x, wide, foot), r, sections=12)
         for s in (-1.0, 1.0):
             y0, y1 = sorted((s * (wide + r + 0.002), s * (wide + r + 0.006)))
-            body += box((x - 1.5 * r, y0, top - 0.004), (x + 1.5 * r, y1, foot + 1.5 * r))
+            body += box((x - 1.5 * r, x + 1.5 * r), (y0, y1), (top - 0.004, foot + 1.5 * r))
         cart.add("body", body, density=STEEL)
         limit = rng.uniform(1.2, 0.5 * np.pi)
         cart.add("handle", handle, revolute("body", (0, -1, 0), (x, 0, foot), 0.0, limit), density=STEEL)
@@ -97,7 +99,7 @@ def _hand_truck(rng: np.random.Generator) -> Assembly:
             [(x, -half, z), (x + bulge, -0.4 * half, z), (x + bulge, 0.4 * half, z), (x, half, z)], 0.75 * r, 8
         )
     if rng.random() < 0.4:
-        body += box((x - 0.003, -0.3 * half, 0.08 * height), (x + 0.003, 0.3 * half, 0.75 * height))
+        body += box((x - 0.003, x + 0.003), 0.3 * half, (0.08 * height, 0.75 * height))
     axle_x = x + wheels.radius + r + 0.02
     inner = half - (0.0 if rng.random() < 0.5 else wheels.wide + 0.02)
     for s in (-1.0, 1.0):
@@ -109,10 +111,10 @@ def _hand_truck(rng: np.random.Generator) -> Assembly:
     folding = rng.random() < 0.45
     toe_x, toe = x - r - 0.006, rng.uniform(0.12, 0.3)
     wide = half * rng.uniform(0.9, 1.3)
-    plate = rounded_box((toe_x - toe, -wide, 0.0), (toe_x if folding else x + r, wide, 0.006), 0.02, axis=2)
+    plate = box((toe_x - toe, toe_x if folding else x + r), wide, (0.0, 0.006), fillet=0.02, axis=2)
     top = _truck_handle(rng, shape, x, half, height, r, slides)
     if not folding:
-        body += plate + box((x - r, -wide, 0.0), (x + r, wide, 0.03))
+        body += plate + box((x - r, x + r), wide, (0.0, 0.03))
     if not slides:
         body += top
     cart = Assembly("body", body, STEEL)
@@ -170,14 +172,12 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
         for row in range(rows):
             z0, z1 = float(edges[row]) + 0.002, float(edges[row + 1]) - 0.002
             if row < rows - 1:
-                body += box(
-                    (-depth, -half + 0.5 * wall, z1 + 0.0005), (depth - 0.5 * wall, half - 0.5 * wall, z1 + 0.0035)
-                )
+                body += box((-depth, depth - 0.5 * wall), half - 0.5 * wall, (z1 + 0.0005, z1 + 0.0035))
             if doors and row == rows - 1:
                 _doors(rng, moving, depth, half, wall, z0, z1, face, kind)
                 continue
             inner = half - wall - 0.003
-            drawer = box((-depth - face, -half + 0.002, z0), (-depth - GAP, half - 0.002, z1))
+            drawer = box((-depth - face, -depth - GAP), half - 0.002, (z0, z1))
             tall = max(0.75 * (z1 - z0 - 0.012), 0.01)
             drawer += tray((-depth - 0.006, -inner, z0 + 0.004), (depth - wall - 0.02, inner, z0 + 0.004 + tall), 0.005)
             span = half * rng.uniform(0.25, 0.6)
@@ -186,9 +186,7 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
             slide = prismatic("body", (-1, 0, 0), 0.0, 2.0 * depth * rng.uniform(0.4, 0.8), (-depth, 0, z))
             moving.append((f"drawer_{row}", drawer, slide))
         if rng.random() < 0.6:
-            body += rounded_box(
-                (-depth - 0.01, -half - 0.01, top - 0.002), (depth + 0.01, half + 0.01, top + 0.018), 0.01, axis=2
-            )
+            body += box(depth + 0.01, half + 0.01, (top - 0.002, top + 0.018), fillet=0.01, axis=2)
     else:
         for sx in (-1.0, 1.0):
             for sy in (-1.0, 1.0):
@@ -200,8 +198,8 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
             if rail > 0:
                 body += tray((-depth, -half, z - 0.008), (depth, half, z - 0.008 + rail), 0.004)
             else:
-                body += rounded_box((-depth, -half, z - 0.012), (depth, half, z), 0.02, axis=2)
-        body += box((-depth, -half, base), (depth, half, base + 0.008))
+                body += box(depth, half, (z - 0.012, z), fillet=0.02, axis=2)
+        body += box(depth, half, (base, base + 0.008))
     if rng.random() < 0.75:  # a handle at the pusher's side
         z = top - rng.uniform(0.0, 0.06)
         out = depth + rng.uniform(0.04, 0.09)
@@ -236,7 +234,7 @@ def _doors(
         [(0.001, half - 0.002, True), (-half + 0.002, -0.001, False)] if two else [(-half + 0.002, half - 0.002, True)]
     )
     for number, (y0, y1, left) in enumerate(leaves):
-        leaf = box((x, y0, z0), (-depth - GAP, y1, z1))
+        leaf = box((x, -depth - GAP), (y0, y1), (z0, z1))
         y = y0 + 0.03 if left else y1 - 0.03
         middle, span = 0.5 * (z0 + z1), 0.2 * (z1 - z0)
         leaf += front_handle(kind, (x, y, middle - span), (x, y, middle + span), 0.03, 0.005)

@@ -55,8 +55,8 @@ def _carton_body(rng: np.random.Generator, x: float, y: float, height: float, wa
     holes = rng.random() < 0.35 and min(x, y) > 0.1 and height > 0.15
     if not holes:
         return tray((-x, -y, 0), (x, y, height), wall)
-    solid = box((-x, -y, 0), (x, y, wall))
-    solid += box((-x, -y, 0), (-x + wall, y, height)) + box((x - wall, -y, 0), (x, y, height))
+    solid = box(x, y, (0, wall))
+    solid += box((-x, -x + wall), y, (0, height)) + box((x - wall, x), y, (0, height))
     low, high = height * rng.uniform(0.6, 0.68), height * rng.uniform(0.75, 0.82)
     half = min(rng.uniform(0.035, 0.05), 0.6 * x)
     for end in (-y, y - wall):
@@ -140,9 +140,7 @@ def _outer_flap(
     edge = (x, y)[across]
     solid = _prism(side, outline, edge, z, z + wall)
     if lip > 0:  # over the front
-        solid += box((-x - GAP - wall, -y, z - lip), (-x - GAP, y, z + wall)) + box(
-            (-x - GAP - wall, -y, z), (0, y, z + wall)
-        )
+        solid += box((-x - GAP - wall, -x - GAP), y, (z - lip, z + wall)) + box((-x - GAP - wall, 0), y, (z, z + wall))
     origin = np.array([0.0, 0.0, z + wall])
     origin[across] = sign * (edge + GAP)  # beyond the wall, which a flap turned by 270 degrees hangs beside
     return solid, revolute("body", axis, tuple(origin), 0.0, limit)

@@ -11,7 +11,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, rounded_box, tube
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0025
@@ -56,13 +56,11 @@ def build(rng: np.random.Generator) -> Assembly:
     hinge = np.array([0.5 * depth + 0.03, 0.0, seat_low + 0.025])
     rest = _back(rng, width, top, hinge, tilting) if back else Solid()
     if back:
-        seat += box(
-            (0.2 * depth, -0.04, seat_low + 0.005), (hinge[0] - (0.018 if tilting else 0.0), 0.04, seat_low + 0.045)
-        )
+        seat += box((0.2 * depth, hinge[0] - (0.018 if tilting else 0.0)), 0.04, (seat_low + 0.005, seat_low + 0.045))
         if tilting:  # forks either side of the hinge
             for side in (-1, 1):
                 y0, y1 = sorted((side * (0.03 + GAP), side * 0.05))
-                seat += box((0.2 * depth, y0, seat_low + 0.005), (hinge[0] + 0.012, y1, seat_low + 0.045))
+                seat += box((0.2 * depth, hinge[0] + 0.012), (y0, y1), (seat_low + 0.005, seat_low + 0.045))
     arms = str(rng.choice(["none", "fixed", "sliding"], p=[1, 0, 0] if stool else [0.4, 0.4, 0.2]))
     if arms == "fixed":
         seat += _arms(rng, depth, width, seat_low, top)
@@ -80,7 +78,7 @@ def build(rng: np.random.Generator) -> Assembly:
 def _arm_sleeves(width: float, low: float, top: float) -> Solid:
     """Upright tubes beside the seat, on beams from below it."""
     y = 0.5 * width + 0.04
-    side = box((-0.02, 0.08, low + 0.004), (0.02, y, low + 0.026))
+    side = box(0.02, (0.08, y), (low + 0.004, low + 0.026))
     side += frame((-0.024, y - 0.014, low + 0.004), (0.024, y + 0.014, top + 0.08), [0.005] * 4, 0, 1)
     return side + side.mirrored(1)
 
@@ -91,8 +89,8 @@ def _sliding_arms(rng: np.random.Generator, chair: Assembly, depth: float, width
     half, fore, aft = rng.uniform(0.025, 0.05), rng.uniform(0.2, 0.35) * depth, rng.uniform(0.15, 0.3) * depth
     travel = rng.uniform(0.04, 0.09)
     for number, side in enumerate((-1, 1)):
-        arm = rounded_box((-fore, side * y - half, z), (aft, side * y + half, z + 0.03), 0.012)
-        arm += box((-0.016, side * y - 0.006, z - travel - 0.03), (0.016, side * y + 0.006, z + 0.01))
+        arm = box((-fore, aft), (side * y - half, side * y + half), (z, z + 0.03), fillet=0.012)
+        arm += box(0.016, (side * y - 0.006, side * y + 0.006), (z - travel - 0.03, z + 0.01))
         chair.add(f"arm_{number}", arm, prismatic("seat", UP, 0.0, travel, (0.0, side * y, z)), density=500.0)
 
 
@@ -135,8 +133,8 @@ def _star(
     slope = rng.uniform(0.0, 0.7)
     for k in range(legs):
         tip_top = low + 0.022
-        root = rounded_box((-0.01, -wide, low + slope * (hub - low - 0.04)), (0.01, wide, hub - 0.006), 0.006)
-        tip = rounded_box((span - 0.02, -narrow, low), (span + 0.02, narrow, tip_top), 0.006)
+        root = box(0.01, wide, (low + slope * (hub - low - 0.04), hub - 0.006), fillet=0.006)
+        tip = box((span - 0.02, span + 0.02), narrow, (low, tip_top), fillet=0.006)
         leg = hull_of(root, tip)
         if not castors:
             leg += cylinder((span, 0, 0), (span, 0, low + 0.01), 0.9 * narrow, sections=14)
@@ -154,7 +152,7 @@ def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, 
         x, y = span * cos(angle), span * sin(angle)
         fork = cylinder((0, 0, floor - 0.018), (0, 0, floor + 0.004 - GAP), 0.011, sections=14)
         fork += hull_of(
-            box((-0.009, -gap, floor - 0.02), (0.009, gap, floor - 0.01)),
+            box(0.009, gap, (floor - 0.02, floor - 0.01)),
             cylinder((trail, -gap, wheel), (trail, gap, wheel), 0.5 * wheel, sections=14),
         )
         wheels = Solid()
@@ -166,11 +164,11 @@ def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, 
         if rolling:
             bore = 0.2 * wheel
             fork = cylinder((0, 0, floor - 0.018), (0, 0, floor + 0.004 - GAP), 0.011, sections=14)
-            fork += box((-0.011, -gap, floor - 0.024), (0.011, gap, floor - 0.012))
+            fork += box(0.011, gap, (floor - 0.024, floor - 0.012))
             fork += ring((trail, 0, wheel), (0, 1, 0), bore + GAP, 0.62 * wheel, 2 * gap, 10)
             fork += hull_of(
-                box((-0.009, -gap, floor - 0.02), (0.009, gap, floor - 0.012)),
-                box((trail - 0.35 * wheel, -gap, 1.42 * wheel), (trail + 0.3 * wheel, gap, 1.5 * wheel)),
+                box(0.009, gap, (floor - 0.02, floor - 0.012)),
+                box((trail - 0.35 * wheel, trail + 0.3 * wheel), gap, (1.42 * wheel, 1.5 * wheel)),
             )
             wheels += cylinder((trail, -gap - 0.004, wheel), (trail, gap + 0.004, wheel), bore, sections=10)
         pose = (x, y, 0.0)
@@ -189,7 +187,7 @@ def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, 
 def _seat(rng: np.random.Generator, depth: float, width: float, thick: float, low: float, stool: bool) -> Solid:
     """Cushion on a plate."""
     z = low + 0.03
-    solid = box((-0.1, -0.09, low), (0.1, 0.09, z + 0.01)) + cylinder((0, 0, low), (0, 0, z), 0.06)
+    solid = box(0.1, 0.09, (low, z + 0.01)) + cylinder((0, 0, low), (0, 0, z), 0.06)
     if stool and rng.random() < 0.7:
         r = 0.5 * depth
         return (
@@ -198,9 +196,9 @@ def _seat(rng: np.random.Generator, depth: float, width: float, thick: float, lo
             + cylinder((0, 0, z + 0.69 * thick), (0, 0, z + thick), r, 0.88 * r, 32)
         )
     corner = rng.uniform(0.05, 0.12)
-    plan = rounded_box((-0.5 * depth, -0.5 * width, z), (0.5 * depth, 0.5 * width, z + 0.65 * thick), corner, axis=2)
+    plan = box(0.5 * depth, 0.5 * width, (z, z + 0.65 * thick), fillet=corner, axis=2)
     a, b = 0.47 * depth, 0.46 * width
-    return solid + hull_of(plan, rounded_box((-a, -b, z), (a, b, z + thick), corner, axis=2))
+    return solid + hull_of(plan, box(a, b, (z, z + thick), fillet=corner, axis=2))
 
 
 def _back(rng: np.random.Generator, width: float, top: float, hinge: Array, tilting: bool) -> Solid:
@@ -217,21 +215,21 @@ def _back(rng: np.random.Generator, width: float, top: float, hinge: Array, tilt
     solid += tube(path, 0.016, 10)
     corner = min(half, 0.5 * tall) * rng.uniform(0.2, 0.7)
     if rng.random() < 0.7:
-        outer = rounded_box((x, -half, low), (x + thick, half, low + tall), corner, axis=0, steps=4)
-        inner = rounded_box((x - 0.012, -0.85 * half, low + 0.06 * tall), (x + thick, 0.85 * half, low + 0.94 * tall),
-                            corner, axis=0, steps=4)  # fmt: skip
+        outer = box((x, x + thick), half, (low, low + tall), fillet=corner, axis=0, steps=4)
+        inner = box((x - 0.012, -0.85 * half, low + 0.06 * tall), (x + thick, 0.85 * half, low + 0.94 * tall),
+                            fillet=corner, axis=0, steps=4)  # fmt: skip
         panel = hull_of(outer, inner)
     else:  # a frame with slats
         bar = 0.03
         panel = frame((x, -half, low), (x + 0.025, half, low + tall), [bar] * 4)
         slats = int(rng.integers(2, 6))
         for z in low + tall * (np.arange(slats) + 1) / (slats + 1):
-            panel += box((x + 0.004, -half + 0.01, z - 0.02), (x + 0.02, half - 0.01, z + 0.02))
-        panel += box((x + 0.006, -0.03, low + 0.01), (x + 0.024, 0.03, low + tall - 0.01))
+            panel += box((x + 0.004, x + 0.02), half - 0.01, (z - 0.02, z + 0.02))
+        panel += box((x + 0.006, x + 0.024), 0.03, (low + 0.01, low + tall - 0.01))
     if rng.random() < 0.25:
         z = low + tall
-        panel += box((x + 0.008, -0.02, z - 0.03), (x + 0.022, 0.02, z + 0.06))
-        panel += rounded_box((x - 0.01, -0.5 * half, z + 0.03), (x + 0.04, 0.5 * half, z + 0.16), 0.02)
+        panel += box((x + 0.008, x + 0.022), 0.02, (z - 0.03, z + 0.06))
+        panel += box((x - 0.01, x + 0.04), 0.5 * half, (z + 0.03, z + 0.16), fillet=0.02)
     # The head end leans back; the bottom stays over the spine.
     panel = panel.turned((0, 1, 0), lean, (x + 0.02, 0, low))
     return solid + panel
@@ -241,7 +239,7 @@ def _arms(rng: np.random.Generator, depth: float, width: float, low: float, top:
     """Two arm rests: posts from under the seat with pads, or closed loops."""
     z = top + rng.uniform(0.14, 0.22)
     y = 0.5 * width + 0.035
-    pad = rounded_box((-0.3 * depth, y - 0.03, z - 0.015), (0.25 * depth, y + 0.03, z + 0.015), 0.012)
+    pad = box((-0.3 * depth, 0.25 * depth), (y - 0.03, y + 0.03), (z - 0.015, z + 0.015), fillet=0.012)
     foot = (0.0, 0.3 * width, low + 0.025)
     if rng.random() < 0.5:
         post = tube([foot, (0, y - 0.01, low + 0.025), (0, y, low + 0.05), (0, y, z)], 0.014, 10)

@@ -17,19 +17,7 @@ from artsim.families.clock_faces import CLOCKWISE, FRONT, add_hands, dial_plate,
 from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import (
-    Solid,
-    box,
-    cylinder,
-    ellipsoid,
-    frame,
-    hull_of,
-    prism,
-    ring,
-    rounded_box,
-    tube,
-    union,
-)
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
 
 GAP = 0.001
 DENSITY = 500.0
@@ -59,7 +47,7 @@ def _mantel_clock(rng: np.random.Generator) -> Assembly:
         low = -half * rng.uniform(1.05, 1.4)
         body += cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
         for y in (-0.6 * half, 0.6 * half):
-            body += box((0.1 * deep, y - 0.1 * half, low), (0.9 * deep, y + 0.1 * half, -0.6 * half))
+            body += box((0.1 * deep, 0.9 * deep), (y - 0.1 * half, y + 0.1 * half), (low, -0.6 * half))
     elif kind == "tambour":
         body += prism(np.concatenate([around, corners]), 0.002, deep, 0)
         wide = half * rng.uniform(1.5, 2.6)
@@ -71,14 +59,12 @@ def _mantel_clock(rng: np.random.Generator) -> Assembly:
     elif kind == "lancet":
         body += prism(np.concatenate([around, corners, [(0.0, 1.6 * half)]]), 0.002, deep, 0)
     else:
-        body += box((0.002, -half, low), (deep, half, half))
+        body += box((0.002, deep), half, (low, half))
         if kind == "house":
             body += prism([(-1.1 * half, half), (1.1 * half, half), (0.0, half * rng.uniform(1.3, 1.8))], -0.008,
                           deep + 0.008, 0)  # fmt: skip
         elif rng.random() < 0.6:
-            body += rounded_box(
-                (-0.012, -1.12 * half, half - 0.001), (deep + 0.008, 1.12 * half, half + 0.1 * half), 0.004
-            )
+            body += box((-0.012, deep + 0.008), 1.12 * half, (half - 0.001, half + 0.1 * half), fillet=0.004)
         if rng.random() < 0.4:  # a handle on top
             top = half * (1.1 if kind == "block" else 1.0)
             angles = np.linspace(0.0, np.pi, 8)
@@ -86,7 +72,7 @@ def _mantel_clock(rng: np.random.Generator) -> Assembly:
             body += tube(arch, 0.04 * half, 8) if kind == "block" else Solid()
     base = half * (rng.uniform(1.05, 1.4) if kind != "tambour" else 2.65)
     if kind != "drum" and rng.random() < 0.75:
-        body += rounded_box((-0.014, -base, low - 0.15 * half), (deep + 0.008, base, low + 0.002), 0.004)
+        body += box((-0.014, deep + 0.008), base, (low - 0.15 * half, low + 0.002), fillet=0.004)
     clock = Assembly()
     tilting = kind == "drum" and rng.random() < 0.4
     if tilting:  # the drum hangs in a fork
@@ -97,8 +83,7 @@ def _mantel_clock(rng: np.random.Generator) -> Assembly:
         clear = half + deep + 0.01
         fork = tube([(x, -arm, 0), (x, -arm, -0.6 * clear), (x, -0.4 * half, -clear), (x, 0.4 * half, -clear),
                      (x, arm, -0.6 * clear), (x, arm, 0)], r, 10)  # fmt: skip
-        fork += rounded_box((x - 0.8 * half, -0.9 * half, -clear - 0.012), (x + 0.8 * half, 0.9 * half, -clear + 0.002),
-                            0.005)  # fmt: skip
+        fork += box((x - 0.8 * half, x + 0.8 * half), 0.9 * half, (-clear - 0.012, -clear + 0.002), fillet=0.005)
         clock.add("body", fork, density=1500.0)
         limit = rng.uniform(0.2, 0.6)
         clock.add("case", drum, revolute("body", (0, 1, 0), (x, 0, 0), -limit, limit), density=DENSITY)
@@ -118,7 +103,9 @@ def _knobs(rng: np.random.Generator, clock: Assembly, x: float, spread: float) -
         y, z = (k - 0.5 * (count - 1)) * spread, rng.uniform(-0.6, 0.3) * spread
         r = 0.35 * spread * rng.uniform(0.6, 1.0)
         knob = cylinder((x + GAP, y, z), (x + GAP + 0.5 * r, y, z), 0.5 * r, sections=10)
-        knob += rounded_box((x + GAP + 0.4 * r, y - r, z - 0.25 * r), (x + GAP + 1.4 * r, y + r, z + 0.25 * r), 0.2 * r)
+        knob += box(
+            (x + GAP + 0.4 * r, x + GAP + 1.4 * r), (y - r, y + r), (z - 0.25 * r, z + 0.25 * r), fillet=0.2 * r
+        )
         name = f"knob_{k}" if count > 1 else "knob"
         clock.add(name, knob, continuous("body", CLOCKWISE, (x, y, z)), density=DENSITY)
 
@@ -135,7 +122,7 @@ def _longcase_clock(rng: np.random.Generator) -> Assembly:
     low = -hood - rng.uniform(0.0, 0.05)
     bottom = low - length
     center = np.zeros(3)
-    body = dial_plate(rng, 0.0, center, radius) + box((0.002, -hood, low), (deep, hood, hood))
+    body = dial_plate(rng, 0.0, center, radius) + box((0.002, deep), hood, (low, hood))
     body += rim(rng, 0.003, center, 1.005 * radius, 0.08 * radius, 0.01 + 0.05 * radius)
     crest = str(rng.choice(["flat", "gable", "arch", "swan"]))
     if crest == "gable":
@@ -155,18 +142,18 @@ def _longcase_clock(rng: np.random.Generator) -> Assembly:
                 0.3 * deep,
                 0,
             )
-    body += rounded_box((-0.02, -1.1 * hood, hood - 0.02), (deep, 1.1 * hood, hood + 0.02), 0.01)
+    body += box((-0.02, deep), 1.1 * hood, (hood - 0.02, hood + 0.02), fillet=0.01)
     if rng.random() < 0.5:
         for s in (-1.0, 1.0):
             body += cylinder((-0.02, s * hood, low), (-0.02, s * hood, hood - 0.02), 0.012, sections=12)
-    body += box((-0.02, -1.05 * hood, low - 0.03), (deep, 1.05 * hood, low + 0.002))
+    body += box((-0.02, deep), 1.05 * hood, (low - 0.03, low + 0.002))
     body += frame((0.01, -trunk, bottom), (deep, trunk, low - 0.028), [0.02] * 4)
-    body += box((deep - 0.012, -trunk + 0.01, bottom + 0.01), (deep, trunk - 0.01, low - 0.03))
-    body += rounded_box((-0.02, -foot, bottom - plinth), (deep, foot, bottom + 0.005), 0.006)
+    body += box((deep - 0.012, deep), trunk - 0.01, (bottom + 0.01, low - 0.03))
+    body += box((-0.02, deep), foot, (bottom - plinth, bottom + 0.005), fillet=0.006)
     if rng.random() < 0.6:
-        body += rounded_box((-0.035, -1.1 * foot, bottom - plinth), (deep, 1.1 * foot, bottom - 0.75 * plinth), 0.006)
+        body += box((-0.035, deep), 1.1 * foot, (bottom - plinth, bottom - 0.75 * plinth), fillet=0.006)
     top = low - 0.05
-    body += box((0.5 * deep, -0.006, top + 0.002), (deep - 0.005, 0.006, top + 0.004))
+    body += box((0.5 * deep, deep - 0.005), 0.006, (top + 0.002, top + 0.004))
     clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
     room = trunk - 0.025
@@ -193,20 +180,20 @@ def _alarm_clock(rng: np.random.Generator) -> Assembly:
         kind = str(rng.choice(["square", "wedge", "drum"]))
         if kind == "drum":
             body += cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
-            body += box((0.1 * deep, -0.7 * half, -1.08 * half), (0.9 * deep, 0.7 * half, -0.5 * half))
+            body += box((0.1 * deep, 0.9 * deep), 0.7 * half, (-1.08 * half, -0.5 * half))
             top = half * cos(np.pi / 32)
         else:
             edge = half * tall
-            body += rounded_box((0.002, -half, -edge), (deep, half, edge), rng.uniform(0.05, 0.4) * half, axis=0)
+            body += box((0.002, deep), half, edge, fillet=rng.uniform(0.05, 0.4) * half, axis=0)
             if kind == "wedge":
                 body += prism([(deep - 0.004, -edge), (deep * 1.9, -edge), (deep - 0.004, 0.6 * edge)], -0.8 * half,
                               0.8 * half, 1)  # fmt: skip
             top = edge
         wide = half * rng.uniform(0.2, 0.55)
-        body += box((0.3 * deep, -0.7 * wide, 0.9 * top), (0.7 * deep, 0.7 * wide, top + 0.0005))
+        body += box((0.3 * deep, 0.7 * deep), 0.7 * wide, (0.9 * top, top + 0.0005))
         clock.add("body", body, density=DENSITY)
         add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
-        button = rounded_box((0.2 * deep, -wide, top + 0.004), (0.8 * deep, wide, top + 0.01), 0.003)
+        button = box((0.2 * deep, 0.8 * deep), wide, (top + 0.004, top + 0.01), fillet=0.003)
         clock.add("button", button, prismatic("body", (0, 0, -1), 0.0, 0.003, (middle, 0, top)), density=DENSITY)
         if kind != "wedge":
             _knobs(rng, clock, deep, 0.3 * radius)

@@ -144,8 +144,9 @@ def glass_door(
     if rng.random() < 0.3:
         middle = 0.5 * (upright[0] + upright[1])
         door += box(
-            (low[0] + 0.002, across[0] + 0.5 * bar, middle - 0.3 * bar),
-            (high[0] - 0.002, across[1] - 0.5 * bar, middle + 0.3 * bar),
+            (low[0] + 0.002, high[0] - 0.002),
+            (across[0] + 0.5 * bar, across[1] - 0.5 * bar),
+            (middle - 0.3 * bar, middle + 0.3 * bar),
         )
     left = rng.random() < 0.5
     y = across[0] + 0.5 * bar if left else across[1] - 0.5 * bar

@@ -20,7 +20,6 @@ from artsim.making.solids import (
     hull,
     hull_of,
     ring,
-    rounded_box,
     rounded_rectangle,
     tray,
     tube,
@@ -45,19 +44,22 @@ def _drip_tray(
     count = int(rng.integers(3, 7))
     for edge in np.linspace(-y, y, count + 1)[1:-1]:
         solid += box(
-            (x0 + 0.001, edge - 0.25 * y / count * 2, high - 0.004),
-            (x0 + depth - 0.001, edge + 0.25 * y / count * 2, high - 0.0005),
+            (x0 + 0.001, x0 + depth - 0.001),
+            (edge - 0.25 * y / count * 2, edge + 0.25 * y / count * 2),
+            (high - 0.004, high - 0.0005),
         )
-    solid += rounded_box((x0 - 0.006, -y, low), (x0 + 0.002, y, high), 0.003)
+    solid += box((x0 - 0.006, x0 + 0.002), y, (low, high), fillet=0.003)
     machine.add("drip_tray", solid, prismatic("body", OUT, 0.0, 0.8 * depth, (x0, 0, low)), density=900.0)
 
 
 def _base(x: float, y: float, height: float, radius: float, tray_y: float, front: float) -> Solid:
     """Base plate with a niche for the drip tray in front, ``front`` deep."""
-    solid = rounded_box((-x + front, -y, 0), (x, y, height), radius, axis=2)
-    solid += box((-x, -y, 0), (-x + front + radius, y, 0.008))
+    solid = box((-x + front, x), y, (0, height), fillet=radius, axis=2)
+    solid += box((-x, -x + front + radius), y, (0, 0.008))
     return solid + union(
-        box((-x, min(s * y, s * (tray_y + GAP)), 0.001), (-x + front + radius, max(s * y, s * (tray_y + GAP)), height))
+        box(
+            (-x, -x + front + radius), (min(s * y, s * (tray_y + GAP)), max(s * y, s * (tray_y + GAP))), (0.001, height)
+        )
         for s in (-1, 1)
     )
 
@@ -70,9 +72,9 @@ def _espresso(rng: np.random.Generator) -> Assembly:
     radius = rng.uniform(0.005, 0.03)
     tray_y = y - 0.012
     body = _base(x, y, base, radius, tray_y, front)
-    body += rounded_box((-x + front, -y, base - 0.002), (x, y, height - 0.002), radius, axis=2)
+    body += box((-x + front, x), y, (base - 0.002, height - 0.002), fillet=radius, axis=2)
     head_low = height - head
-    body += rounded_box((-x, -y, head_low), (x, y, height), radius, axis=1 if rng.random() < 0.4 else 2)
+    body += box(x, y, (head_low, height), fillet=radius, axis=1 if rng.random() < 0.4 else 2)
     with_lid = rng.random() < 0.5
     if rng.random() < 0.6:  # rail for cups, before the lid
         post, behind = 0.02, 0.1 * x if with_lid else x - 0.03
@@ -144,8 +146,8 @@ def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, h
     """Lid of the water tank on top."""
     seam, thick = height + GAP, 0.008
     low, high = (0.25 * x, -0.7 * y, seam), (0.97 * x, 0.7 * y, seam + thick)
-    lid = rounded_box(low, high, 0.01, axis=2)
-    lid += rounded_box((0.27 * x, -0.012, seam + 0.5 * thick), (0.27 * x + 0.012, 0.012, seam + thick + 0.004), 0.002)
+    lid = box(low, high, fillet=0.01, axis=2)
+    lid += box((0.27 * x, 0.27 * x + 0.012), 0.012, (seam + 0.5 * thick, seam + thick + 0.004), fillet=0.002)
     limit = np.deg2rad(rng.uniform(70.0, 100.0))
     machine.add("lid", lid, revolute("body", (0, 1, 0), (0.97 * x, 0, seam), 0.0, limit), density=900.0)
 
@@ -160,14 +162,14 @@ def _drip(rng: np.random.Generator) -> Assembly:
     center = -x + pot + 0.012
     back = center + pot + 0.006
     head_low = height - head
-    body = rounded_box((-x, -y, 0), (x, y, base), radius, axis=2)
-    body += rounded_box((back, -y, 0), (x + 0.02, y, height), min(radius, 0.02), axis=2)
+    body = box(x, y, (0, base), fillet=radius, axis=2)
+    body += box((back, x + 0.02), y, (0, height), fillet=min(radius, 0.02), axis=2)
     shrink = rng.choice([0.0, rng.uniform(0.0, 0.15)]) * y  # the head may narrow upward
     reach = center - 0.5 * pot if rng.random() < 0.3 else -x  # or end above the middle of the carafe
     body += _tapered((reach, -y), (x + 0.018, y), (head_low, height), radius, shrink)
     body += cylinder((center, 0, base - 0.002), (center, 0, base + 0.003), 0.8 * pot)
     if rng.random() < 0.5:  # gauge of the water tank
-        body += box((x - 0.01, -y - 0.002, base + 0.03), (x + 0.004, -y + 0.002, head_low - 0.02))
+        body += box((x - 0.01, x + 0.004), (-y - 0.002, -y + 0.002), (base + 0.03, head_low - 0.02))
     plain = rng.random() < 0.35  # nothing but the lid moves
     carafe = _carafe(rng, center, pot, base + 0.003 + GAP, head_low - GAP)
     machine = Assembly("body", body + carafe.moved((0, 0, -GAP - 0.0005)) if plain else body, 700.0)
@@ -190,7 +192,7 @@ def _drip(rng: np.random.Generator) -> Assembly:
     if rng.random() < 0.5:
         _controls(rng, machine, reach, 0.7 * (y - shrink), head_low, height)
     else:
-        key = rounded_box((reach - 0.010, -0.012, z - 0.008), (reach - 0.0032, 0.012, z + 0.008), 0.002)
+        key = box((reach - 0.010, reach - 0.0032), 0.012, (z - 0.008, z + 0.008), fillet=0.002)
         machine.add("button", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, (reach, 0, z)), density=900.0)
     return machine
 
@@ -272,8 +274,8 @@ def _pod(rng: np.random.Generator) -> Assembly:
     radius = rng.uniform(0.01, 0.03)
     tank_x = x - rng.uniform(0.05, 0.07)
     body = _base(x, y, base, radius, y - 0.01, front)
-    body += rounded_box((-x + front, -y, base - 0.002), (tank_x, y, height - 0.002), radius, axis=2)
-    body += rounded_box((-x + 0.01, -y, height - head), (tank_x - 0.001, y, height), 1.5 * radius, axis=1)
+    body += box((-x + front, tank_x), y, (base - 0.002, height - 0.002), fillet=radius, axis=2)
+    body += box((-x + 0.01, tank_x - 0.001), y, (height - head, height), fillet=1.5 * radius, axis=1)
     body += cylinder(
         (-x + 0.5 * front, 0, height - head - 0.018), (-x + 0.5 * front, 0, height - head + 0.002), 0.012, 0.02, 16
     )
@@ -283,13 +285,11 @@ def _pod(rng: np.random.Generator) -> Assembly:
     pivot = (tank_x - 0.04, 0.0, height + 0.012)
     wide, thick = 0.7 * y, 0.010
     length = rng.uniform(0.6, 0.95) * (pivot[0] + x - 0.01)
-    lever = rounded_box(
-        (pivot[0] - length, -wide, height + GAP), (pivot[0] - length + 0.03, wide, height + GAP + thick), 0.004
-    )
+    lever = box((pivot[0] - length, pivot[0] - length + 0.03), wide, (height + GAP, height + GAP + thick), fillet=0.004)
     for s in (-1.0, 1.0):
         arm = sorted((s * wide, s * (wide - 0.01)))
-        lever += rounded_box(
-            (pivot[0] - length, arm[0], height + GAP), (pivot[0] + 0.006, arm[1], height + GAP + thick), 0.004
+        lever += box(
+            (pivot[0] - length, pivot[0] + 0.006), (arm[0], arm[1]), (height + GAP, height + GAP + thick), fillet=0.004
         )
     lever += cylinder((pivot[0], -wide, height + 0.0075), (pivot[0], wide, height + 0.0075), 0.005, sections=12)
     machine.add(
@@ -299,10 +299,8 @@ def _pod(rng: np.random.Generator) -> Assembly:
         density=900.0,
     )
     top = height * rng.uniform(0.8, 0.98)
-    tank = rounded_box((tank_x + GAP, -0.9 * y, base + GAP), (x, 0.9 * y, top), 0.015, axis=2)
-    tank += rounded_box(
-        (tank_x + GAP + 0.001, -0.85 * y, top - 0.001), (x - 0.001, 0.85 * y, top + 0.006), 0.012, axis=2
-    )
+    tank = box((tank_x + GAP, x), 0.9 * y, (base + GAP, top), fillet=0.015, axis=2)
+    tank += box((tank_x + GAP + 0.001, x - 0.001), 0.85 * y, (top - 0.001, top + 0.006), fillet=0.012, axis=2)
     machine.add("water_tank", tank, prismatic("body", (0, 0, 1), 0.0, 0.8 * (top - base), (x, 0, base)), density=900.0)
     return machine
 
@@ -317,19 +315,18 @@ def _urn(rng: np.random.Generator) -> Assembly:
     if niche:  # a foot, a column at the back, and a head
         foot, head = 0.09 * height, rng.uniform(0.35, 0.6) * height
         back = x * rng.uniform(-0.2, 0.4)
-        body = rounded_box((-x, -y, 0), (x, y, foot), radius, axis=2, steps=5)
-        body += rounded_box((back, -0.85 * y, 0.5 * foot), (0.95 * x, 0.85 * y, height - 0.5 * head), 0.02, axis=2)
-        body += rounded_box((-x, -y, height - head), (x, y, height), radius, axis=2, steps=5)
+        body = box(x, y, (0, foot), fillet=radius, axis=2, steps=5)
+        body += box((back, 0.95 * x), 0.85 * y, (0.5 * foot, height - 0.5 * head), fillet=0.02, axis=2)
+        body += box(x, y, (height - head, height), fillet=radius, axis=2, steps=5)
         spout = (0.5 * (back - x), 0.0, height - head)
         body += cylinder((spout[0], 0, spout[2] - 0.02), (spout[0], 0, spout[2] + 0.002), 0.01, 0.015, 14)
     else:
         waist = rng.uniform(0.75, 1.0)
-        low = rounded_box((-x, -y, 0), (x, y, 0.12 * height), radius, axis=2, steps=5)
+        low = box(x, y, (0, 0.12 * height), fillet=radius, axis=2, steps=5)
         body = low + hull_of(
-            rounded_box((-x * waist, -y * waist, 0.11 * height), (x * waist, y * waist, 0.13 * height),
-                        waist * radius, axis=2, steps=5),
-            rounded_box((-x, -y, height - 0.02), (x, y, height), radius, axis=2, steps=5),
-        )  # fmt: skip
+            box(x * waist, y * waist, (0.11 * height, 0.13 * height), fillet=waist * radius, axis=2, steps=5),
+            box((-x, -y, height - 0.02), (x, y, height), fillet=radius, axis=2, steps=5),
+        )
         tap = (-0.9 * waist * x, 0.0, 0.22 * height)
         body += tube([tap, (tap[0] - 0.3 * x, 0, tap[2]), (tap[0] - 0.34 * x, 0, tap[2] - 0.12 * x)], 0.09 * x, 10)
     if rng.random() < 0.6:  # a handle at the back
@@ -341,10 +338,9 @@ def _urn(rng: np.random.Generator) -> Assembly:
     rise = x * rng.uniform(0.08, 0.45)
     side_x, side_y = share * x, share * y
     lid = hull_of(
-        rounded_box((-side_x, -side_y, seam), (side_x, side_y, seam + 0.3 * rise), share * radius, axis=2, steps=5),
-        rounded_box((-0.7 * side_x, -0.7 * side_y, seam), (0.7 * side_x, 0.7 * side_y, seam + rise),
-                    0.7 * share * radius, axis=2, steps=5),
-    )  # fmt: skip
+        box((-side_x, -side_y, seam), (side_x, side_y, seam + 0.3 * rise), fillet=share * radius, axis=2, steps=5),
+        box(0.7 * side_x, 0.7 * side_y, (seam, seam + rise), fillet=0.7 * share * radius, axis=2, steps=5),
+    )
     if rng.random() < 0.75:
         grip = x * rng.uniform(0.08, 0.16)
         top = seam + rise
@@ -354,7 +350,7 @@ def _urn(rng: np.random.Generator) -> Assembly:
         joint = prismatic("body", (0, 0, 1), 0.0, height * power(12.0, rng.uniform(-1.0, -0.1)), (0, 0, seam))
     else:
         hinge, half = (side_x + 0.006, 0.0, seam + 0.002), 0.3 * side_y
-        lid += box((side_x - 0.3 * x, -half, seam), (hinge[0], half, seam + 0.004))
+        lid += box((side_x - 0.3 * x, hinge[0]), half, (seam, seam + 0.004))
         lid += cylinder((hinge[0], -half, hinge[2]), (hinge[0], half, hinge[2]), 0.002, sections=10)
         joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
     machine.add("lid", lid, joint)

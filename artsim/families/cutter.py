@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin, tan
 from artsim.making.assembly import Assembly, continuous, prismatic
-from artsim.making.solids import Solid, box, cylinder, prism, rounded_box, rounded_rectangle, union
+from artsim.making.solids import Solid, box, cylinder, prism, rounded_rectangle, union
 
 GAP = 0.0005
 
@@ -49,8 +49,8 @@ def build(rng: np.random.Generator) -> Assembly:
     travel *= rng.uniform(0.8, 1.0)
     cutter.add("blade", blade, prismatic("body", (-1, 0, 0), 0.0, travel, (front, 0, channel)), density=5000.0)
     if capped:
-        plug = rounded_box((end + GAP, -half * 0.97, 0.03 * height), (back, half * 0.97, 0.97 * height), 0.002)
-        plug += box((end - wall, -0.8 * inner, channel), (end + 0.003, 0.8 * inner, channel + sheet))
+        plug = box((end + GAP, back), half * 0.97, (0.03 * height, 0.97 * height), fillet=0.002)
+        plug += box((end - wall, end + 0.003), 0.8 * inner, (channel, channel + sheet))
         pull = rng.uniform(0.015, 0.03)
         cutter.add("cap", plug, prismatic("body", (1, 0, 0), 0.0, pull, (end, 0, 0.5 * height)), density=1000.0)
     if rng.random() < 0.25:
@@ -96,7 +96,7 @@ def _body(
         solid += prism(crown, 0.85 * height, height)
     tail = 0.004
     if capped:
-        solid += box((back - tail, -half, roof), (back, half, 0.9 * height))
+        solid += box((back - tail, back), half, (roof, 0.9 * height))
     else:
         outline = rounded_rectangle((back - 2 * tail, -half), (back + 0.3 * half, half), 0.6 * half)
         solid += prism(outline[outline[:, 0] > back - tail - 1e-6], 0.05 * height, 0.95 * height)
@@ -126,10 +126,10 @@ def _button(
     rng: np.random.Generator, start: float, end: float, slot: float, low: float, height: float, top: float, half: float
 ) -> Solid:
     """Stem through the slot and a ribbed button above it."""
-    solid = box((start, -slot, low - 0.0008), (end, slot, top - 0.0005))
+    solid = box((start, end), slot, (low - 0.0008, top - 0.0005))
     wide = min(slot * rng.uniform(1.2, 2.2), 0.9 * half)
-    solid += rounded_box((start, -wide, height + GAP), (end, wide, top), 0.002)
+    solid += box((start, end), wide, (height + GAP, top), fillet=0.002)
     count = int(rng.integers(0, 6))
     for x in np.linspace(start + 0.003, end - 0.003, count):
-        solid += box((x - 0.0006, -0.9 * wide, top - 0.001), (x + 0.0006, 0.9 * wide, top + 0.0005))
+        solid += box((x - 0.0006, x + 0.0006), 0.9 * wide, (top - 0.001, top + 0.0005))
     return solid

@@ -19,7 +19,6 @@ from artsim.making.solids import (
     frame,
     hull,
     prism,
-    rounded_box,
     rounded_rectangle,
     tube,
     union,
@@ -81,7 +80,7 @@ def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> S
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     sides = high - low
     if kind == "slab" or min(sides[1:]) < 3.2 * rail:
-        return rounded_box(low, high, 0.15 * sides[0], steps=2)
+        return box(low, high, fillet=0.15 * sides[0], steps=2)
     bars = frame(low, high, [rail] * 4)
     inside = np.array([0.0, rail - 0.002, rail - 0.002])
     inner_low, inner_high = low + inside, high - inside
@@ -130,7 +129,7 @@ def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, dept
     along = unit(end - start)
     side = half * (1.0 - along)
     front, back = np.array([-reach, 0.0, 0.0]), np.array([depth - reach, 0.0, 0.0])
-    solid = rounded_box(start - side + front, end + side + back, 0.25 * min(thickness, depth))
+    solid = box(start - side + front, end + side + back, fillet=0.25 * min(thickness, depth))
     for share in (0.06, 0.94):
         foot = start + share * (end - start)
         solid += box(foot - half + 0.5 * (front + back), foot + half + (0.002, 0.0, 0.0))
@@ -198,7 +197,7 @@ def windowed_panel(low: Vector, high: Vector, margins: Sequence[float], pane: fl
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     left, right, bottom, top = np.asarray(margins, dtype=np.float64) - 0.002
     x = low[0] + inset
-    glass = box((x, low[1] + left, low[2] + bottom), (x + pane, high[1] - right, high[2] - top))
+    glass = box((x, x + pane), (low[1] + left, high[1] - right), (low[2] + bottom, high[2] - top))
     return frame(low, high, margins) + glass
 
 
@@ -207,7 +206,7 @@ def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     solid = frame(low, high, [wire] * 4, 0, 1)
     for y in np.linspace(low[1], high[1] - wire, bars + 2)[1:-1]:
-        solid += box((low[0], y, low[2]), (high[0], y + wire, low[2] + min(wire, high[2] - low[2])))
+        solid += box((low[0], high[0]), (y, y + wire), (low[2], low[2] + min(wire, high[2] - low[2])))
     return solid
 
 
@@ -279,7 +278,7 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     """
     face = np.asarray(face, dtype=np.float64)
     half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
-    return rounded_box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), round_off, axis=0)
+    return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0)
 
 
 def side_hinge(x: float, y: float, upper: float, left: bool, parent: str = "body") -> JointSpec:
@@ -364,14 +363,14 @@ def grid_panel(
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     inner_low = low + (0, widths[0], widths[2])
     inner_high = high - (0, widths[1], widths[3])
-    solid = box((low[0], inner_low[1], low[2]), (high[0], inner_high[1], inner_low[2]))
-    solid += box((low[0], inner_low[1], inner_high[2]), (high[0], inner_high[1], high[2]))
+    solid = box((low[0], high[0]), (inner_low[1], inner_high[1]), (low[2], inner_low[2]))
+    solid += box((low[0], high[0]), (inner_low[1], inner_high[1]), (inner_high[2], high[2]))
     for y0, y1 in ((low[1], inner_low[1]), (inner_high[1], high[1])):
         if bore is None or not y0 < bore[0] < y1:
-            solid += box((low[0], y0, low[2]), (high[0], y1, high[2]))
+            solid += box((low[0], high[0]), (y0, y1), (low[2], high[2]))
             continue
         z0, z1 = bore[1] - 2 * bore[2], bore[1] + 2 * bore[2]
-        solid += box((low[0], y0, low[2]), (high[0], y1, z0)) + box((low[0], y0, z1), (high[0], y1, high[2]))
+        solid += box((low[0], high[0]), (y0, y1), (low[2], z0)) + box((low[0], high[0]), (y0, y1), (z1, high[2]))
         solid += holed_plate((low[0], y0, z0), (high[0], y1, z1), bore[:2], bore[2], sections=12)
     inset = np.array([0.1 * (high[0] - low[0]), 0.0, 0.0])
     for y in columns:

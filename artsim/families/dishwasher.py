@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import hypot
 from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.making.solids import Solid, box, cylinder, frame, tray, union
 
 GAP = 0.002
 
@@ -122,10 +122,10 @@ def _drawers(rng: np.random.Generator) -> Assembly:
         liner=0.0,
     )
     body = tray((shape.front, -half, plinth), (depth, half, shape.height), wall, axis=0, side=-1)
-    body += box((shape.front + rng.uniform(0.0, 0.06), -half + 0.005, 0.0), (depth, half - 0.005, plinth + 0.003))
+    body += box((shape.front + rng.uniform(0.0, 0.06), depth), half - 0.005, (0.0, plinth + 0.003))
     if count == 2:
         z = plinth + tall
-        body += box((shape.front, -half + 0.002, z - 0.5 * wall), (depth, half - 0.002, z + 0.5 * wall))
+        body += box((shape.front, depth), half - 0.002, (z - 0.5 * wall, z + 0.5 * wall))
     low, inside, back = plinth + wall + 0.004, half - wall - 0.005, depth - wall - rng.uniform(0.01, 0.08)
     machine = Assembly()
     drawer = _door(rng, shape, True, machine)
@@ -146,25 +146,25 @@ def _body(rng: np.random.Generator, s: Shape, strip: float, flush: bool, flanked
     face = -s.thick * (1.0 if rng.random() < 0.6 else rng.uniform(0.3, 0.95))  # front of the fixed panels
     if flanked:
         for y in (-half, half - s.wall):
-            solid += box((face, y, s.bottom - 0.01), (front + 0.01, y + s.wall, s.height))
+            solid += box((face, front + 0.01), (y, y + s.wall), (s.bottom - 0.01, s.height))
     if strip > 0:
         y = half - (0.001 if flanked else 0.0)
-        solid += rounded_box((-s.thick, -y, s.height - strip), (front + s.wall, y, s.height), 0.004)
+        solid += box((-s.thick, front + s.wall), y, (s.height - strip, s.height), fillet=0.004)
     if flush:
         foot = min(rng.uniform(0.0, 0.09), 0.5 * s.bottom, base - 0.002)
-        solid += rounded_box((face, -half, foot), (front + 0.02, half, s.bottom - GAP), 0.003)
-        solid += box((front + 0.01, -half, foot), (back, half, base + 0.002))
-        solid += box((face + rng.uniform(0.02, 0.06), -half + 0.01, 0.0), (back - 0.02, half - 0.01, foot + 0.01))
+        solid += box((face, front + 0.02), half, (foot, s.bottom - GAP), fillet=0.003)
+        solid += box((front + 0.01, back), half, (foot, base + 0.002))
+        solid += box((face + rng.uniform(0.02, 0.06), back - 0.02), half - 0.01, (0.0, foot + 0.01))
     elif compact or rng.random() < 0.25:
         feet = ((x, y) for x in (front + 0.05, back - 0.05) for y in (-half + 0.05, half - 0.05))
         solid += union(cylinder((x, y, 0), (x, y, base + 0.003), 0.018, sections=14) for x, y in feet)
     else:
         recess = front + rng.uniform(0.0, 0.08)
-        solid += box((recess, -half + 0.002, 0), (back, half - 0.002, base + 0.003))
+        solid += box((recess, back), half - 0.002, (0, base + 0.003))
     if not compact and rng.random() < 0.4:  # a worktop
         lip = rng.uniform(0.0, 0.02)
-        solid += rounded_box((-s.thick * rng.uniform(0.0, 1.4), -half - lip, s.height - 0.001),
-                             (back + lip, half + lip, s.height + rng.uniform(0.012, 0.04)), 0.004)  # fmt: skip
+        solid += box((-s.thick * rng.uniform(0.0, 1.4), -half - lip, s.height - 0.001),
+                             (back + lip, half + lip, s.height + rng.uniform(0.012, 0.04)), fillet=0.004)  # fmt: skip
     return solid
 
 
@@ -181,7 +181,7 @@ def _rack(rng: np.random.Generator, front: float, back: float, half: float, low:
     solid += frame((front, -half, low + height - wire), (back, half, low + height), [wire] * 4, 0, 1)
     posts = [(x, y) for x in (front, back - wire) for y in np.linspace(-half, half - wire, 6)]
     posts += [(0.5 * (front + back), y) for y in (-half, half - wire)]
-    return solid + union(box((x, y, low), (x + wire, y + wire, low + height)) for x, y in posts)
+    return solid + union(box((x, x + wire), (y, y + wire), (low, low + height)) for x, y in posts)
 
 
 def _sliding_racks(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
@@ -195,7 +195,7 @@ def _sliding_racks(rng: np.random.Generator, machine: Assembly, s: Shape) -> Non
     center = 0.5 * (front + back)
     reach = min(0.5 * (back - front), half) - 0.02
     low = s.floor + 0.02
-    arm = rounded_box((center - reach, -0.025, low), (center + reach, 0.025, low + 0.015), 0.02, axis=2)
+    arm = box((center - reach, center + reach), 0.025, (low, low + 0.015), fillet=0.02, axis=2)
     arm += cylinder((center, 0, s.floor + GAP), (center, 0, low + 0.02), 0.03)
     machine.add("spray_arm", arm, continuous("body", (0, 0, 1), (center, 0, low)))
 
@@ -224,22 +224,20 @@ def _door(rng: np.random.Generator, s: Shape, controls_above: bool, machine: Ass
     z = s.top - band - rng.uniform(0.03, 0.1)  # height of the handle
     if kind == "pocket":
         deep, side, slot = rng.uniform(0.012, 0.02), rng.uniform(0.2, 0.75) * half, rng.uniform(0.02, 0.05)
-        solid = box((x + deep - 0.001, -half, s.bottom), (0, half, s.top))
+        solid = box((x + deep - 0.001, 0), half, (s.bottom, s.top))
         widths = [half - side, half - side, z - slot - s.bottom, s.top - z]
         solid += frame((x, -half, s.bottom), (x + deep, half, s.top), widths)
     else:
-        solid = rounded_box((x, -half, s.bottom), (0, half, s.top), rng.uniform(0.002, 0.012))
+        solid = box((x, 0), half, (s.bottom, s.top), fillet=rng.uniform(0.002, 0.012))
     if band > 0:  # a strip of controls, in front of the door or within an outline
         lead = rng.uniform(0.003, 0.02)
-        solid += rounded_box((x - lead, -half, s.top - band), (x + 0.02, half, s.top), 0.003)
+        solid += box((x - lead, x + 0.02), half, (s.top - band, s.top), fillet=0.003)
         solid += _marks(rng, x - lead, half, s.top - 0.5 * band)
     elif rng.random() < 0.3:
-        solid += box(
-            (x - 0.0015, -0.12 * half, s.bottom + 0.12 * tall), (x + 0.002, 0.12 * half, s.bottom + 0.15 * tall)
-        )
+        solid += box((x - 0.0015, x + 0.002), 0.12 * half, (s.bottom + 0.12 * tall, s.bottom + 0.15 * tall))
     if kind != "pocket" and rng.random() < 0.25:  # a raised board
         edge = rng.uniform(0.02, 0.07)
-        solid += rounded_box((x - 0.004, edge - half, s.bottom + edge), (x + 0.003, half - edge, z - 0.03), 0.003)
+        solid += box((x - 0.004, x + 0.003), half - edge, (s.bottom + edge, z - 0.03), fillet=0.003)
     span = half * rng.uniform(0.45, 0.93)
     reach, radius = rng.uniform(0.03, 0.06), rng.uniform(0.006, 0.013)
     left, right = (x, -span, z), (x, span, z)
@@ -250,17 +248,15 @@ def _door(rng: np.random.Generator, s: Shape, controls_above: bool, machine: Ass
     elif kind == "flat":
         solid += flat_handle(left, right, reach, rng.uniform(0.015, 0.04), rng.uniform(0.006, 0.014))
     elif kind == "edge":  # a lip along the upper edge
-        solid += rounded_box((x - reach, -half, s.top - 0.02), (x + 0.01, half, s.top), 0.006)
+        solid += box((x - reach, x + 0.01), half, (s.top - 0.02, s.top), fillet=0.006)
     return solid + _inside(rng, s)
 
 
 def _marks(rng: np.random.Generator, x: float, half: float, z: float) -> Solid:
     """A display and keys that do not move."""
-    solid = (
-        box((x - 0.0015, -0.2 * half, z - 0.015), (x + 0.002, 0.2 * half, z + 0.015)) if rng.random() < 0.6 else Solid()
-    )
+    solid = box((x - 0.0015, x + 0.002), 0.2 * half, (z - 0.015, z + 0.015)) if rng.random() < 0.6 else Solid()
     for y in np.linspace(0.4, 0.8, int(rng.integers(2, 6))) * half * rng.choice([-1, 1]):
-        solid += rounded_box((x - 0.002, y - 0.01, z - 0.007), (x + 0.002, y + 0.01, z + 0.007), 0.004, axis=0)
+        solid += box((x - 0.002, x + 0.002), (y - 0.01, y + 0.01), (z - 0.007, z + 0.007), fillet=0.004, axis=0)
     return solid
 
 
@@ -273,6 +269,6 @@ def _inside(rng: np.random.Generator, s: Shape) -> Solid:
     solid = tray((-0.002, -half, low), (s.liner, half, high), 0.03, 0.0035, axis=0, side=1)
     if s.liner > 0.01:
         y, z = rng.uniform(-0.2, 0.5) * half, low + rng.uniform(0.4, 0.7) * (high - low)
-        solid += rounded_box((0, y - 0.06, z - 0.05), (0.8 * s.liner, y + 0.09, z + 0.05), 0.006)
+        solid += box((0, 0.8 * s.liner), (y - 0.06, y + 0.09), (z - 0.05, z + 0.05), fillet=0.006)
         solid += cylinder((0, y - 0.12, z), (0.7 * s.liner, y - 0.12, z), 0.03)
     return solid

@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, UP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -47,8 +47,8 @@ def _pump_bottle(rng: np.random.Generator) -> Assembly:
     body = union(one.moved((0, y, 0)) for y in places)
     if count > 1 or rng.random() < 0.12:
         wide = half + places[-1] + 0.006
-        body += rounded_box((-depth - 0.006, -wide, -0.006), (depth + 0.006, wide, 0.004), 0.006, axis=2)
-        body += rounded_box((0.55 * depth, -wide, 0), (depth + 0.006, wide, height * rng.uniform(0.3, 0.8)), 0.004)
+        body += box(depth + 0.006, wide, (-0.006, 0.004), fillet=0.006, axis=2)
+        body += box((0.55 * depth, depth + 0.006), wide, (0, height * rng.uniform(0.3, 0.8)), fillet=0.004)
     wall = max(0.14 * radius, 0.0016)
     outer = 1.02 * radius + GAP + wall
     low, high = height + GAP, rim + GAP + wall
@@ -112,19 +112,20 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
     low = height * rng.uniform(0.22, 0.35)  # where the cover begins
     thick = depth * rng.uniform(0.2, 0.7)
     front = -thick - CLEAR  # of the body behind the cover
-    body = rounded_box((front, -half, low), (depth - thick, half, height), radius, axis=0)
-    body += rounded_box((front - 0.004, -0.8 * half, 0.3 * low), (depth - thick, 0.8 * half, low), 0.006)
-    body += box((front * 0.5, -0.6 * half, low - 0.006), (depth - thick - 0.01, 0.6 * half, low + 0.03))
+    body = box((front, depth - thick), half, (low, height), fillet=radius, axis=0)
+    body += box((front - 0.004, depth - thick), 0.8 * half, (0.3 * low, low), fillet=0.006)
+    body += box((front * 0.5, depth - thick - 0.01), 0.6 * half, (low - 0.006, low + 0.03))
     nozzle = front * 0.4
     body += cylinder((nozzle, 0, 0.3 * low), (nozzle, 0, 0.12 * low), 0.008, 0.006, 14)
     face = front - CLEAR
     cover = rounded_tray((face - thick, -half, low + 0.002 + CLEAR), (face, half, height), 0.003, radius,
                          ((0.0, rng.uniform(0.0, 0.25) * half), (0.35, 0.0), (1.0, 0.0)), axis=0, side=1)  # fmt: skip
     if rng.random() < 0.5:  # a window that shows how much is left
-        body_window = rounded_box(
-            (face - thick - 0.0015, -0.2 * half, low + 0.3 * (height - low)),
-            (face - thick + 0.002, 0.2 * half, low + 0.8 * (height - low)),
-            0.003,
+        body_window = box(
+            (face - thick - 0.0015, face - thick + 0.002),
+            0.2 * half,
+            (low + 0.3 * (height - low), low + 0.8 * (height - low)),
+            fillet=0.003,
             axis=0,
         )
         cover += body_window
@@ -144,7 +145,7 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
                 (pivot[0] - reach, 0, pivot[2] - 0.03 - 0.3 * reach)]  # fmt: skip
         wide = 0.5 * half
         solid = tube([path[0], path[1]], r, 10) + hull_of(
-            *(rounded_box((x - 0.003, -w, z - 0.003), (x + 0.003, w, z + 0.003), 0.002)
+            *(box((x - 0.003, -w, z - 0.003), (x + 0.003, w, z + 0.003), fillet=0.002)
               for (x, _, z), w in ((path[1], 0.006), (path[2], wide)))
         )  # fmt: skip
         solid += cylinder((pivot[0], -0.4 * wide, pivot[2]), (pivot[0], 0.4 * wide, pivot[2]), r, sections=12)
@@ -157,7 +158,7 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
     top = low - 0.001
     bottom = 0.35 * low
     if style == "bar":
-        solid = rounded_box((tip, -wide, bottom), (back, wide, top), 0.005)
+        solid = box((tip, back), wide, (bottom, top), fillet=0.005)
         dispenser.add("bar", solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, 0, bottom)))
         return dispenser
     spots = [0.0] if style == "button" else [-0.4 * half, 0.4 * half]
@@ -215,7 +216,7 @@ def _drink_jar(rng: np.random.Generator) -> Assembly:
     if hinged:
         x, w = 1.05 * radius + 0.006, 0.3 * radius
         lid += cylinder((x, -w, top + CLEAR + 0.004), (x, w, top + CLEAR + 0.004), 0.004, sections=12)
-        lid += box((0.8 * radius, -w, top + CLEAR), (x, w, top + CLEAR + 0.004))
+        lid += box((0.8 * radius, x), w, (top + CLEAR, top + CLEAR + 0.004))
     dispenser = Assembly("body", body, DENSITY)
     if hinged:
         joint = revolute("body", (0, 1, 0), (x, 0, top + CLEAR + 0.004), 0.0, rng.uniform(0.8, 1.55))
@@ -281,19 +282,19 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
     shelf = height - rng.uniform(0.28, 0.34) if tall else rng.uniform(0.03, 0.06)
     roof = height - rng.uniform(0.05, 0.09)
     niche = -depth + rng.uniform(0.08, 0.13)
-    body = box((niche, -half, shelf - 0.01), (depth, half, roof + 0.01))
-    body += rounded_box((-depth, -half, roof), (depth, half, height), rng.uniform(0.01, 0.05), axis=2)
+    body = box((niche, depth), half, (shelf - 0.01, roof + 0.01))
+    body += box(depth, half, (roof, height), fillet=rng.uniform(0.01, 0.05), axis=2)
     for s in (-1.0, 1.0):
         y0, y1 = sorted((s * half, s * (half - 0.012)))
-        body += box((-depth + 0.01, y0, shelf - 0.01), (depth, y1, roof + 0.01))
+        body += box((-depth + 0.01, depth), (y0, y1), (shelf - 0.01, roof + 0.01))
     door = tall and rng.random() < 0.7
     inset = 0.03 if door else 0.0
     if shelf > 0.1:
-        body += box((-depth + inset, -half, 0.0), (depth, half, shelf))
-        body += box((-depth, -half, shelf - 0.03), (depth, half, shelf))
+        body += box((-depth + inset, depth), half, (0.0, shelf))
+        body += box(depth, half, (shelf - 0.03, shelf))
     else:
-        body += rounded_box((-depth, -half, 0.0), (depth, half, shelf), 0.02, axis=2)
-    body += rounded_box((-depth - 0.02, -0.6 * half, shelf - 0.015), (niche + 0.01, 0.6 * half, shelf + 0.008), 0.006)
+        body += box(depth, half, (0.0, shelf), fillet=0.02, axis=2)
+    body += box((-depth - 0.02, niche + 0.01), 0.6 * half, (shelf - 0.015, shelf + 0.008), fillet=0.006)
     count = int(rng.choice([2, 3], p=[0.75, 0.25]))
     spots = (np.linspace(-1.0, 1.0, count) * 0.4 * half).tolist()
     style = str(rng.choice(["lever", "button", "tap"]))
@@ -305,7 +306,7 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
         body += cylinder((nose, y, z + 0.01), (nose, y, z - 0.03), 0.009, sections=14)
         if style == "lever":  # a paddle below the tap, which the cup pushes back
             pivot = (niche - 0.012, y, z - 0.04)
-            paddle = box((pivot[0] - 0.003, y - 0.02, z - 0.11), (pivot[0] + 0.003, y + 0.02, z - 0.045))
+            paddle = box((pivot[0] - 0.003, pivot[0] + 0.003), (y - 0.02, y + 0.02), (z - 0.11, z - 0.045))
             paddle += cylinder((pivot[0], y - 0.012, pivot[2]), (pivot[0], y + 0.012, pivot[2]), 0.006, sections=12)
             taps.append((paddle, revolute("body", (0, -1, 0), pivot, 0.0, 0.09)))
         elif style == "tap":
@@ -314,10 +315,11 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
             face = -depth - 0.001
             middle = 0.5 * (roof + height)
             size = min(0.3 * (height - roof), 0.02)
-            button = rounded_box(
-                (face - 0.008, y - 1.3 * size, middle - size),
-                (face - 0.003, y + 1.3 * size, middle + size),
-                0.003,
+            button = box(
+                (face - 0.008, face - 0.003),
+                (y - 1.3 * size, y + 1.3 * size),
+                (middle - size, middle + size),
+                fillet=0.003,
                 axis=0,
             )
             taps.append((button, prismatic("body", (1, 0, 0), 0.0, 0.002, (face, y, middle))))
@@ -330,7 +332,7 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
     if door:
         face, thick = -depth + inset - 0.002, inset - 0.002
         left = rng.random() < 0.5
-        panel = rounded_box((face - thick, -half + 0.004, 0.03), (face, half - 0.004, shelf - 0.033), 0.004)
+        panel = box((face - thick, face), half - 0.004, (0.03, shelf - 0.033), fillet=0.004)
         y = (half if left else -half) * 0.6 * -1.0
         panel += front_handle(str(rng.choice(["bar", "bow", "flat"])), (face - thick, y, 0.5 * shelf),
                               (face - thick, y, 0.8 * shelf), 0.025, 0.005)  # fmt: skip

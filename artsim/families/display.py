@@ -22,7 +22,6 @@ from artsim.making.solids import (
     hull,
     loft,
     ring,
-    rounded_box,
     rounded_rectangle,
     tube,
     union,
@@ -67,7 +66,7 @@ def _foot(rng: np.random.Generator, half: float, depth: float, thick: float) -> 
         return cylinder((0, 0, 0), (0, 0, thick), 0.5 * depth, 0.5 * depth * rng.uniform(0.7, 1.0), 32)
     if kind == "legs":  # two legs that spread to the front
         width = rng.uniform(0.02, 0.05)
-        solid = box((-0.3 * back, -1.5 * width, 0), (back, 1.5 * width, thick))
+        solid = box((-0.3 * back, back), 1.5 * width, (0, thick))
         for s in (-1.0, 1.0):
             solid += hull([(x, y, z) for x, y in ((0.5 * back, s * 0.2 * width), (0.5 * back, s * 1.2 * width),
                            (front, s * half), (front, s * (half - width))) for z in (0, thick)])  # fmt: skip
@@ -82,7 +81,7 @@ def _foot(rng: np.random.Generator, half: float, depth: float, thick: float) -> 
             [(front + 0.6 * (back - front) * a * a + d, half * a, z) for d in (0.0, width) for z in (0.0, thick)]
             for a in np.linspace(-1.0, 1.0, 9)
         ]
-        return loft(bows) + box((front + 0.5 * width, -width, 0), (0.6 * back, width, thick))
+        return loft(bows) + box((front + 0.5 * width, 0.6 * back), width, (0, thick))
     outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.02, 0.95) * min(half, 0.5 * depth), 4)
     top = rng.uniform(0.55, 0.9) if kind == "tapered" else rng.uniform(0.96, 1.0)
     return hull([(x, y, 0.0) for x, y in outline] + [(x, y, 0.4 * thick) for x, y in outline]
@@ -145,12 +144,10 @@ def _on_stand(rng: np.random.Generator, display: Assembly) -> None:
     offsets = (np.arange(count) - 0.5 * (count - 1)) * (2.0 * panel.half + 0.02)
     if count > 1:
         reach = float(offsets[-1]) + 0.03
-        chain.solid += rounded_box(
-            (front - 0.004, -reach, middle - 0.014), (front + 0.005, reach, middle + 0.014), 0.004
-        )
+        chain.solid += box((front - 0.004, front + 0.005), reach, (middle - 0.014, middle + 0.014), fillet=0.004)
     ear = 0.6 * radius
     for y in offsets:
-        chain.solid += box((axis, y - ear, middle - 0.8 * knuckle), (front + 0.004, y + ear, middle + 0.8 * knuckle))
+        chain.solid += box((axis, front + 0.004), (y - ear, y + ear), (middle - 0.8 * knuckle, middle + 0.8 * knuckle))
         if tilts:
             chain.solid += cylinder((axis, y - ear, middle), (axis, y + ear, middle), knuckle, sections=14)
     parent = chain.name
@@ -198,13 +195,13 @@ def _head(
 ) -> Solid:  # fmt: skip
     """What holds a screen: a plate behind it, and ears on either side of the hinge, or an arm where nothing tilts."""
     size = min(0.045, 0.5 * panel.rise)
-    solid = box((plane, y - 0.8 * size, z - size), (plane + 0.006, y + 0.8 * size, z + size))
+    solid = box((plane, plane + 0.006), (y - 0.8 * size, y + 0.8 * size), (z - size, z + size))
     if not tilts:
-        return solid + box((plane, y - ear, z - 0.8 * knuckle), (axis + 0.001, y + ear, z + 0.8 * knuckle))
+        return solid + box((plane, axis + 0.001), (y - ear, y + ear), (z - 0.8 * knuckle, z + 0.8 * knuckle))
     for s in (-1.0, 1.0):
         first, last = sorted((y + s * (ear + 0.001), y + s * (ear + 0.006)))
         solid += cylinder((axis, first, z), (axis, last, z), knuckle, sections=14)
-        solid += box((plane, first, z - 0.8 * knuckle), (axis, last, z + 0.8 * knuckle))
+        solid += box((plane, axis), (first, last), (z - 0.8 * knuckle, z + 0.8 * knuckle))
     return solid
 
 
@@ -281,7 +278,7 @@ def _on_easel(rng: np.random.Generator, display: Assembly) -> None:
     wide = panel.half * (rng.uniform(0.2, 0.85) if count == 1 else rng.uniform(0.04, 0.15))
     for k in range(count):
         y = 0.0 if count == 1 else (k - 0.5) * 1.2 * panel.half
-        leaf = box((GAP, y - wide, low), (GAP + thick, y + wide, z))
+        leaf = box((GAP, GAP + thick), (y - wide, y + wide), (low, z))
         leaf += cylinder((GAP + 0.5 * thick, y - wide, z), (GAP + 0.5 * thick, y + wide, z), 0.5 * thick, sections=12)
         hinge = revolute("body", (0, -1, 0), (GAP + 0.5 * thick, y, z), 0.0, rng.uniform(0.5, 1.6))
         display.add("stand" if count == 1 else f"leg_{k}", leaf, hinge, density=1500.0)
@@ -323,7 +320,7 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
     side = rng.uniform(0.3, 0.6) * half if rng.random() < 0.4 else 0.0  # a strip for knobs, on the right
     chin = rng.uniform(0.1, 0.3) * rise if side == 0 else 0.0
     lip = rng.uniform(0.006, 0.02)
-    shell = rounded_box((front + lip, -half, low), (front + cabinet, half, high), rng.uniform(0.02, 0.2) * rise, axis=0)
+    shell = box((front + lip, front + cabinet), half, (low, high), fillet=rng.uniform(0.02, 0.2) * rise, axis=0)
     inset = 0.08 * rise
     shell += frame(
         (front, inset - half, low + inset),

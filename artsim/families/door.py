@@ -95,7 +95,7 @@ def _sliding(
         leaves.append((leaf, side, 0.5 * (low + high)))
     travel = width / 2 - overlap - 0.006
     if fixed:
-        body += leaves.pop()[0] + box((-depth / 2 + 0.02, -width / 2 - 0.002, -0.001), (depth / 2 - 0.02, 0, 0.001))
+        body += leaves.pop()[0] + box(depth / 2 - 0.02, (-width / 2 - 0.002, 0), 0.001)
     door.add("frame", body)
     for number, (leaf, side, center) in enumerate(leaves):
         name = "door" if fixed else f"door_{number}"
@@ -250,7 +250,7 @@ def _knuckles(low: Array, high: Array, edge: float, side: float) -> Solid:
     for share in (0.12, 0.5, 0.88):
         z = low[2] + share * (high[2] - low[2])
         solid += cylinder((x, y, z - 0.045), (x, y, z + 0.045), 0.0055, sections=12)
-        solid += box((x, y - 0.003, z - 0.045), (low[0] + 0.001, y + 0.003, z + 0.045))
+        solid += box((x, low[0] + 0.001), (y - 0.003, y + 0.003), (z - 0.045, z + 0.045))
     return solid
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from artsim.families.details import bar_handle, bow_handle, knob, panel
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, prismatic
-from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull_of, rounded_box, tray, tube
+from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull_of, tray, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -77,9 +77,9 @@ class _Furniture:
         thin = wall / 4
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
         for z in edges_z[1:-1]:
-            solid += box((low[0], low[1] + wall / 2, z - thin), (high[0] - wall / 4, high[1] - wall / 2, z + thin))
+            solid += box((low[0], high[0] - wall / 4), (low[1] + wall / 2, high[1] - wall / 2), (z - thin, z + thin))
         for y in edges_y[1:-1]:
-            solid += box((low[0], y - thin, low[2] + wall / 2), (high[0] - wall / 4, y + thin, high[2] - wall / 2))
+            solid += box((low[0], high[0] - wall / 4), (y - thin, y + thin), (low[2] + wall / 2, high[2] - wall / 2))
         for row in range(len(edges_z) - 2, -1, -1):
             content = contents[row] if contents else "drawer"
             for column in range(len(edges_y) - 1):
@@ -174,7 +174,7 @@ def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
         over = rng.uniform(0.003, 0.04)
         front = over + (_FRONT if furniture.style.overlay and rng.random() < 0.7 else 0.0)
         thick = rng.uniform(0.01, 0.035)
-        furniture.body += rounded_box((x0 - front, -y - over, top - 0.001), (x1, y + over, top + thick), 0.3 * thick)
+        furniture.body += box((x0 - front, x1), y + over, (top - 0.001, top + thick), fillet=0.3 * thick)
     if raised:
         size = rng.uniform(0.02, 0.06)
         furniture.body += _legs(rng, x0, x1, y, legs + 0.001, size)
@@ -220,17 +220,17 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
             )  # fmt: skip
             for near, far in ((-between, middle - span + 0.002), (middle + span - 0.002, between)):
                 if far - near > 0.003:
-                    board = box((x0 + inset, near, top - apron), (x0 + inset + wall, far, top + 0.001))
+                    board = box((x0 + inset, x0 + inset + wall), (near, far), (top - apron, top + 0.001))
                     furniture.body += board.mirrored(0) if back else board
         else:
-            board = box((x1 - inset - wall, -between, top - apron), (x1 - inset, between, top + 0.001))
+            board = box((x1 - inset - wall, x1 - inset), between, (top - apron, top + 0.001))
             furniture.body += board if back else board.mirrored(0)
     for side in (-1, 1):
         beside = sorted((side * (y - inset), side * (y - inset - wall)))
-        furniture.body += box((x0 + leg - 0.002, beside[0], top - apron), (x1 - leg + 0.002, beside[1], top + 0.001))
+        furniture.body += box((x0 + leg - 0.002, x1 - leg + 0.002), (beside[0], beside[1]), (top - apron, top + 0.001))
     if rng.random() < 0.25:  # a shelf between the legs
         z = rng.uniform(0.12, 0.35) * height
-        furniture.body += box((x0 + 0.25 * leg, -y + 0.25 * leg, z), (x1 - 0.25 * leg, y - 0.25 * leg, z + 0.018))
+        furniture.body += box((x0 + 0.25 * leg, x1 - 0.25 * leg), y - 0.25 * leg, (z, z + 0.018))
 
 
 def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
@@ -275,10 +275,12 @@ def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
         furniture.body += _legs(rng, x0, x1, y, top + 0.001, leg)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y
-        furniture.body += box((x0, min(edge, edge + sides[0] * wall), 0), (x1, max(edge, edge + sides[0] * wall), top))
+        furniture.body += box(
+            (x0, x1), (min(edge, edge + sides[0] * wall), max(edge, edge + sides[0] * wall)), (0, top)
+        )
     if on_legs or rng.random() < 0.7:  # a board at the back
         furniture.body += box(
-            (x1 - 0.06, left, top - rng.uniform(0.15, 0.9) * (top - low)), (x1 - 0.04, right, top + 0.001)
+            (x1 - 0.06, x1 - 0.04), (left, right), (top - rng.uniform(0.15, 0.9) * (top - low), top + 0.001)
         )
     if rng.random() < 0.5:
         flat = rng.uniform(0.08, 0.13)
@@ -316,8 +318,8 @@ def _top(rng: np.random.Generator, depth: float, width: float, low: float, high:
     radius = rng.choice([0.1, 0.45]) * (high - low)
     corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
     if rng.random() < 0.2:
-        return rounded_box(*corners, rng.uniform(0.02, 0.1), axis=2)
-    return rounded_box(*corners, radius)
+        return box(*corners, fillet=rng.uniform(0.02, 0.1), axis=2)
+    return box(*corners, fillet=radius)
 
 
 def _legs(rng: np.random.Generator, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
@@ -329,19 +331,19 @@ def _legs(rng: np.random.Generator, x0: float, x1: float, y: float, height: floa
     for x in (x0 + half, x1 - half):
         for w in (-y + half, y - half):
             if kind == "square":
-                solid += box((x - half, w - half, 0), (x + half, w + half, height))
+                solid += box((x - half, x + half), (w - half, w + half), (0, height))
             elif kind == "round":
                 solid += cylinder((x, w, 0), (x, w, height), half * taper, half, 16)
             elif kind == "tapered":  # below a straight block, its outer faces upright
-                block = box((x - half, w - half, 0.75 * height), (x + half, w + half, height))
+                block = box((x - half, x + half), (w - half, w + half), (0.75 * height, height))
                 foot = taper * half
                 corner = (x + np.sign(x - middle) * (half - foot), w + np.sign(w) * (half - foot), 0.0)
-                solid += block + hull_of(block, box((-foot, -foot, 0), (foot, foot, 0.01)).moved(corner))
+                solid += block + hull_of(block, box(foot, foot, (0, 0.01)).moved(corner))
             else:
                 levels = np.array([0.0, 0.03, 0.1, 0.45, 0.5, 0.53, 0.56, 0.7]) * height
                 radii = half * np.array([0.5, 0.8, 0.5, 0.95, 0.6, 0.9, 0.6, 1.0])
                 solid += tube(np.column_stack([np.full(8, x), np.full(8, w), levels]), radii.tolist(), 12)
-                solid += box((x - half, w - half, 0.69 * height), (x + half, w + half, height))
+                solid += box((x - half, x + half), (w - half, w + half), (0.69 * height, height))
     return solid
 
 

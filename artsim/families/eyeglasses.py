@@ -278,10 +278,10 @@ def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
     x = float(front.x(front.half))
     near, far = front.half + front.barrel, front.half + front.barrel + front.thickness
     x_lens = float(front.x(y))
-    at_lens = box((x_lens - depth / 2, y - 1.2 * MM, z - h), (x_lens + depth / 2, y, z + h))
-    corner = box((x - depth / 2, near, z - h), (x + 0.7 * depth, far - 0.3 * front.thickness, z + h))
-    ahead = box((x, near, z - h), (x + depth, far, z + h))
-    back = box((-3.0 * MM, near, z - h), (-GAP, far, z + h))
+    at_lens = box((x_lens - depth / 2, x_lens + depth / 2), (y - 1.2 * MM, y), (z - h, z + h))
+    corner = box((x - depth / 2, x + 0.7 * depth), (near, far - 0.3 * front.thickness), (z - h, z + h))
+    ahead = box((x, x + depth), (near, far), (z - h, z + h))
+    back = box((-3.0 * MM, -GAP), (near, far), (z - h, z + h))
     solid = hull_of(at_lens, corner) + hull_of(corner, ahead) + hull_of(ahead, back)
     return solid if side > 0 else solid.mirrored(1)
 
@@ -292,7 +292,7 @@ def _plate_corner(front: Front, outline: Array, depth: float, side: int) -> Soli
     right = right[np.argsort(right[:, 1], kind="stable")]
     h, z = 0.5 * front.height, front.hinge_z
     y = float(np.interp(z, right[:, 1], right[:, 0]))
-    solid = box((-depth - GAP, y - 1.2 * MM, z - h), (-GAP, front.half + front.thickness, z + h))
+    solid = box((-depth - GAP, -GAP), (y - 1.2 * MM, front.half + front.thickness), (z - h, z + h))
     return solid if side > 0 else solid.mirrored(1)
 
 
@@ -304,7 +304,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
     third = half / 3
 
     def knuckle(low: float, high: float, x0: float, x1: float) -> Solid:
-        leaf = box((x0, -0.3 * b, low), (x1, b + 0.8 * MM, high))
+        leaf = box((x0, x1), (-0.3 * b, b + 0.8 * MM), (low, high))
         return cylinder((0, 0, low), (0, 0, high), 0.9 * b, sections=12) + leaf
 
     fixed = knuckle(third, half, -3.0 * MM, -GAP) + knuckle(-half, -third, -3.0 * MM, -GAP)

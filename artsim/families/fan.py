@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, rounded_box, tube, union
+from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, tube, union
 
 GAP = 0.002
 UP = np.array([0.0, 0.0, 1.0])
@@ -93,10 +93,10 @@ def _neck(column: float, motor: float, z: float, level: float, side: float) -> S
     """A knuckle with two cheeks that carry the motor."""
     cheek = 0.01
     solid = cylinder((0, 0, z), (0, 0, z + 0.014), 1.4 * column, sections=18)
-    solid += box((-column, -side - cheek, z + 0.004), (column, side + cheek, z + 0.014))
+    solid += box(column, side + cheek, (z + 0.004, z + 0.014))
     for s in (-1, 1):
         y0, y1 = sorted((s * side, s * (side + cheek)))
-        solid += box((-0.9 * column, y0, z + 0.005), (0.9 * column, y1, level))
+        solid += box(0.9 * column, (y0, y1), (z + 0.005, level))
         solid += cylinder((0, y0, level), (0, y1, level), 1.1 * column, sections=18)
     return solid
 
@@ -164,7 +164,7 @@ def _box_fan(rng: np.random.Generator) -> Assembly:
     wall, outer = 0.014, 1.06 * cage + 0.014
     base = frame((-half, -outer, -outer), (half, outer, outer), [wall] * 4)
     for y in (-0.7 * outer, 0.7 * outer):
-        base += rounded_box((-1.3 * half, y - 0.015, -outer - 0.02), (1.3 * half, y + 0.015, -outer + 0.004), 0.004)
+        base += box(1.3 * half, (y - 0.015, y + 0.015), (-outer - 0.02, -outer + 0.004), fillet=0.004)
     if rng.random() < 0.5:
         spots = [(-0.3, -0.004), (-0.25, 0.03), (0.25, 0.03), (0.3, -0.004)]
         base += tube([(0, y * outer, outer + z) for y, z in spots], 0.006, 10)
@@ -172,9 +172,9 @@ def _box_fan(rng: np.random.Generator) -> Assembly:
     bar = 0.0022
     for x in (-half + 2 * bar, half - 2 * bar):
         for y in np.linspace(-1.0, 1.0, bars + 2)[1:-1] * cage:
-            base += box((x - bar, y - bar, -outer + 0.5 * wall), (x + bar, y + bar, outer - 0.5 * wall))
+            base += box((x - bar, x + bar), (y - bar, y + bar), outer - 0.5 * wall)
         for z in (-0.5 * cage, 0.0, 0.5 * cage):
-            base += box((x - 0.8 * bar, -outer + 0.5 * wall, z - bar), (x + 0.8 * bar, outer - 0.5 * wall, z + bar))
+            base += box((x - 0.8 * bar, x + 0.8 * bar), outer - 0.5 * wall, (z - bar, z + bar))
     motor = 0.25 * cage
     back = half - 0.35 * half
     base += cylinder((back, 0, 0), (half - bar, 0, 0), motor)
@@ -182,7 +182,7 @@ def _box_fan(rng: np.random.Generator) -> Assembly:
     corner = np.array([-half, outer - 0.035, outer - 0.035])
     with_knob = rng.random() < 0.5
     if with_knob:
-        base += rounded_box(corner - (0, 0.03, 0.03), corner + (half, 0.03, 0.03), 0.006, axis=0)
+        base += box(corner - (0, 0.03, 0.03), corner + (half, 0.03, 0.03), fillet=0.006, axis=0)
     fan = Assembly("base", base, 500.0)
     blades = _blades(rng, cage, 1.5 * half) + cylinder((0, 0, 0), (back - GAP, 0, 0), 0.03 * cage, sections=10)
     fan.add("blades", blades, continuous("base", FRONT, (0, 0, 0)), density=1200.0)
@@ -208,8 +208,8 @@ def _ceiling_fan(rng: np.random.Generator) -> Assembly:
     half, z = rng.uniform(0.05, 0.08), low - 0.6 * tall
     pitch = np.deg2rad(rng.uniform(8, 15))
     root = body + rng.uniform(0.03, 0.08)
-    paddle = rounded_box((-reach, -half, -0.004), (-root, half, 0.004), rng.uniform(0.2, 1.0) * half, axis=2, steps=4)
-    arm = box((-root - 0.06, -0.02, -0.0055), (-0.8 * body, 0.02, 0.0055))
+    paddle = box((-reach, -root), half, 0.004, fillet=rng.uniform(0.2, 1.0) * half, axis=2, steps=4)
+    arm = box((-root - 0.06, -0.8 * body), 0.02, 0.0055)
     blade = (paddle + arm).turned(FRONT, pitch).moved((0, 0, z))
     rotor += union(blade.turned(UP, 2.0 * np.pi * k / count) for k in range(count))
     fan = Assembly("base", mount, 1500.0)
@@ -222,9 +222,9 @@ def _foot(rng: np.random.Generator, cage: float, standing: bool) -> Solid:
     wide = cage * rng.uniform(0.85, 1.05)
     if standing and rng.random() < 0.4:
         half = 0.022
-        return box((-wide, -half, 0), (wide, half, 0.025)) + box((-half, -wide, 0), (half, wide, 0.025))
+        return box(wide, half, (0, 0.025)) + box(half, wide, (0, 0.025))
     if rng.random() < 0.25:
-        return rounded_box((-0.8 * wide, -0.8 * wide, 0), (0.8 * wide, 0.8 * wide, 0.03), 0.25 * wide, axis=2)
+        return box(0.8 * wide, 0.8 * wide, (0, 0.03), fillet=0.25 * wide, axis=2)
     tall = rng.uniform(0.015, 0.03)
     return cylinder((0, 0, 0), (0, 0, tall), wide, 0.9 * wide, 32) + cylinder(
         (0, 0, tall - 0.001), (0, 0, 2 * tall), 0.85 * wide, 0.3 * wide, 28

@@ -13,7 +13,7 @@ from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute, screw
-from artsim.making.solids import Solid, Vector, cylinder, ellipsoid, hull_of, rounded_box, tube, union
+from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -42,7 +42,7 @@ def _basin_mixer(rng: np.random.Generator) -> Assembly:
     elif kind == "bar":
         half, thick = r * rng.uniform(0.8, 1.5), r * rng.uniform(0.35, 0.6)
         tip = root + (-reach, 0, min(rng.uniform(-0.1, 0.25) * reach, top - root[2] - 2 * r))
-        ends = [rounded_box(p - (0.006, half, thick), p + (0.006, half, thick), 0.4 * thick) for p in (root, tip)]
+        ends = [box(p - (0.006, half, thick), p + (0.006, half, thick), fillet=0.4 * thick) for p in (root, tip)]
         body += hull_of(*ends) + _nozzle(rng, tip + (0.008, 0, 0), -UP, 0.6 * thick, 1.4 * thick)
     else:
         rise = (top - root[2] - 1.3 * r) if kind == "bow" else 0.1 * reach
@@ -111,7 +111,7 @@ def _three_piece(rng: np.random.Generator) -> Assembly:
     foot_radius, foot_height = rng.uniform(0.018, 0.026), rng.uniform(0.02, 0.07)
     plate = rng.uniform(0.005, 0.012)
     half = foot_radius + rng.uniform(0.003, 0.012)
-    base = rounded_box((-half, -spread - half, 0), (half, spread + half, plate), half, axis=2, steps=5)
+    base = box(half, spread + half, (0, plate), fillet=half, axis=2, steps=5)
     taper = rng.uniform(0.45, 0.9)
     for y in (-spread, spread):
         base += cylinder((0, y, 0.5 * plate), (0, y, foot_height), foot_radius, taper * foot_radius)
@@ -197,8 +197,8 @@ def _body(rng: np.random.Generator, radius: float, height: float) -> tuple[Solid
     kind = rng.choice(["round", "tapered", "square", "turned"], p=[0.4, 0.25, 0.15, 0.2])
     if kind == "square":
         s = 0.95 * radius
-        solid = rounded_box((-s, -s, 0), (s, s, height), 0.25 * s, axis=2)
-        return solid + rounded_box((-foot, -foot, 0), (foot, foot, thick), 0.3 * s, axis=2), height
+        solid = box(s, s, (0, height), fillet=0.25 * s, axis=2)
+        return solid + box(foot, foot, (0, thick), fillet=0.3 * s, axis=2), height
     low = radius * (rng.uniform(1.05, 1.35) if kind == "tapered" else 1.0)
     solid = cylinder((0, 0, 0), (0, 0, height), low, radius) + cylinder((0, 0, 0), (0, 0, thick), 1.1 * foot, foot)
     if kind == "turned":

@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, rounded_box, union
+from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004
@@ -43,7 +43,7 @@ class _Bar:
         size = min(self.thick, self.deep)
         if self.round:
             return cylinder((x, -half, z), (x, half, z), 0.9 * size, sections=12)
-        return box((x - size, -half, z - size), (x + size, half, z + size))
+        return box((x - size, x + size), half, (z - size, z + size))
 
 
 def build(rng: np.random.Generator) -> Assembly:
@@ -88,8 +88,8 @@ def _panel(rng: np.random.Generator, low: Array, high: Array, axis: int) -> Soli
         a[thick], b[thick] = middle - 0.0025, middle + 0.0025
         return solid + box(a, b)
     if kind == "cushion":
-        return rounded_box(low, high, 0.45 * (high[thick] - low[thick]))
-    return rounded_box(low, high, rng.uniform(0.01, 0.09), axis=thick, steps=4)
+        return box(low, high, fillet=0.45 * (high[thick] - low[thick]))
+    return box(low, high, fillet=rng.uniform(0.01, 0.09), axis=thick, steps=4)
 
 
 def _crossed(rng: np.random.Generator) -> Assembly:
@@ -199,7 +199,7 @@ def _under(rng: np.random.Generator) -> Assembly:
         length = float(hypot(knee, ahead * slant * knee))
         legs.append((name, solid, way, (x, 0.0, knee), length, ahead * slant))
         for t in (-1, 1):  # lugs
-            seat += box((x - 0.02, t * y - bar.thick, under + 0.001), (x + 0.02, t * y + bar.thick, seat_z + 0.002))
+            seat += box((x - 0.02, x + 0.02), (t * y - bar.thick, t * y + bar.thick), (under + 0.001, seat_z + 0.002))
     chair = Assembly("seat", seat, 600.0)
     for name, solid, way, at, length, slope in legs:
         # They stop a little below the seat; those in front fold back, those behind fold forward, to the inside.
@@ -247,8 +247,8 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
         y = start + k * pitch
         a, b = y - 0.5 * side_thick, y + 0.5 * side_thick
         if on_post:
-            body += box((-0.02, a, 0.0), (0.06, b, arm_z)) + box((x0 + 0.05, a, 0.0), (x1 + 0.06, b, 0.025))
-            body += box((-0.02, a, seat_z - 0.05), (x1 + 0.03 + back_thick, b, seat_z + thick + 0.1))
+            body += box((-0.02, 0.06), (a, b), (0.0, arm_z)) + box((x0 + 0.05, x1 + 0.06), (a, b), (0.0, 0.025))
+            body += box((-0.02, x1 + 0.03 + back_thick), (a, b), (seat_z - 0.05, seat_z + thick + 0.1))
         else:
             body += hull(
                 [
@@ -262,7 +262,7 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
                     )
                 ]
             )
-        body += rounded_box((x0 + 0.02, a - 0.006, arm_z - 0.002), (x1 + 0.04, b + 0.006, arm_z + 0.03), 0.01)
+        body += box((x0 + 0.02, x1 + 0.04), (a - 0.006, b + 0.006), (arm_z - 0.002, arm_z + 0.03), fillet=0.01)
     hinge_x = x1 - 0.04
     seats = []
     lift = seat_z + thick + 0.02

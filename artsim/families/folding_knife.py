@@ -146,10 +146,10 @@ def _details(rng: np.random.Generator, outline: Array, pins: Array, top: float) 
     elif kind == "badge":
         y = float(outline[:, len(outline[0]) // 2, 1].mean())
         size = rng.uniform(0.04, 0.09) * half
-        solid += box((x - 1.4 * size, y - size, top - 0.001), (x + 1.4 * size, y + size, top + 0.0005))
+        solid += box((x - 1.4 * size, x + 1.4 * size), (y - size, y + size), (top - 0.001, top + 0.0005))
     elif kind == "clip":  # belt clip
         y = float(outline[:, len(outline[0]) // 2, 1].mean())
         lift = top + 0.0025
-        solid += box((x + 0.32 * half, y - 0.003, top - 0.001), (x + 0.42 * half, y + 0.003, lift + 0.0015))
-        solid += box((x - 0.25 * half, y - 0.003, lift), (x + 0.42 * half, y + 0.003, lift + 0.0015))
+        solid += box((x + 0.32 * half, x + 0.42 * half), (y - 0.003, y + 0.003), (top - 0.001, lift + 0.0015))
+        solid += box((x - 0.25 * half, x + 0.42 * half), (y - 0.003, y + 0.003), (lift, lift + 0.0015))
     return solid

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tray
+from artsim.making.solids import Solid, box, cylinder, hull_of, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -291,7 +291,7 @@ def _handle(
         wide[along] = half
         wide[0] = 0.5 * reach
         middle = center - (0.5 * reach - 0.002, 0, 0)
-        return rounded_box(middle - wide, middle + wide, 0.3 * radius, axis=along)
+        return box(middle - wide, middle + wide, fillet=0.3 * radius, axis=along)
     if style.handle == "cup":
         ends = [center + s * 0.8 * ahead for s in (-1, 1)]
         thick = np.array([0.0, 0.0, 0.004]) if along == 1 else np.array([0.0, 0.004, 0.0])

@@ -15,13 +15,13 @@ from artsim.common.products import apply, unit
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.solids import (
     Solid,
+    box,
     cylinder,
     ellipsoid,
     hull,
     revolved,
     ring,
     rotation_about,
-    rounded_box,
     tube,
     union,
 )
@@ -137,7 +137,7 @@ def _stand(rng: np.random.Generator, radius: float, top: float, thick: float) ->
         return solid
     tall = radius * rng.uniform(0.06, 0.14)
     if kind == "plinth":
-        return solid + rounded_box((-wide, -wide, low - tall), (wide, wide, low + 0.002), 0.1 * wide, axis=2)
+        return solid + box(wide, wide, (low - tall, low + 0.002), fillet=0.1 * wide, axis=2)
     solid += cylinder((0, 0, low - tall), (0, 0, low + 0.002), wide, 0.9 * wide, 32)
     if kind == "stepped":
         solid += cylinder((0, 0, low), (0, 0, low + 0.7 * tall), 0.65 * wide, 0.55 * wide, 28)

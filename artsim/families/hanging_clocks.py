@@ -62,7 +62,7 @@ def pendulum_clock(rng: np.random.Generator) -> Assembly:
     body += rim(rng, 0.003, center, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
     low = -half
     if kind in ("house", "arch"):
-        body += box((0.002, -half, -half), (deep, half, half))
+        body += box((0.002, deep), half, half)
         if kind == "house":
             body += prism(
                 [(-1.15 * half, half), (1.15 * half, half), (0.0, half * rng.uniform(1.4, 1.9))], -0.01, deep, 0
@@ -78,13 +78,13 @@ def pendulum_clock(rng: np.random.Generator) -> Assembly:
     free = rng.random() < 0.35
     if free:  # in the open below the case
         solid, swing = pendulum(rng, 0.4 * deep, low - 0.004, length, half)
-        body += box((0.35 * deep, -0.004, low - 0.0025), (0.45 * deep, 0.004, low + 0.01))
+        body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
         clock.add("body", body, density=DENSITY)
     else:
         room = half * rng.uniform(0.5, 0.85)
         bottom = low - length - 0.02
         body += frame((0.006, -room - 0.01, bottom - 0.012), (deep, room + 0.01, low + 0.01), [0.01] * 4)
-        body += box((deep - 0.008, -room - 0.005, bottom - 0.008), (deep, room + 0.005, low + 0.005))
+        body += box((deep - 0.008, deep), room + 0.005, (bottom - 0.008, low + 0.005))
         if rng.random() < 0.6:
             body += prism(
                 [
@@ -97,7 +97,7 @@ def pendulum_clock(rng: np.random.Generator) -> Assembly:
                 deep,
                 0,
             )
-        body += box((deep - 0.03, -0.003, low - 0.003), (deep, 0.003, low + 0.01))
+        body += box((deep - 0.03, deep), 0.003, (low - 0.003, low + 0.01))
         solid, swing = pendulum(rng, 0.5 * deep, low - 0.004, length - 0.006, room)
         clock.add("body", body, density=DENSITY)
         if rng.random() < 0.6:
@@ -115,7 +115,7 @@ def cuckoo_clock(rng: np.random.Generator) -> Assembly:
     center = np.zeros(3)
     low, eaves = -radius * rng.uniform(1.25, 1.6), radius * rng.uniform(1.6, 2.2)
     ridge = eaves + half * rng.uniform(0.7, 1.2)
-    body = dial_plate(rng, 0.0, center, radius) + box((0.002, -half, low), (deep, half, eaves))
+    body = dial_plate(rng, 0.0, center, radius) + box((0.002, deep), half, (low, eaves))
     body += prism([(-half, eaves - 0.001), (half, eaves - 0.001), (0, ridge)], 0.002, deep, 0)
     thick, over = 0.08 * half, 1.25
     slope = (ridge - eaves) / half
@@ -131,7 +131,7 @@ def cuckoo_clock(rng: np.random.Generator) -> Assembly:
     top, wide = eaves + 0.25 * (ridge - eaves), 0.22 * half
     base = radius * 1.15
     length = radius * rng.uniform(1.5, 3.0)
-    body += box((0.35 * deep, -0.004, low - 0.0025), (0.45 * deep, 0.004, low + 0.01))
+    body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
     clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
     two = rng.random() < 0.5
@@ -140,7 +140,7 @@ def cuckoo_clock(rng: np.random.Generator) -> Assembly:
         left = number == 0
         seam = 0.0006
         across = (seam if two else -wide, wide) if left else (-wide, -seam)
-        leaf = box((0.002 - GAP - thin, across[0], base), (0.002 - GAP, across[1], max(top, base + 1.5 * wide)))
+        leaf = box((0.002 - GAP - thin, 0.002 - GAP), (across[0], across[1]), (base, max(top, base + 1.5 * wide)))
         edge = across[1] if left else across[0]
         joint = side_hinge(0.002 - GAP - thin, edge, rng.uniform(1.2, 2.0), left)
         clock.add(f"door_{number}" if two else "door", leaf, joint)

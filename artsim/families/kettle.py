@@ -16,7 +16,7 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -199,7 +199,7 @@ def _lid(rng: np.random.Generator, pot: Pot, joint: str, low: bool) -> tuple[Sol
         top += 1.6 * size
     elif kind == "bar":
         half = 1.3 * size
-        lid += rounded_box((-0.35 * size, -half, foot - 0.3 * rise), (0.35 * size, half, top + 0.7 * size), 0.2 * size)
+        lid += box(0.35 * size, half, (foot - 0.3 * rise, top + 0.7 * size), fillet=0.2 * size)
         top += 0.7 * size
     else:
         lid += cylinder((0, 0, foot), (0, 0, top + 1.2 * size), 0.5 * size, size, 16)
@@ -207,7 +207,7 @@ def _lid(rng: np.random.Generator, pot: Pot, joint: str, low: bool) -> tuple[Sol
     if joint == "hinge":
         x, half, r = _hinge(pot)
         lid += cylinder((x, -half, z + r), (x, half, z + r), r, sections=14)
-        lid += box((0.8 * radius, -half, z), (x, half, z + r))
+        lid += box((0.8 * radius, x), half, (z, z + r))
     elif rng.random() < 0.5:  # a rim that reaches into the pot is hidden while the lid lies: only a plate shows
         lid += ring((0, 0, z + 0.5 * rim), UP, 0.9 * radius, 1.03 * radius, 0.6 * rim, 24)
     return lid, top
@@ -336,7 +336,7 @@ def _base(rng: np.random.Generator, kettle: Assembly, pot: Pot) -> None:
     base = cylinder((0, 0, 0), (0, 0, 0.55 * tall), radius) + cylinder((0, 0, 0.5 * tall), (0, 0, tall), radius,
                                                                      0.85 * radius)  # fmt: skip
     if rng.random() < 0.5:
-        base += rounded_box((radius * 0.5, -0.3 * radius, 0.0), (1.35 * radius, 0.3 * radius, 0.6 * tall), 0.004)
+        base += box((radius * 0.5, 1.35 * radius), 0.3 * radius, (0.0, 0.6 * tall), fillet=0.004)
     at = np.array([0.0, 0.0, tall])
     joint = continuous("body", UP, at) if rng.random() < 0.5 else prismatic("body", -UP, 0.0, rng.uniform(0.03, 0.15))
     kettle.add("base", base, joint)
@@ -351,7 +351,7 @@ def _switch(rng: np.random.Generator, pot: Pot) -> tuple[Solid, str, Solid, Join
 
     def between(near: float, far: float, x: float, high: float, low: float) -> Solid:
         y0, y1 = sorted((side * near, side * far))
-        return rounded_box((-x, y0, z - low), (x, y1, z + high), 0.002)
+        return box(x, (y0, y1), (z - low, z + high), fillet=0.002)
 
     mount = between(0.6 * y, y, 1.5 * half, half + 0.004, half + 0.004)
     if rng.random() < 0.5:

@@ -26,7 +26,7 @@ from artsim.families.key_layouts import (
 )
 from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull, rounded_box, rounded_rectangle, tube, union
+from artsim.making.solids import Solid, box, cylinder, hull, rounded_rectangle, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -172,7 +172,7 @@ def _pads(low: Array, high: Array, height: float, feet: bool) -> Solid:
     spots = [(0.7 * low[1], 0.7 * low[0]), (0.7 * low[1], 0.7 * high[0]), (0.5 * high[1], 0.0)]
     if not feet:
         spots += [(0.6 * high[1], 0.7 * low[0]), (0.6 * high[1], 0.7 * high[0])]
-    return union(box((x - size, -u - size, 0.0), (x + size, -u + size, height + 0.001)) for x, u in spots)
+    return union(box((x - size, x + size), (-u - size, -u + size), (0.0, height + 0.001)) for x, u in spots)
 
 
 def _slab(face: Face, low: Sequence[float], high: Sequence[float], heights: tuple[float, float]) -> Solid:
@@ -236,7 +236,7 @@ def _feet(rng: np.random.Generator, keyboard: Assembly, low: Array, high: Array,
     limit = rng.uniform(1.1, 1.7)
     for k, share in enumerate((-0.33, 0.33)):
         y = -0.5 * (low[0] + high[0]) + share * (high[0] - low[0])
-        solid = box((x - length, y - 0.5 * wide, GAP), (x, y + 0.5 * wide, GAP + thick))
+        solid = box((x - length, x), (y - 0.5 * wide, y + 0.5 * wide), (GAP, GAP + thick))
         solid += cylinder((x, y - 0.5 * wide, z), (x, y + 0.5 * wide, z), 0.5 * thick, sections=10)
         keyboard.add(f"foot_{k}", solid, revolute("body", (0, -1, 0), (x, y, z), 0.0, limit), density=1000.0)
 
@@ -248,7 +248,7 @@ def _wrist_rest(
     deep, rise = rng.uniform(0.04, 0.09), height * rng.uniform(0.6, 1.1)
     half = 0.5 * float(high[0] - low[0]) * rng.uniform(0.85, 1.0)
     middle = -0.5 * float(low[0] + high[0])
-    solid = rounded_box((end - deep, middle - half, 0.0), (end, middle + half, rise), 0.6 * rise, axis=1)
+    solid = box((end - deep, end), (middle - half, middle + half), (0.0, rise), fillet=0.6 * rise, axis=1)
     slide = prismatic("body", (-1, 0, 0), 0.0, rng.uniform(0.02, 0.08), (end, 0, 0))
     keyboard.add("wrist_rest", solid, slide, density=400.0)
 
@@ -273,14 +273,14 @@ def _pivot(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     bodies = []
     for side in (1.0, -1.0):
         face = top_face(thick, 0.0, side * (half[0] + gap))
-        body = rounded_box(
+        body = box(
             (-half[1], side * (half[0] + gap) - half[0], 0.0), (half[1], side * (half[0] + gap) + half[0], thick),
-            rng.uniform(0.003, 0.02), axis=2)  # fmt: skip
+            fillet=rng.uniform(0.003, 0.02), axis=2)  # fmt: skip
         # One half's disc lies on the other's, each joined to its own half by an arm.
         low, high = (0.0, 0.45 * thick) if side > 0 else (0.45 * thick + GAP, thick)
         body += cylinder((pivot[0], 0, low), (pivot[0], 0, high), radius, sections=20)
         arm = sorted((side * (gap + 0.2 * radius), side * (gap + 1.6 * radius)))
-        body += box((half[1] - 0.003, arm[0], low), (pivot[0] + 0.3 * radius, arm[1], high))
+        body += box((half[1] - 0.003, pivot[0] + 0.3 * radius), (arm[0], arm[1]), (low, high))
         bodies.append((body, face))
     keyboard.add("left", bodies[0][0])
     keyboard.add("right", bodies[1][0], revolute("left", (0, 0, 1), (*pivot, thick), 0.0, rng.uniform(0.3, 0.9)))
@@ -301,7 +301,7 @@ def _folding(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     rounding = rng.uniform(0.003, 0.015)
     for side, face, name in zip((1.0, -1.0), faces, ("left", "right"), strict=True):
         y = float(face.origin[1])
-        body = rounded_box((-half[1], y - half[0], 0.0), (half[1], y + half[0], thick), rounding, axis=2)
+        body = box(half[1], (y - half[0], y + half[0]), (0.0, thick), fillet=rounding, axis=2)
         shares = (-0.9, -0.5, 0.5, 0.9) if side > 0 else (-0.49, -0.2, 0.2, 0.49)
         for first, last in ((shares[0], shares[1]), (shares[2], shares[3])):
             x0, x1 = first * half[1], last * half[1]

@@ -12,7 +12,7 @@ from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rounded_box, tube, union, vessel
+from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube, union, vessel
 from artsim.model.kinematics import Array
 
 GAP = 0.0012
@@ -43,14 +43,14 @@ def build(rng: np.random.Generator) -> Assembly:
         r = 0.005
         x, z = lid_radius + 1.6 * r, height + GAP + r
         half = rng.uniform(0.012, 0.025)
-        arm = box((lid_radius - 0.012, -half, height + GAP), (x, half, height + GAP + 0.9 * r))
+        arm = box((lid_radius - 0.012, x), half, (height + GAP, height + GAP + 0.9 * r))
         lid += arm + cylinder((x, -half, z), (x, half, z), r, sections=16)
         for side in (-1, 1):  # lugs on the pot, either side of the barrel
             y0, y1 = sorted((side * (half + GAP), side * (half + GAP + 0.006)))
             lug = hull_of(
-                cylinder((x, y0, z), (x, y1, z), r, sections=16), box((x - r, y0, height - 0.02), (x + r, y1, height))
+                cylinder((x, y0, z), (x, y1, z), r, sections=16), box((x - r, x + r), (y0, y1), (height - 0.02, height))
             )
-            pot += lug + box((radius - wall, y0, height - 0.02), (x, y1, height - 0.008))
+            pot += lug + box((radius - wall, x), (y0, y1), (height - 0.02, height - 0.008))
         assembly.add("pot", pot)
         joint = revolute("pot", (0, 1, 0), (x, 0, z), 0.0, np.deg2rad(rng.uniform(80, 105)))
     else:
@@ -98,7 +98,7 @@ def _stick(rng: np.random.Generator, radius: float, z: float) -> Solid:
     root, tip = np.array([-radius, 0.0, z]), np.array([-radius - length, 0.0, z + rise * length])
     waist = root + 0.3 * (tip - root)
     spots = ((root + (0.006, 0, 0), 1.3), (waist, 0.75), (tip, 1.0))
-    slabs = [rounded_box(p - (0.003, w * half, thick), p + (0.003, w * half, thick), 0.6 * thick) for p, w in spots]
+    slabs = [box(p - (0.003, w * half, thick), p + (0.003, w * half, thick), fillet=0.6 * thick) for p, w in spots]
     return hull_of(slabs[0], slabs[1]) + hull_of(slabs[1], slabs[2])
 
 
@@ -119,8 +119,8 @@ def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Soli
         return bar + union(tube([foot, tip], 0.8 * r, 10) for foot, tip in posts)
     half, thick = radius * sin(spread), rng.uniform(0.004, 0.007)
     far_x = -radius - reach
-    far = rounded_box((far_x, -0.6 * half, z - thick), (far_x + 0.012, 0.6 * half, z + 0.8 * thick), 0.004)
-    start_box = rounded_box((-radius - 0.004, -half, z - thick), (-inside * cos(spread), half, z + thick), 0.003)
+    far = box((far_x, far_x + 0.012), 0.6 * half, (z - thick, z + 0.8 * thick), fillet=0.004)
+    start_box = box((-radius - 0.004, -inside * cos(spread)), half, (z - thick, z + thick), fillet=0.003)
     return hull_of(start_box, far)
 
 

@@ -16,7 +16,7 @@ from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, continuous, revolute
-from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, rounded_box, tube, union
+from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -98,16 +98,16 @@ def _base(rng: np.random.Generator, link: Link, r: float) -> float:
     wide, thick = rng.uniform(0.06, 0.1), rng.uniform(0.012, 0.03)
     kind = rng.choice(["disc", "dome", "square", "clamp"], p=[0.4, 0.2, 0.25, 0.15])
     if kind == "clamp":
-        link.solid += rounded_box((-0.06, -0.025, -0.012), (0.035, 0.025, 0.012), 0.004)
-        link.solid += box((0.02, -0.025, -0.09), (0.035, 0.025, 0.0)) + box((-0.04, -0.02, -0.09), (0.03, 0.02, -0.078))
+        link.solid += box((-0.06, 0.035), 0.025, 0.012, fillet=0.004)
+        link.solid += box((0.02, 0.035), 0.025, (-0.09, 0.0)) + box((-0.04, 0.03), 0.02, (-0.09, -0.078))
         link.solid += tube([(-0.02, 0, -0.11), (-0.02, 0, -0.045)], 0.006, 12)
         link.solid += cylinder((-0.02, 0, -0.05), (-0.02, 0, -0.042), 0.014, sections=16)
-        link.solid += box((-0.04, -0.004, -0.114), (0.0, 0.004, -0.106))
+        link.solid += box((-0.04, 0.0), 0.004, (-0.114, -0.106))
         link.guard((-0.02, 0, -0.12), (-0.02, 0, 0.03), 0.05)
         link.guard((-0.08, 0, 0), (0.05, 0, 0), 0.03)
         thick = 0.012
     elif kind == "square":
-        link.solid += rounded_box((-wide, -0.8 * wide, 0), (wide, 0.8 * wide, thick), 0.25 * wide, axis=2)
+        link.solid += box(wide, 0.8 * wide, (0, thick), fillet=0.25 * wide, axis=2)
     else:
         link.solid += cylinder((0, 0, 0), (0, 0, thick), wide, 0.95 * wide, 36)
         if kind == "dome":

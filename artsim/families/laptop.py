@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import tan
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
 
 GAP = 0.0008
 
@@ -84,7 +84,7 @@ def _shell(
     rng: np.random.Generator, low: tuple[float, ...], high: tuple[float, ...], corner: float, side: int
 ) -> Solid:
     """Plate whose upper (side 1) or lower (-1) edges are bevelled or, seen from the side, wedge-shaped."""
-    plate = rounded_box(low, high, corner, axis=2)
+    plate = box(low, high, fillet=corner, axis=2)
     kind = rng.choice(["plain", "bevel", "wedge"], p=[0.45, 0.4, 0.15])
     if kind == "plain":
         return plate
@@ -96,10 +96,10 @@ def _shell(
     bevel = rng.uniform(0.3, 2.0) * thick if kind == "bevel" else 0.1 * thick
     recess = bevel if kind == "bevel" else rng.uniform(0.1, 0.5) * (high[0] - low[0])
     return hull_of(
-        rounded_box((*low[:2], outer[0]), (*high[:2], outer[1]), corner, axis=2),
-        rounded_box(
+        box((*low[:2], outer[0]), (*high[:2], outer[1]), fillet=corner, axis=2),
+        box(
             (low[0] + recess, low[1] + bevel, inner[0]), (high[0] - min(bevel, 0.005), high[1] - bevel, inner[1]),
-            corner, axis=2,
+            fillet=corner, axis=2,
         ),
     )  # fmt: skip
 
@@ -112,14 +112,14 @@ def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
     rim = width * rng.uniform(0.01, 0.03)
     solid = _shell(rng, (front, -width / 2, 0), (back, width / 2, deck), shape.corner, -1)
     for y in (-width / 2, width / 2 - rim):
-        solid += box((front + shape.corner, y, deck - 0.001), (back - shape.corner, y + rim, height))
+        solid += box((front + shape.corner, back - shape.corner), (y, y + rim), (deck - 0.001, height))
     solid += _keyboard(rng, shape, deck, rim)
     # Behind the hinge the base is low enough for the lid to swing past it.
     room = shape.hinge_z - max(shape.hinge_radius, shape.lid + GAP) - 0.0015
     if room > 0.004 and rng.random() < 0.6:
         reach = shape.hinge_x + rng.uniform(0.0, 0.07 if rng.random() < 0.6 else 0.2) * shape.depth
         half = width / 2 - rng.choice([0.0, rng.uniform(0.0, 0.2) * width]) - 0.5 * shape.corner
-        solid += rounded_box((back - 0.02, -half, 0.15 * room), (reach, half, room), 0.3 * room)
+        solid += box((back - 0.02, reach), half, (0.15 * room, room), fillet=0.3 * room)
     if rng.random() < 0.7:
         foot = 0.02 * width
         solid += union(
@@ -129,7 +129,7 @@ def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
         )
     if rng.random() < 0.15:  # a catch or a lip at the front
         half, reach = rng.uniform(0.03, 0.2) * width, rng.uniform(0.002, 0.012)
-        solid += box((front - reach, -half, 0.3 * deck), (front + 0.2 * shape.depth, half, 0.8 * deck))
+        solid += box((front - reach, front + 0.2 * shape.depth), half, (0.3 * deck, 0.8 * deck))
     return solid
 
 
@@ -137,7 +137,7 @@ def _propped(rng: np.random.Generator, shape: _Shape) -> Solid:
     """A tilted plate with the keyboard, held up by a bar below its back edge."""
     half, height, back = shape.width / 2, shape.height, shape.back
     deck = height - 0.0015
-    plate = rounded_box((shape.base_front, -half, 0), (back, half, deck), shape.corner, axis=2)
+    plate = box((shape.base_front, back), half, (0, deck), fillet=shape.corner, axis=2)
     plate += _keyboard(rng, shape, deck, 0.01 * shape.width)
     drop = tan(shape.tilt) * (back - shape.base_front) + height
     radius = 0.5 * drop * rng.uniform(0.7, 1.1)
@@ -168,7 +168,7 @@ def _keyboard(rng: np.random.Generator, shape: _Shape, deck: float, rim: float) 
                 edges = right + (left - right) * np.array([0.0, 0.13, 0.27, 0.7, 0.86, 1.0])
             x = keys_back - row * pitch
             for near, far in pairwise(edges):
-                solid += box((x - pitch + slit, near + slit, deck - 0.001), (x - slit, far - slit, top))
+                solid += box((x - pitch + slit, x - slit), (near + slit, far - slit), (deck - 0.001, top))
     pad_front, pad_back = shape.base_front + length * 0.04, keys_back - rows * pitch - length * 0.03
     if pad_back - pad_front > 0.03:
         half_pad, middle = shape.width * rng.uniform(0.1, 0.2), shape.width * rng.choice([0.0, rng.uniform(-0.05, 0.1)])
@@ -176,9 +176,9 @@ def _keyboard(rng: np.random.Generator, shape: _Shape, deck: float, rim: float) 
         if rng.random() < 0.4:  # two buttons before the pad
             split = pad_front + 0.2 * (pad_back - pad_front)
             for near, far in ((right, middle - 0.0005), (middle + 0.0005, left)):
-                solid += box((pad_front, near, deck - 0.001), (split - 0.001, far, 0.5 * (deck + top)))
+                solid += box((pad_front, split - 0.001), (near, far), (deck - 0.001, 0.5 * (deck + top)))
             pad_front = split
-        solid += box((pad_front, right, deck - 0.001), (pad_back, left, deck + 0.3 * (top - deck)))
+        solid += box((pad_front, pad_back), (right, left), (deck - 0.001, deck + 0.3 * (top - deck)))
     return solid
 
 
@@ -205,11 +205,11 @@ def _lid(rng: np.random.Generator, shape: _Shape) -> Solid:
         solid += cylinder((x, 0, top - 0.0015), (x, 0, top + 0.0006), radius)
     elif badge < 0.5:
         long, wide = shape.width * rng.uniform(0.05, 0.12), shape.width * rng.uniform(0.02, 0.05)
-        solid += rounded_box((middle - wide, -long, top - 0.0015), (middle + wide, long, top + 0.0007), 0.01, axis=2)
+        solid += box((middle - wide, middle + wide), long, (top - 0.0015, top + 0.0007), fillet=0.01, axis=2)
     elif badge < 0.65:
         rib = shape.width * rng.uniform(0.01, 0.03)
         for y in (-0.3 * shape.width, 0.3 * shape.width):
-            solid += box((front + 0.12 * shape.depth, y - rib, top - 0.0015), (middle, y + rib, top + 0.0012))
+            solid += box((front + 0.12 * shape.depth, middle), (y - rib, y + rib), (top - 0.0015, top + 0.0012))
     return solid
 
 
@@ -224,6 +224,6 @@ def _hinges(rng: np.random.Generator, shape: _Shape) -> Solid:
         right, left = first * shape.width, last * shape.width
         solid += cylinder((x, right, z), (x, left, z), radius, sections=16)
         solid += box(
-            (shape.back - 0.012, right, arm + 0.0004), (x, left, arm + max(min(0.8 * shape.lid, radius), 0.0015))
+            (shape.back - 0.012, x), (right, left), (arm + 0.0004, arm + max(min(0.8 * shape.lid, radius), 0.0015))
         )
     return solid

@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.elementary import power as raised
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -29,7 +29,7 @@ def _spark_wheel(center: Array, radius: float, half: float, notched: bool) -> So
     wheel = cylinder(center - half * y, center + half * y, radius, sections=18)
     if notched:
         for k in range(6):
-            tooth = box((-1.04 * radius, -0.9 * half, -0.12 * radius), (1.04 * radius, 0.9 * half, 0.12 * radius))
+            tooth = box(1.04 * radius, 0.9 * half, 0.12 * radius)
             wheel += tooth.turned(y, np.pi * k / 6).moved(center)
     return wheel
 
@@ -41,7 +41,7 @@ def _fork(center: Array, inner: float, thick: float, low: float, radius: float) 
         y0, y1 = sorted((side * inner, side * (inner + thick)))
         cheeks += hull_of(
             cylinder((center[0], y0, center[2]), (center[0], y1, center[2]), radius, sections=12),
-            box((center[0] - radius, y0, low), (center[0] + radius, y1, low + 0.001)),
+            box((center[0] - radius, center[0] + radius), (y0, y1), (low, low + 0.001)),
         )
     return cheeks
 
@@ -70,11 +70,9 @@ def _pocket(rng: np.random.Generator) -> Assembly:
     lid_tall = rng.uniform(0.014, 0.03)
     wall = rng.uniform(0.0008, 0.0014)
     corner = rng.uniform(0.1, 0.95) * half_y
-    body = rounded_box((-half_x, -half_y, 0), (half_x, half_y, height), corner, axis=2)
+    body = box(half_x, half_y, (0, height), fillet=corner, axis=2)
     if rng.random() < 0.5:  # bevelled foot
-        body += rounded_box(
-            (-0.93 * half_x, -0.9 * half_y, -0.002), (0.93 * half_x, 0.9 * half_y, 0.001), corner, axis=2
-        )
+        body += box(0.93 * half_x, 0.9 * half_y, (-0.002, 0.001), fillet=corner, axis=2)
     # Insert: a chimney with the wick, and the wheel before it.
     room_y, top = half_y - wall - 2 * GAP, height + lid_tall - wall - 2 * GAP
     wheel_radius = min(rng.uniform(0.003, 0.0045), 0.28 * lid_tall, 0.22 * half_x)
@@ -93,11 +91,11 @@ def _pocket(rng: np.random.Generator) -> Assembly:
     low = height + GAP
     knuckle = 0.0012
     body += cylinder((hinge_x, -0.5 * half_y, height), (hinge_x, 0.5 * half_y, height), 0.8 * knuckle, sections=10)
-    body += box((half_x - 0.001, -0.45 * half_y, height - 0.004), (hinge_x, 0.45 * half_y, height - 0.0001))
+    body += box((half_x - 0.001, hinge_x), 0.45 * half_y, (height - 0.004, height - 0.0001))
     lighter = Assembly("body", body, 4000.0)
     # The lid is a cap with walls, open at the bottom.
     lid = Solid()
-    outline = rounded_box((-half_x, -half_y, 0), (half_x, half_y, 1), corner, axis=2).union()[0]
+    outline = box(half_x, half_y, (0, 1), fillet=corner, axis=2).union()[0]
     plan = outline[outline[:, 2] > 0.5][:, :2]
     plan = plan[np.argsort(arctan2(plan[:, 1], plan[:, 0]))]
     shrink = 1.0 - wall / half_y * np.ones(2)
@@ -117,7 +115,7 @@ def _pocket(rng: np.random.Generator) -> Assembly:
     for side in (-1, 1):
         y0, y1 = sorted((side * 0.53 * half_y, side * 0.85 * half_y))
         lid += cylinder((hinge_x, y0, height), (hinge_x, y1, height), knuckle, sections=10)
-        lid += box((half_x - 0.0005, y0, low), (hinge_x, y1, low + 0.004))
+        lid += box((half_x - 0.0005, hinge_x), (y0, y1), (low, low + 0.004))
     limit = rng.uniform(1.6, 2.6)
     lighter.add("lid", lid, revolute("body", (0, 1, 0), (hinge_x, 0, height), 0.0, limit), density=7000.0)
     if rng.random() < 0.85:
@@ -142,9 +140,9 @@ def _disposable(rng: np.random.Generator) -> Assembly:
     wheel_radius = rng.uniform(0.3, 0.45) * hood_tall
     wheel_half = side - thin - 3 * GAP - 0.0008
     electric = rng.random() < 0.35  # a button instead of wheel and lever
-    hood = box((front + 0.15 * half_x, -side, height - 0.001), (back * 0.96, -side + thin, height + hood_tall))
+    hood = box((front + 0.15 * half_x, back * 0.96), (-side, -side + thin), (height - 0.001, height + hood_tall))
     hood += hood.mirrored(1)
-    hood += box((back * 0.8, -side, height - 0.001), (back * 0.96, side, height + hood_tall * rng.uniform(0.6, 1.0)))
+    hood += box((back * 0.8, back * 0.96), side, (height - 0.001, height + hood_tall * rng.uniform(0.6, 1.0)))
     nozzle = 0.5 * half_x
     hood += cylinder((nozzle, 0, height - 0.001), (nozzle, 0, height + 0.55 * hood_tall), 0.002, sections=10)
     body += hood
@@ -155,8 +153,8 @@ def _disposable(rng: np.random.Generator) -> Assembly:
         low = height + travel + GAP
         wide = 0.6 * half_y
         button = hull_of(
-            box((x0, -wide, low), (x1, wide, low + 0.001)),
-            rounded_box((x0 + rng.uniform(0, 0.3) * half_x, -wide, top - 0.003), (x1, wide, top), 0.001),
+            box((x0, x1), wide, (low, low + 0.001)),
+            box((x0 + rng.uniform(0, 0.3) * half_x, x1), wide, (top - 0.003, top), fillet=0.001),
         )
         lighter.add("body", body, density=1100.0)
         lighter.add(
@@ -185,12 +183,12 @@ def _disposable(rng: np.random.Generator) -> Assembly:
     travel = 0.5 * (under - height - thick)
     if rng.random() < 0.5:
         low = height + travel + GAP
-        lever = rounded_box((reach, -wide, low), (end, wide, low + thick), 0.0005)
-        lever += rounded_box((reach, -wide, low), (0.5 * (reach + end), wide, min(low + 2 * thick, center[2])), 0.0005)
+        lever = box((reach, end), wide, (low, low + thick), fillet=0.0005)
+        lever += box((reach, 0.5 * (reach + end)), wide, (low, min(low + 2 * thick, center[2])), fillet=0.0005)
         joint = prismatic("body", (0, 0, -1), 0.0, travel, (reach, 0, low))
     else:
         low = under - thick - GAP
-        lever = rounded_box((reach, -wide, low), (end, wide, low + thick), 0.0005)
+        lever = box((reach, end), wide, (low, low + thick), fillet=0.0005)
         length = end - reach
         turn = 0.8 * float(arctan2(low - height - GAP, length))
         joint = revolute("body", (0, -1, 0), (end, 0, low + 0.5 * thick), 0.0, max(turn, 0.03))
@@ -209,9 +207,7 @@ def _long(rng: np.random.Generator) -> Assembly:
     body = _layers(outline, [(0.8, 0.0), (1.0, 0.1 * handle), (waist, 0.35 * handle), (1.0, slot_low)])
     neck = rng.uniform(0.5, 0.9)
     body += _layers(outline, [(1.0, slot_high), (neck, handle)])
-    back = box(
-        (-half_x + depth + 0.004, -0.55 * half_y, slot_low - 0.001), (0.9 * half_x, 0.55 * half_y, slot_high + 0.001)
-    )
+    back = box((-half_x + depth + 0.004, 0.9 * half_x), 0.55 * half_y, (slot_low - 0.001, slot_high + 0.001))
     body += back
     guard = rng.random() < 0.4
     out = rng.uniform(0.004, 0.01)
@@ -243,10 +239,10 @@ def _long(rng: np.random.Generator) -> Assembly:
     travel = min(depth * 0.5, out * 0.9)
     z0, z1 = slot_low + GAP, slot_high - GAP
     if rng.random() < 0.55:
-        trigger = box((-half_x - 0.2 * out, -wide, z0), (-half_x + depth - travel, wide, z1))
+        trigger = box((-half_x - 0.2 * out, -half_x + depth - travel), wide, (z0, z1))
         trigger += hull_of(
-            box((-half_x, -wide, z0), (-half_x + 0.001, wide, z1)),
-            box((-half_x - out, -wide, z0 + 0.3 * (z1 - z0)), (-half_x, wide, z1 - rng.uniform(0, 0.3) * (z1 - z0))),
+            box((-half_x, -half_x + 0.001), wide, (z0, z1)),
+            box((-half_x - out, -half_x), wide, (z0 + 0.3 * (z1 - z0), z1 - rng.uniform(0, 0.3) * (z1 - z0))),
         )
         joint = prismatic("body", (1, 0, 0), 0.0, travel, (-half_x - out, 0, 0.5 * (z0 + z1)))
     else:
@@ -255,7 +251,7 @@ def _long(rng: np.random.Generator) -> Assembly:
         trigger = cylinder(pivot - (0, wide, 0), pivot + (0, wide, 0), 0.0024, sections=12)
         trigger += hull_of(
             box(pivot - (0.0024, wide, 0.001), pivot + (0.001, wide, 0)),
-            box((-half_x - out, -wide, z0 + 0.0015), (-half_x - out + 0.004, wide, z0 + 0.3 * long)),
+            box((-half_x - out, -half_x - out + 0.004), wide, (z0 + 0.0015, z0 + 0.3 * long)),
         )
         turn = min(0.7 * travel / long, 0.5)
         joint = revolute("body", (0, -1, 0), pivot, 0.0, max(turn, 0.05))
@@ -264,7 +260,7 @@ def _long(rng: np.random.Generator) -> Assembly:
         z = rng.uniform(slot_high + 0.01, handle - 0.012) if handle - slot_high > 0.026 else 0.3 * handle
         share = float(np.interp(z, [0.1 * handle, 0.35 * handle, slot_low, slot_high, handle], [1, waist, 1, 1, neck]))
         x = max(share, 0.0) * half_x + 0.0025
-        catch = rounded_box((x, -0.4 * half_y, z - 0.004), (x + 0.003, 0.4 * half_y, z + 0.004), 0.001)
+        catch = box((x, x + 0.003), 0.4 * half_y, (z - 0.004, z + 0.004), fillet=0.001)
         lighter.add("switch", catch, prismatic("body", (0, 0, 1), 0.0, 0.005, (x, 0, z)))
     return lighter
 
@@ -286,23 +282,22 @@ def _table(rng: np.random.Generator) -> Assembly:
     body += cylinder((flame, 0, height - 0.001), (flame, 0, height + 0.5 * flap_tall), burner, sections=12)
     low = height + travel + GAP
     top = low + rng.uniform(0.004, 0.014)
-    button = rounded_box(
-        (-0.8 * half_x, -0.7 * wide, low), (split - 2 * GAP - 0.001, 0.7 * wide, top), rng.uniform(0.001, 0.004)
-    )
+    button = box((-0.8 * half_x, split - 2 * GAP - 0.001), 0.7 * wide, (low, top), fillet=rng.uniform(0.001, 0.004))
     thin = 0.0012
     if rng.random() < 0.7:
         at = height + 0.0016
         body += union(
             box(
-                (hinge_x - 0.0012, s * 0.5 * wide - 0.0015, height - 0.001),
-                (hinge_x + 0.0012, s * 0.5 * wide + 0.0015, at - 0.0004),
+                (hinge_x - 0.0012, hinge_x + 0.0012),
+                (s * 0.5 * wide - 0.0015, s * 0.5 * wide + 0.0015),
+                (height - 0.001, at - 0.0004),
             )
             for s in (-1, 1)
         )
         base = at + GAP
         flap = frame((split, -wide, base), (hinge_x - 0.0015, wide, base + flap_tall), [thin] * 4, 0, 1)
-        flap += box((split, -wide, base + flap_tall - thin), (hinge_x - 0.0015, wide, base + flap_tall))
-        flap += box((hinge_x - 0.003, -0.3 * wide, base), (hinge_x + 0.001, 0.3 * wide, base + 0.5 * flap_tall))
+        flap += box((split, hinge_x - 0.0015), wide, (base + flap_tall - thin, base + flap_tall))
+        flap += box((hinge_x - 0.003, hinge_x + 0.001), 0.3 * wide, (base, base + 0.5 * flap_tall))
         lighter.add("body", body, density=2500.0)
         lighter.add(
             "lid",

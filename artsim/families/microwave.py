@@ -12,7 +12,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, rounded_box, tray, union
+from artsim.making.solids import Solid, box, cylinder, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -43,11 +43,11 @@ def build(rng: np.random.Generator) -> Assembly:
     hollow_high = np.array([depth - wall, half - wall, foot + height - wall])
     body = _body(rng, panel_low[1], half, foot, foot + height, depth, hollow_low, hollow_high)
     if low[2] > foot and not drops:
-        body += union(box((-thick, -half, z), (0.01, half, z + wall - GAP)) for z in (foot, high[2] + GAP))
+        body += union(box((-thick, 0.01), half, (z, z + wall - GAP)) for z in (foot, high[2] + GAP))
     oven = Assembly()
     has_panel = strip > 0
     if has_panel:
-        body += rounded_box(panel_low, panel_high + (0.01, 0, 0), 0.004, axis=1)
+        body += box(panel_low, panel_high + (0.01, 0, 0), fillet=0.004, axis=1)
     opener = bool(has_panel and not drops and rng.random() < 0.35)
     controls, movers = _controls(rng, panel_low, panel_high, opener) if has_panel else (Solid(), [])
     handle = "none" if opener else str(rng.choice(["bar", "bow", "flat", "none"]))
@@ -88,17 +88,17 @@ def _body(
     """Case around the hollow from ``inner`` to ``outer``, which is open to the front."""
     shell = 0.012
     solid = tray((GAP, right, low), (depth, left, high), shell, axis=0, side=-1)
-    solid += box((GAP, right + 0.002, low + 0.002), (depth - 0.002, inner[1], high - 0.002))  # the electronics
-    solid += box((GAP, inner[1] - 0.01, low + 0.002), (outer[0] + 0.01, left - 0.002, inner[2]))
-    solid += box((GAP, inner[1] - 0.01, outer[2]), (outer[0] + 0.01, left - 0.002, high - 0.002))
-    solid += box((GAP, outer[1], low + 0.002), (outer[0] + 0.01, left - 0.002, high - 0.002))
-    solid += box((outer[0], inner[1] - 0.01, low + 0.002), (depth - 0.002, left - 0.002, high - 0.002))
+    solid += box((GAP, depth - 0.002), (right + 0.002, inner[1]), (low + 0.002, high - 0.002))  # the electronics
+    solid += box((GAP, outer[0] + 0.01), (inner[1] - 0.01, left - 0.002), (low + 0.002, inner[2]))
+    solid += box((GAP, outer[0] + 0.01), (inner[1] - 0.01, left - 0.002), (outer[2], high - 0.002))
+    solid += box((GAP, outer[0] + 0.01), (outer[1], left - 0.002), (low + 0.002, high - 0.002))
+    solid += box((outer[0], depth - 0.002), (inner[1] - 0.01, left - 0.002), (low + 0.002, high - 0.002))
     spots = ((x, y) for x in (0.05, depth - 0.05) for y in (right + 0.05, left - 0.05))
     solid += union(cylinder((x, y, 0), (x, y, low + 0.004), 0.015, sections=14) for x, y in spots)
     if rng.random() < 0.4:  # ribs over the vents
         for x in np.linspace(0.4, 0.8, 7) * depth:
             solid += box(
-                (x, left - 0.005, low + 0.55 * (high - low)), (x + 0.006, left + 0.0025, low + 0.85 * (high - low))
+                (x, x + 0.006), (left - 0.005, left + 0.0025), (low + 0.55 * (high - low), low + 0.85 * (high - low))
             )
     return solid
 
@@ -112,7 +112,7 @@ def _door(rng: np.random.Generator, low: Array, high: Array, drops: bool, handle
     if rng.random() < 0.75:
         solid = windowed_panel(low, high, list(margins), 0.004, rng.uniform(0.0015, 0.008))
     else:
-        solid = rounded_box(low, high, 0.004)
+        solid = box(low, high, fillet=0.004)
         solid += box(low + (-0.0015, margins[0], margins[2]), high - (0.004, margins[1], margins[3]))
     radius, reach = rng.uniform(0.005, 0.009), rng.uniform(0.025, 0.042)
     inside = rng.uniform(0.08, 0.25)

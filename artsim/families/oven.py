@@ -14,7 +14,7 @@ from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.making.solids import Solid, box, cylinder, frame, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -40,22 +40,22 @@ def build(rng: np.random.Generator) -> Assembly:
     oven = Assembly()
     oven.record(handles=True)
     body = _shell(half, depth, plinth, height, wall)
-    body += rounded_box((-thick, -half, ceiling), (0.02, half, height), 0.004, axis=1)
+    body += box((-thick, 0.02), half, (ceiling, height), fillet=0.004, axis=1)
     feet = ((x, y) for x in (0.05, depth - 0.05) for y in (0.05 - half, half - 0.05))
     body += union(cylinder((x, y, 0), (x, y, plinth + 0.01), 0.02, sections=14) for x, y in feet)
     if not built_in:
         body += _hob(rng, half, depth, height, thick)
         if rng.random() < 0.6:  # a plinth set back
-            body += box((0.03, 0.004 - half, 0.0), (depth - 0.01, half - 0.004, plinth + 0.002))
+            body += box((0.03, depth - 0.01), half - 0.004, (0.0, plinth + 0.002))
     if guard > 0:
-        body += rounded_box((depth - 0.05, -half, height - 0.01), (depth, half, height + guard), 0.006, axis=1)
+        body += box((depth - 0.05, depth), half, (height - 0.01, height + guard), fillet=0.006, axis=1)
     floor = plinth + drawer
     if drawer > 0:
-        body += box((GAP, 0.01 - half, floor - 0.012), (depth - 0.01, half - 0.01, floor + 0.01))
+        body += box((GAP, depth - 0.01), half - 0.01, (floor - 0.012, floor + 0.01))
     edges = [floor, ceiling] if not two else [floor, floor + rng.uniform(0.5, 0.62) * (ceiling - floor), ceiling]
     for low, high in pairwise(edges):
-        body += box((GAP, 0.01 - half, high - wall), (depth - 0.01, half - 0.01, high + 0.01))
-        body += box((GAP, 0.01 - half, low), (depth - 0.01, half - 0.01, low + wall))
+        body += box((GAP, depth - 0.01), half - 0.01, (high - wall, high + 0.01))
+        body += box((GAP, depth - 0.01), half - 0.01, (low, low + wall))
         for z in np.linspace(low + wall, high - wall, int(rng.integers(2, 4)))[1:-1]:
             body += wire_shelf(
                 (0.05, wall - half - 0.002, z), (depth - wall + 0.002, half - wall + 0.002, z + 0.006), 7, 0.006
@@ -89,11 +89,11 @@ def _cooktop(rng: np.random.Generator) -> Assembly:
     beside = rng.random() < 0.6
     front = 0.004
     side = float(rng.choice([-1.0, 1.0]))
-    body = _hob(rng, half, depth, height, front, 0.008) + rounded_box((-front, -half, 0), (depth, half, height), 0.008)
+    body = _hob(rng, half, depth, height, front, 0.008) + box((-front, depth), half, (0, height), fillet=0.008)
     level = height + 0.008
     if beside:
         ends = sorted((side * (half - 0.01), side * (half + strip)))
-        body += rounded_box((-front, ends[0], 0.0), (depth, ends[1], level), 0.006)
+        body += box((-front, depth), (ends[0], ends[1]), (0.0, level), fillet=0.006)
     cooktop = Assembly()
     count, room = int(rng.integers(1, 7)), (depth if beside else 1.8 * half)
     gap = min(room / (count + 1), rng.uniform(0.05, 0.12))
@@ -104,7 +104,7 @@ def _cooktop(rng: np.random.Generator) -> Assembly:
         middle = side * (half + 0.02 + 0.5 * (strip - 0.02))
         feet.append((float(share), middle, level) if beside else (-0.5 * strip, float(share) - 0.5 * room, level))
     if not beside:
-        body += rounded_box((-strip, -half, 0), (0.01, half, level), 0.006)
+        body += box((-strip, 0.01), half, (0, level), fillet=0.006)
     cooktop.add("body", body, density=350.0)
     reach, axis = rng.uniform(0.015, 0.035), (0, 0, float(rng.choice([-1.0, 1.0])))
     stops = rng.random() < 0.25
@@ -124,14 +124,12 @@ def _hob(
     """Worktop with two to six burners, ``rise`` above the height ``z``."""
     top = z + (rng.uniform(0.008, 0.03) if rise is None else rise)
     over = rng.uniform(0.0, 0.012)
-    solid = rounded_box((-thick - over, -half - over, z - 0.001), (depth, half + over, top), 0.004)
+    solid = box((-thick - over, depth), half + over, (z - 0.001, top), fillet=0.004)
     columns = 3 if half > 0.34 else 2 if half > 0.22 else 1
     ys = (np.arange(columns) - 0.5 * (columns - 1)) * (1.9 * half / columns)
     kind = str(rng.choice(["gas", "coil", "glass"], p=[0.5, 0.25, 0.25]))
     if kind == "glass":
-        solid += rounded_box(
-            (-thick + 0.02, 0.02 - half, top - 0.001), (depth - 0.07, half - 0.02, top + 0.003), 0.01, axis=2
-        )
+        solid += box((-thick + 0.02, depth - 0.07), half - 0.02, (top - 0.001, top + 0.003), fillet=0.01, axis=2)
     for x in np.array([0.24, 0.68]) * depth:
         for y in ys:
             radius = min(rng.uniform(0.06, 0.1), 0.2 * depth) if kind != "gas" else rng.uniform(0.025, 0.045)
@@ -151,11 +149,11 @@ def _grate(x: float, y: float, long: float, wide: float, low: float) -> Solid:
     """Iron grate over the burners of one column."""
     bar, lift = 0.009, low + 0.02
     solid = frame((x - long, y - wide, lift), (x + long, y + wide, lift + bar), [bar] * 4, 0, 1)
-    solid += box((x - long, y - 0.5 * bar, lift), (x + long, y + 0.5 * bar, lift + 1.5 * bar))
+    solid += box((x - long, x + long), (y - 0.5 * bar, y + 0.5 * bar), (lift, lift + 1.5 * bar))
     for u in (x - 0.55 * long, x, x + 0.55 * long):
-        solid += box((u - 0.5 * bar, y - wide, lift), (u + 0.5 * bar, y + wide, lift + 1.5 * bar))
+        solid += box((u - 0.5 * bar, u + 0.5 * bar), (y - wide, y + wide), (lift, lift + 1.5 * bar))
     feet = [(u, v) for u in (x - long, x + long - bar) for v in (y - wide, y + wide - bar)]
-    return solid + union(box((u, v, low - 0.001), (u + bar, v + bar, lift + 0.001)) for u, v in feet)
+    return solid + union(box((u, u + bar), (v, v + bar), (low - 0.001, lift + 0.001)) for u, v in feet)
 
 
 def _door(rng: np.random.Generator, low: Array, high: Array, kind: str, reach: float) -> tuple[Solid, float]:
@@ -167,9 +165,9 @@ def _door(rng: np.random.Generator, low: Array, high: Array, kind: str, reach: f
     if rng.random() < 0.75:
         solid = windowed_panel(low, high, margins, rng.uniform(0.006, 0.02), rng.uniform(0.001, 0.006))
     else:
-        solid = rounded_box(low, high, 0.005)
+        solid = box(low, high, fillet=0.005)
         if rng.random() < 0.6:
-            solid += rounded_box(low + (-0.003, side, margins[2]), high - (0.01, side, margins[3]), 0.002)
+            solid += box(low + (-0.003, side, margins[2]), high - (0.01, side, margins[3]), fillet=0.002)
     span = half * rng.uniform(0.6, 0.93)
     radius = rng.uniform(0.007, 0.012)
     return solid + front_handle(kind, (low[0], -span, grip), (low[0], span, grip), reach, radius), float(grip)
@@ -190,7 +188,7 @@ def _drawer(
     rng: np.random.Generator, half: float, depth: float, thick: float, wall: float, low: float, high: float, kind: str
 ) -> Solid:
     """Drawer below the oven, for trays."""
-    solid = rounded_box((-thick, 0.001 - half, low + GAP), (0.0, half - 0.001, high - GAP), 0.005)
+    solid = box((-thick, 0.0), half - 0.001, (low + GAP, high - GAP), fillet=0.005)
     side = half - wall - 0.004
     inner = max(low + 0.023, low + wall + 0.003) if wall > 0.02 else low + 0.023
     solid += tray((-0.003, -side, inner), (depth - 0.05, side, high - 0.03), 0.006)

@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, hull, loft, rounded_box, union
+from artsim.making.solids import Solid, box, hull, loft, union
 from artsim.model.kinematics import Array
 
 UP = (0.0, 0.0, 1.0)
@@ -103,7 +103,7 @@ def _clip(rng: np.random.Generator, section: _Section, radius: float, top: float
     out = radius * rng.uniform(1.25, 1.7)
     near = -section.flat * radius
     reach = min(near - 0.0008, near - (out - radius))
-    strip = rounded_box((reach - thick, -half, top - length), (reach, half, top), 0.4 * thick, axis=1)
+    strip = box((reach - thick, reach), half, (top - length, top), fillet=0.4 * thick, axis=1)
     if rng.random() < 0.5:  # it narrows to a ball at the free end
         ball = 1.1 * thick
         strip = hull(
@@ -114,12 +114,13 @@ def _clip(rng: np.random.Generator, section: _Section, radius: float, top: float
                 for w, z in ((1.0, top), (0.5, top - length))
             ]
         )
-        strip += rounded_box(
-            (reach - thick, -ball, top - length),
-            (min(reach + 0.5 * thick, near - GAP), ball, top - length + 2 * ball),
-            0.4 * ball,
+        strip += box(
+            (reach - thick, min(reach + 0.5 * thick, near - GAP)),
+            ball,
+            (top - length, top - length + 2 * ball),
+            fillet=0.4 * ball,
         )
-    return strip + box((reach - 0.5 * thick, -0.8 * half, top - 1.6 * thick), (0.4 * near, 0.8 * half, top))
+    return strip + box((reach - 0.5 * thick, 0.4 * near), 0.8 * half, (top - 1.6 * thick, top))
 
 
 def _capped(rng: np.random.Generator, section: _Section, length: float, radius: float, turning: bool) -> Assembly:
@@ -282,7 +283,7 @@ def _sliders(rng: np.random.Generator, length: float, radius: float) -> Assembly
     body += section.rod([(radius, length - 0.4 * radius), (radius * rng.uniform(0.5, 0.95), length + radius)])
     half = min(0.28 * np.pi / count, 0.5) * radius
     for k in range(count):  # ribs between the slots
-        rib = box((-0.98 * radius, -0.4 * half, start - 0.001), (0.0, 0.4 * half, length - 0.2 * radius))
+        rib = box((-0.98 * radius, 0.0), 0.4 * half, (start - 0.001, length - 0.2 * radius))
         body += rib.turned(UP, 2.0 * np.pi * (k + 0.5) / count)
     body += _clip(rng, section, radius, length + 0.3 * radius, (length - start) * 0.9).turned(UP, np.pi / count)
     pen = Assembly("body", body, 1100.0)
@@ -291,10 +292,8 @@ def _sliders(rng: np.random.Generator, length: float, radius: float) -> Assembly
     for k in range(count):
         top = length - 0.4 * radius - GAP
         half_here = min(half, 0.3 * core)
-        slider = box((-1.0 * radius, -half_here, top - size), (-core - GAP, half_here, top))
-        slider += rounded_box(
-            (-1.25 * radius, -half_here, top - 0.5 * size), (-0.9 * radius, half_here, top), 0.2 * half_here
-        )
+        slider = box((-1.0 * radius, -core - GAP), half_here, (top - size, top))
+        slider += box((-1.25 * radius, -0.9 * radius), half_here, (top - 0.5 * size, top), fillet=0.2 * half_here)
         joint = prismatic("body", (0, 0, -1), 0.0, (room - size) * 0.95, (-radius, 0, top))
         angle = 2.0 * np.pi * k / count
         turned = slider.turned(UP, angle)

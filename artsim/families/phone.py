@@ -13,17 +13,9 @@ import numpy as np
 
 from artsim.common.elementary import exp
 from artsim.families.desk_phone import desk_set
-from artsim.families.keys import (
-    Face,
-    add_function_keys,
-    add_key,
-    add_keypad,
-    cross_sections,
-    front_face,
-    key_outline,
-)
+from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
 from artsim.making.assembly import Assembly, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull, loft, rounded_box, union
+from artsim.making.solids import Solid, box, cylinder, hull, loft, union
 
 GAP = 0.0005
 KINDS = ("bar", "flip", "slider", "swivel", "fold", "smartphone", "cordless", "desk")
@@ -105,7 +97,7 @@ def _stand(rng: np.random.Generator, phone: Assembly, half: float, x: float, len
         return
     thick, z = 0.0015, length * rng.uniform(0.4, 0.65)
     wide, low = half * rng.uniform(0.3, 0.8), length * rng.uniform(0.03, 0.2)
-    leaf = rounded_box((x + GAP, -wide, low), (x + GAP + thick, wide, z), 0.004, axis=0, steps=2)
+    leaf = box((x + GAP, x + GAP + thick), wide, (low, z), fillet=0.004, axis=0, steps=2)
     phone.add("stand", leaf, revolute("body", (0, -1, 0), (x + GAP, 0, z), 0.0, rng.uniform(0.5, 1.5)), density=1500.0)
 
 
@@ -115,7 +107,7 @@ def _bar(rng: np.random.Generator, phone: Assembly) -> None:
     body = _slab(rng, half, (0.0, thick), (0.0, length), 1)
     split = length * rng.uniform(0.42, 0.68)
     inner = 0.72 * half
-    body += box((-0.0006, -inner, split + 0.04 * length), (0.001, inner, 0.9 * length))
+    body += box((-0.0006, 0.001), inner, (split + 0.04 * length, 0.9 * length))
     if rng.random() < 0.35:  # a stub of an antenna
         y, top = rng.choice([-0.6, 0.6]) * half, length * rng.uniform(1.08, 1.35)
         body += cylinder((0.5 * thick, y, 0.9 * length), (0.5 * thick, y, top), 0.3 * thick, 0.22 * thick, 12)
@@ -149,17 +141,22 @@ def _flip(rng: np.random.Generator, phone: Assembly) -> None:
     for s in (-1.0, 1.0):
         first, last = sorted((s * (span + GAP), s * half * 0.98))
         body += cylinder((plane, first, pivot), (plane, last, pivot), radius, sections=16)
-        body += box((plane + 0.0003, first, top - 4.0 * radius), (max(lower * 0.5, knuckle), last, pivot))
+        body += box((plane + 0.0003, max(lower * 0.5, knuckle)), (first, last), (top - 4.0 * radius, pivot))
     phone.add("body", body)
     bottom = rng.uniform(0.0, 0.45) * top if rng.random() < 0.3 else 0.0
     lid = _slab(rng, half, (plane - upper, plane), (bottom, pivot - radius - GAP), -1)
     lid += cylinder((plane, GAP - span, pivot), (plane, span - GAP, pivot), radius * 0.9, sections=16)
-    lid += box((plane - min(upper, radius), GAP - span, pivot - 4.0 * radius), (plane, span - GAP, pivot))
+    lid += box((plane - min(upper, radius), plane), span - GAP, (pivot - 4.0 * radius, pivot))
     if rng.random() < 0.6:  # a small display on the outside
         z = bottom + rng.uniform(0.45, 0.7) * (pivot - bottom)
         size = 0.45 * half
-        lid += rounded_box(
-            (plane - upper - 0.0008, -size, z - size), (plane - 0.5 * upper, size, z + size), 0.3 * size, 0, 2
+        lid += box(
+            (plane - upper - 0.0008, plane - 0.5 * upper),
+            size,
+            (z - size, z + size),
+            fillet=0.3 * size,
+            axis=0,
+            steps=2,
         )
     phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
@@ -177,8 +174,7 @@ def _slider(rng: np.random.Generator, phone: Assembly) -> None:
     travel = (half if sideways else 0.5 * length) * rng.uniform(0.7, 0.95)
     if sideways:
         body += union(
-            box((plane + GAP, -0.5 * half, z), (0.001, 0.5 * half, z + 0.03 * length))
-            for z in (0.02 * length, 0.95 * length)
+            box((plane + GAP, 0.001), 0.5 * half, (z, z + 0.03 * length)) for z in (0.02 * length, 0.95 * length)
         )
         keys = (0.12 * length, 0.88 * length)
     else:
@@ -188,7 +184,7 @@ def _slider(rng: np.random.Generator, phone: Assembly) -> None:
     phone.add("body", body)
     upper = thick - lower
     lid = _slab(rng, half, (plane - upper, plane), (0.0, length), -1)
-    lid += box((plane - upper - 0.0005, -0.75 * half, 0.35 * length), (plane - 0.5 * upper, 0.75 * half, 0.88 * length))
+    lid += box((plane - upper - 0.0005, plane - 0.5 * upper), 0.75 * half, (0.35 * length, 0.88 * length))
     axis = (0, float(rng.choice([-1.0, 1.0])), 0) if sideways else (0, 0, 1)
     phone.add("lid", lid, prismatic("body", axis, 0.0, travel, (plane, 0, 0)))
     number = add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, keys, height)
@@ -228,14 +224,19 @@ def _fold(rng: np.random.Generator, phone: Assembly) -> None:
     reach = sorted((side * 0.5 * half, y))
     for low, high in ((first[0], first[1]), (first[4], first[5])):
         body += cylinder((0, y, low), (0, y, high), radius, sections=16)
-        body += box((0.5 * gap, reach[0], low), (0.5 * gap + 0.5 * (leaf - 0.5 * gap), reach[1], high))
-    body += rounded_box(
-        (leaf - 0.0005, -0.6 * half, 0.7 * length), (leaf + 0.0016, 0.1 * half, 0.95 * length), 0.3 * half, 0, 2
+        body += box((0.5 * gap, 0.5 * gap + 0.5 * (leaf - 0.5 * gap)), (reach[0], reach[1]), (low, high))
+    body += box(
+        (leaf - 0.0005, leaf + 0.0016),
+        (-0.6 * half, 0.1 * half),
+        (0.7 * length, 0.95 * length),
+        fillet=0.3 * half,
+        axis=0,
+        steps=2,
     )
     phone.add("body", body, density=1500.0)
     lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
     lid += cylinder((0, y, first[1] + GAP), (0, y, first[4] - GAP), radius, sections=16)
-    lid += box((-0.5 * leaf - 0.25 * gap, reach[0], first[1] + GAP), (-0.5 * gap, reach[1], first[4] - GAP))
+    lid += box((-0.5 * leaf - 0.25 * gap, -0.5 * gap), (reach[0], reach[1]), (first[1] + GAP, first[4] - GAP))
     phone.add("lid", lid, revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1)), density=1500.0)
     _side_keys(rng, phone, "body", half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
 
@@ -246,11 +247,13 @@ def _smartphone(rng: np.random.Generator, phone: Assembly) -> None:
     length, thick = 1.25 * length, max(0.7 * thick, 0.006)
     body = _slab(rng, half, (0.0, thick), (0.0, length), 1)
     chin, brow = rng.uniform(0.02, 0.2), rng.uniform(0.02, 0.14)
-    body += box((-0.0005, -0.92 * half, chin * length), (0.001, 0.92 * half, (1.0 - brow) * length))
+    body += box((-0.0005, 0.001), 0.92 * half, (chin * length, (1.0 - brow) * length))
     if rng.random() < 0.7:  # the camera's bump
         bump, size = rng.uniform(0.0008, 0.004), rng.uniform(0.15, 0.45) * half
         y, z = rng.choice([0.0, 0.45]) * half, 0.88 * length - size
-        body += rounded_box((0.5 * thick, y - size, z - size), (thick + bump, y + size, z + size), 0.5 * size, 0, 2)
+        body += box(
+            (0.5 * thick, thick + bump), (y - size, y + size), (z - size, z + size), fillet=0.5 * size, axis=0, steps=2
+        )
     phone.add("body", body, density=1800.0)
     if chin > 0.1:
         add_function_keys(
@@ -292,7 +295,7 @@ def _cordless(rng: np.random.Generator, phone: Assembly) -> None:
     face = front_face(-0.5 * thick, 0.0, start)
     body = _slab(rng, half, (-0.5 * thick, 0.5 * thick), (start, start + length), 1)
     inner = 0.74 * half
-    body += box((-0.5 * thick - 0.0005, -inner, start + 0.68 * length), (0.0, inner, start + 0.9 * length))
+    body += box((-0.5 * thick - 0.0005, 0.0), inner, (start + 0.68 * length, start + 0.9 * length))
     if rng.random() < 0.4:
         y = rng.choice([-0.6, 0.6]) * half
         body += cylinder(

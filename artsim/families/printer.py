@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull, prism, rounded_box, rounded_rectangle, tray, union
+from artsim.making.solids import Solid, box, cylinder, hull, prism, rounded_rectangle, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -123,7 +123,7 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
         radius = 0.45 * height
         return union(
             cylinder((x, y - 0.4 * radius, radius), (x, y + 0.4 * radius, radius), radius, sections=14)
-            + box((x - 0.5 * radius, y - 0.6 * radius, radius), (x + 0.5 * radius, y + 0.6 * radius, height + 0.001))
+            + box((x - 0.5 * radius, x + 0.5 * radius), (y - 0.6 * radius, y + 0.6 * radius), (radius, height + 0.001))
             for x, y in spots
         )
     size = 0.1 * min(case.x, case.y)
@@ -143,24 +143,22 @@ def _fill(
     thick = min(rng.uniform(0.006, 0.014), 0.3 * band.height)
     if band.kind == "drawer":
         depth = cavity - 2.0 * GAP
-        solid = rounded_box((front, -wide, low + GAP), (front + thick, wide, high - GAP), 0.03 * wide, axis=0, steps=2)
+        solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         rise = (high - low) * rng.uniform(0.5, 0.85)
         solid += tray((front + 0.5 * thick, -0.96 * wide, low + GAP), (front + depth, 0.96 * wide, low + rise), 0.003)
         solid += _pull(rng, front, 0.35 * wide, low + GAP, high - GAP)
         slide = prismatic("body", OUT, 0.0, depth * rng.uniform(0.6, 0.9), (front, 0, low))
         printer.add(f"drawer_{number}", solid, slide, density=700.0)
     elif band.kind == "flap":
-        solid = rounded_box((front, -wide, low + GAP), (front + thick, wide, high - GAP), 0.03 * wide, axis=0, steps=2)
+        solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         if rng.random() < 0.6:
-            solid += box(
-                (front - 0.006, -0.15 * wide, high - GAP - 0.012),
-                (front + 0.5 * thick, 0.15 * wide, high - GAP - 0.004),
-            )
+            solid += box((front - 0.006, front + 0.5 * thick), 0.15 * wide, (high - GAP - 0.012, high - GAP - 0.004))
         if rng.random() < 0.4:  # guides for paper on its inner side
             solid += union(
                 box(
-                    (front + thick - 0.001, s * 0.7 * wide - 0.003, low + 0.2 * band.height),
-                    (front + thick + 0.006, s * 0.7 * wide + 0.003, high - 0.1 * band.height),
+                    (front + thick - 0.001, front + thick + 0.006),
+                    (s * 0.7 * wide - 0.003, s * 0.7 * wide + 0.003),
+                    (low + 0.2 * band.height, high - 0.1 * band.height),
                 )
                 for s in (-1, 1)
             )
@@ -169,11 +167,11 @@ def _fill(
     elif band.kind == "sliding tray":
         depth = cavity * rng.uniform(0.6, 0.95)
         z = low + GAP
-        solid = box((front, -0.9 * wide, z), (front + depth, 0.9 * wide, z + 0.004))
-        solid += box((front, -0.9 * wide, z), (front + 0.005, 0.9 * wide, z + min(0.3 * band.height, 0.014)))
+        solid = box((front, front + depth), 0.9 * wide, (z, z + 0.004))
+        solid += box((front, front + 0.005), 0.9 * wide, (z, z + min(0.3 * band.height, 0.014)))
         printer.add(f"tray_{number}", solid, prismatic("body", OUT, 0.0, 0.85 * depth, (front, 0, low)), density=900.0)
     elif band.kind == "tilting panel":
-        solid = rounded_box((front, -wide, low + GAP), (front + thick, wide, high - GAP), 0.03 * wide, axis=0, steps=2)
+        solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, rng.uniform(0.4, 1.2))
         name = printer.add(f"panel_{number}", solid, hinge, density=900.0)
         _keys(rng, printer, name, front, wide, low + GAP, high - GAP)
@@ -185,13 +183,11 @@ def _pull(rng: np.random.Generator, front: float, half: float, low: float, high:
     """Handle of a drawer: a lip, a bar or nothing."""
     kind, reach = rng.random(), rng.uniform(0.006, 0.016)
     if kind < 0.35:
-        return box((front - reach, -half, high - 0.3 * (high - low)), (front + 0.003, half, high - 0.15 * (high - low)))
+        return box((front - reach, front + 0.003), half, (high - 0.3 * (high - low), high - 0.15 * (high - low)))
     if kind < 0.6:
         z = 0.5 * (low + high)
         deep = min(0.2 * (high - low), 0.01)
-        return rounded_box(
-            (front - reach, -half, z - deep), (front + 0.003, half, z + deep), 0.4 * deep, axis=1, steps=2
-        )
+        return box((front - reach, front + 0.003), half, (z - deep, z + deep), fillet=0.4 * deep, axis=1, steps=2)
     return Solid()
 
 
@@ -239,7 +235,7 @@ def _paper_stop(rng: np.random.Generator, printer: Assembly, case: _Case, level:
         return
     thick, z = 0.004, level + GAP
     wide, first = case.y * rng.uniform(0.1, 0.6), -0.86 * case.x
-    flap = rounded_box((first, -wide, z), (rng.uniform(-0.6, -0.3) * case.x, wide, z + thick), 0.008, axis=2, steps=2)
+    flap = box((first, rng.uniform(-0.6, -0.3) * case.x), wide, (z, z + thick), fillet=0.008, axis=2, steps=2)
     hinge = revolute("body", (0, -1, 0), (first, 0, z), 0.0, rng.uniform(0.6, 1.6))
     printer.add("paper_stop", flap, hinge, density=900.0)
 
@@ -270,15 +266,19 @@ def _lid(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, to
     if feeder:
         rise = rng.uniform(0.03, 0.09)
         y0, y1 = 0.15 * case.y, 0.8 * case.y
-        lid += rounded_box(
-            (front + 0.15 * case.x, y0, crown - 0.002), (edge - 0.1 * case.x, y1, crown + rise), 0.3 * rise, axis=0
+        lid += box(
+            (front + 0.15 * case.x, edge - 0.1 * case.x),
+            (y0, y1),
+            (crown - 0.002, crown + rise),
+            fillet=0.3 * rise,
+            axis=0,
         )
     printer.add("lid", lid, revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, rng.uniform(0.7, 1.5)), density=300.0)
     if feeder:
         z, wide = crown + GAP, 0.6 * (edge - front) * rng.uniform(0.5, 0.9)
         x = 0.5 * (front + edge)
         end = -0.85 * case.y
-        solid = rounded_box((x - 0.5 * wide, end, z), (x + 0.5 * wide, y0 - GAP, z + 0.006), 0.01, axis=2)
+        solid = box((x - 0.5 * wide, x + 0.5 * wide), (end, y0 - GAP), (z, z + 0.006), fillet=0.01, axis=2)
         turn = revolute("lid", (-1, 0, 0), (x, y0 - GAP, z + 0.006), 0.0, rng.uniform(0.25, 0.9))
         printer.add("feeder_tray", solid, turn, density=600.0)
 
@@ -301,7 +301,7 @@ def _top_keys(rng: np.random.Generator, printer: Assembly, case: _Case, top: flo
 def _paper_support(rng: np.random.Generator, printer: Assembly, case: _Case, seam: float, front: float) -> None:
     """A flap that lies over the paper's slot at the back and folds up and back."""
     thick, wide = rng.uniform(0.004, 0.01), case.y * rng.uniform(0.5, 0.85)
-    solid = rounded_box((front + GAP, -wide, seam), (case.x - 0.004, wide, seam + thick), 0.01, axis=2)
+    solid = box((front + GAP, case.x - 0.004), wide, (seam, seam + thick), fillet=0.01, axis=2)
     solid += cylinder(
         (case.x - 0.004, -wide, seam + 0.5 * thick),
         (case.x - 0.004, wide, seam + 0.5 * thick),

@@ -17,7 +17,7 @@ import numpy as np
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.making.assembly import Assembly, JointSpec
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -135,7 +135,7 @@ def _shape(rng: np.random.Generator, size: Array) -> Solid:
     x, y, z = half
     thin = 0.22 * float(size.min())
     if kind == "rounded":
-        return rounded_box(-half, half, 0.3 * size.min(), steps=2)
+        return box(-half, half, fillet=0.3 * size.min(), steps=2)
     if kind == "cylinder":
         return cylinder((0, 0, -z), (0, 0, z), min(x, y))
     if kind == "cone":
@@ -146,17 +146,15 @@ def _shape(rng: np.random.Generator, size: Array) -> Solid:
         bars = [(np.array([x, thin, thin]), np.array([0, s * (y - thin), 0])) for s in (-1, 1)]
         bars += [(np.array([thin, y, thin]), np.array([s * (x - thin), 0, 0])) for s in (-1, 1)]
         solid = union(box(middle - extent, middle + extent) for extent, middle in bars)
-        return solid + box((-x + thin, -0.5 * thin, -0.8 * thin), (x - thin, 0.5 * thin, 0.8 * thin))
+        return solid + box(x - thin, 0.5 * thin, 0.8 * thin)
     if kind == "ring":  # with a spoke, to carry stubs
         radius = min(x, y)
-        spoke = box((-radius + thin, -0.5 * thin, -0.8 * thin), (radius - thin, 0.5 * thin, 0.8 * thin))
+        spoke = box(radius - thin, 0.5 * thin, 0.8 * thin)
         return ring((0, 0, 0), (0, 0, 1), radius - 2 * thin, radius, 2 * thin, 16) + spoke
     if kind == "bar":
-        return box((-0.4 * x, -0.4 * y, -1.6 * z), (0.4 * x, 0.4 * y, 1.6 * z))
+        return box(0.4 * x, 0.4 * y, 1.6 * z)
     if kind == "cross":
-        return box((-x, -thin, -thin), (x, thin, thin)) + box((-thin, -y, -thin), (thin, y, thin)) + box(
-            (-thin, -thin, -z), (thin, thin, z)
-        )  # fmt: skip
+        return box((-x, -thin, -thin), (x, thin, thin)) + box((-thin, -y, -thin), (thin, y, thin)) + box(thin, thin, z)
     if kind == "wedge":
         return hull([(-x, -y, -z), (x, -y, -z), (-x, y, -z), (x, y, -z), (-x, -y, z), (-x, y, z)])
     return box(-half, half)

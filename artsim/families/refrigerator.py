@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, prismatic
-from artsim.making.solids import Solid, box, cylinder, frame, rounded_box, tray, union
+from artsim.making.solids import Solid, box, cylinder, frame, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
@@ -96,8 +96,8 @@ def build(rng: np.random.Generator) -> Assembly:
             solid += frame(
                 (-style.thick - 0.008, y - 0.08, z - 0.14), (0.5 * -style.thick, y + 0.08, z + 0.14), [0.014] * 4
             )
-            solid += rounded_box(
-                (-style.thick - 0.014, y - 0.05, z + 0.08), (-0.5 * style.thick, y + 0.05, z + 0.13), 0.004
+            solid += box(
+                (-style.thick - 0.014, -0.5 * style.thick), (y - 0.05, y + 0.05), (z + 0.08, z + 0.13), fillet=0.004
             )
         name = f"door_{doors}" if layout != "single" else "door"
         edge = left if side > 0 else right
@@ -117,32 +117,32 @@ def _body(
 ) -> Solid:
     wall = style.wall
     solid = rounded_shell((GAP, -half, low), (depth, half, high), wall, min(style.corner, 0.9 * wall), 2)
-    solid += box((depth - wall, 0.01 - half, low + 0.01), (depth - 0.001, half - 0.01, high - 0.01))
+    solid += box((depth - wall, depth - 0.001), half - 0.01, (low + 0.01, high - 0.01))
     inner_back, inner = depth - wall + 0.002, half - wall + 0.002
     for z in {front[3] for front in fronts} - {low}:
-        solid += box((GAP, -inner, z - 0.02), (inner_back, inner, z + 0.02))
+        solid += box((GAP, inner_back), inner, (z - 0.02, z + 0.02))
     beside = [f for f in fronts if f[0] == -1 and f[3] == low and f[2] < 0.9 * half]
     if beside:
-        solid += box((GAP, beside[0][2] - 0.02, low + 0.01), (inner_back, beside[0][2] + 0.02, high - 0.01))
+        solid += box((GAP, inner_back), (beside[0][2] - 0.02, beside[0][2] + 0.02), (low + 0.01, high - 0.01))
     for side, right, left, bottom, top in fronts:
         if side == 0:
             continue
         shelf_low, shelf_high = max(right, -inner) - 0.0, min(left, inner)
         front = style.bins + rng.uniform(0.02, 0.05)
         for z in np.linspace(bottom + wall, top - wall, int(2 + (top - bottom) // 0.25))[1:-1]:
-            solid += box((front, shelf_low, z), (inner_back, shelf_high, z + 0.008))
+            solid += box((front, inner_back), (shelf_low, shelf_high), (z, z + 0.008))
         if rng.random() < 0.5 and side != 0 and top - bottom > 0.6:  # a crisper
             solid += box(
-                (front + 0.01, shelf_low, bottom + wall - 0.002), (inner_back, shelf_high, bottom + wall + 0.12)
+                (front + 0.01, inner_back), (shelf_low, shelf_high), (bottom + wall - 0.002, bottom + wall + 0.12)
             )
     if rng.random() < 0.5:
-        solid += box((rng.uniform(0.0, 0.05) + GAP, 0.01 - half, 0.0), (depth - 0.01, half - 0.01, low + 0.01))
+        solid += box((rng.uniform(0.0, 0.05) + GAP, depth - 0.01), half - 0.01, (0.0, low + 0.01))
     else:
         spots = ((x, y) for x in (0.06, depth - 0.06) for y in (0.06 - half, half - 0.06))
         solid += union(cylinder((x, y, 0), (x, y, low + 0.01), 0.022, sections=14) for x, y in spots)
     if small and rng.random() < 0.4:  # a top that lies over the door
-        solid += rounded_box((-style.thick * rng.uniform(0.0, 1.2), -half - 0.002, high - 0.001),
-                             (depth, half + 0.002, high + rng.uniform(0.012, 0.03)), 0.004)  # fmt: skip
+        solid += box((-style.thick * rng.uniform(0.0, 1.2), -half - 0.002, high - 0.001),
+                             (depth, half + 0.002, high + rng.uniform(0.012, 0.03)), fillet=0.004)  # fmt: skip
     return solid
 
 
@@ -150,10 +150,10 @@ def _door(
     rng: np.random.Generator, low: Array, high: Array, style: Style, side: int, grip_at_top: bool, inner_edge: bool
 ) -> Solid:
     """Door with its handle at the side away from the hinge."""
-    solid = rounded_box(low, high, style.corner, axis=None if rng.random() < 0.5 else 2)
+    solid = box(low, high, fillet=style.corner, axis=None if rng.random() < 0.5 else 2)
     wide, tall = high[1] - low[1], high[2] - low[2]
     if rng.random() < 0.2:  # a raised board
-        solid += rounded_box(low + (-0.004, 0.09, 0.06), high - (0.006, 0.09, 0.06), 0.003)
+        solid += box(low + (-0.004, 0.09, 0.06), high - (0.006, 0.09, 0.06), fillet=0.003)
     free = low[1] if side > 0 else high[1]
     if style.level:
         z = high[2] - 0.05 if grip_at_top else low[2] + 0.05
@@ -178,7 +178,7 @@ def _door(
 
 def _drawer(rng: np.random.Generator, low: Array, high: Array, depth: float, style: Style) -> Solid:
     """Freezer drawer: a front with a tray behind it."""
-    solid = rounded_box(low, high, style.corner, axis=None if rng.random() < 0.5 else 2)
+    solid = box(low, high, fillet=style.corner, axis=None if rng.random() < 0.5 else 2)
     half = high[1] - style.wall - 0.012
     solid += tray(
         (-0.003, -half, low[2] + style.wall + 0.008), (depth - style.wall - 0.02, half, high[2] - 0.08), 0.006

@@ -15,7 +15,7 @@ from artsim.common.elementary import exp, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, cross_sections, front_face, key, key_cells, key_outline
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, cylinder, loft, ring, rounded_box
+from artsim.making.solids import Solid, box, cylinder, loft, ring
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -224,7 +224,7 @@ def _front_cover(rng: np.random.Generator, remote: Assembly, body: _Body, height
     _, _, halves = body.at(np.linspace(low, high, 8))
     half = float(halves.min())
     back, thick = -height - 0.0006, rng.uniform(0.0012, 0.003)
-    cover = rounded_box((back - thick, -half, low), (back, half, high), 0.3 * half, axis=0)
+    cover = box((back - thick, back), half, (low, high), fillet=0.3 * half, axis=0)
     if rng.random() < 0.5:
         joint = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.6, 1.0) * (high - low), (back, 0, low))
     else:

@@ -19,7 +19,6 @@ from artsim.making.solids import (
     hull_of,
     ring,
     rotation_about,
-    rounded_box,
     rounded_rectangle,
 )
 from artsim.model.kinematics import Array
@@ -214,7 +213,7 @@ def _base(chain: _Chain, reach: float) -> None:
     if rng.random() < 0.5:
         link.rod(floor, floor + (0, 0, thick), wide)
     else:
-        link.solid += rounded_box(floor - (wide, wide, 0), floor + (wide, wide, thick), 0.2 * wide, axis=2)
+        link.solid += box(floor - (wide, wide, 0), floor + (wide, wide, thick), fillet=0.2 * wide, axis=2)
         link.guard(floor, floor + (0, 0, thick), 1.3 * wide)
     foot = r * rng.uniform(1.0, 1.15)
     link.rod(floor + (0, 0, 0.5 * thick), floor + (0, 0, height), foot, r)
@@ -231,7 +230,7 @@ def _rail(chain: _Chain, reach: float) -> None:
     low[axis], high[axis] = -half, half + travel
     low[other], high[other] = -1.1 * r, 1.1 * r
     high[2] = r
-    chain.link.solid += rounded_box(low, high, 0.15 * r)
+    chain.link.solid += box(low, high, fillet=0.15 * r)
     for side in (-0.7, 0.7):
         a, b = low.copy(), high.copy()
         a[other], b[other] = (side - 0.15) * r, (side + 0.15) * r
@@ -243,7 +242,7 @@ def _rail(chain: _Chain, reach: float) -> None:
     direction = np.eye(3)[axis]
     chain.begin(prismatic(chain.name, direction, 0.0, travel, (0, 0, 1.15 * r)))
     bottom = 1.15 * r + GAP
-    chain.link.solid += rounded_box((-half, -half, bottom), (half, half, bottom + 0.5 * r), 0.1 * r)
+    chain.link.solid += box(half, half, (bottom, bottom + 0.5 * r), fillet=0.1 * r)
     chain.link.guard((0, 0, bottom), (0, 0, bottom + 0.5 * r), 1.8 * r)
     chain.at = np.array([0.0, 0.0, bottom + 0.49 * r])
 

@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, continuous, revolute
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -122,26 +122,27 @@ def build(rng: np.random.Generator) -> Assembly:
 def _body(rng: np.random.Generator, s: Shape) -> Solid:
     corner = min(rng.choice([0.004, rng.uniform(0.01, 0.05)]), 0.9 * s.wall)
     solid = rounded_shell((0.0, -s.half, s.low), (s.depth, s.half, s.high), s.wall, corner, 3)
-    solid += rounded_box((s.depth - s.wall, 0.002 - s.half, s.low + 0.002), (s.depth, s.half - 0.002, s.high - 0.002),
-                         corner, axis=0)  # fmt: skip
+    solid += box((s.depth - s.wall, s.depth), s.half - 0.002, (s.low + 0.002, s.high - 0.002), fillet=corner, axis=0)
     inside = s.half - s.wall + 0.002
     if rng.random() < 0.6:
         front = (s.thick if s.inset else 0.0) + 0.06
         tall = s.high - s.low
         for z in np.linspace(s.low + s.wall, s.high - s.wall, int(2 + tall // 0.35 + (tall > 0.3)))[1:-1]:
-            solid += box((front, -inside, z), (s.depth - s.wall + 0.002, inside, z + 0.005))
+            solid += box((front, s.depth - s.wall + 0.002), inside, (z, z + 0.005))
     if s.low > 0:
         spots = [(x, y) for x in (0.16 * s.half, s.depth - 0.16 * s.half) for y in (-0.82 * s.half, 0.82 * s.half)]
         radius = 0.1 * s.half
         if rng.random() < 0.5:
             solid += union(cylinder((x, y, 0), (x, y, s.low + 0.004), radius, sections=16) for x, y in spots)
         else:
-            solid += union(box((x - radius, y - radius, 0), (x + radius, y + radius, s.low + 0.004)) for x, y in spots)
+            solid += union(
+                box((x - radius, x + radius), (y - radius, y + radius), (0, s.low + 0.004)) for x, y in spots
+            )
     if s.barrel > 0:
         x, y = s.hinge
         for low, high in _knuckles(s, of_door=False):
             solid += cylinder((x, y, low), (x, y, high), s.barrel - 0.0005, sections=16)
-            solid += box((x, y, low), (0.002, y + 0.6 * s.wall, high))
+            solid += box((x, 0.002), (y, y + 0.6 * s.wall), (low, high))
     return solid
 
 
@@ -160,27 +161,30 @@ def _door(rng: np.random.Generator, s: Shape, combination: bool, opener: str) ->
     low, high = s.door
     wide, tall = high[1] - low[1], high[2] - low[2]
     if s.inset:
-        solid = rounded_box(low, high, 0.003, axis=0)
+        solid = box(low, high, fillet=0.003, axis=0)
     else:
-        solid = rounded_box(low, high, min(0.4 * s.thick, 0.012))
+        solid = box(low, high, fillet=min(0.4 * s.thick, 0.012))
         # The plug that fills the opening; its inner edge swings past the wall.
         plug, inner = rng.uniform(0.01, 0.03), s.half - s.wall
         swing = plug * plug / (4.0 * inner) + 0.004
         solid += box(
-            (high[0] - 0.002, swing - inner, low[2] + s.wall + 0.004), (plug, inner - 0.004, high[2] - s.wall - 0.004)
+            (high[0] - 0.002, plug), (swing - inner, inner - 0.004), (low[2] + s.wall + 0.004, high[2] - s.wall - 0.004)
         )
     if rng.random() < 0.5:  # a raised board; the hinge side stays free for the barrels
         edge = 0.1 * min(wide, tall)
-        solid += rounded_box(low + (-0.003, edge, edge), (low[0] + 0.004, *(high[1:] - edge)), 0.0015)
+        solid += box(low + (-0.003, edge, edge), (low[0] + 0.004, *(high[1:] - edge)), fillet=0.0015)
     if s.barrel > 0:
         x, y = s.hinge
         for bottom, top in _knuckles(s, of_door=True):
             solid += cylinder((x, y, bottom), (x, y, top), s.barrel - 0.0005, sections=16)
-            solid += box((x, y - 0.14 * wide, bottom), (0.003, y, top))
+            solid += box((x, 0.003), (y - 0.14 * wide, y), (bottom, top))
     if not combination:  # a keypad with its keys
         y, z, unit = low[1] + 0.66 * wide, low[2] + 0.66 * tall if tall > 0.85 * wide else low[2] + 0.5 * tall, 0.014
-        solid += rounded_box(
-            (low[0] - 0.008, y - 2.3 * unit, z - 3 * unit), (low[0] + 0.003, y + 2.3 * unit, z + 3 * unit), 0.004
+        solid += box(
+            (low[0] - 0.008, low[0] + 0.003),
+            (y - 2.3 * unit, y + 2.3 * unit),
+            (z - 3 * unit, z + 3 * unit),
+            fillet=0.004,
         )
         for row in range(4):
             for column in (-1, 0, 1):
@@ -200,8 +204,9 @@ def _combination(rng: np.random.Generator, x: float, y: float, z: float, radius:
     solid = cylinder((x, y, z), (x - skirt, y, z), radius, 0.85 * radius, 28)
     solid += cylinder((x - 0.5 * skirt, y, z), (x - skirt - reach, y, z), 0.55 * radius, 0.45 * radius, 16)
     return solid + box(
-        (x - skirt - 0.002, y - 0.03 * radius - 0.001, z + 0.5 * radius),
-        (x - 0.001, y + 0.03 * radius + 0.001, z + 0.9 * radius),
+        (x - skirt - 0.002, x - 0.001),
+        (y - 0.03 * radius - 0.001, y + 0.03 * radius + 0.001),
+        (z + 0.5 * radius, z + 0.9 * radius),
     )
 
 
@@ -231,4 +236,4 @@ def _lever(rng: np.random.Generator, x: float, y: float, z: float, radius: float
     tip = np.array([x - reach, y - 1.1 * radius, z])
     if rng.random() < 0.5:
         return solid + tube(np.stack([tip + (0.004, 1.1 * radius, 0.0), tip]), [0.010, 0.007], 12)
-    return solid + rounded_box(tip - (0.0, 0.0, 0.011), (x - reach + 0.012, y + 0.012, z + 0.011), 0.005)
+    return solid + box(tip - (0.0, 0.0, 0.011), (x - reach + 0.012, y + 0.012, z + 0.011), fillet=0.005)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.making.solids import Solid, frame, hull, rounded_box
+from artsim.making.solids import Solid, box, frame, hull
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def screen(rng: np.random.Generator, panel: Panel, chin: float) -> Solid:
                 solid += hull([(x - f, y, z) for y, f in corners for x in (x0, x1) for z in (z0, z1)])
     else:
         radius = rng.uniform(0.01, 0.12) * rise
-        solid += rounded_box((lip - thick, -half, -rise), (back, half, rise), radius, axis=0)
+        solid += box((lip - thick, back), half, rise, fillet=radius, axis=0)
         inset = 0.3 * radius
         solid += frame((-thick, inset - half, inset - rise), (lip - thick + 0.0005, half - inset, rise - inset),
                        [rim, rim, chin + rim, rim])  # fmt: skip

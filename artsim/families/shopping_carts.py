@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.families.wheels import STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 
@@ -93,7 +93,7 @@ def shopping_cart(rng: np.random.Generator) -> Assembly:
             wheels.add(cart, (x, y, wheels.radius))
     if seat:  # the flap of the child seat, inside of the back wall
         low_z = low + 0.55 * (high - low)
-        flap = rounded_box((seat_x - 0.004, -0.6 * half, low_z), (seat_x, 0.6 * half, hinge_z), 0.002, axis=0)
+        flap = box((seat_x - 0.004, seat_x), 0.6 * half, (low_z, hinge_z), fillet=0.002, axis=0)
         turn = revolute("body", (0, 1, 0), (seat_x, 0, hinge_z), 0.0, rng.uniform(0.5, 1.3))
         cart.add("flap", flap, turn, label="seat", density=900.0)
     return cart

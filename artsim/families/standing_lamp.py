@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rounded_box, tube, union, vessel
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
 
 GAP = 0.002
 UP = (0.0, 0.0, 1.0)
@@ -49,7 +49,7 @@ def standing(rng: np.random.Generator) -> Assembly:
     if tilts:  # a knuckle at the head of the pole carries it
         at = (0.0, 0.0, height + 0.015)
         shade += cylinder((0, -0.006, at[2]), (0, 0.006, at[2]), 0.01, sections=14)
-        shade += box((-0.004, -0.004, at[2]), (0.004, 0.004, low + 0.004))
+        shade += box(0.004, 0.004, (at[2], low + 0.004))
         reach = rng.uniform(0.4, 1.0)
         lamp.add("shade", shade, revolute(parent, SIDE, at, -reach, reach), density=500.0)
     else:
@@ -81,7 +81,7 @@ def _foot(
     if kind == "disc":
         return cylinder((0, 0, 0), (0, 0, thick), wide, rng.uniform(0.8, 1.0) * wide, 36), thick
     if kind == "square":
-        return rounded_box((-wide, -wide, 0), (wide, wide, thick), rng.uniform(0.05, 0.5) * wide, axis=2), thick
+        return box(wide, wide, (0, thick), fillet=rng.uniform(0.05, 0.5) * wide, axis=2), thick
     if kind == "legs":
         head = rng.uniform(0.25, 0.75) * height
         span = min(rng.uniform(0.25, 0.5) * height + 0.06, 0.4)
@@ -111,7 +111,7 @@ def _shade(rng: np.random.Generator, kind: str, rim: float, tall: float, low: fl
     holder = low + rng.uniform(0.02, 0.25) * tall
     shell = vessel([(rim, low), (neck, low + tall)], wall, (0.0, 0.0, 0.0), sections, floor=False)
     width = (rim + (neck - rim) * (holder - low) / tall) * cos(np.pi / sections)
-    spokes = box((-width + 0.002, -0.003, holder), (width - 0.002, 0.003, holder + 0.004))
+    spokes = box(width - 0.002, 0.003, (holder, holder + 0.004))
     spokes += spokes.turned(UP, np.pi / 2)
     if sections == 4:
         spokes = spokes.turned(UP, np.pi / 4)
@@ -152,12 +152,11 @@ def spotlight(rng: np.random.Generator) -> Assembly:
     low = high + GAP
     center = np.array([0.0, 0.0, low + thick + reach])
     half = radius + 0.006
-    yoke = box((-0.012, -half - thick, low), (0.012, half + thick, low + thick))
+    yoke = box(0.012, half + thick, (low, low + thick))
     for s in (-1, 1):
         a, b = sorted((s * half, s * (half + thick)))
         yoke += hull_of(
-            box((-0.012, a, low), (0.012, b, low + thick)),
-            cylinder((0, a, center[2]), (0, b, center[2]), 0.012, sections=14),
+            box(0.012, (a, b), (low, low + thick)), cylinder((0, a, center[2]), (0, b, center[2]), 0.012, sections=14)
         )
     lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)))
     # The front of the head looks to -X.

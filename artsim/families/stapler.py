@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_box, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_rectangle
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -90,7 +90,7 @@ def build(rng: np.random.Generator) -> Assembly:
         stapler.add("magazine", magazine, revolute("base", axis, origin, 0.0, lift), density=3500.0)
         stapler.add("arm", arm, revolute("magazine", axis, origin, 0.0, wide - lift), density=2000.0)
     else:
-        joined = box((-0.9 * length, -0.3 * width, lay.magazine - 0.001), (0, 0.3 * width, lay.magazine + 0.002))
+        joined = box((-0.9 * length, 0), 0.3 * width, (lay.magazine - 0.001, lay.magazine + 0.002))
         stapler.add("arm", magazine + joined + arm, revolute("base", axis, origin, 0.0, wide))
     return stapler
 
@@ -127,22 +127,20 @@ def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
     if kind == "round":
         half = max(half, min(half * rng.uniform(1.3, 1.9), 0.3 * (back - front)))
         ends = [cylinder((x, 0, 0), (x, 0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
-        solid = hull_of(*ends) + rounded_box(
-            (front + 0.4 * half, -0.5 * arm_width, 0.001), (back, 0.5 * arm_width, lay.base), 0.003, axis=2
+        solid = hull_of(*ends) + box(
+            (front + 0.4 * half, back), 0.5 * arm_width, (0.001, lay.base), fillet=0.003, axis=2
         )
     else:
         outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.1, 0.9) * half, 5)
         inner = outline * (1.0, rng.uniform(0.8, 0.97))
         solid = hull_of(prism(outline, 0, 0.6 * lay.base), prism(inner, 0.5 * lay.base, lay.base))
         if kind == "boat":  # a rounded rear block
-            solid += rounded_box((-0.3 * lay.length, -half * 0.9, 0.001), (back, 0.9 * half, lay.base), 0.002)
+            solid += box((-0.3 * lay.length, back), 0.9 * half, (0.001, lay.base), fillet=0.002)
     anvil = -lay.length + 0.012
-    solid += box((anvil - 0.006, -0.0065, lay.base - 0.002), (anvil + 0.006, 0.0065, lay.base + 0.0005))
+    solid += box((anvil - 0.006, anvil + 0.006), 0.0065, (lay.base - 0.002, lay.base + 0.0005))
     if rng.random() < 0.5:
         step = rng.uniform(0.15, 0.3) * lay.length
-        solid += rounded_box(
-            (anvil + 0.012, -0.4 * inside, lay.base - 0.002), (-step, 0.4 * inside, lay.base + 0.0006), 0.001, 2
-        )
+        solid += box((anvil + 0.012, -step), 0.4 * inside, (lay.base - 0.002, lay.base + 0.0006), fillet=0.001, axis=2)
     rise = lay.hinge + rng.uniform(0.3, 0.6) * lay.tail
     for side in (-1, 1):
         y = sorted((side * inside, side * (inside + cheek)))
@@ -152,7 +150,7 @@ def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
         head = side * (inside + cheek)
         solid += cylinder((0, head - side * 0.001, lay.hinge), (0, head + side * 0.0008, lay.hinge), 0.3 * lay.tail)
     if rng.random() < 0.4:
-        solid += rounded_box((front + 0.008, -0.8 * half, -0.0015), (back - 0.006, 0.8 * half, 0.001), 0.003, axis=2)
+        solid += box((front + 0.008, back - 0.006), 0.8 * half, (-0.0015, 0.001), fillet=0.003, axis=2)
     return solid
 
 
@@ -162,10 +160,10 @@ def _magazine(rng: np.random.Generator, lay: Layout) -> Solid:
     low = lay.base + rng.uniform(0.0025, 0.005)
     high = lay.magazine
     start = -lay.length + rng.uniform(0.0, 0.004)
-    solid = box((start, -half, low), (-1.4 * lay.tail, half, high))
+    solid = box((start, -1.4 * lay.tail), half, (low, high))
     tongue = cylinder((0, -half, lay.hinge), (0, half, lay.hinge), high - lay.hinge, sections=20)
-    solid += hull_of(tongue, box((-1.6 * lay.tail, -half, low), (-1.4 * lay.tail, half, high)))
-    return solid + box((start - 0.0015, -0.8 * half, low + 0.001), (start + 0.001, 0.8 * half, high - 0.001))
+    solid += hull_of(tongue, box((-1.6 * lay.tail, -1.4 * lay.tail), half, (low, high)))
+    return solid + box((start - 0.0015, start + 0.001), 0.8 * half, (low + 0.001, high - 0.001))
 
 
 def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
@@ -207,6 +205,6 @@ def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
         skirt = [(0.92 * front, low + 0.001), (0.88 * front, low - hem), (neck, low - hem), (neck, low + 0.001)]
         solid += prism(skirt, y[0], y[1], axis=1)
         eye = cylinder((0, y[0], lay.hinge), (0, y[1], lay.hinge), 0.7 * lay.tail, sections=16)
-        ends = box((neck, y[0], low), (0.3 * lay.tail, y[1], low + 0.002))
+        ends = box((neck, 0.3 * lay.tail), (y[0], y[1]), (low, low + 0.002))
         solid += hull_of(eye, ends)
     return solid

@@ -169,17 +169,17 @@ def _carcass(
     top = stand + height
     to_floor = stand > 0 and rng.random() < 0.3
     sides_from = 0.0 if to_floor else stand
-    solid = box((style.back, -y + 0.001, stand + 0.001), (x1, y - 0.001, top - 0.001))
+    solid = box((style.back, x1), y - 0.001, (stand + 0.001, top - 0.001))
     solid += union(
-        box((x0, s - board / 2, sides_from), (x1, s + board / 2, top)) for s in (board / 2 - y, y - board / 2)
+        box((x0, x1), (s - board / 2, s + board / 2), (sides_from, top)) for s in (board / 2 - y, y - board / 2)
     )
-    solid += box((x0, -y + 0.001, stand), (x1, y - 0.001, stand + board))
+    solid += box((x0, x1), y - 0.001, (stand, stand + board))
     if kind == "base" and rng.random() < 0.4:  # open at the top, with rails for a worktop
         rail = rng.uniform(0.06, 0.12)
         for near, far in ((x0, x0 + rail), (style.back - rail, x1 - 0.001)):
-            solid += box((near, -y + 0.001, top - board), (far, y - 0.001, top))
+            solid += box((near, far), y - 0.001, (top - board, top))
     else:
-        solid += box((x0, -y + 0.001, top - board), (x1, y - 0.001, top))
+        solid += box((x0, x1), y - 0.001, (top - board, top))
         solid += _top(rng, kind, x0, x1, y, top)
     if kind not in ("base", "wall") and rng.random() < 0.15:  # posts at the corners, down to the floor
         post = rng.uniform(0.02, 0.045)
@@ -188,7 +188,7 @@ def _carcass(
                        for near in (x0 - fronts.GAP, x1 - post) for s in (-1, 1))  # fmt: skip
     if to_floor:
         setback = x0 + rng.uniform(0.02, 0.07)
-        return solid + box((setback, -y + 0.001, 0), (setback + board, y - 0.001, stand + 0.001))
+        return solid + box((setback, setback + board), y - 0.001, (0, stand + 0.001))
     return solid + (_stand(rng, kind, x0, x1, y, stand, board, furniture) if stand > 0 else Solid())
 
 
@@ -198,13 +198,13 @@ def _top(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, to
     over = rng.uniform(0.0, 0.035)
     thick = rng.uniform(0.012, 0.04)
     front = x0 - 0.022 - over
-    solid = box((front, -y - over, top - 0.001), (x1, y + over, top + thick))
+    solid = box((front, x1), y + over, (top - 0.001, top + thick))
     if kind == "tall" and rng.random() < 0.4:  # cornice
         for step in (1, 2):
             more, z = over + 0.012 * step, top + thick * step
-            solid += box((x0 - 0.022 - more, -y - more, z - 0.001), (x1, y + more, z + thick))
+            solid += box((x0 - 0.022 - more, x1), y + more, (z - 0.001, z + thick))
     if kind in ("dresser", "sideboard", "nightstand") and rng.random() < 0.12:  # board at the back
-        solid += box((x1 - 0.02, -y, top), (x1, y, top + thick + rng.uniform(0.05, 0.2)))
+        solid += box((x1 - 0.02, x1), y, (top, top + thick + rng.uniform(0.05, 0.2)))
     return solid
 
 

@@ -13,7 +13,18 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, rounded_box, rounded_rectangle, tube, union
+from artsim.making.solids import (
+    Solid,
+    about,
+    box,
+    cylinder,
+    frame,
+    hull,
+    loft,
+    rounded_rectangle,
+    tube,
+    union,
+)
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -46,7 +57,7 @@ def _shells(rng: np.random.Generator, x: float, y: float, low: float, high: floa
         else:
             middle, half = low + room + share * (high - low - 2 * room), 0.12 * (high - low) / count
             rib_low, rib_high = (-y + room, middle - half), (y - room, middle + half)
-        halves[0] += rounded_box((-x - 0.004, *rib_low), (-x + 0.002, *rib_high), 0.003, steps=2)
+        halves[0] += box((-x - 0.004, *rib_low), (-x + 0.002, *rib_high), fillet=0.003, steps=2)
     return halves[0], halves[1]
 
 
@@ -85,15 +96,17 @@ def _trolley(rng: np.random.Generator) -> Assembly:
     else:
         places = []
         for s in (-1.0, 1.0):  # feet in front, wheel arches behind
-            back += rounded_box(
-                (seam + 0.004, s * (y - 0.05) - 0.012, 0.0),
-                (seam + 0.017, s * (y - 0.05) + 0.012, lift + 0.01),
-                0.003,
+            back += box(
+                (seam + 0.004, seam + 0.017),
+                (s * (y - 0.05) - 0.012, s * (y - 0.05) + 0.012),
+                (0.0, lift + 0.01),
+                fillet=0.003,
             )
             for cheek in (-0.022, 0.022):
                 back += box(
-                    (wheel_x - 0.02, s * (y - 0.04) + cheek - 0.004, 0.022),
-                    (wheel_x + 0.022, s * (y - 0.04) + cheek + 0.004, lift + 0.01),
+                    (wheel_x - 0.02, wheel_x + 0.022),
+                    (s * (y - 0.04) + cheek - 0.004, s * (y - 0.04) + cheek + 0.004),
+                    (0.022, lift + 0.01),
                 )
     case = Assembly("body", back, 300.0)
     limit = np.deg2rad(rng.uniform(60.0, 175.0))
@@ -113,8 +126,8 @@ def _trolley(rng: np.random.Generator) -> Assembly:
 def _housing(x: float, half: float, low: float, high: float) -> Solid:
     """Cover behind the back, open at the top, in which the telescopic handle slides."""
     y, z0, z1 = half + 0.016, low + 0.02, high - 0.01
-    solid = box((x + 0.019, -y, z0), (x + 0.023, y, z1)) + box((x - 0.002, -y, z0), (x + 0.02, y, z0 + 0.012))
-    return solid + union(box((x - 0.002, s * y - 0.002, z0), (x + 0.0225, s * y + 0.002, z1)) for s in (-1, 1))
+    solid = box((x + 0.019, x + 0.023), y, (z0, z1)) + box((x - 0.002, x + 0.02), y, (z0, z0 + 0.012))
+    return solid + union(box((x - 0.002, x + 0.0225), (s * y - 0.002, s * y + 0.002), (z0, z1)) for s in (-1, 1))
 
 
 def _telescope(rng: np.random.Generator, case: Assembly, x: float, half: float, low: float, high: float) -> None:
@@ -123,20 +136,19 @@ def _telescope(rng: np.random.Generator, case: Assembly, x: float, half: float, 
     travel = rng.uniform(0.6, 0.8) * (z1 - z0)
     middle = x + 0.0095
     grip_low, grip_high = (middle - 0.008, -half - 0.011, high + 0.004), (middle + 0.008, half + 0.011, high + 0.024)
-    grip = rounded_box(grip_low, grip_high, 0.006)
+    grip = box(grip_low, grip_high, fillet=0.006)
     if rng.random() < 0.6:
         rods = union(
-            box((middle - 0.006, s * half - 0.008, z0), (middle + 0.006, s * half + 0.008, high + 0.01))
+            box((middle - 0.006, middle + 0.006), (s * half - 0.008, s * half + 0.008), (z0, high + 0.01))
             for s in (-1, 1)
         )
         case.add("handle", grip + rods, prismatic("body", (0, 0, 1), 0.0, travel, (middle, 0, high)), density=800.0)
         return
-    tubes = box((middle - 0.0075, -half, z0), (middle + 0.0075, half, z0 + 0.012))
+    tubes = box((middle - 0.0075, middle + 0.0075), half, (z0, z0 + 0.012))
     for s in (-1, 1):
         near, far = (middle - 0.0075, s * half - 0.009, z0), (middle + 0.0075, s * half + 0.009, z1 - 0.001)
         tubes += frame(near, far, [0.002] * 4, 0, 1)
-    rods = union(box((middle - 0.0045, s * half - 0.006, z0 + 0.014), (middle + 0.0045, s * half + 0.006, high + 0.01))
-                 for s in (-1, 1))  # fmt: skip
+    rods = union(box(about(middle, 0.0045), about(s * half, 0.006), (z0 + 0.014, high + 0.01)) for s in (-1, 1))
     travel *= 0.9
     case.add("handle_stage", tubes, prismatic("body", (0, 0, 1), 0.0, travel, (middle, 0, high)), density=800.0)
     case.add(
@@ -172,12 +184,12 @@ def _briefcase(rng: np.random.Generator) -> Assembly:
     for share in (-0.6, 0.6):
         ends = (share * y - 0.03, share * y + 0.03)
         front += cylinder((seam, ends[0], -barrel - 0.001), (seam, ends[1], -barrel - 0.001), barrel, sections=12)
-        front += box((seam - 0.012, ends[0], -barrel - 0.001), (seam - GAP / 2, ends[1], 0.002))
+        front += box((seam - 0.012, seam - GAP / 2), (ends[0], ends[1]), (-barrel - 0.001, 0.002))
     middle = 0.5 * (x + seam)
     half = rng.uniform(0.05, 0.08)
     handle, lugs = _bail((middle, 0.0, z + 0.0085), half, rng.uniform(0.035, 0.06), 0.0055, (0, 0, -1), 0.0095)
     for s in (-1.0, 1.0):  # locks beside the handle
-        front += box((seam - 0.02, s * 0.6 * y - 0.02, z - 0.002), (seam - GAP / 2, s * 0.6 * y + 0.02, z + 0.004))
+        front += box((seam - 0.02, seam - GAP / 2), (s * 0.6 * y - 0.02, s * 0.6 * y + 0.02), (z - 0.002, z + 0.004))
     if rng.random() < 0.6:
         back += union(
             cylinder((0.6 * x, s * 0.8 * y, -0.008), (0.6 * x, s * 0.8 * y, 0.003), 0.008, 0.01, 12) for s in (-1, 1)

@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import arctan, sin, tan
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, rounded_box, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007
@@ -42,7 +42,7 @@ def build(rng: np.random.Generator) -> Assembly:
         plate += frame((-depth, *-half), (0, *half), [border - 0.004] * 4)
         plate += union(_bar(a, b, 1 if upright else 0, depth) for a, b in pairwise(cells))
     else:
-        plate += rounded_box((-depth, -width / 2, -height / 2), (0, width / 2, height / 2), 0.004)
+        plate += box((-depth, 0), width / 2, height / 2, fillet=0.004)
     buttons: list[tuple[Solid, JointSpec]] = []
     # The end of a rocker that is pressed in stays before the plate's back.
     room = 0.8 * depth - 0.0028 - 0.3 * min(0.3 * depth, 0.004)
@@ -110,7 +110,7 @@ def _plate(rng: np.random.Generator, width: float, height: float, depth: float, 
         for side in (-1, 1):
             low, high = -half.copy(), half.copy()
             low[axis], high[axis] = (-half[axis], -half[axis] + rim) if side < 0 else (half[axis] - rim, half[axis])
-            solid += rounded_box((-edge, *low), (0, *high), 0.0025)
+            solid += box((-edge, *low), (0, *high), fillet=0.0025)
     if screws and rng.random() < 0.5:
         z = half[1] - 0.008
         solid += union(cylinder((-depth - 0.0006, 0, s * z), (-0.001, 0, s * z), 0.0028, sections=14) for s in (-1, 1))
@@ -125,17 +125,17 @@ def _rocker(rng: np.random.Generator, cell: Array, depth: float, tilt: float) ->
     thick = min(0.3 * depth, 0.004)
     proud = rng.uniform(0.0005, 0.0025)
     half_z = 0.5 * (high[1] - low[1]) - GAP - (thick + proud) * sin(2 * tilt) - 0.0003
-    ridge = rounded_box((x - thick, -half_y, -0.001), (x + 0.3 * thick, half_y, 0.001), 0.0008)
+    ridge = box((x - thick, x + 0.3 * thick), half_y, 0.001, fillet=0.0008)
     solid = Solid()
     for side in (-1.0, 1.0):
         # Bent outward by the tilt: either half stands flush when the switch is tipped its way.
-        end = rounded_box((x - thick - proud, -half_y, -0.0015), (x + 0.2 * thick, half_y, 0.0015), 0.001)
+        end = box((x - thick - proud, x + 0.2 * thick), half_y, 0.0015, fillet=0.001)
         solid += hull_of(ridge, end.moved((-0.5 * half_z * tan(tilt), 0, side * (half_z - 0.0015))))
     if rng.random() < 0.5:
         mark = 0.12 * half_z
         z, w = 0.7 * half_z, 0.1 * half_y
         front = x - thick - proud - 0.45 * half_z * tan(tilt)
-        solid += box((front - 0.0006, -w, z - mark), (x, w, z))
+        solid += box((front - 0.0006, x), w, (z - mark, z))
     return solid.moved((0, *center)).turned((0, 1, 0), -tilt, (x, *center))
 
 
@@ -145,9 +145,9 @@ def _toggle(rng: np.random.Generator, center: Array, depth: float) -> Solid:
     wide, r = rng.uniform(0.0035, 0.006), 0.0045
     length = with_tails(rng, (0.012, 0.02), (0.007, 0.028), 0.3)
     hub = cylinder((x, -wide, 0), (x, wide, 0), r, sections=18)
-    root = rounded_box((x - 0.003, -wide, -0.003), (x, wide, 0.003), 0.001)
+    root = box((x - 0.003, x), wide, 0.003, fillet=0.001)
     tip_half = rng.uniform(0.003, 0.0043)
-    tip = rounded_box((x - length, -wide * 1.1, -tip_half), (x - length + 0.004, wide * 1.1, tip_half), 0.0015)
+    tip = box((x - length, x - length + 0.004), wide * 1.1, tip_half, fillet=0.0015)
     return (hub + hull_of(root, tip)).moved((0, *center))
 
 
@@ -156,5 +156,5 @@ def _dimmer(rng: np.random.Generator, center: Array, depth: float, radius: float
     r, tall = min(radius, rng.uniform(0.012, 0.02)), rng.uniform(0.009, 0.016)
     x = -depth - GAP
     solid = cylinder((x, 0, 0), (x - tall, 0, 0), r, rng.uniform(0.8, 0.98) * r, 32)
-    solid += box((x - tall - 0.0008, -0.0012, 0.2 * r), (x - 0.5 * tall, 0.0012, 0.75 * r))
+    solid += box((x - tall - 0.0008, x - 0.5 * tall), 0.0012, (0.2 * r, 0.75 * r))
     return solid.moved((0, *center))

@@ -98,19 +98,17 @@ def _apron(rng: np.random.Generator, table: Table) -> None:
     rail = min(0.008, 0.4 * size)
     for s in (-1, 1):  # rails into the legs, beside and behind the case
         table.body += (
-            box((s * (x - inset) - 0.008, -half, top - apron), (s * (x - inset) + 0.008, half, top + 0.001))
+            box((s * (x - inset) - 0.008, s * (x - inset) + 0.008), half, (top - apron, top + 0.001))
             if (s > 0 and not both and not rear) or (s < 0 and rear)
             else Solid()
         )
-        table.body += box(
-            (-x + 0.5 * size, s * half - rail, top - apron), (x - 0.5 * size, s * half + rail, top + 0.001)
-        )
+        table.body += box(x - 0.5 * size, (s * half - rail, s * half + rail), (top - apron, top + 0.001))
         for near in (-x + inset, x - inset - 0.012):
             a, b = sorted((s * (high[1] - 0.002), s * half))
-            table.body += box((near, a, top - apron), (near + 0.012, b, top + 0.001))
+            table.body += box((near, near + 0.012), (a, b), (top - apron, top + 0.001))
     if rng.random() < 0.25:
         z = foot + rng.uniform(0.1, 0.4) * (top - apron - foot)
-        table.body += box((-x + 0.3 * size, -y + 0.3 * size, z), (x - 0.3 * size, y - 0.3 * size, z + 0.018))
+        table.body += box(x - 0.3 * size, y - 0.3 * size, (z, z + 0.018))
     if rng.random() < 0.1:
         drop_leaves(rng, table, depth, width, top, height)
     if rolling:
@@ -154,7 +152,9 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
             free=(side < 0 and not on_legs, side > 0 and not on_legs),
         )
         if not on_legs and not rolling and low_z > 0:
-            table.body += box((front + 0.03, a + 0.01, 0.0), (front + deep - overhang - 0.02, b - 0.01, low_z + 0.001))
+            table.body += box(
+                (front + 0.03, front + deep - overhang - 0.02), (a + 0.01, b - 0.01), (0.0, low_z + 0.001)
+            )
         if rolling:
             spots = [(u, v) for u in (front + 0.05, front + deep - overhang - 0.05) for v in (a + 0.05, b - 0.05)]
             wheels(table, spots, low_z, 0.05)
@@ -163,12 +163,13 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
     elif len(sides) == 1:
         panel = rng.uniform(0.02, 0.05)
         a, b = sorted((-sides[0] * y, -sides[0] * (y - panel)))
-        table.body += box((-x + overhang, a, 0.0), (x, b, top + 0.001))
+        table.body += box((-x + overhang, x), (a, b), (0.0, top + 0.001))
     near = -outer + (broad if -1 in sides else panel) - 0.001
     far = outer - (broad if 1 in sides else panel) + 0.001
     table.body += box(
-        (front + deep - overhang - 0.03, near, top - rng.uniform(0.2, 0.8) * (top - low_z)),
-        (front + deep - overhang - 0.012, far, top + 0.001),
+        (front + deep - overhang - 0.03, front + deep - overhang - 0.012),
+        (near, far),
+        (top - rng.uniform(0.2, 0.8) * (top - low_z), top + 0.001),
     )
     between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
     if far - near < 0.2:
@@ -187,8 +188,8 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
         keyboard_tray(rng, table, front, near, far, top, 0.6 * deep)
     if rng.random() < 0.15:  # shelves on the top
         rise, back = rng.uniform(0.2, 0.5), x - rng.uniform(0.18, 0.3)
-        table.body += union(box((back, yy, height - 0.001), (x, yy + 0.02, height + rise)) for yy in (-y, y - 0.02))
-        table.body += box((back, -y, height + rise - 0.02), (x, y, height + rise))
+        table.body += union(box((back, x), (yy, yy + 0.02), (height - 0.001, height + rise)) for yy in (-y, y - 0.02))
+        table.body += box((back, x), y, (height + rise - 0.02, height + rise))
 
 
 def _case(rng: np.random.Generator, table: Table) -> None:
@@ -228,7 +229,7 @@ def _case(rng: np.random.Generator, table: Table) -> None:
         table.body += four_legs(rng, x - ahead, y, 0.0, low + 0.002, size, splay=rng.random() < 0.3)
     elif stand == "plinth":
         inset = rng.uniform(0.01, 0.06)
-        table.body += box((-x + ahead + inset, -y + inset, 0.0), (x - inset, y - inset, low + 0.001))
+        table.body += box((-x + ahead + inset, x - inset), y - inset, (0.0, low + 0.001))
     else:
         wheels(table, [(sx * (x - 0.06), sy * (y - 0.06)) for sx in (-1, 1) for sy in (-1, 1)], low, 0.05)
 
@@ -264,8 +265,8 @@ def _column(rng: np.random.Generator, table: Table) -> None:
     for k in range(feet):
         angle = 2.0 * np.pi * (k + 0.5) / feet
         leg = hull_of(
-            box((0, -0.6 * radius, low), (0.01, 0.6 * radius, low + rng.uniform(0.05, 0.15))),
-            box((span - 0.02, -0.02, foot), (span + 0.015, 0.02, foot + 0.03)),
+            box((0, 0.01), 0.6 * radius, (low, low + rng.uniform(0.05, 0.15))),
+            box((span - 0.02, span + 0.015), 0.02, (foot, foot + 0.03)),
         )
         base += leg.turned(UP, angle)
         spots.append((span * cos(angle), span * sin(angle)))
@@ -294,16 +295,17 @@ def _column(rng: np.random.Generator, table: Table) -> None:
         table.moving.append(("top", slab(top), joint))
     else:
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - 0.05), radius)
-        base += box((-radius, -radius, top - 0.06), (0.5 * radius, radius, top - 0.02))
+        base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))
         hinge = (radius + 0.01, 0.0, top - 0.03)
         lugs = union(
             box(
-                (hinge[0] - 0.01, t * 1.3 * radius - 0.008, top - 0.04),
-                (hinge[0] + 0.01, t * 1.3 * radius + 0.008, top + 0.002),
+                (hinge[0] - 0.01, hinge[0] + 0.01),
+                (t * 1.3 * radius - 0.008, t * 1.3 * radius + 0.008),
+                (top - 0.04, top + 0.002),
             )
             for t in (-1, 1)
         )
-        base += box((0.0, -1.1 * radius, top - 0.04), (hinge[0] + 0.005, 1.1 * radius, top - 0.025))
+        base += box((0.0, hinge[0] + 0.005), 1.1 * radius, (top - 0.04, top - 0.025))
         # Beyond the hinge's axis the top comes down before the column.
         table.moving.append(("top", slab(top) + lugs, revolute("body", (0, 1, 0), hinge, 0.0, rng.uniform(0.5, 0.9))))
     table.body += base

@@ -9,7 +9,7 @@ import numpy as np
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
@@ -51,8 +51,8 @@ class Table:
         board = style.board
         style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)
         solid = box((style.back, low[1], low[2]), high)
-        solid += union(box((style.face, low[1], z), (high[0], high[1], z + board)) for z in (low[2], high[2] - board))
-        solid += union(box((style.face, y, low[2]), (high[0], y + board, high[2])) for y in (low[1], high[1] - board))
+        solid += union(box((style.face, high[0]), (low[1], high[1]), (z, z + board)) for z in (low[2], high[2] - board))
+        solid += union(box((style.face, high[0]), (y, y + board), (low[2], high[2])) for y in (low[1], high[1] - board))
         whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
                      (free[0], True), (free[1], True))  # fmt: skip
         columns, boards = _divided(rng, whole, 0, grid[0], style)
@@ -126,8 +126,8 @@ def table_top(rng: np.random.Generator, depth: float, width: float, low: float, 
     """A board with round corners or round edges, from height ``low`` to ``high``."""
     corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
     if rng.random() < 0.25:
-        return rounded_box(*corners, rng.uniform(0.02, 0.12), axis=2)
-    return rounded_box(*corners, rng.choice([0.1, 0.3, 0.49]) * (high - low))
+        return box(*corners, fillet=rng.uniform(0.02, 0.12), axis=2)
+    return box(*corners, fillet=rng.choice([0.1, 0.3, 0.49]) * (high - low))
 
 
 def four_legs(rng: np.random.Generator, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
@@ -140,8 +140,8 @@ def four_legs(rng: np.random.Generator, x: float, y: float, low: float, high: fl
     if kind == "loops":
         for s in (-1, 1):
             a, b = sorted((s * y, s * (y - size)))
-            solid += union(box((u, a, low), (u + size, b, high)) for u in (-x, x - size))
-            solid += box((-x, a, low), (x, b, low + 0.7 * size))
+            solid += union(box((u, u + size), (a, b), (low, high)) for u in (-x, x - size))
+            solid += box(x, (a, b), (low, low + 0.7 * size))
         return solid
     for sx in (-1, 1):
         for sy in (-1, 1):
@@ -174,7 +174,7 @@ def drop_leaves(rng: np.random.Generator, table: Table, depth: float, width: flo
     long = min(long, top - 0.05)
     for side in (-1, 1)[: int(rng.integers(1, 3))]:
         near, far = side * (width / 2 + GAP), side * (width / 2 + GAP + long)
-        leaf = rounded_box((-depth / 2, min(near, far), top), (depth / 2, max(near, far), height), 0.2 * (height - top))
+        leaf = box(depth / 2, (min(near, far), max(near, far)), (top, height), fillet=0.2 * (height - top))
         joint = revolute("body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * rng.uniform(0.9, 1.0))
         table.moving.append(("leaf", leaf, joint))
 
@@ -189,8 +189,8 @@ def keyboard_tray(
     y0, y1 = middle - 0.5 * wide, middle + 0.5 * wide
     z = top - rng.uniform(0.07, 0.12)
     for y in (y0 - 0.012, y1):
-        table.body += box((front + 0.01, y, z - 0.005), (front + deep, y + 0.012, top + 0.001))
-    board = rounded_box((front + 0.005, y0 + GAP, z), (front + deep, y1 - GAP, z + 0.018), 0.004)
+        table.body += box((front + 0.01, front + deep), (y, y + 0.012), (z - 0.005, top + 0.001))
+    board = box((front + 0.005, front + deep), (y0 + GAP, y1 - GAP), (z, z + 0.018), fillet=0.004)
     table.moving.append(
         ("drawer", board, prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z)))
     )
@@ -202,12 +202,13 @@ def wheels(table: Table, spots: list[tuple[float, float]], height: float, size: 
     half, thick = 0.3 * radius, 0.004
     for x, y in spots:
         body = box(
-            (x - 0.5 * radius, y - half - thick - 0.002, height - 0.1 * radius),
-            (x + 0.5 * radius, y + half + thick + 0.002, height + 0.012),
+            (x - 0.5 * radius, x + 0.5 * radius),
+            (y - half - thick - 0.002, y + half + thick + 0.002),
+            (height - 0.1 * radius, height + 0.012),
         )
         for s in (-1, 1):
             a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
-            body += box((x - 0.35 * radius, a, 0.7 * radius), (x + 0.35 * radius, b, height))
+            body += box((x - 0.35 * radius, x + 0.35 * radius), (a, b), (0.7 * radius, height))
         body += cylinder((x, y, height - 0.001), (x, y, height + 0.01), 0.4 * size, sections=12)
         table.body += body
         wheel = cylinder((x, y - half, radius), (x, y + half, radius), radius, sections=18)

@@ -17,7 +17,6 @@ from artsim.making.solids import (
     frame,
     hull_of,
     prism,
-    rounded_box,
     rounded_rectangle,
     tube,
     union,
@@ -48,7 +47,7 @@ def build(rng: np.random.Generator) -> Assembly:
         body += union(cylinder((x, y, 0), (x, y, foot + 0.012), 0.011, 0.014, 14) for x, y in spots)
         base = False
     else:
-        body += rounded_box((0.012, 0.008 - half, 0.0), (length - 0.012, half - 0.008, foot + 0.012), 0.01, axis=2)
+        body += box((0.012, length - 0.012), half - 0.008, (0.0, foot + 0.012), fillet=0.01, axis=2)
         base = True
     if rng.random() < 0.5:  # a collar around the slots
         start = (margin - 0.01, slots[0] - 0.5 * wide - 0.008, high[2] - 0.006)
@@ -76,11 +75,9 @@ def build(rng: np.random.Generator) -> Assembly:
     _controls(rng, toaster, places, half, top - travel - 0.02, foot)
     if not base and rng.random() < 0.4:
         side = 0.75 * half - 0.017
-        tray = box((0.06, -side, foot - 0.0045), (length + 0.001, side, foot - 0.0015))
-        tray += rounded_box(
-            (length + 0.0015, -0.4 * half, foot - 0.0045), (length + 0.012, 0.4 * half, foot + 0.008), 0.002
-        )
-        tray += box((length, -0.4 * half, foot - 0.0045), (length + 0.004, 0.4 * half, foot - 0.0015))
+        tray = box((0.06, length + 0.001), side, (foot - 0.0045, foot - 0.0015))
+        tray += box((length + 0.0015, length + 0.012), 0.4 * half, (foot - 0.0045, foot + 0.008), fillet=0.002)
+        tray += box((length, length + 0.004), 0.4 * half, (foot - 0.0045, foot - 0.0015))
         toaster.add("crumb_tray", tray, prismatic("body", (1, 0, 0), 0.0, 0.6 * length, (length, 0, foot)))
     return toaster
 
@@ -100,9 +97,9 @@ def _block(
         return prism(outline, low[1], high[1], 1)
     if shape == "block":  # wider below
         narrow = 0.3 * side
-        upper = rounded_box((low[0] + 0.008, low[1] + narrow, high[2] - 0.02), high - (0.008, narrow, 0.0), 0.009)
-        return hull_of(upper, rounded_box(low, (high[0], high[1], low[2] + 0.03), 0.012, axis=2))
-    return rounded_box(low, high, rng.uniform(0.006, 0.02))
+        upper = box((low[0] + 0.008, low[1] + narrow, high[2] - 0.02), high - (0.008, narrow, 0.0), fillet=0.009)
+        return hull_of(upper, box(low, (high[0], high[1], low[2] + 0.03), fillet=0.012, axis=2))
+    return box(low, high, fillet=rng.uniform(0.006, 0.02))
 
 
 def _slotted(block: Solid, slots: Array, wide: float, span: tuple[float, float], floor: float) -> Solid:
@@ -126,21 +123,21 @@ def _slotted(block: Solid, slots: Array, wide: float, span: tuple[float, float],
             for side in (-1, 1):
                 v = y + side * 0.5 * wide
                 solid += box(
-                    (x - 0.0015, v - 0.002, floor - 0.001), (x + 0.0015, v + 0.002, block.bounds()[1, 2] - 0.012)
+                    (x - 0.0015, x + 0.0015), (v - 0.002, v + 0.002), (floor - 0.001, block.bounds()[1, 2] - 0.012)
                 )
     return solid
 
 
 def _lever_style(rng: np.random.Generator) -> Solid:
     """Lever before the plane x = 0, centred on the origin, with a tongue in its guide."""
-    solid = box((-0.014, -0.0035, -0.006), (-GAP, 0.0035, 0.006))
+    solid = box((-0.014, -GAP), 0.0035, 0.006)
     half = rng.uniform(0.012, 0.026)
     kind = int(rng.integers(3))
     if kind == 0:
-        return solid + rounded_box((-0.032, -half, -0.007), (-0.006, half, 0.007), 0.004)
+        return solid + box((-0.032, -0.006), half, 0.007, fillet=0.004)
     if kind == 1:
-        tip = rounded_box((-0.034, -half, -0.004), (-0.028, half, 0.004), 0.0015)
-        return solid + hull_of(tip, rounded_box((-0.012, -0.6 * half, -0.009), (-0.006, 0.6 * half, 0.009), 0.0015))
+        tip = box((-0.034, -0.028), half, 0.004, fillet=0.0015)
+        return solid + hull_of(tip, box((-0.012, -0.006), 0.6 * half, 0.009, fillet=0.0015))
     return solid + cylinder((-0.006, 0, 0), (-0.026, 0, 0), 0.5 * half + 0.003, 0.6 * half + 0.004, 18)
 
 

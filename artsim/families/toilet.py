@@ -15,7 +15,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, rounded_box, tray, tube, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, tray, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -106,10 +106,10 @@ def _bowl(
     )
     deck = rng.uniform(0.04, 0.12)
     half = 0.5 * width * rng.uniform(0.75, 1.0)
-    solid += box((0.5 * length - wall, -half, height - deck), (back, half, height))
+    solid += box((0.5 * length - wall, back), half, (height - deck, height))
     solid += hull_of(
-        box((0.3 * length, -0.8 * half, height - deck - 0.03), (back, 0.8 * half, height - deck + 0.01)),
-        box((0.2 * length, -0.4 * half, low - 0.02), (back, 0.4 * half, low)),
+        box((0.3 * length, back), 0.8 * half, (height - deck - 0.03, height - deck + 0.01)),
+        box((0.2 * length, back), 0.4 * half, (low - 0.02, low)),
     )
     if hung:
         return solid
@@ -126,8 +126,7 @@ def _bowl(
         solid += loft(rings)
         if rng.random() < 0.6:
             solid += hull_of(
-                box((0.1 * length, -0.08, 0.01), (back - 0.02, 0.08, 0.03)),
-                box((0.2 * length, -0.09, low), (back, 0.09, low + 0.02)),
+                box((0.1 * length, back - 0.02), 0.08, (0.01, 0.03)), box((0.2 * length, back), 0.09, (low, low + 0.02))
             )
     elif kind == "skirt":
         shift = 0.5 * (back - 0.5 * foot * length) * 0.5
@@ -137,11 +136,9 @@ def _bowl(
                 _oval(narrow * length, narrow * width, power, low),
             ]
         )
-        solid += box((0.1, -0.4 * foot * width, 0), (back, 0.4 * foot * width, low))
+        solid += box((0.1, back), 0.4 * foot * width, (0, low))
     else:
-        solid += rounded_box(
-            (-0.4 * foot * length, -0.42 * foot * width, 0), (back, 0.42 * foot * width, low), 0.05, axis=2
-        )
+        solid += box((-0.4 * foot * length, back), 0.42 * foot * width, (0, low), fillet=0.05, axis=2)
     return solid
 
 
@@ -154,15 +151,15 @@ def _low_cistern(rng: np.random.Generator, moving: list[Moving], back: float, wi
     wall = 0.02
     taper = rng.uniform(0.85, 1.0)
     solid = hull_of(
-        box((start, -taper * half, foot), (start + taper * deep, taper * half, foot + 0.05)),
-        box((start, -half, foot + 0.04), (start + deep, half, foot + 0.1)),
+        box((start, start + taper * deep), taper * half, (foot, foot + 0.05)),
+        box((start, start + deep), half, (foot + 0.04, foot + 0.1)),
     )
     top = foot + tall
     solid += tray((start, -half, foot + 0.06), (start + deep, half, top), wall)
     # The deck below, down to the floor or a slope.
     solid += hull_of(
-        box((start, -0.6 * taper * half, foot - 0.06), (start + 0.7 * deep, 0.6 * taper * half, foot + 0.01)),
-        box((start - 0.05, -0.3 * half, 0.5 * height), (start + 0.02, 0.3 * half, 0.5 * height + 0.03)),
+        box((start, start + 0.7 * deep), 0.6 * taper * half, (foot - 0.06, foot + 0.01)),
+        box((start - 0.05, start + 0.02), 0.3 * half, (0.5 * height, 0.5 * height + 0.03)),
     )
     flush = str(rng.choice(["lever", "side lever", "button", "two buttons"], p=[0.35, 0.15, 0.25, 0.25]))
     over, thick = rng.uniform(0.004, 0.02), rng.uniform(0.02, 0.045)
@@ -173,7 +170,7 @@ def _low_cistern(rng: np.random.Generator, moving: list[Moving], back: float, wi
     if buttons:
         lid, parts = _button_lid(rng, low, high, middle, 2 if flush == "two buttons" else 1)
     else:
-        lid, parts = rounded_box(low, high, rng.uniform(0.15, 0.45) * thick), []
+        lid, parts = box(low, high, fillet=rng.uniform(0.15, 0.45) * thick), []
     if lifts:
         joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.1, 0.3), (middle[0], 0.0, low[2]))
         moving.append(("cistern_lid", lid, joint))
@@ -217,7 +214,7 @@ def _button_lid(
     x, y = middle
     well = frame(low, high, [x - half - low[0], high[0] - x - half, y - half - low[1], high[1] - y - half], 0, 1)
     floor = low[2] + 0.25 * (high[2] - low[2])
-    well += box((x - half - 0.001, y - half - 0.001, low[2]), (x + half + 0.001, y + half + 0.001, floor))
+    well += box((x - half - 0.001, x + half + 0.001), (y - half - 0.001, y + half + 0.001), (low[2], floor))
     buttons = []
     share = rng.uniform(0.4, 0.65) if count == 2 else 1.0
     edges = [(-half, half)] if count == 1 else [(-half, -half + 2 * half * share), (-half + 2 * half * share, half)]
@@ -226,10 +223,11 @@ def _button_lid(
     for y0, y1 in edges:
         corner = round_off * 0.5 * min(y1 - y0, 2 * half)
         buttons.append(
-            rounded_box(
-                (x - half + GAP / 2, y + y0 + GAP / 2, low_z),
-                (x + half - GAP / 2, y + y1 - GAP / 2, high[2] + rng.uniform(0.0065, 0.01)),
-                corner,
+            box(
+                (x - half + GAP / 2, x + half - GAP / 2),
+                (y + y0 + GAP / 2, y + y1 - GAP / 2),
+                (low_z, high[2] + rng.uniform(0.0065, 0.01)),
+                fillet=corner,
                 axis=2,
                 steps=5,
             )
@@ -245,17 +243,16 @@ def _high_cistern(rng: np.random.Generator, moving: list[Moving], back: float, h
     pipe = tube([(back - 0.03, 0, height - 0.06), (x, 0, height - 0.04), (x, 0, height + up + 0.01)], 0.02, 14)
     low = height + up
     start = x - 0.5 * deep
-    solid = pipe + rounded_box((start, -half, low), (start + deep, half, low + tall), 0.02)
-    solid += rounded_box(
-        (start - 0.012, -half - 0.012, low + tall - 0.01),
-        (start + deep + 0.012, half + 0.012, low + tall + 0.02),
-        0.008,
+    solid = pipe + box((start, start + deep), half, (low, low + tall), fillet=0.02)
+    solid += box(
+        (start - 0.012, start + deep + 0.012), half + 0.012, (low + tall - 0.01, low + tall + 0.02), fillet=0.008
     )
     side = rng.choice([-1.0, 1.0])
     y = side * (half + 0.03)
     solid += box(
-        (x - 0.012, min(side * (half - 0.01), y + side * 0.012), low + 0.6 * tall),
-        (x + 0.012, max(side * (half - 0.01), y + side * 0.012), low + 0.6 * tall + 0.015),
+        (x - 0.012, x + 0.012),
+        (min(side * (half - 0.01), y + side * 0.012), max(side * (half - 0.01), y + side * 0.012)),
+        (low + 0.6 * tall, low + 0.6 * tall + 0.015),
     )
     long = rng.uniform(0.3, 0.55) * up + 0.2
     top = low + 0.6 * tall - GAP
@@ -281,8 +278,8 @@ def _wall(
     split = 0.0 if count == 1 else inner * rng.uniform(-0.3, 0.3)
     edges = [(-inner, inner)] if count == 1 else [(-inner, split - GAP / 2), (split + GAP / 2, inner)]
     for number, (y0, y1) in enumerate(edges):
-        button = rounded_box(
-            (back - 0.016, y0, z - high + 0.012 + GAP), (back - 0.008, y1, z + high - 0.012 - GAP), 0.002
+        button = box(
+            (back - 0.016, back - 0.008), (y0, y1), (z - high + 0.012 + GAP, z + high - 0.012 - GAP), fillet=0.002
         )
         joint = prismatic("body", (1, 0, 0), 0.0, 0.006, (back - 0.016, 0.5 * (y0 + y1), z))
         moving.append((f"button_{number}", button, joint))
@@ -314,15 +311,15 @@ def _seat_and_lid(
     round_off = 0.45 * cover.thick
     for y in (-apart, apart):
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
-        seat += box((edge - 0.06, near, low + 0.15 * cover.thick), (axis_x, far, low + 0.85 * cover.thick))
+        seat += box((edge - 0.06, axis_x), (near, far), (low + 0.15 * cover.thick, low + 0.85 * cover.thick))
         seat += cylinder((axis_x, near, at), (axis_x, far, at), round_off, sections=14)
     lid = _lid(rng, long, wide, power, top + GAP, cover.lid)
     for y in (-apart - half, apart + half):  # arms from the plate down to the axis, beside the seat's
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
-        arm = box((edge - 0.07, near, top + GAP), (axis_x, far, top + GAP + 0.5 * cover.lid))
+        arm = box((edge - 0.07, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid))
         lid += arm + hull_of(
             cylinder((axis_x, near, at), (axis_x, far, at), 0.3 * cover.thick, sections=14),
-            box((axis_x - 0.01, near, top + GAP), (axis_x, far, top + GAP + 0.5 * cover.lid)),
+            box((axis_x - 0.01, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid)),
         )
     hinge = (axis_x, 0.0, at)
     kind = str(rng.choice(["both", "in step", "lid", "seat"], p=[0.45, 0.2, 0.25, 0.1]))

@@ -13,7 +13,7 @@ import numpy as np
 from artsim.families.details import rounded_tray
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, continuous, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, rounded_box, tube, union
+from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 
 GAP = 0.0015
 
@@ -73,8 +73,7 @@ def _body(rng: np.random.Generator, size: Bin) -> Solid:
     body = rounded_tray((-x, -y, size.foot), (x, y, size.height), wall, size.radius, [(0.0, size.taper), (1.0, 0.0)],
                         steps=size.steps)  # fmt: skip
     out = rng.choice([0.004, -0.006]) - size.taper
-    body += rounded_box((-x - out, -y - out, 0), (x + out, y + out, size.foot + 0.002), size.radius, axis=2,
-                        steps=size.steps)  # fmt: skip
+    body += box(x + out, y + out, (0, size.foot + 0.002), fillet=size.radius, axis=2, steps=size.steps)
     if rng.random() < 0.5:  # a collar around the opening
         body += rounded_tray((-x - 0.003, -y - 0.003, size.height - rng.uniform(0.01, 0.04)),
                              (x + 0.003, y + 0.003, size.height), 0.005, size.radius, floor=0.0,
@@ -92,12 +91,10 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
     profile = [(0.0, inset), (0.12, 0.45 * inset), (0.5, 0.06 * inset), (1.0, 0.0)]
     lid = rounded_tray((-x - 0.003, -size.y - 0.003, seam), (x + 0.003, size.y + 0.003, seam + rise), 0.003,
                        size.radius, profile, side=-1, steps=size.steps)  # fmt: skip
-    lid += box((x - 0.012, -half, seam), (hinge[0], half, seam + 0.007))
+    lid += box((x - 0.012, hinge[0]), half, (seam, seam + 0.007))
     lid += cylinder((hinge[0], -half, seam + 0.002), (hinge[0], half, seam + 0.002), 0.006, sections=12)
     if rng.random() < 0.6:  # housing of the hinge
-        body += box(
-            (x - 0.006 - size.taper, -0.8 * half, size.height - 0.14), (x + 0.014, 0.8 * half, size.height - 0.02)
-        )
+        body += box((x - 0.006 - size.taper, x + 0.014), 0.8 * half, (size.height - 0.14, size.height - 0.02))
     falls = rng.random() < 0.35  # over the back, past the upright, as far as the hinge lets it
     turned_over = 180.0 if rng.random() < 0.5 else rng.uniform(110.0, 205.0)  # many real lids turn by half a turn
     limit = np.deg2rad(turned_over if falls else rng.uniform(60.0, 110.0))
@@ -105,20 +102,20 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
     if rng.random() < (0.7 if falls else 0.25):  # no pedal, perhaps a lip to lift it by
         if rng.random() < 0.6:
             lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
-            lid += rounded_box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), 0.003)
+            lid += box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), fillet=0.003)
         can.add("body", body, density=500.0)
         can.add("lid", lid, joint, density=500.0)
         return
     wide = rng.uniform(0.025, 0.05)
     base = -x + size.taper - 0.005
     cheeks = [s * (wide + 0.007) for s in (-1, 1)]
-    body += union(box((base - 0.025, c - 0.004, 0), (base + 0.03, c + 0.004, size.foot + 0.012)) for c in cheeks)
+    body += union(box((base - 0.025, base + 0.03), (c - 0.004, c + 0.004), (0, size.foot + 0.012)) for c in cheeks)
     can.add("body", body, density=500.0)
     can.add("lid", lid, joint, density=500.0)
     tip, middle = base - rng.uniform(0.03, 0.06), 0.5 * size.foot + 0.01
     pedal = hull_of(
-        rounded_box((tip, -wide, middle - 0.004), (tip + 0.02, wide, middle + 0.004), 0.004, axis=1),
-        box((base - 0.003, -wide, middle - 0.003), (base - 0.0015, wide, middle + 0.003)),
+        box((tip, tip + 0.02), wide, (middle - 0.004, middle + 0.004), fillet=0.004, axis=1),
+        box((base - 0.003, base - 0.0015), wide, (middle - 0.003, middle + 0.003)),
     )
     ratio = min(0.2, 0.8 * (middle - 0.006) / (base - tip)) / limit
     turn = revolute("body", (0, -1, 0), (base - 0.002, 0.0, middle), 0.0, ratio * limit, mimic=("lid", ratio))
@@ -135,9 +132,9 @@ def _swinging_flap(rng: np.random.Generator, can: Assembly, body: Solid, size: B
                          steps=size.steps)  # fmt: skip
     can.add("body", body, density=500.0)
     rim = shrink + 0.004 + 0.003
-    flap = rounded_box((-x + rim, -y + rim, top - 0.012), (x - rim, y - rim, top - 0.006),
-                       max(size.radius - rim, 0.002), axis=2, steps=size.steps)  # fmt: skip
-    flap += box((-0.006, -0.8 * (y - rim), top - 0.016), (0.006, 0.8 * (y - rim), top - 0.011))
+    flap = box((-x + rim, -y + rim, top - 0.012), (x - rim, y - rim, top - 0.006),
+                       fillet=max(size.radius - rim, 0.002), axis=2, steps=size.steps)  # fmt: skip
+    flap += box(0.006, 0.8 * (y - rim), (top - 0.016, top - 0.011))
     limit = np.deg2rad(rng.uniform(40.0, 80.0))
     can.add("flap", flap, revolute("body", (0, 1, 0), (0, 0, top - 0.009), -limit, limit), label="lid", density=500.0)
 
@@ -147,14 +144,14 @@ def _two_lids(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -
     seam, thick = size.height + GAP, rng.uniform(0.006, 0.012)
     can.add("body", body, density=500.0)
     limit = np.deg2rad(rng.uniform(70.0, 95.0))
-    whole = rounded_box((-size.x, -size.y, seam), (size.x, size.y, seam + thick), size.radius, axis=2, steps=6)
+    whole = box(size.x, size.y, (seam, seam + thick), fillet=size.radius, axis=2, steps=6)
     for number, s in enumerate((1.0, -1.0)):
         hinge = s * (size.y + 0.009)
         lid = Solid((whole.pieces[0].trim_by_plane((0.0, s, 0.0), GAP),))
         barrel = 0.25 * size.x
         lid += cylinder((-barrel, hinge, seam + 0.001), (barrel, hinge, seam + 0.001), 0.0045, sections=12)
         inner = s * 0.9 * size.y
-        lid += box((-barrel, min(hinge, inner), seam + 0.0005), (barrel, max(hinge, inner), seam + 0.005))
+        lid += box(barrel, (min(hinge, inner), max(hinge, inner)), (seam + 0.0005, seam + 0.005))
         can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit), density=500.0)
 
 
@@ -170,9 +167,9 @@ def _wheelie(rng: np.random.Generator) -> Assembly:
     wide = rng.uniform(0.035, 0.05)
     axle = (x - taper + rng.uniform(0.0, 0.4) * wheel, wheel)
     body += cylinder((axle[0], -inner + 0.001, axle[1]), (axle[0], inner - 0.001, axle[1]), 0.012, sections=16)
-    body += box((x - taper - 0.02, -0.6 * y, axle[1] - 0.03), (axle[0] + 0.014, 0.6 * y, axle[1] + 0.03))
+    body += box((x - taper - 0.02, axle[0] + 0.014), 0.6 * y, (axle[1] - 0.03, axle[1] + 0.03))
     front = -x + taper
-    body += box((front + 0.002, -0.6 * y, 0.0), (front + 0.05, 0.6 * y, lift + 0.003))
+    body += box((front + 0.002, front + 0.05), 0.6 * y, (0.0, lift + 0.003))
     grip_z, grip_x = height - rng.uniform(0.06, 0.08), x + rng.uniform(0.045, 0.06)
     for s in (-1.0, 1.0):
         body += tube([(x - 0.004, s * 0.7 * y, grip_z - 0.02), (grip_x, s * 0.7 * y, grip_z)], 0.011, 10)
@@ -184,7 +181,7 @@ def _wheelie(rng: np.random.Generator) -> Assembly:
     rise = rng.uniform(0.03, 0.07)
     shape = [(0.0, rng.uniform(0.2, 0.9) * rise + 0.02), (0.6, 0.01), (0.62, 0.0), (1.0, 0.0)]
     lid = rounded_tray((-x - 0.02, -y - 0.012, seam), (x, y + 0.012, seam + rise), 0.005, radius, shape, side=-1)
-    lid += box((x - 0.02, -0.6 * y, seam), (hinge[0], 0.6 * y, seam + 0.009))
+    lid += box((x - 0.02, hinge[0]), 0.6 * y, (seam, seam + 0.009))
     lid += cylinder((hinge[0], -0.6 * y, seam + 0.002), (hinge[0], 0.6 * y, seam + 0.002), 0.008, sections=12)
     limit = np.deg2rad(rng.uniform(75.0, 108.0) if rng.random() < 0.6 else rng.uniform(108.0, 205.0))
     can.add("lid", lid, revolute("body", (0, 1, 0), hinge, 0.0, limit))

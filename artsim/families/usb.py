@@ -21,7 +21,6 @@ from artsim.making.solids import (
     hull_of,
     prism,
     ring,
-    rounded_box,
     rounded_rectangle,
     tube,
     union,
@@ -89,9 +88,7 @@ def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
         1,
     )
     first, last = sorted((x - sign * 0.002, x + sign * 0.93 * plug.reach))
-    return solid + box(
-        (first, -plug.half + 0.5 * wall, -0.05 * plug.thick), (last, plug.half - 0.5 * wall, 0.5 * plug.thick)
-    )
+    return solid + box((first, last), plug.half - 0.5 * wall, (-0.05 * plug.thick, 0.5 * plug.thick))
 
 
 def _outline(kind: str, x0: float, x1: float, half: float, rng: np.random.Generator) -> list[Array]:
@@ -124,7 +121,7 @@ def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: 
     half, thick = stick.half, stick.thick
     if kind == "drum":
         low, high = np.array([x0, -half, -thick]), np.array([x1, half, thick])
-        return rounded_box(low, high, rng.uniform(0.6, 1.0) * min(half, thick), axis=0, steps=4)
+        return box(low, high, fillet=rng.uniform(0.6, 1.0) * min(half, thick), axis=0, steps=4)
     bevel = rng.choice([0.0, rng.uniform(0.2, 0.9)])
     solid = Solid()
     for outline in _outline(kind, x0, x1, half, rng):
@@ -138,7 +135,7 @@ def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: 
     if extra < 0.25:  # ribs to hold it by
         for share in np.linspace(0.45, 0.75, int(rng.integers(2, 6))):
             x = x0 + share * span
-            solid += box((x, -0.5 * half, -1.08 * thick), (x + 0.03 * span, 0.5 * half, 1.08 * thick))
+            solid += box((x, x + 0.03 * span), 0.5 * half, 1.08 * thick)
     elif extra < 0.4:  # studs of a toy brick
         columns = int(rng.integers(2, 5))
         size = 0.3 * min(span / columns, half)
@@ -149,9 +146,7 @@ def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: 
                 for s in (-1, 1)
             )
     elif extra < 0.6:
-        solid += rounded_box(
-            (x0 + 0.3 * span, -0.5 * half, 0), (x0 + 0.7 * span, 0.5 * half, 1.1 * thick), 0.2 * half, 2
-        )
+        solid += box((x0 + 0.3 * span, x0 + 0.7 * span), 0.5 * half, (0, 1.1 * thick), fillet=0.2 * half, axis=2)
     return solid
 
 
@@ -212,7 +207,7 @@ def _swivel(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     end = key_outline("round", (2.0 * tail, 2.0 * wide), 16) + (pivot, 0.0)
     outline = np.concatenate([end[end[:, 0] > pivot], [(pivot - reach - sheet, -wide), (pivot - reach - sheet, wide)]])
     cover = prism(outline, low - sheet, low) + prism(outline, high, high + sheet)
-    cover += box((pivot - reach - sheet, -wide, low - sheet), (pivot - reach, wide, high + sheet))
+    cover += box((pivot - reach - sheet, pivot - reach), wide, (low - sheet, high + sheet))
     for z, out in ((low - sheet, -1.0), (high + sheet, 1.0)):
         cover += cylinder((pivot, 0, z - out * 0.5 * sheet), (pivot, 0, z + out * 0.0006), pin, sections=16)
     side = float(rng.choice([-1.0, 1.0]))
@@ -276,9 +271,9 @@ def _retracting(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     low = inner - GAP
     slider += box((plug.reach, *-low), (plug.reach + carriage, *low))
     knob_top = thick + rng.uniform(0.0006, 0.003)
-    slider += box((knob_start, GAP - slot, 0), (knob_end, slot - GAP, knob_top))
-    slider += rounded_box((knob_start, -rng.uniform(0.8, 1.6) * slot, thick + GAP),
-                          (knob_end, rng.uniform(0.8, 1.6) * slot, knob_top + 0.0006), 0.001, 2)  # fmt: skip
+    slider += box((knob_start, knob_end), slot - GAP, (0, knob_top))
+    across = (-rng.uniform(0.8, 1.6) * slot, rng.uniform(0.8, 1.6) * slot)
+    slider += box((knob_start, knob_end), across, (thick + GAP, knob_top + 0.0006), fillet=0.001, axis=2)
     usb.add("connector", slider, prismatic("body", OUT, 0.0, plug.reach, (plug.reach, 0, 0)), density=2000.0)
 
 
@@ -309,5 +304,5 @@ def _switch(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
         return
     x, top = 0.2 * stick.length, 1.12 * stick.thick + 0.4 * stick.half + GAP
     size = 0.1 * stick.length
-    knob = rounded_box((x, -0.6 * size, top), (x + size, 0.6 * size, top + 0.001), 0.0003, 2)
+    knob = box((x, x + size), 0.6 * size, (top, top + 0.001), fillet=0.0003, axis=2)
     usb.add("switch", knob, prismatic("body", (1, 0, 0), 0.0, size, (x, 0, top)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous, revolute, screw
-from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, rounded_box, tube
+from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -146,13 +146,13 @@ def _ball_valve(rng: np.random.Generator, pipe: float, room: float) -> tuple[Sol
     length = min(pipe * rng.uniform(2.8, 4.2), 2.0 * room - 1.5 * neck)
     rise = max(pipe * rng.uniform(0.2, 0.8), FLANGE * pipe + thick + GAP - z)  # open, the grip lies over a flange
     # Shut, the lever stands across the pipe, towards the front.
-    a = rounded_box((-0.9 * neck, -1.1 * half, z), (0.9 * neck, 1.1 * half, z + thick), 0.4 * thick)
-    b = rounded_box((-0.35 * length, -half, z + rise), (-0.35 * length + 0.008, half, z + rise + thick), 0.4 * thick)
-    c = rounded_box((-length, -half, z + rise), (-length + 0.01, half, z + rise + thick), 0.4 * thick)
-    lever = a + hull_of(rounded_box((-neck, -half, z), (-0.3 * neck, half, z + thick), 0.4 * thick), b)
+    a = box(0.9 * neck, 1.1 * half, (z, z + thick), fillet=0.4 * thick)
+    b = box((-0.35 * length, -0.35 * length + 0.008), half, (z + rise, z + rise + thick), fillet=0.4 * thick)
+    c = box((-length, -length + 0.01), half, (z + rise, z + rise + thick), fillet=0.4 * thick)
+    lever = a + hull_of(box((-neck, -0.3 * neck), half, (z, z + thick), fillet=0.4 * thick), b)
     if rng.random() < 0.6:  # a sleeve on the grip
-        grown = rounded_box((-length - 0.002, -1.2 * half, z + rise - 0.3 * thick),
-                            (-0.4 * length, 1.2 * half, z + rise + 1.5 * thick), 0.6 * thick)  # fmt: skip
+        grown = box((-length - 0.002, -1.2 * half, z + rise - 0.3 * thick),
+                            (-0.4 * length, 1.2 * half, z + rise + 1.5 * thick), fillet=0.6 * thick)  # fmt: skip
         lever += grown
     lever += hull_of(b, c)
     if rng.random() < 0.25 and length + 2 * GAP < room:  # a second wing: a butterfly handle

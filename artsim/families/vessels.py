@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull_of, loft, ring, rounded_box, tube, union
+from artsim.making.solids import Solid, about, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -151,12 +151,12 @@ def pump_head(rng: np.random.Generator, low: float, stem: float, size: float, re
     r = min(size * rng.uniform(0.3, 0.48), 0.48 * tall)
     middle = low + 0.5 * tall
     if kind == "saddle":  # a wide thumb rest that narrows to the nozzle
-        back = rounded_box((-0.6 * size, -size, low), (size, size, low + tall), 0.35 * tall)
+        back = box((-0.6 * size, size), size, (low, low + tall), fillet=0.35 * tall)
         tip = ellipsoid((-reach, 0, middle - droop * reach), r, 10)
         return solid + back + hull_of(ellipsoid((-0.3 * size, 0, middle), 1.3 * r, 10), tip)
     if kind == "block":
         wide = max(1.2 * r, 0.55 * size)
-        return solid + rounded_box((-reach, -wide, low), (0.9 * size, wide, low + tall), 0.4 * min(tall, wide))
+        return solid + box((-reach, 0.9 * size), wide, (low, low + tall), fillet=0.4 * min(tall, wide))
     if kind == "hook":
         bend = -reach * rng.uniform(0.75, 0.9)
         path = [(0, 0, middle), (bend, 0, middle + 0.1 * reach), (-reach, 0, middle - max(droop, 0.1) * reach)]
@@ -181,6 +181,5 @@ def grip_loop(points: ArrayLike, wide: float, thick: float) -> Solid:
         Half extents along Y and across.
     """
     path = np.asarray(points, dtype=np.float64)
-    knots = [rounded_box((x - thick, -wide, z - thick), (x + thick, wide, z + thick), 0.8 * thick, axis=1)
-             for x, z in path.tolist()]  # fmt: skip
+    knots = [box(about(x, thick), wide, about(z, thick), fillet=0.8 * thick, axis=1) for x, z in path.tolist()]
     return union(hull_of(a, b) for a, b in pairwise(knots))

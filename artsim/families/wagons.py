@@ -24,37 +24,37 @@ def wagon(rng: np.random.Generator) -> Assembly:
         body = rounded_tray((-0.5 * length, -half, floor), (0.5 * length, half, floor + tall), 0.006, radius,
                             ((0.0, rng.uniform(0.0, 0.04)), (1.0, 0.0)))  # fmt: skip
     else:  # stakes and boards
-        body = box((-0.5 * length, -half, floor), (0.5 * length, half, floor + 0.02))
+        body = box(0.5 * length, half, (floor, floor + 0.02))
         boards = int(rng.integers(1, 4))
         for k in range(boards):
             z0 = floor + 0.02 + (k + 0.3) * tall / boards
             z1 = z0 + 0.6 * tall / boards
             for s in (-1.0, 1.0):
                 y0, y1 = sorted((s * half, s * (half - 0.015)))
-                body += box((-0.5 * length, y0, z0), (0.5 * length, y1, z1))
+                body += box(0.5 * length, (y0, y1), (z0, z1))
                 a, b = sorted((s * 0.5 * length, s * (0.5 * length - 0.015)))
-                body += box((a, -half, z0), (b, half, z1))
+                body += box((a, b), half, (z0, z1))
         for sx in (-1.0, 1.0):
             for sy in (-1.0, 1.0):
                 x, y = sx * (0.5 * length - 0.025), sy * (half - 0.025)
-                body += box((x - 0.012, y - 0.012, floor), (x + 0.012, y + 0.012, floor + 0.02 + tall))
+                body += box((x - 0.012, x + 0.012), (y - 0.012, y + 0.012), (floor, floor + 0.02 + tall))
     x_front, x_back = -0.5 * length + 1.3 * wheels.radius, 0.5 * length - 1.2 * wheels.radius
     track = half - 0.5 * wheels.wide
     inner = track - 0.5 * wheels.wide - GAP
     z = wheels.radius
-    body += box((x_back - 0.02, -inner + 0.03, z - 0.015), (x_back + 0.02, inner - 0.03, floor + 0.002))
+    body += box((x_back - 0.02, x_back + 0.02), inner - 0.03, (z - 0.015, floor + 0.002))
     body += cylinder((x_back, -inner, z), (x_back, inner, z), 0.012, sections=12)
     cart = Assembly("body", body, 500.0)
     top = floor - GAP
     axle = cylinder((x_front, 0, top), (x_front, 0, top - 0.015), 0.4 * half, sections=20)
-    axle += box((x_front - 0.02, -0.35 * half, z - 0.015), (x_front + 0.02, 0.35 * half, top - 0.005))
+    axle += box((x_front - 0.02, x_front + 0.02), 0.35 * half, (z - 0.015, top - 0.005))
     axle += cylinder((x_front, -inner, z), (x_front, inner, z), 0.012, sections=12)
     limit = rng.uniform(0.3, 0.6)
     # Steered all the way and turned up, the drawbar stays in front of the tray's lower edge.
     rise, ahead = floor - z, (x_front + 0.5 * length + 0.04) / cos(limit)
     nose = x_front - max(0.5 * wheels.radius, 0.06, ahead - rise * rng.uniform(0.2, 1.2))
     steepest = float(arctan2(rise, max(ahead - (x_front - nose), 0.15 * rise)))
-    axle += box((nose, -0.025, z - 0.012), (x_front, 0.025, z + 0.012))
+    axle += box((nose, x_front), 0.025, (z - 0.012, z + 0.012))
     cart.add("axle", axle, revolute("body", UP, (x_front, 0, top), -limit, limit), density=STEEL)
     long = rng.uniform(0.5, 0.85)
     start = rng.uniform(0.35, 0.95) * steepest
@@ -90,7 +90,7 @@ def hand_cart(rng: np.random.Generator) -> Assembly:
     low = wheels.radius + rng.uniform(-0.02, 0.12)
     tall, wall = rng.uniform(0.12, 0.45) if rng.random() < 0.7 else 0.0, rng.uniform(0.012, 0.025)
     front, back = -0.5 * length, 0.5 * length
-    body = box((front, -half, low), (back, half, low + wall))
+    body = box((front, back), half, (low, low + wall))
     gate = tall > 0 and rng.random() < 0.55
     flare = rng.uniform(0.0, 0.12)
     if tall > 0:
@@ -110,7 +110,7 @@ def hand_cart(rng: np.random.Generator) -> Assembly:
                          0.5 * wall, 8)  # fmt: skip
         ends = [front] if gate else [front, back - wall]
         for x in ends:
-            body += box((x, -half, low), (x + wall, half, top - (0.0 if rng.random() < 0.5 else 0.3 * tall)))
+            body += box((x, x + wall), half, (low, top - (0.0 if rng.random() < 0.5 else 0.3 * tall)))
     x_axle = rng.uniform(-0.1, 0.15) * length
     y_wheel = half + flare + 0.5 * wheels.wide + 0.012
     z = wheels.radius
@@ -122,8 +122,9 @@ def hand_cart(rng: np.random.Generator) -> Assembly:
     )
     for s in (-1.0, 1.0):
         body += box(
-            (x_axle - 0.04, s * 0.7 * half - 0.02, min(z, low) - 0.02),
-            (x_axle + 0.04, s * 0.7 * half + 0.02, low + 0.002),
+            (x_axle - 0.04, x_axle + 0.04),
+            (s * 0.7 * half - 0.02, s * 0.7 * half + 0.02),
+            (min(z, low) - 0.02, low + 0.002),
         )
     r, reach = rng.uniform(0.012, 0.02), rng.uniform(0.5, 1.1)
     rise = rng.uniform(-0.1, 0.25)
@@ -142,7 +143,7 @@ def hand_cart(rng: np.random.Generator) -> Assembly:
     cart = Assembly("body", body, 500.0)
     if gate:
         x = back + GAP
-        leaf = box((x, -half + 0.004, low + 0.004), (x + wall, half - 0.004, low + tall))
+        leaf = box((x, x + wall), half - 0.004, (low + 0.004, low + tall))
         hinge = revolute("body", (0, 1, 0), (x + wall, 0, low + 0.004), 0.0, rng.uniform(1.0, 2.4))
         cart.add("tailgate", leaf, hinge, label="door")
     for s in (-1.0, 1.0):

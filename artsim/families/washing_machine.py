@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, ring, rounded_box, tray, union, vessel
+from artsim.making.solids import Solid, box, cylinder, frame, hull, ring, tray, union, vessel
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -74,13 +74,13 @@ def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
         widths = [slot[0] - box_half + s.half, s.half - slot[0] - box_half, 0.016, 0.016]
         body += frame((-proud, -s.half, strip), (plate, s.half, s.high), widths)
     else:
-        body += rounded_box((-proud, -s.half, strip), (plate, s.half, s.high), 0.003)
+        body += box((-proud, plate), s.half, (strip, s.high), fillet=0.003)
     if rng.random() < 0.6:
-        body += rounded_box((-rng.uniform(0.0, 0.02), -s.half - 0.002, s.high - 0.001),
-                            (s.depth, s.half + 0.002, s.high + rng.uniform(0.01, 0.035)), 0.005)  # fmt: skip
+        body += box((-rng.uniform(0.0, 0.02), -s.half - 0.002, s.high - 0.001),
+                            (s.depth, s.half + 0.002, s.high + rng.uniform(0.01, 0.035)), fillet=0.005)  # fmt: skip
     if rng.random() < 0.5:  # plinth and the flap of the filter
-        body += box((0.012, 0.005 - s.half, 0.0), (s.depth - 0.01, s.half - 0.005, s.low + 0.002))
-        body += rounded_box((-0.0025, s.half - 0.2, s.low + 0.03), (0.01, s.half - 0.05, s.low + 0.12), 0.004, axis=0)
+        body += box((0.012, s.depth - 0.01), s.half - 0.005, (0.0, s.low + 0.002))
+        body += box((-0.0025, 0.01), (s.half - 0.2, s.half - 0.05), (s.low + 0.03, s.low + 0.12), fillet=0.004, axis=0)
     turning = bool(rng.random() < 0.6)
     bowl = rng.uniform(0.03, 0.06)
     tub = _drum(s, z, drum, hole, plate, bowl if turning else -plate / 2)
@@ -97,13 +97,14 @@ def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
     if turning:
         machine.add("drum", tub, continuous("body", (-1, 0, 0), (0, 0, z)), density=900.0)
     if drawer:
-        solid = rounded_box((-proud - 0.016, slot[0] - box_half + GAP, strip + 0.012),
-                            (-proud - GAP, slot[0] + box_half - GAP, s.high - 0.012), 0.004)  # fmt: skip
+        solid = box((-proud - 0.016, slot[0] - box_half + GAP, strip + 0.012),
+                            (-proud - GAP, slot[0] + box_half - GAP, s.high - 0.012), fillet=0.004)  # fmt: skip
         inner = np.array([box_half - 0.004, room - 0.003])
         solid += tray((-proud - 0.006, *(slot - inner)), (0.55 * s.depth, *(slot + inner)), 0.003)
         solid += box(
-            (-proud - 0.024, slot[0] - 0.4 * box_half, strip + 0.022),
-            (-proud - 0.012, slot[0] + 0.4 * box_half, strip + 0.032),
+            (-proud - 0.024, -proud - 0.012),
+            (slot[0] - 0.4 * box_half, slot[0] + 0.4 * box_half),
+            (strip + 0.022, strip + 0.032),
         )
         travel = rng.uniform(0.3, 0.45) * s.depth
         machine.add("detergent_drawer", solid, prismatic("body", (-1, 0, 0), 0.0, travel, (0, *slot)))
@@ -150,11 +151,11 @@ def _porthole(rng: np.random.Generator, z: float, hole: float, outer: float, thi
     # The bowl is narrow enough to swing past the rim of the hole.
     solid += cylinder((x1 - 0.002, 0, z), (x1 + bowl, 0, z), hole - 0.008, 0.78 * hole, 28)
     for side in (-0.35, 0.35):  # hinges
-        solid += box((x1 - 0.014, 0.6 * outer, z + side * outer - 0.02), (x1, outer + 0.01, z + side * outer + 0.02))
+        solid += box((x1 - 0.014, x1), (0.6 * outer, outer + 0.01), (z + side * outer - 0.02, z + side * outer + 0.02))
     y, reach = 0.018 - outer, rng.uniform(0.03, 0.05)
     if rng.random() < 0.5:
         grip = 0.25 * outer
-        return solid + box((x0 - 0.012, y - 0.004, z - grip), (x0 + 0.01, y + 0.014, z + grip))
+        return solid + box((x0 - 0.012, x0 + 0.01), (y - 0.004, y + 0.014), (z - grip, z + grip))
     start, end = (x0, 0.02 - 0.97 * outer, z - 0.1 * outer), (x0, 0.02 - 0.97 * outer, z + 0.1 * outer)
     return solid + front_handle(str(rng.choice(["bow", "flat"])), start, end, reach, 0.006)
 
@@ -181,11 +182,9 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
     body += hull([(x, y, z) for x, z in face for y in (-s.half, s.half)])
     upright = slope < 0.2 * console
     if upright:  # dials stand on its face
-        body += box(
-            (back + 0.003, -0.95 * s.half, s.high + 0.02), (back + 0.02 + slope, 0.95 * s.half, s.high + rise - 0.01)
-        )
+        body += box((back + 0.003, back + 0.02 + slope), 0.95 * s.half, (s.high + 0.02, s.high + rise - 0.01))
     if rng.random() < 0.5:  # a raised board in front
-        body += rounded_box((-0.003, 0.06 - s.half, s.low + 0.08), (0.01, s.half - 0.06, s.high - 0.1), 0.002)
+        body += box((-0.003, 0.01), s.half - 0.06, (s.low + 0.08, s.high - 0.1), fillet=0.002)
     machine = Assembly()
     machine.add("body", body, density=350.0)
 
@@ -200,15 +199,15 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
         lid = frame(low, high, [edge] * 4, 0, 1)
         lid += box(low + (edge - 0.002, edge - 0.002, 0.3 * thick), high - (edge - 0.002, edge - 0.002, 0.3 * thick))
     else:
-        lid = rounded_box(low, high, 0.008)
+        lid = box(low, high, fillet=0.008)
     if rng.random() < 0.65:  # hinged at the back
         upper = np.deg2rad(rng.uniform(75.0, 89.0))
-        lid += rounded_box((low[0] - 0.012, -0.07, low[2] + 0.004), (low[0] + 0.01, 0.07, high[2] - 0.003), 0.004)
+        lid += box((low[0] - 0.012, low[0] + 0.01), 0.07, (low[2] + 0.004, high[2] - 0.003), fillet=0.004)
         machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
     else:
         upper, side = np.deg2rad(with_tails(rng, (85.0, 120.0), (40.0, 120.0), 0.3)), int(rng.choice([-1, 1]))
         x, free = 0.5 * (low[0] + high[0]), -side * high[1]
-        lid += rounded_box((x - 0.06, free - 0.01, low[2] + 0.004), (x + 0.06, free + 0.01, high[2] - 0.003), 0.004)
+        lid += box((x - 0.06, x + 0.06), (free - 0.01, free + 0.01), (low[2] + 0.004, high[2] - 0.003), fillet=0.004)
         machine.add("lid", lid, revolute("body", (-side, 0, 0), (x, side * high[1], high[2]), 0.0, upper))
     machine.add(
         "drum", _agitator(rng, center, radius, s), continuous("body", (0, 0, 1), (*center, s.low)), density=900.0
@@ -226,7 +225,7 @@ def _agitator(rng: np.random.Generator, center: Array, radius: float, s: Shape) 
     top = low + (rng.uniform(0.6, 0.85) * (high - low) if rng.random() < 0.5 else 0.05)
     solid += cylinder((x, y, low + 0.001), (x, y, top), 0.3 * r, 0.15 * r, 16)
     for k in range(4):
-        vane = box((x, y - 0.01, low + 0.001), (x + 0.6 * r, y + 0.01, low + 0.06))
+        vane = box((x, x + 0.6 * r), (y - 0.01, y + 0.01), (low + 0.001, low + 0.06))
         solid += vane.turned((0, 0, 1), 0.5 * np.pi * k, (x, y, 0))
     return solid
 

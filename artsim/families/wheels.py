@@ -51,11 +51,11 @@ class Wheels:
         r = self.radius
         for s in (-1.0, 1.0):
             y0, y1 = sorted((y + s * (0.5 * self.wide + 0.003), y + s * (0.5 * self.wide + 0.007)))
-            plate = box((x - 0.7 * r, y0, top - 0.006), (x + 0.7 * r, y1, top))
+            plate = box((x - 0.7 * r, x + 0.7 * r), (y0, y1), (top - 0.006, top))
             solid += hull_of(plate, cylinder((x, y0, r), (x, y1, r), 0.3 * r, sections=8))
         lid = max(2.0 * r + GAP, top - 0.006)
         return solid + box(
-            (x - 0.7 * r, y - 0.5 * self.wide - 0.007, lid), (x + 0.7 * r, y + 0.5 * self.wide + 0.007, top)
+            (x - 0.7 * r, x + 0.7 * r), (y - 0.5 * self.wide - 0.007, y + 0.5 * self.wide + 0.007), (lid, top)
         )
 
     def add(self, cart: Assembly, center: Vector, parent: str = "body") -> None:
@@ -74,10 +74,10 @@ class Wheels:
         for s in (-1.0, 1.0):
             y0, y1 = sorted((y + s * cheek, y + s * (cheek + 0.003)))
             fork += hull_of(
-                box((x - 0.3 * self.radius, y0, disc - plate), (x + 0.4 * self.radius, y1, disc - plate + 0.004)),
+                box((x - 0.3 * self.radius, x + 0.4 * self.radius), (y0, y1), (disc - plate, disc - plate + 0.004)),
                 cylinder((axle[0], y0, axle[2]), (axle[0], y1, axle[2]), 0.3 * self.radius, sections=8),
             )
-            fork += box((x - 0.3 * self.radius, y0, disc - plate), (x + 0.4 * self.radius, y1, disc - 0.001))
+            fork += box((x - 0.3 * self.radius, x + 0.4 * self.radius), (y0, y1), (disc - plate, disc - 0.001))
         name = f"caster_{self.count}"
         cart.add(name, fork, continuous("body", UP, (x, y, disc)), density=STEEL)
         self.add(cart, axle, name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.making.assembly import Assembly, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, rounded_box
+from artsim.making.solids import Solid, box, cylinder, frame
 from artsim.model.kinematics import Array
 
 GAP = 0.003
@@ -57,9 +57,7 @@ def _frame(rng: np.random.Generator, width: float, height: float, depth: float, 
     solid = frame((x0, -y - bar, -bar), (x1, y + bar, height + bar), [bar] * 4)
     if rng.random() < 0.4:  # sill
         out, over = rng.uniform(0.02, 0.12), rng.uniform(0.0, 0.08)
-        solid += rounded_box(
-            (x0 - out, -y - bar - over, -bar - 0.02), (x1, y + bar + over, -bar + 0.006), 0.006, axis=1
-        )
+        solid += box((x0 - out, x1), y + bar + over, (-bar - 0.02, -bar + 0.006), fillet=0.006, axis=1)
     around = rng.random()
     if around < 0.25:  # casing, level with the frame so that sashes can pass
         wide = rng.uniform(0.04, 0.09)
@@ -92,8 +90,8 @@ def _hinged(
     top = height
     if rng.random() < 0.2 and height > 0.9:  # a fixed light above
         top = height * rng.uniform(0.68, 0.78)
-        body += box((x0, -width / 2 - 0.001, top), (depth / 2, width / 2 + 0.001, top + mullion))
-        body += box((-PANE / 2, -width / 2 - 0.001, top), (PANE / 2, width / 2 + 0.001, height + 0.001))
+        body += box((x0, depth / 2), width / 2 + 0.001, (top, top + mullion))
+        body += box(PANE / 2, width / 2 + 0.001, (top, height + 0.001))
     meeting = count == 2 and rng.random() < 0.45
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sideways = rng.random() < 0.65 or meeting
@@ -107,7 +105,9 @@ def _hinged(
         first = edges[k] + (mullion / 2 if k > 0 and not meeting else 0.0)
         last = edges[k + 1] - (mullion / 2 if k < count - 1 and not meeting else 0.0)
         if k < count - 1 and not meeting:
-            body += box((x0, edges[k + 1] - mullion / 2, -0.001), (depth / 2, edges[k + 1] + mullion / 2, top + 0.001))
+            body += box(
+                (x0, depth / 2), (edges[k + 1] - mullion / 2, edges[k + 1] + mullion / 2), (-0.001, top + 0.001)
+            )
         if k == fixed:
             low, high = (
                 np.array([x0 + 0.01, first - 0.001, -0.001]),
@@ -140,7 +140,7 @@ def _leaf(
     solid = _sash(low, high, rail, glazing)
     half = np.array([0.005, min(0.011, 0.35 * rail), min(0.011, 0.35 * rail)])
     half[along] = 0.03
-    solid += rounded_box(foot - half - (0.004, 0, 0), foot + half, 0.003, steps=2)
+    solid += box(foot - half - (0.004, 0, 0), foot + half, fillet=0.003, steps=2)
     origin = foot.copy()
     origin[0], origin[across] = low[0] - 0.001, edge
     stay, most = swing_limits(abs(foot[across] - edge) - 0.12, 0.05)  # whichever way the lever points
@@ -156,7 +156,7 @@ def _leaf(
     lever = cylinder(foot - (0.010, 0, 0), foot - (reach, 0, 0), 0.008, sections=12)
     corner_low, corner_high = np.minimum(foot, tip) - 0.007, np.maximum(foot, tip) + 0.007
     corner_low[0], corner_high[0] = foot[0] - reach - 0.004, foot[0] - reach + 0.008
-    lever += rounded_box(corner_low, corner_high, 0.005, steps=2)
+    lever += box(corner_low, corner_high, fillet=0.005, steps=2)
     turn = float(end if along == 2 else -end)
     joint = revolute(name, (turn, 0, 0), tuple(foot), 0.0, np.pi / 2)
     window.add(name.replace("sash", "handle"), lever, joint, label="handle", density=2500.0)
@@ -178,7 +178,7 @@ def _sliding(
         low, high = np.array([x, first, GAP]), np.array([x + sash, last, height - GAP])
         solid = _sash(low, high, rail, glazing)
         y = first + rail / 2 if k == 0 else last - rail / 2
-        solid += box((x - 0.0018, y - 0.3 * rail, 0.4 * height), (x + 0.002, y + 0.3 * rail, 0.4 * height + 0.14))
+        solid += box((x - 0.0018, x + 0.002), (y - 0.3 * rail, y + 0.3 * rail), (0.4 * height, 0.4 * height + 0.14))
         left = last - width / 2 + GAP  # travel to both sides, towards +Y and -Y
         joint = prismatic(
             "frame", (0, 1, 0), min(0.0, -(first + width / 2 - GAP)), max(0.0, -left), tuple(0.5 * (low + high))
@@ -205,8 +205,9 @@ def _hung(
         solids.append((solid, tuple(0.5 * (low + high))))
     if not both:
         body += solids[1][0] + box(
-            (-depth / 2 + 0.006 + sash + 2 * GAP, -width / 2 - 0.001, meet),
-            (depth / 2 - 0.002, -width / 2 + 0.01, height + 0.001),
+            (-depth / 2 + 0.006 + sash + 2 * GAP, depth / 2 - 0.002),
+            (-width / 2 - 0.001, -width / 2 + 0.01),
+            (meet, height + 0.001),
         )
     window.add("frame", body, density=700.0)
     window.add(

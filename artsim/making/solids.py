@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, overload
 
 import numpy as np
 from manifold3d import Manifold, OpType
@@ -20,6 +21,8 @@ from artsim.common.products import apply, dot, matmul, unit
 from artsim.model.kinematics import Array, cross_matrix
 
 Vector = Sequence[float] | Array
+Span = float | tuple[float, float]
+"""Two ends along an axis, in either order, or half of a width about 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,40 +115,48 @@ def hull_of(*solids: Solid) -> Solid:
     return Solid((Manifold.batch_hull([p for s in solids for p in s.pieces]),))
 
 
-def box(low: Vector, high: Vector) -> Solid:
-    """Axis-aligned box between two corners."""
-    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-    return Solid((Manifold.cube(high - low).translate(low),))
-
-
-def rounded_box(low: Vector, high: Vector, radius: float, axis: int | None = None, steps: int = 3) -> Solid:
-    """Box whose edges are round.
+@overload
+def box(
+    low: Vector, high: Vector, /, *, fillet: float | None = None, axis: int | None = None, steps: int = 3
+) -> Solid: ...
+@overload
+def box(
+    x: Span, y: Span, z: Span, /, *, fillet: float | None = None, axis: int | None = None, steps: int = 3
+) -> Solid: ...
+def box(*extent: Any, fillet: float | None = None, axis: int | None = None, steps: int = 3) -> Solid:
+    """Axis-aligned box between two corners, or by its span along each axis; its edges may be round.
 
     Parameters
     ----------
-    low, high : (3,) float
-    radius : float
-        Cut to just under half of the smallest side concerned.
+    fillet : float, optional
+        Radius of the edges. Cut to just under half of the smallest side concerned.
     axis : int, optional
         Round only the four edges along this coordinate axis; all twelve by default.
     steps : int
         Segments of a quarter circle.
     """
-    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    if len(extent) == 3:
+        extent = tuple(zip(*(sorted(s) if isinstance(s, tuple) else (-s, s) for s in extent), strict=True))
+    low, high = (np.asarray(corner, dtype=np.float64) for corner in extent)
     sides = high - low
+    if fillet is None:
+        return Solid((Manifold.cube(sides).translate(low),))
     across = [i for i in range(3) if i != axis]
-    radius = float(min(radius, 0.499 * sides[across].min()))
-    if axis is None:
-        angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
-        corner = np.array(
-            [(cos(a) * cos(b), sin(a) * cos(b), sin(b)) for b in angles[:-1] for a in angles] + [(0.0, 0.0, 1.0)]
-        )
-        signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        half = 0.5 * sides - radius
-        points = (signs[:, None] * (half + radius * corner)).reshape(-1, 3) + 0.5 * (low + high)
-        return hull(points)
-    outline = rounded_rectangle(low[across], high[across], radius, steps)
-    return prism(outline, low[axis], high[axis], axis)
+    radius = float(min(fillet, 0.499 * sides[across].min()))
+    if axis is not None:
+        return prism(rounded_rectangle(low[across], high[across], radius, steps), low[axis], high[axis], axis)
+    angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
+    corner = np.array(
+        [(cos(a) * cos(b), sin(a) * cos(b), sin(b)) for b in angles[:-1] for a in angles] + [(0.0, 0.0, 1.0)]
+    )
+    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    half = 0.5 * sides - radius
+    return hull((signs[:, None] * (half + radius * corner)).reshape(-1, 3) + 0.5 * (low + high))
+
+
+def about(middle: float, half: float) -> tuple[float, float]:
+    """Span of twice a half width about its middle."""
+    return middle - half, middle + half
 
 
 def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import matmul
-from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, rounded_box, tube, vessel
+from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, tube, vessel
 from artsim.model.appearance import Coat, Material, plain_coat
 from artsim.model.appearance.finishes import draw_material, piece_of_face
 from artsim.model.kinematics import Array
@@ -69,7 +69,7 @@ def table(size: Vector, rng: np.random.Generator) -> list[Thing]:
     thick, leg, inset = 0.03, 0.05, 0.04
     material = draw_material(str(rng.choice(_TABLE_FINISHES)), rng)
     legs = material if rng.random() < 0.5 else draw_material("steel", rng)
-    top = rounded_box((-x, -y, -thick), (x, y, 0.0), 0.02, axis=2)
+    top = box((-x, -y, -thick), (x, y, 0.0), fillet=0.02, axis=2)
     things = [place_solid("table", top, material)]
     for sx in (-1, 1):
         for sy in (-1, 1):
@@ -171,7 +171,7 @@ def _bowl(rng: np.random.Generator) -> tuple[Solid, list[Material]]:
 
 def _block(rng: np.random.Generator) -> tuple[Solid, list[Material]]:
     side = rng.uniform(0.03, 0.055)
-    body = rounded_box((0, 0, 0), (side, side, side), 0.15 * side)
+    body = box((0, 0, 0), (side, side, side), fillet=0.15 * side)
     return body, [draw_material(str(rng.choice(["wood", "plastic"])), rng)]
 
 
