@@ -15,7 +15,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -34,7 +34,7 @@ class Mouth:
     shoulder: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A bottle, closed at rest; nozzles, triggers and the free edge of flip tops are at -X, handles at +X."""
     closures = (_screw_cap, _pump, _flip_top, _stopper, _sprayer, _cup, _bail)
     closure = closures[int(rng.choice(len(closures), p=[0.34, 0.15, 0.16, 0.12, 0.09, 0.07, 0.07]))]
@@ -46,7 +46,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return bottle
 
 
-def _body(rng: np.random.Generator, shape: str, wide: bool, tall: float) -> tuple[Solid, Mouth]:
+def _body(rng: Rng, shape: str, wide: bool, tall: float) -> tuple[Solid, Mouth]:
     """Body without its closure; its neck is at least ``tall`` above the shoulder."""
     kinds = {"wine": ["round"], "beer": ["round"], "flask": ["flask", "square"], "ball": ["round", "octagon"]}
     kind = str(rng.choice(kinds.get(shape, ["round", "round", "square", "square", "octagon", "hexagon"])))
@@ -97,7 +97,7 @@ def _body(rng: np.random.Generator, shape: str, wide: bool, tall: float) -> tupl
     return body, mouth
 
 
-def _profile(rng: np.random.Generator, shape: str) -> list[tuple[float, float, float]]:
+def _profile(rng: Rng, shape: str) -> list[tuple[float, float, float]]:
     """Height and half width over those of the body, and roundness, from the foot to the shoulder."""
     soft = rng.uniform(0.0, 0.3)
     if shape in ("wine", "beer"):
@@ -143,7 +143,7 @@ def _bevelled(levels: list[Level]) -> list[Level]:
     return [(z, x - cut, y - cut, r), (z + cut, x, y, r), *levels[1:]]
 
 
-def _jug_handle(rng: np.random.Generator, depth: float, half: float, low: float, high: float) -> Solid:
+def _jug_handle(rng: Rng, depth: float, half: float, low: float, high: float) -> Solid:
     reach = depth + rng.uniform(0.02, 0.035)
     root = 0.45 * depth
     points = [
@@ -157,7 +157,7 @@ def _jug_handle(rng: np.random.Generator, depth: float, half: float, low: float,
     return grip_loop(points, min(rng.uniform(0.006, 0.012), 0.5 * half), rng.uniform(0.004, 0.006))
 
 
-def _closing(rng: np.random.Generator, mouth: Mouth, height: float) -> JointSpec:
+def _closing(rng: Rng, mouth: Mouth, height: float) -> JointSpec:
     """Joint of a cap that covers the neck: on a thread mostly; some slide off, some only turn."""
     kind = str(rng.choice(["screw", "slide", "turn"], p=[0.62, 0.23, 0.15]))
     at = (0.0, 0.0, mouth.rim)
@@ -169,7 +169,7 @@ def _closing(rng: np.random.Generator, mouth: Mouth, height: float) -> JointSpec
     return screw("body", UP, at, 0.0, turns, height * rng.uniform(0.6, 1.5) / turns)
 
 
-def _cover(rng: np.random.Generator, mouth: Mouth, bore: float = 0.0) -> tuple[Solid, float, float, float]:
+def _cover(rng: Rng, mouth: Mouth, bore: float = 0.0) -> tuple[Solid, float, float, float]:
     """A cap over the neck: the solid, its radius at the top, its underside and its top."""
     sections = int(rng.choice([24, 24, 8, 16]))
     inside = (mouth.radius * 1.02 + GAP) / cos(np.pi / sections)
@@ -182,7 +182,7 @@ def _cover(rng: np.random.Generator, mouth: Mouth, bore: float = 0.0) -> tuple[S
     return cap(radius, wall, low, high, bore, upper, sections), upper, low, high
 
 
-def _screw_cap(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _screw_cap(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     lid, radius, low, high = _cover(rng, mouth)
     tall = high - low
     if rng.random() < 0.5:
@@ -204,7 +204,7 @@ def _screw_cap(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: M
     bottle.add("lid", lid, _closing(rng, mouth, high - low))
 
 
-def _stopper(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _stopper(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A cork, a glass ball or a disc on a plug that sits in the neck."""
     plug = (mouth.bore - GAP) * cos(np.pi / 18) * 0.98
     low, rim = mouth.rim - 0.7 * (mouth.rim - mouth.foot), mouth.rim + GAP
@@ -231,7 +231,7 @@ def _stopper(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mou
     bottle.add("lid", lid, prismatic("body", UP, 0.0, depth * rng.uniform(1.0, 3.0), (0, 0, rim)))
 
 
-def _flip_top(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A lid that swings back about a hinge at the edge of a collar."""
     collar, radius, low, high = _cover(rng, mouth)
     tall = radius * rng.uniform(0.15, 0.9)
@@ -266,7 +266,7 @@ def _flip_top(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mo
     bottle.add("lid", lid, joint)
 
 
-def _pump(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _pump(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A collar that turns on the neck, and a head that is pressed down in it."""
     stem = min(mouth.bore * rng.uniform(0.3, 0.5), 0.005)
     collar, radius, low, high = _cover(rng, mouth, stem + GAP)
@@ -289,7 +289,7 @@ def _pump(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth)
     bottle.add("pump", solid, pressed)
 
 
-def _sprayer(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _sprayer(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A sprayer's head on a collar, with a trigger that swings back."""
     head, radius, low, high = _cover(rng, mouth)
     wide = radius * rng.uniform(0.5, 0.8)
@@ -317,7 +317,7 @@ def _sprayer(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mou
     bottle.add("trigger", trigger, revolute("head", (0, -1, 0), (x, 0, z), 0.0, limit))
 
 
-def _cup(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _cup(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A vacuum flask: a screwed stopper, and a cup over it."""
     plug = (mouth.bore - GAP) * cos(np.pi / 18) * 0.98
     rim = mouth.rim + GAP
@@ -343,7 +343,7 @@ def _cup(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) 
     bottle.add("cup", cup, prismatic("body", UP, 0.0, lift, (0, 0, top)))
 
 
-def _bail(rng: np.random.Generator, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _bail(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A preserving jar or a swing-top bottle: a flat lid on a hinge at the back, with a wire bow at the front."""
     r = 0.09 * mouth.radius
     rim = mouth.rim + GAP

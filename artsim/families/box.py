@@ -12,18 +12,18 @@ from artsim.common.elementary import cos, sin
 from artsim.families.carton import LEAST_SHARES, MOST_SHARES, carton
 from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.families.proportions import unusual_sides, with_tails
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, tray, union
 
 GAP = 0.0015
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A box, closed at rest."""
     return carton(rng) if rng.random() < 0.45 else _rigid(rng)
 
 
-def _rigid(rng: np.random.Generator) -> Assembly:
+def _rigid(rng: Rng) -> Assembly:
     """Chest, case or jewellery box; its hinge lies behind the back, so that the lid clears it in every state."""
     width = rng.choice([rng.uniform(0.12, 0.35), rng.uniform(0.4, 1.3)])
     depth = width * rng.uniform(0.42, 0.8)
@@ -54,11 +54,7 @@ def _rigid(rng: np.random.Generator) -> Assembly:
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
             lid = box(x, (min(sign * y, sign * GAP), max(sign * y, sign * GAP)), (seam, seam + thick))
             lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)
-            chest.add(
-                f"lid_{number}",
-                lid,
-                revolute("body", axis, (0, sign * (y + band + 0.001), seam), 0.0, limit),
-            )
+            chest.add(f"lid_{number}", lid, revolute("body", axis, (0, sign * (y + band + 0.001), seam), 0.0, limit))
         return chest
     lid, top, domed = _lid(rng, x, y, seam, height, wall, radius, band == 0.0)
     lid += _bands(rng, x, y, seam, top, band, wall, radius) if top - seam > 3 * wall else Solid()
@@ -83,7 +79,7 @@ def _rigid(rng: np.random.Generator) -> Assembly:
     return chest
 
 
-def _rigid_body(rng: np.random.Generator, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
+def _rigid_body(rng: Rng, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
     if radius == 0.0:
         return tray((-x, -y, 0), (x, y, height), wall)
     bevel = rng.choice([0.0, 0.4 * radius])
@@ -91,9 +87,7 @@ def _rigid_body(rng: np.random.Generator, x: float, y: float, height: float, wal
     return rounded_tray((-x, -y, 0), (x, y, height), wall, radius, profile, floor=wall + bevel)
 
 
-def _bands(
-    rng: np.random.Generator, x: float, y: float, low: float, high: float, band: float, wall: float, radius: float
-) -> Solid:
+def _bands(rng: Rng, x: float, y: float, low: float, high: float, band: float, wall: float, radius: float) -> Solid:
     """Boards and straps that stand out all around: at the edges, or across the front."""
     if band <= 0:
         return Solid()
@@ -112,7 +106,7 @@ def _bands(
     return solid
 
 
-def _interior(rng: np.random.Generator, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
+def _interior(rng: Rng, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
     """Dividers below the rim."""
     if rng.random() < 0.5:
         return Solid()
@@ -126,7 +120,7 @@ def _interior(rng: np.random.Generator, x: float, y: float, height: float, wall:
     return solid
 
 
-def _feet(rng: np.random.Generator, x: float, y: float, wall: float) -> Solid:
+def _feet(rng: Rng, x: float, y: float, wall: float) -> Solid:
     """Plinth, blocks or balls below the corners, or nothing."""
     kind = str(rng.choice(["none", "plinth", "blocks", "balls"], p=[0.5, 0.2, 0.2, 0.1]))
     drop = wall * rng.uniform(1.0, 3.0)
@@ -145,7 +139,7 @@ def _feet(rng: np.random.Generator, x: float, y: float, wall: float) -> Solid:
 
 
 def _lid(
-    rng: np.random.Generator, x: float, y: float, seam: float, height: float, wall: float, radius: float, plain: bool
+    rng: Rng, x: float, y: float, seam: float, height: float, wall: float, radius: float, plain: bool
 ) -> tuple[Solid, float, bool]:
     """Lid above the seam, the top of its upright part, and whether a dome rises above that."""
     kind = str(rng.choice(["flat", "hollow", "dome"], p=[0.35, 0.45, 0.2]))
@@ -190,7 +184,7 @@ def _lid(
     return solid, seam + straight, True
 
 
-def _lid_handle(rng: np.random.Generator, x: float, y: float, top: float) -> Solid:
+def _lid_handle(rng: Rng, x: float, y: float, top: float) -> Solid:
     """Knob or bow on a flat top, or nothing."""
     size = min(x, 0.5 * y, 0.12)
     kind = rng.random()
@@ -201,7 +195,7 @@ def _lid_handle(rng: np.random.Generator, x: float, y: float, top: float) -> Sol
     return Solid()
 
 
-def _side_handles(rng: np.random.Generator, x: float, y: float, height: float) -> Solid:
+def _side_handles(rng: Rng, x: float, y: float, height: float) -> Solid:
     """Bows at the two ends of a chest."""
     half, z = min(0.4 * x, 0.06), rng.uniform(0.55, 0.75) * height
     return union(
@@ -209,7 +203,7 @@ def _side_handles(rng: np.random.Generator, x: float, y: float, height: float) -
     )
 
 
-def _latches(rng: np.random.Generator, chest: Assembly, front: float, y: float, seam: float, top: float) -> None:
+def _latches(rng: Rng, chest: Assembly, front: float, y: float, seam: float, top: float) -> None:
     """Hasps on the lid's front that hang down over the body and flip up."""
     width = min(0.08 * y, 0.02)
     upper = min(0.4 * (top - seam), 0.1 * y, 0.025)

@@ -12,7 +12,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.common.products import norm
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, ring, tube, vessel
 from artsim.model.kinematics import Array
 
@@ -20,7 +20,7 @@ SIDES = 20
 """Segments of the vessel's circle."""
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A bucket whose bail stands up at rest and swings to both sides."""
     top = with_tails(rng, (0.09, 0.18), (0.06, 0.34), 0.25)
     height = top * with_tails(rng, (0.85, 3.2), (0.55, 5.4), 0.3)
@@ -93,7 +93,7 @@ def _swing(side: float, path: Array, thick: Array, profile: Array, outer: float,
     return float(angles[max(first - 1, 0), 0])
 
 
-def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
+def _profile(rng: Rng, top: float, height: float) -> Array:
     """Outer radius and height, from the bottom up."""
     bottom = top * rng.uniform(0.6, 0.98)
     kind = str(rng.choice(["taper", "steps", "belly", "foot"], p=[0.5, 0.2, 0.15, 0.15]))
@@ -112,7 +112,7 @@ def _profile(rng: np.random.Generator, top: float, height: float) -> Array:
     return np.array([(bottom, 0.0), (top, height)])
 
 
-def _rim(rng: np.random.Generator, top: float, height: float, wall: float, profile: Array) -> Solid:
+def _rim(rng: Rng, top: float, height: float, wall: float, profile: Array) -> Solid:
     """Rolled rim, hoops around the side, and a spout."""
     solid = ring((0, 0, height), (0, 0, 1), top - wall - 0.001, top + rng.uniform(0.002, 0.006), 0.006, SIDES)
     for share in rng.uniform(0.2, 0.8, int(rng.choice([0, 1, 2], p=[0.5, 0.35, 0.15]))):
@@ -138,9 +138,7 @@ def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float
     return solid + cylinder((0, tip, pivot), (0, tip + side * 0.002, pivot), 1.6 * pin, sections=12)
 
 
-def _bail(
-    rng: np.random.Generator, half: float, reach: float, pivot: float, pin: float, wire: float
-) -> tuple[Solid, Array, Array]:
+def _bail(rng: Rng, half: float, reach: float, pivot: float, pin: float, wire: float) -> tuple[Solid, Array, Array]:
     """Wire or strap from eye to eye over the opening, with a grip in the middle; its middle line and its radius."""
     curved = rng.random() < 0.85
     height = reach * (rng.uniform(1.0, 1.3) if rng.random() < 0.6 else rng.uniform(1.2, 1.7))

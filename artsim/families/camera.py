@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, about, box, cylinder, ellipsoid, hull_of, prism, ring, tube
 from artsim.model.kinematics import Array
 
@@ -35,7 +35,7 @@ class Shell:
     lens_radius: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A camera; its lens looks towards -X and is drawn in at rest, all covers are shut."""
     kind = str(rng.choice(["compact", "reflex", "rangefinder", "instant", "camcorder", "swivel"],
                           p=[0.26, 0.27, 0.17, 0.1, 0.12, 0.08]))  # fmt: skip
@@ -60,7 +60,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return camera
 
 
-def _shell(rng: np.random.Generator, kind: str) -> Shell:
+def _shell(rng: Rng, kind: str) -> Shell:
     half = {"compact": rng.uniform(0.042, 0.06), "reflex": rng.uniform(0.055, 0.08),
             "rangefinder": rng.uniform(0.055, 0.075), "instant": rng.uniform(0.05, 0.075)}[kind]  # fmt: skip
     tall = {"compact": (1.05, 1.45), "reflex": (1.15, 1.6), "rangefinder": (1.0, 1.35), "instant": (1.3, 2.1)}[kind]
@@ -74,7 +74,7 @@ def _shell(rng: np.random.Generator, kind: str) -> Shell:
     return Shell(half, depth, height, y, z, min(radius, z - 0.002))
 
 
-def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float, float]]:
+def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float, float]]:
     """The body; the span along Y and the height of what stands on its middle, for a flash."""
     half, depth, height = shell.half, shell.depth, shell.height
     r = min(rng.uniform(0.05, 0.45) * depth, 0.4 * height)
@@ -132,7 +132,7 @@ def _body(rng: np.random.Generator, shell: Shell, kind: str) -> tuple[Solid, tup
 
 
 def _top_controls(
-    rng: np.random.Generator, shell: Shell, middle: tuple[float, float, float], kind: str
+    rng: Rng, shell: Shell, middle: tuple[float, float, float], kind: str
 ) -> tuple[Solid, list[tuple[str, Solid, JointSpec]]]:
     """Shutter button and dials on the deck, beside what stands on its middle: their seats, and the parts."""
     half, depth = shell.half, shell.depth
@@ -177,7 +177,7 @@ def _top_controls(
     return seats, parts
 
 
-def _dial(rng: np.random.Generator, foot: Array, radius: float) -> Solid:
+def _dial(rng: Rng, foot: Array, radius: float) -> Solid:
     """A flat dial, knurled by chance."""
     tall = radius * rng.uniform(0.4, 1.1)
     solid = cylinder(foot, foot + tall * UP, radius, radius * rng.uniform(0.9, 1.0), 20)
@@ -191,7 +191,7 @@ def _dial(rng: np.random.Generator, foot: Array, radius: float) -> Solid:
     return solid
 
 
-def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
+def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
     """A screen that swings or tilts, or buttons; and a door for the battery at the side."""
     half, depth, height = shell.half, shell.depth + 0.001, shell.height
     kind = str(rng.choice(["fixed", "swing", "tilt", "back", "none"], p=[0.25, 0.25, 0.15, 0.1, 0.25]))
@@ -235,7 +235,7 @@ def _back(rng: np.random.Generator, camera: Assembly, shell: Shell) -> None:
         camera.add("door", door, revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2)))
 
 
-def _flash(rng: np.random.Generator, camera: Assembly, shell: Shell, span: tuple[float, float, float]) -> None:
+def _flash(rng: Rng, camera: Assembly, shell: Shell, span: tuple[float, float, float]) -> None:
     """A flash on the crest: it lies flat and swings up about its back edge, or slides up."""
     y0, y1, z = span
     low = z + GAP
@@ -252,7 +252,7 @@ def _flash(rng: np.random.Generator, camera: Assembly, shell: Shell, span: tuple
 # --- other kinds -----------------------------------------------------------------------------------------------------
 
 
-def _camcorder(rng: np.random.Generator) -> Assembly:
+def _camcorder(rng: Rng) -> Assembly:
     """A long body with a screen at its left side, a strap at its right, and a viewfinder at the back."""
     half, height = rng.uniform(0.022, 0.045), rng.uniform(0.05, 0.085)
     depth = rng.uniform(0.09, 0.2)
@@ -307,7 +307,7 @@ def _camcorder(rng: np.random.Generator) -> Assembly:
     return camera
 
 
-def _swivel(rng: np.random.Generator) -> Assembly:
+def _swivel(rng: Rng) -> Assembly:
     """A camera that turns and nods in a fork on a foot: for a desk, a wall, a ceiling."""
     r = rng.uniform(0.02, 0.06)
     shape = str(rng.choice(["ball", "bullet", "box"]))

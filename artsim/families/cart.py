@@ -16,21 +16,21 @@ from artsim.families.details import front_handle, side_hinge
 from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tray, tube, union
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A cart that moves towards -X; whoever pushes it stands at +X. Everything is folded out and shut at rest."""
-    kinds: tuple[Callable[[np.random.Generator], Assembly], ...] = (
+    kinds: tuple[Callable[[Rng], Assembly], ...] = (
         shopping_cart, _platform_trolley, _hand_truck, _service_trolley, _wheelbarrow, wagon, hand_cart
     )  # fmt: skip
     return kinds[int(rng.choice(len(kinds), p=[0.2, 0.15, 0.16, 0.2, 0.09, 0.1, 0.1]))](rng)
 
 
-def _platform_trolley(rng: np.random.Generator) -> Assembly:
+def _platform_trolley(rng: Rng) -> Assembly:
     """A deck on four wheels with a handle at the back that folds down, or two fixed ones."""
     length, half = rng.uniform(0.55, 1.2), rng.uniform(0.2, 0.38)
     wheels = Wheels(rng, min(rng.uniform(0.035, 0.075), 0.3 * (half - 0.04)), rng.uniform(0.02, 0.035))
@@ -83,7 +83,7 @@ def _platform_trolley(rng: np.random.Generator) -> Assembly:
     return cart
 
 
-def _hand_truck(rng: np.random.Generator) -> Assembly:
+def _hand_truck(rng: Rng) -> Assembly:
     """An upright frame on two wheels, with a toe plate in front and a handle on top."""
     wheels = Wheels(rng, rng.uniform(0.07, 0.14), rng.uniform(0.03, 0.06))
     half, height = rng.uniform(0.15, 0.25), rng.uniform(0.7, 1.25)
@@ -129,9 +129,7 @@ def _hand_truck(rng: np.random.Generator) -> Assembly:
     return cart
 
 
-def _truck_handle(
-    rng: np.random.Generator, shape: str, x: float, half: float, height: float, r: float, slides: bool
-) -> Solid:
+def _truck_handle(rng: Rng, shape: str, x: float, half: float, height: float, r: float, slides: bool) -> Solid:
     """What the hands hold; one that slides has two legs before the frame."""
     rise = rng.uniform(0.1, 0.3)
     low, y, front = height - 0.005, half, x
@@ -150,7 +148,7 @@ def _truck_handle(
     return legs + grips + bar((front, -y, top - 0.06), (front, y, top - 0.06), 0.8 * r)
 
 
-def _service_trolley(rng: np.random.Generator) -> Assembly:
+def _service_trolley(rng: Rng) -> Assembly:
     """Shelves between posts, or a cabinet with drawers or doors, on four casters."""
     depth, half = rng.uniform(0.17, 0.3), rng.uniform(0.2, 0.42)  # half of each
     wheels = Wheels(rng, min(rng.uniform(0.025, 0.055), 0.28 * (depth - 0.02)), rng.uniform(0.016, 0.028))
@@ -216,7 +214,7 @@ def _service_trolley(rng: np.random.Generator) -> Assembly:
 
 
 def _doors(
-    rng: np.random.Generator,
+    rng: Rng,
     moving: list[tuple[str, Solid, JointSpec]],
     depth: float,
     half: float,
@@ -241,7 +239,7 @@ def _doors(
         moving.append((f"door_{number}", leaf, side_hinge(x, y1 if left else y0, limit, left)))
 
 
-def _wheelbarrow(rng: np.random.Generator) -> Assembly:
+def _wheelbarrow(rng: Rng) -> Assembly:
     """A tray between two long shafts, one or two wheels in front, two legs."""
     wheels = Wheels(rng, rng.uniform(0.13, 0.2), rng.uniform(0.05, 0.09))
     half, length = rng.uniform(0.24, 0.36), rng.uniform(0.55, 0.85)

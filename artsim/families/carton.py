@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.proportions import unusual_sides
-from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, revolute
 from artsim.making.solids import Solid, box, frame, hull, tray
 from artsim.model.kinematics import Array
 
@@ -19,7 +19,7 @@ LEAST_SHARES, MOST_SHARES = (0.29, 0.43, 0.075), (0.765, 0.95, 0.79)
 """Depth, width and height of unusual boxes over their diagonal."""
 
 
-def carton(rng: np.random.Generator) -> Assembly:
+def carton(rng: Rng) -> Assembly:
     """Cardboard box; the longer flaps hang on the front and the back."""
     width = rng.uniform(0.18, 0.6)
     depth = width * rng.uniform(0.5, 1.0)
@@ -46,12 +46,12 @@ def carton(rng: np.random.Generator) -> Assembly:
     return result
 
 
-def _limit(rng: np.random.Generator, least: float) -> float:
+def _limit(rng: Rng, least: float) -> float:
     """Degrees that a flap turns by; some hang down flat against the outside."""
     return 270.0 if rng.random() < 0.2 else float(rng.uniform(least, 250.0))
 
 
-def _carton_body(rng: np.random.Generator, x: float, y: float, height: float, wall: float) -> Solid:
+def _carton_body(rng: Rng, x: float, y: float, height: float, wall: float) -> Solid:
     holes = rng.random() < 0.35 and min(x, y) > 0.1 and height > 0.15
     if not holes:
         return tray((-x, -y, 0), (x, y, height), wall)
@@ -68,7 +68,7 @@ Flap = tuple[str, bool, Array]
 """Where it hangs, whether it folds inward, and its outline (N, 2): distance from the hinge, and position along it."""
 
 
-def _flaps(rng: np.random.Generator, kind: str, x: float, y: float, wall: float, height: float) -> list[Flap]:
+def _flaps(rng: Rng, kind: str, x: float, y: float, wall: float, height: float) -> list[Flap]:
     c = 0.002  # between flaps
 
     def bar(reach: float, low: float, high: float, tip: float = 0.0) -> Array:

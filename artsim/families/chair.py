@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
@@ -19,7 +19,7 @@ UP = np.array([0.0, 0.0, 1.0])
 SIDE = np.array([0.0, 1.0, 0.0])
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A chair; one sits down facing -X. At rest the seat is at its lowest and faces forward."""
     legs = int(rng.choice([0, 3, 4, 5, 6], p=[0.15, 0.07, 0.18, 0.5, 0.1]))  # none: a disc
     span = rng.uniform(0.22, 0.36)
@@ -83,7 +83,7 @@ def _arm_sleeves(width: float, low: float, top: float) -> Solid:
     return side + side.mirrored(1)
 
 
-def _sliding_arms(rng: np.random.Generator, chair: Assembly, depth: float, width: float, top: float) -> None:
+def _sliding_arms(rng: Rng, chair: Assembly, depth: float, width: float, top: float) -> None:
     """Pads on bars that slide in their sleeves."""
     y, z = 0.5 * width + 0.04, top + 0.08 + GAP
     half, fore, aft = rng.uniform(0.025, 0.05), rng.uniform(0.2, 0.35) * depth, rng.uniform(0.15, 0.3) * depth
@@ -94,7 +94,7 @@ def _sliding_arms(rng: np.random.Generator, chair: Assembly, depth: float, width
         chair.add(f"arm_{number}", arm, prismatic("seat", UP, 0.0, travel, (0.0, side * y, z)), density=500.0)
 
 
-def _controls(rng: np.random.Generator, chair: Assembly, width: float, low: float) -> None:
+def _controls(rng: Rng, chair: Assembly, width: float, low: float) -> None:
     """A lever and a knob at the plate below the seat."""
     side = float(rng.choice([-1.0, 1.0]))
     reach, z = rng.uniform(0.1, 0.2), low + 0.002
@@ -111,7 +111,7 @@ def _controls(rng: np.random.Generator, chair: Assembly, width: float, low: floa
 
 
 def _star(
-    rng: np.random.Generator,
+    rng: Rng,
     legs: int,
     span: float,
     floor: float,
@@ -142,7 +142,7 @@ def _star(
     return solid
 
 
-def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, floor: float, wheel: float) -> None:
+def _castors(rng: Rng, chair: Assembly, legs: int, span: float, floor: float, wheel: float) -> None:
     """A swivelling fork under every leg, with two wheels, which are parts of their own by chance."""
     rolling = rng.random() < 0.5
     trail = 0.6 * wheel
@@ -184,7 +184,7 @@ def _castors(rng: np.random.Generator, chair: Assembly, legs: int, span: float, 
             )
 
 
-def _seat(rng: np.random.Generator, depth: float, width: float, thick: float, low: float, stool: bool) -> Solid:
+def _seat(rng: Rng, depth: float, width: float, thick: float, low: float, stool: bool) -> Solid:
     """Cushion on a plate."""
     z = low + 0.03
     solid = box(0.1, 0.09, (low, z + 0.01)) + cylinder((0, 0, low), (0, 0, z), 0.06)
@@ -201,7 +201,7 @@ def _seat(rng: np.random.Generator, depth: float, width: float, thick: float, lo
     return solid + hull_of(plan, box(a, b, (z, z + thick), fillet=corner, axis=2))
 
 
-def _back(rng: np.random.Generator, width: float, top: float, hinge: Array, tilting: bool) -> Solid:
+def _back(rng: Rng, width: float, top: float, hinge: Array, tilting: bool) -> Solid:
     """Back rest on a spine that starts at the hinge; it may carry a head rest."""
     tall = rng.uniform(0.35, 0.65)
     low = top + rng.uniform(0.03, 0.1)
@@ -235,7 +235,7 @@ def _back(rng: np.random.Generator, width: float, top: float, hinge: Array, tilt
     return solid + panel
 
 
-def _arms(rng: np.random.Generator, depth: float, width: float, low: float, top: float) -> Solid:
+def _arms(rng: Rng, depth: float, width: float, low: float, top: float) -> Solid:
     """Two arm rests: posts from under the seat with pads, or closed loops."""
     z = top + rng.uniform(0.14, 0.22)
     y = 0.5 * width + 0.035

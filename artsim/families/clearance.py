@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from artsim.common.elementary import cos
 from artsim.common.products import dot, matmul, norm, unit
-from artsim.making.assembly import JointSpec
+from artsim.making.assembly import JointSpec, Rng
 from artsim.making.solids import Solid, Vector, cylinder
 from artsim.model.kinematics import Array, Joint, KinematicTree
 
@@ -99,9 +99,7 @@ def narrow_limits(links: list[Link], margin: float) -> bool:
     return False
 
 
-def _tight_pairs(
-    pairs: _Pairs, wanted: Array, bounds: Array, unit: Array, rng: np.random.Generator
-) -> NDArray[np.bool_]:
+def _tight_pairs(pairs: _Pairs, wanted: Array, bounds: Array, unit: Array, rng: Rng) -> NDArray[np.bool_]:
     """(P,) which pairs come closer than wanted; ``unit`` is the share of its range that each joint goes first."""
     for step in range(_DESCENTS + 1):
         spare = pairs.gaps(bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])) - wanted

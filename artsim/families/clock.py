@@ -16,22 +16,22 @@ from artsim.common.elementary import cos, sin
 from artsim.families.clock_faces import CLOCKWISE, FRONT, add_hands, dial_plate, glass_door, outline, pendulum, rim
 from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
 
 GAP = 0.001
 DENSITY = 500.0
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A clock; its face looks towards -X and the pendulum hangs straight at rest."""
-    kinds: tuple[Callable[[np.random.Generator], Assembly], ...] = (
+    kinds: tuple[Callable[[Rng], Assembly], ...] = (
         wall_clock, pendulum_clock, _mantel_clock, _longcase_clock, _alarm_clock, cuckoo_clock, _watch
     )  # fmt: skip
     return kinds[int(rng.choice(len(kinds), p=[0.24, 0.16, 0.16, 0.13, 0.15, 0.08, 0.08]))](rng)
 
 
-def _mantel_clock(rng: np.random.Generator) -> Assembly:
+def _mantel_clock(rng: Rng) -> Assembly:
     """A case that stands: a block, an arch, a tambour, a house, or a drum on feet."""
     radius = rng.uniform(0.04, 0.1)
     deep = radius * rng.uniform(0.7, 1.5)
@@ -96,7 +96,7 @@ def _mantel_clock(rng: np.random.Generator) -> Assembly:
     return clock
 
 
-def _knobs(rng: np.random.Generator, clock: Assembly, x: float, spread: float) -> None:
+def _knobs(rng: Rng, clock: Assembly, x: float, spread: float) -> None:
     """One to three knobs at the back."""
     count = int(rng.integers(1, 4))
     for k in range(count):
@@ -110,7 +110,7 @@ def _knobs(rng: np.random.Generator, clock: Assembly, x: float, spread: float) -
         clock.add(name, knob, continuous("body", CLOCKWISE, (x, y, z)), density=DENSITY)
 
 
-def _longcase_clock(rng: np.random.Generator) -> Assembly:
+def _longcase_clock(rng: Rng) -> Assembly:
     """A tall case on the floor: a hood with the face, a trunk with pendulum and weights, a plinth."""
     radius = rng.uniform(0.11, 0.17)
     deep = rng.uniform(0.18, 0.28)
@@ -164,7 +164,7 @@ def _longcase_clock(rng: np.random.Generator) -> Assembly:
     return clock
 
 
-def _alarm_clock(rng: np.random.Generator) -> Assembly:
+def _alarm_clock(rng: Rng) -> Assembly:
     """A drum on feet with two bells, or a small case with a button."""
     radius = rng.uniform(0.025, 0.06)
     deep = radius * rng.uniform(0.6, 1.3)
@@ -234,7 +234,7 @@ def _alarm_clock(rng: np.random.Generator) -> Assembly:
     return clock
 
 
-def _watch(rng: np.random.Generator) -> Assembly:
+def _watch(rng: Rng) -> Assembly:
     """A pocket watch that stands upright: a flat drum with a crown, a bow, and by chance a lid."""
     radius = rng.uniform(0.016, 0.028)
     deep = radius * rng.uniform(0.25, 0.55)

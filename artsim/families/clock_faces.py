@@ -6,7 +6,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
-from artsim.making.assembly import Assembly, continuous
+from artsim.making.assembly import Assembly, Rng, continuous
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
 from artsim.model.kinematics import Array
 
@@ -27,7 +27,7 @@ def outline(kind: str, half: float, tall: float = 1.0) -> Array:
     return points
 
 
-def marks(rng: np.random.Generator, x: float, center: Array, radius: float) -> Solid:
+def marks(rng: Rng, x: float, center: Array, radius: float) -> Solid:
     """Marks of the hours on a face at ``x``: bars, dots, or four large ones."""
     kind = str(rng.choice(["bars", "dots", "four", "mixed"]))
     solid = Solid()
@@ -52,7 +52,7 @@ def marks(rng: np.random.Generator, x: float, center: Array, radius: float) -> S
     return solid
 
 
-def add_hands(rng: np.random.Generator, clock: Assembly, x: float, center: Array, radius: float, parent: str) -> float:
+def add_hands(rng: Rng, clock: Assembly, x: float, center: Array, radius: float, parent: str) -> float:
     """Add hour, minute and by chance a second hand before a face at ``x``; returns where they end in front."""
     kind = str(rng.choice(["bar", "lance", "spade", "dart"]))
     thick = max(0.012 * radius, 0.0008)
@@ -97,13 +97,13 @@ def _hand(kind: str, low: float, high: float, wide: float, long: float, tail: fl
     return back + plate([(-wide, 0.0), (wide, 0.0), (0.0, long)])
 
 
-def dial_plate(rng: np.random.Generator, x: float, center: Array, radius: float) -> Solid:
+def dial_plate(rng: Rng, x: float, center: Array, radius: float) -> Solid:
     """A round plate whose front is at ``x``, with the marks of the hours."""
     solid = cylinder(center + (x, 0, 0), center + (x + 0.004, 0, 0), radius, sections=32)
     return solid + marks(rng, x, center, radius)
 
 
-def rim(rng: np.random.Generator, x: float, center: Array, radius: float, wide: float, rise: float) -> Solid:
+def rim(rng: Rng, x: float, center: Array, radius: float, wide: float, rise: float) -> Solid:
     """A ring around a face at ``x``, which stands out by ``rise``: bevelled or flat."""
     inner = rng.uniform(0.3, 1.0) * rise
     section = [(radius, -0.003), (radius + wide, -0.003), (radius + wide, inner), (radius, rise)]
@@ -112,7 +112,7 @@ def rim(rng: np.random.Generator, x: float, center: Array, radius: float, wide: 
     return revolved(section, center + (x, 0, 0), FRONT, 28)
 
 
-def pendulum(rng: np.random.Generator, x: float, top: float, length: float, room: float) -> tuple[Solid, float]:
+def pendulum(rng: Rng, x: float, top: float, length: float, room: float) -> tuple[Solid, float]:
     """A rod with a bob that hangs from height ``top``; and how far it may swing in a case of half width ``room``."""
     bob = min(length * rng.uniform(0.1, 0.22), 0.55 * room)
     z = top - length + bob
@@ -133,9 +133,7 @@ def pendulum(rng: np.random.Generator, x: float, top: float, length: float, room
     return solid, max(swing, 0.03)
 
 
-def glass_door(
-    rng: np.random.Generator, clock: Assembly, x: float, across: tuple[float, float], upright: tuple[float, float]
-) -> None:
+def glass_door(rng: Rng, clock: Assembly, x: float, across: tuple[float, float], upright: tuple[float, float]) -> None:
     """A frame before an opening at ``x``, hinged at its left or right."""
     thick = rng.uniform(0.006, 0.012)
     low, high = (x - GAP - thick, across[0], upright[0]), (x - GAP, across[1], upright[1])

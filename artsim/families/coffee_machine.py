@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import power
 from artsim.families.details import dial
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
     box,
@@ -31,14 +31,12 @@ GAP = 0.0015
 OUT = (-1.0, 0.0, 0.0)
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """An espresso, a drip or a pod machine, a percolator or an urn."""
     return (_espresso, _drip, _pod, _percolator, _urn)[int(rng.choice(5, p=[0.29, 0.29, 0.14, 0.14, 0.14]))](rng)
 
 
-def _drip_tray(
-    rng: np.random.Generator, machine: Assembly, x0: float, depth: float, y: float, low: float, high: float
-) -> None:
+def _drip_tray(rng: Rng, machine: Assembly, x0: float, depth: float, y: float, low: float, high: float) -> None:
     """A tray with a slotted cover, in an opening of the base between two heights."""
     solid = tray((x0, -y, low), (x0 + depth, y, high), 0.003)
     count = int(rng.integers(3, 7))
@@ -64,7 +62,7 @@ def _base(x: float, y: float, height: float, radius: float, tray_y: float, front
     )
 
 
-def _espresso(rng: np.random.Generator) -> Assembly:
+def _espresso(rng: Rng) -> Assembly:
     x, y = rng.uniform(0.12, 0.18), rng.uniform(0.09, 0.19)
     height = rng.uniform(0.28, 0.4)
     base, head = rng.uniform(0.045, 0.075), rng.uniform(0.1, 0.15)
@@ -125,7 +123,7 @@ def _espresso(rng: np.random.Generator) -> Assembly:
     return machine
 
 
-def _controls(rng: np.random.Generator, machine: Assembly, face: float, y: float, low: float, high: float) -> None:
+def _controls(rng: Rng, machine: Assembly, face: float, y: float, low: float, high: float) -> None:
     """Knobs and buttons in a row on the front of the head."""
     z = 0.5 * (low + high)
     room = 0.36 * (high - low)
@@ -142,7 +140,7 @@ def _controls(rng: np.random.Generator, machine: Assembly, face: float, y: float
             machine.add(f"button_{number}", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, center), density=900.0)
 
 
-def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, height: float) -> None:
+def _back_lid(rng: Rng, machine: Assembly, x: float, y: float, height: float) -> None:
     """Lid of the water tank on top."""
     seam, thick = height + GAP, 0.008
     low, high = (0.25 * x, -0.7 * y, seam), (0.97 * x, 0.7 * y, seam + thick)
@@ -152,7 +150,7 @@ def _back_lid(rng: np.random.Generator, machine: Assembly, x: float, y: float, h
     machine.add("lid", lid, revolute("body", (0, 1, 0), (0.97 * x, 0, seam), 0.0, limit), density=900.0)
 
 
-def _drip(rng: np.random.Generator) -> Assembly:
+def _drip(rng: Rng) -> Assembly:
     y = rng.uniform(0.075, 0.125)
     pot = y - rng.uniform(0.01, 0.02)  # radius of the carafe
     x = pot + rng.uniform(0.05, 0.07)
@@ -197,7 +195,7 @@ def _drip(rng: np.random.Generator) -> Assembly:
     return machine
 
 
-def _percolator(rng: np.random.Generator) -> Assembly:
+def _percolator(rng: Rng) -> Assembly:
     """A tall jug with a handle, on a heated foot; its lid lifts off or swings up."""
     foot, tall, radius = rng.uniform(0.03, 0.11), rng.uniform(0.14, 0.3), rng.uniform(0.045, 0.085)
     narrow, half = rng.uniform(0.6, 1.05) * radius, rng.uniform(0.95, 1.35) * radius
@@ -248,7 +246,7 @@ def _tapered(
     return hull(np.concatenate(outlines))
 
 
-def _carafe(rng: np.random.Generator, center: float, pot: float, low: float, high: float) -> Solid:
+def _carafe(rng: Rng, center: float, pot: float, low: float, high: float) -> Solid:
     """Glass jug with a handle in front, between the base and the head."""
     rise = (high - low) * rng.uniform(0.8, 0.97)
     lid = 0.014
@@ -266,7 +264,7 @@ def _carafe(rng: np.random.Generator, center: float, pot: float, low: float, hig
     return solid + tube(np.array(grip), 0.007, 10)
 
 
-def _pod(rng: np.random.Generator) -> Assembly:
+def _pod(rng: Rng) -> Assembly:
     y, x = rng.uniform(0.055, 0.085), rng.uniform(0.13, 0.18)
     height = rng.uniform(0.22, 0.3)
     base, head = rng.uniform(0.03, 0.045), rng.uniform(0.08, 0.11)
@@ -305,7 +303,7 @@ def _pod(rng: np.random.Generator) -> Assembly:
     return machine
 
 
-def _urn(rng: np.random.Generator) -> Assembly:
+def _urn(rng: Rng) -> Assembly:
     """A tall body, round or square, with a lid on top that lifts off or swings up; a niche for a cup, or a tap."""
     x = rng.uniform(0.07, 0.15)
     y = x * (1.0 if rng.random() < 0.5 else rng.uniform(0.7, 1.35))

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin, tan
-from artsim.making.assembly import Assembly, continuous, prismatic
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic
 from artsim.making.solids import Solid, box, cylinder, prism, rounded_rectangle, union
 
 GAP = 0.0005
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
     length = rng.uniform(0.07, 0.3)
     half = 0.5 * length * rng.uniform(0.075, 0.45)
@@ -65,7 +65,7 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _body(
-    rng: np.random.Generator,
+    rng: Rng,
     front: float,
     back: float,
     half: float,
@@ -114,7 +114,7 @@ def _body(
     return solid
 
 
-def _blade(rng: np.random.Generator, front: float, back: float, half: float, low: float, thick: float) -> Solid:
+def _blade(rng: Rng, front: float, back: float, half: float, low: float, thick: float) -> Solid:
     """Strip with a slanted point."""
     slant = 2 * half * tan(rng.uniform(0.35, 1.0))
     side = float(rng.choice([-1, 1]))
@@ -123,7 +123,7 @@ def _blade(rng: np.random.Generator, front: float, back: float, half: float, low
 
 
 def _button(
-    rng: np.random.Generator, start: float, end: float, slot: float, low: float, height: float, top: float, half: float
+    rng: Rng, start: float, end: float, slot: float, low: float, height: float, top: float, half: float
 ) -> Solid:
     """Stem through the slot and a ribbed button above it."""
     solid = box((start, end), slot, (low - 0.0008, top - 0.0005))

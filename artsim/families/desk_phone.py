@@ -7,14 +7,14 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
 from artsim.families.keys import Face, add_keypad
-from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
 from artsim.making.solids import cylinder, hull, loft, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
 
 
-def desk_set(rng: np.random.Generator, phone: Assembly) -> None:
+def desk_set(rng: Rng, phone: Assembly) -> None:
     """A sloping base with keys or a dial, and a handset across its left side or along its back."""
     depth, width = rng.uniform(0.14, 0.26), rng.uniform(0.13, 0.3)
     front, back = rng.uniform(0.012, 0.04), rng.uniform(0.03, 0.13)
@@ -69,9 +69,8 @@ def desk_set(rng: np.random.Generator, phone: Assembly) -> None:
 
 
 def _handset(
-    rng: np.random.Generator, phone: Assembly, foot: Array, along: Array, side: Array, out: Array, length: float,
-    grip: float,
-) -> None:  # fmt: skip
+    rng: Rng, phone: Assembly, foot: Array, along: Array, side: Array, out: Array, length: float, grip: float
+) -> None:
     """A bar between two round or square ends that lie on the cradle; it is lifted off."""
     thick = grip * rng.uniform(0.7, 1.2)
     bow = rng.uniform(0.1, 0.9) * thick
@@ -104,7 +103,7 @@ def _handset(
     phone.add("handset", solid, prismatic("base", out, 0.0, rng.uniform(0.06, 0.2), tuple(foot)), density=500.0)
 
 
-def _dial(rng: np.random.Generator, phone: Assembly, face: Face, v: float, radius: float) -> None:
+def _dial(rng: Rng, phone: Assembly, face: Face, v: float, radius: float) -> None:
     """A dial with ten holes that turns."""
     center, out = face.at(0.0, v, 0.001), face.outward
     thick = rng.uniform(0.0025, 0.006)
@@ -123,7 +122,7 @@ def _dial(rng: np.random.Generator, phone: Assembly, face: Face, v: float, radiu
     phone.add("dial", solid, revolute("base", -out, tuple(center), 0.0, rng.uniform(4.2, 5.4)), density=1200.0)
 
 
-def _display(rng: np.random.Generator, phone: Assembly, face: Face, v: float, deep: float, half: float) -> None:
+def _display(rng: Rng, phone: Assembly, face: Face, v: float, deep: float, half: float) -> None:
     """A display above the keys, hinged at its lower edge."""
     thick = rng.uniform(0.006, 0.012)
     corners = [face.at(u, w, h) for u in (-half, half) for w in (v, v + deep) for h in (0.001, thick)]

@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import hypot
 from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, tray, union
 
 GAP = 0.002
@@ -52,7 +52,7 @@ class Shape:
         return self.bottom + 0.6 * self.wall
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A dishwasher, closed at rest."""
     if rng.random() < 0.12:
         return _drawers(rng)
@@ -102,7 +102,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return machine
 
 
-def _drawers(rng: np.random.Generator) -> Assembly:
+def _drawers(rng: Rng) -> Assembly:
     """Tubs that slide out behind a full front, one above the other."""
     count = int(rng.choice([1, 2], p=[0.65, 0.35]))
     half, depth, wall = 0.5 * rng.uniform(0.5, 0.64), rng.uniform(0.42, 0.62), rng.uniform(0.012, 0.03)
@@ -140,7 +140,7 @@ def _drawers(rng: np.random.Generator) -> Assembly:
     return machine
 
 
-def _body(rng: np.random.Generator, s: Shape, strip: float, flush: bool, flanked: bool, compact: bool) -> Solid:
+def _body(rng: Rng, s: Shape, strip: float, flush: bool, flanked: bool, compact: bool) -> Solid:
     front, back, half, base = s.front, s.depth, s.half, s.floor - s.wall
     solid = tray((front, -half, base), (back, half, s.height), s.wall, axis=0, side=-1)
     face = -s.thick * (1.0 if rng.random() < 0.6 else rng.uniform(0.3, 0.95))  # front of the fixed panels
@@ -174,7 +174,7 @@ def _rack_heights(s: Shape) -> list[float]:
     return [lower] if s.top - s.floor < 0.5 else [lower, s.floor + 0.55 * (s.top - s.floor)]
 
 
-def _rack(rng: np.random.Generator, front: float, back: float, half: float, low: float) -> Solid:
+def _rack(rng: Rng, front: float, back: float, half: float, low: float) -> Solid:
     """Basket of wire, open at the top."""
     wire, height = 0.005, rng.uniform(0.06, 0.11)
     solid = wire_shelf((front, -half, low), (back, half, low + wire), 6, wire)
@@ -184,7 +184,7 @@ def _rack(rng: np.random.Generator, front: float, back: float, half: float, low:
     return solid + union(box((x, x + wire), (y, y + wire), (low, low + height)) for x, y in posts)
 
 
-def _sliding_racks(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
+def _sliding_racks(rng: Rng, machine: Assembly, s: Shape) -> None:
     """Racks that stay behind the door in every state, and perhaps a spray arm below them."""
     front, back = s.front + s.liner + 0.01, s.depth - s.wall - 0.005
     half = s.half - s.wall - 0.006
@@ -200,7 +200,7 @@ def _sliding_racks(rng: np.random.Generator, machine: Assembly, s: Shape) -> Non
     machine.add("spray_arm", arm, continuous("body", (0, 0, 1), (center, 0, low)))
 
 
-def _controls(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
+def _controls(rng: Rng, machine: Assembly, s: Shape) -> None:
     """Buttons and perhaps a dial on the fixed strip."""
     z = 0.5 * (s.top + 0.008 + s.height)
     size = min(0.012, 0.22 * (s.height - s.top))
@@ -216,7 +216,7 @@ def _controls(rng: np.random.Generator, machine: Assembly, s: Shape) -> None:
         machine.add("dial", dial(foot, (-1, 0, 0), 0.02, radius), continuous("body", (-1, 0, 0), foot))
 
 
-def _door(rng: np.random.Generator, s: Shape, controls_above: bool, machine: Assembly) -> Solid:
+def _door(rng: Rng, s: Shape, controls_above: bool, machine: Assembly) -> Solid:
     half, tall, x = s.half_door, s.top - s.bottom, -s.thick
     kind = str(rng.choice(["bar", "bow", "flat", "pocket", "edge", "none"], p=[0.24, 0.24, 0.16, 0.18, 0.1, 0.08]))
     machine.record(handles=kind in ("bar", "bow", "flat", "edge"))
@@ -252,7 +252,7 @@ def _door(rng: np.random.Generator, s: Shape, controls_above: bool, machine: Ass
     return solid + _inside(rng, s)
 
 
-def _marks(rng: np.random.Generator, x: float, half: float, z: float) -> Solid:
+def _marks(rng: Rng, x: float, half: float, z: float) -> Solid:
     """A display and keys that do not move."""
     solid = box((x - 0.0015, x + 0.002), 0.2 * half, (z - 0.015, z + 0.015)) if rng.random() < 0.6 else Solid()
     for y in np.linspace(0.4, 0.8, int(rng.integers(2, 6))) * half * rng.choice([-1, 1]):
@@ -260,7 +260,7 @@ def _marks(rng: np.random.Generator, x: float, half: float, z: float) -> Solid:
     return solid
 
 
-def _inside(rng: np.random.Generator, s: Shape) -> Solid:
+def _inside(rng: Rng, s: Shape) -> Solid:
     """The shallow tray on the inside of the door, with the box for the detergent."""
     if s.liner == 0.0:
         return Solid()

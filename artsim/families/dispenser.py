@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, UP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -21,7 +21,7 @@ DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
 CLEAR = 0.0015
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A dispenser, shut at rest; it gives towards -X."""
     kinds = (_pump_bottle, _soap_box, _drink_jar, _water_cooler)
     return kinds[int(rng.choice(len(kinds), p=[0.5, 0.18, 0.2, 0.12]))](rng)
@@ -30,7 +30,7 @@ def build(rng: np.random.Generator) -> Assembly:
 # --- pumps -----------------------------------------------------------------------------------------------------------
 
 
-def _pump_bottle(rng: np.random.Generator) -> Assembly:
+def _pump_bottle(rng: Rng) -> Assembly:
     """One bottle with a pump, or two or three alike side by side."""
     count = int(rng.choice([1, 2, 3], p=[0.78, 0.15, 0.07]))
     half, depth, height = rng.uniform(0.025, 0.06), rng.uniform(0.025, 0.06), rng.uniform(0.06, 0.24)
@@ -86,7 +86,7 @@ def _pump_bottle(rng: np.random.Generator) -> Assembly:
     return dispenser
 
 
-def _bottle_levels(rng: np.random.Generator, depth: float, half: float, height: float, radius: float) -> list[Level]:
+def _bottle_levels(rng: Rng, depth: float, half: float, height: float, radius: float) -> list[Level]:
     """From the foot to the shoulder, where a round neck follows."""
     kind = str(rng.choice(["straight", "cone", "belly", "waist", "foam", "step"]))
     edge = rng.uniform(0.6, 0.95)
@@ -105,7 +105,7 @@ def _bottle_levels(rng: np.random.Generator, depth: float, half: float, height: 
 # --- a soap box on a wall -------------------------------------------------------------------------------------------
 
 
-def _soap_box(rng: np.random.Generator) -> Assembly:
+def _soap_box(rng: Rng) -> Assembly:
     """A box with a cover in front, and a lever, a push bar or buttons below it."""
     depth, half, height = rng.uniform(0.07, 0.13), rng.uniform(0.05, 0.11), rng.uniform(0.14, 0.32)
     radius = rng.uniform(0.005, 0.03)
@@ -175,7 +175,7 @@ def _soap_box(rng: np.random.Generator) -> Assembly:
 # --- a jar with taps -------------------------------------------------------------------------------------------------
 
 
-def _drink_jar(rng: np.random.Generator) -> Assembly:
+def _drink_jar(rng: Rng) -> Assembly:
     """A jar or an urn with taps near its foot, on a stand or on feet."""
     half, height = rng.uniform(0.08, 0.15), rng.uniform(0.18, 0.42)
     foot = rng.uniform(0.06, 0.2)
@@ -235,7 +235,7 @@ def _drink_jar(rng: np.random.Generator) -> Assembly:
     return dispenser
 
 
-def _tap_handle(style: str, at: Array, r: float, long: float, rng: np.random.Generator) -> tuple[Solid, JointSpec]:
+def _tap_handle(style: str, at: Array, r: float, long: float, rng: Rng) -> tuple[Solid, JointSpec]:
     """What opens a tap: a lever that turns about the upright, a wing, or a lever that is pulled towards the front."""
     if style == "flip":
         pivot = at + (0, 0, 1.1 * r)
@@ -253,7 +253,7 @@ def _tap_handle(style: str, at: Array, r: float, long: float, rng: np.random.Gen
     return solid, revolute("body", UP, at, -limit if rng.random() < 0.4 else 0.0, limit)
 
 
-def _stand(rng: np.random.Generator, wide: float, foot: float) -> Solid:
+def _stand(rng: Rng, wide: float, foot: float) -> Solid:
     """Legs with a ring, a pedestal, or a plinth."""
     kind = str(rng.choice(["legs", "pedestal", "plinth"]))
     if kind == "plinth":
@@ -274,7 +274,7 @@ def _stand(rng: np.random.Generator, wide: float, foot: float) -> Solid:
 # --- a water cooler --------------------------------------------------------------------------------------------------
 
 
-def _water_cooler(rng: np.random.Generator) -> Assembly:
+def _water_cooler(rng: Rng) -> Assembly:
     """A cabinet with a bottle on top, levers or buttons over a drip tray, and sometimes a door below."""
     depth, half = rng.uniform(0.14, 0.2), rng.uniform(0.13, 0.2)
     tall = rng.random() < 0.7
@@ -341,7 +341,7 @@ def _water_cooler(rng: np.random.Generator) -> Assembly:
     return cooler
 
 
-def _big_bottle(rng: np.random.Generator, cooler: Assembly, z: float, room: float) -> None:
+def _big_bottle(rng: Rng, cooler: Assembly, z: float, room: float) -> None:
     """A bottle upside down, which lifts out."""
     radius, height = room * rng.uniform(0.72, 0.95), rng.uniform(0.28, 0.42)
     z += CLEAR

@@ -13,7 +13,7 @@ from artsim.common.elementary import arcsin, cos, hypot, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
     box,
@@ -32,7 +32,7 @@ GAP = 0.0015
 OUT = (-1.0, 0.0, 0.0)
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A display; upright and at its lowest, no key pressed at rest."""
     kind = str(rng.choice(["stand", "feet", "tube", "easel"], p=[0.58, 0.14, 0.16, 0.12]))
     display = Assembly()
@@ -40,7 +40,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return display
 
 
-def _keys(rng: np.random.Generator, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
+def _keys(rng: Rng, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
     """A row of keys to one side of a chin, on some; returns how many."""
     if rng.random() < 0.35 or size < 0.004:
         return 0
@@ -57,7 +57,7 @@ def _keys(rng: np.random.Generator, display: Assembly, parent: str, face: Face, 
     return count
 
 
-def _foot(rng: np.random.Generator, half: float, depth: float, thick: float) -> Solid:
+def _foot(rng: Rng, half: float, depth: float, thick: float) -> Solid:
     """What stands on the table, below z = ``thick``; the middle of it is solid."""
     kind = str(rng.choice(["plate", "disc", "legs", "ring", "tapered", "arc"], p=[0.27, 0.22, 0.15, 0.08, 0.18, 0.1]))
     back = 0.45 * depth
@@ -105,7 +105,7 @@ class _Chain:
         return self.display.add(self.name, self.solid, self.joint, density=1500.0)
 
 
-def _on_stand(rng: np.random.Generator, display: Assembly) -> None:
+def _on_stand(rng: Rng, display: Assembly) -> None:
     """Screens on a column that turns, slides, tilts and turns to portrait, or some of these."""
     panel = draw_panel(rng)
     count = int(rng.choice([1, 2, 3], p=[0.84, 0.1, 0.06])) if not panel.bend and panel.half < 0.3 else 1
@@ -177,7 +177,7 @@ def _forward_tilt(reach: float, below: float, axis: float, column: float) -> flo
     return max(float(arcsin(min(reach / far, 1.0))) + float(arcsin(min((column - axis - 0.005) / far, 1.0))), 0.01)
 
 
-def _column(rng: np.random.Generator, radius: float, low: float, high: float, free: bool) -> Solid:
+def _column(rng: Rng, radius: float, low: float, high: float, free: bool) -> Solid:
     """The upright of a stand; a square one, unless its shape is free."""
     kind = str(rng.choice(["square", "round", "wide", "tapered"])) if free else "square"
     if kind == "round":
@@ -205,7 +205,7 @@ def _head(
     return solid
 
 
-def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
+def _finish_screen(rng: Rng, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
     """Add the panel to the chain's last part, finish that, and put keys on the first one."""
     chin = rng.uniform(0.0, 0.16) * panel.rise * rng.choice([0.0, 1.0], p=[0.4, 0.6])
     chain.solid += screen(rng, panel, chin).moved(at)
@@ -224,7 +224,7 @@ def _finish_screen(rng: np.random.Generator, chain: _Chain, panel: Panel, at: Ar
         _edge_keys(rng, chain.display, name, face, panel)
 
 
-def _edge_keys(rng: np.random.Generator, display: Assembly, name: str, face: Face, panel: Panel) -> None:
+def _edge_keys(rng: Rng, display: Assembly, name: str, face: Face, panel: Panel) -> None:
     """Keys above one another on an edge, on some."""
     size = min(0.4 * panel.thick, 0.008)
     if rng.random() < 0.5 or size < 0.002:
@@ -235,7 +235,7 @@ def _edge_keys(rng: np.random.Generator, display: Assembly, name: str, face: Fac
         add_key(display, name, f"button_{k}", face, (0.0, (k - 3.0) * pitch), outline, 0.003, 0.001)
 
 
-def _on_feet(rng: np.random.Generator, display: Assembly) -> None:
+def _on_feet(rng: Rng, display: Assembly) -> None:
     """A television set on two feet that fold in below it."""
     panel = draw_panel(rng, 1.5)
     foot = rng.uniform(0.02, 0.1)
@@ -266,7 +266,7 @@ def _on_feet(rng: np.random.Generator, display: Assembly) -> None:
         display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)
 
 
-def _on_easel(rng: np.random.Generator, display: Assembly) -> None:
+def _on_easel(rng: Rng, display: Assembly) -> None:
     """A thin panel with a leaf or two legs on its back that fold out."""
     panel = draw_panel(rng, 0.6)
     chain = _Chain(display)
@@ -284,7 +284,7 @@ def _on_easel(rng: np.random.Generator, display: Assembly) -> None:
         display.add("stand" if count == 1 else f"leg_{k}", leaf, hinge, density=1500.0)
 
 
-def _tube(rng: np.random.Generator, display: Assembly) -> None:
+def _tube(rng: Rng, display: Assembly) -> None:
     """A deep set with a picture tube, on a swivel, or a television set on legs with knobs and rabbit ears."""
     half, ratio = rng.uniform(0.14, 0.38), rng.uniform(0.7, 1.05)
     rise, depth = half * ratio, half * rng.uniform(1.2, 2.3)
@@ -362,7 +362,7 @@ def _tube(rng: np.random.Generator, display: Assembly) -> None:
         _rabbit_ears(rng, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
 
 
-def _rabbit_ears(rng: np.random.Generator, display: Assembly, parent: str, foot: Array, half: float) -> None:
+def _rabbit_ears(rng: Rng, display: Assembly, parent: str, foot: Array, half: float) -> None:
     """Two rods that turn about a block's axes."""
     length, lean = half * rng.uniform(0.8, 2.2), rng.uniform(0.25, 0.6)
     for k, s in enumerate((-1.0, 1.0)):

@@ -15,7 +15,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -40,7 +40,7 @@ class Style:
     handle_z: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A door, mostly closed at rest."""
     kind = str(rng.choice(["single", "double", "sliding"], p=[0.62, 0.23, 0.15]))
     width = rng.uniform(0.5, 1.4) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
@@ -73,9 +73,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return door
 
 
-def _sliding(
-    rng: np.random.Generator, door: Assembly, body: Solid, width: float, height: float, depth: float, style: Style
-) -> None:
+def _sliding(rng: Rng, door: Assembly, body: Solid, width: float, height: float, depth: float, style: Style) -> None:
     """Two leaves, one behind the other; the one behind may be fixed, as a part of the frame."""
     fixed = rng.random() < 0.4
     first = float(rng.choice([-1.0, 1.0]))  # where the leaf in front stands
@@ -102,7 +100,7 @@ def _sliding(
         door.add(name, leaf, prismatic("frame", (0, -side, 0), 0.0, travel, tuple(center)), label="door", density=500.0)
 
 
-def _style(rng: np.random.Generator, kind: str) -> Style:
+def _style(rng: Rng, kind: str) -> Style:
     look = str(rng.choice(["flush", "panels", "glass", "half"], p=[0.3, 0.4, 0.2, 0.1]))
     thickness = rng.uniform(0.035, 0.05)
     shares: tuple[float, ...] = ()
@@ -123,9 +121,7 @@ def _style(rng: np.random.Generator, kind: str) -> Style:
     )
 
 
-def _frame(
-    rng: np.random.Generator, width: float, height: float, depth: float, jamb: float, style: Style, kind: str
-) -> Solid:
+def _frame(rng: Rng, width: float, height: float, depth: float, jamb: float, style: Style, kind: str) -> Solid:
     """Jambs and lintel with a stop behind the leaves; above or beside them perhaps a fixed light or an arch."""
     x0, x1, y = -depth / 2, depth / 2, width / 2
     threshold = float(rng.choice([0.0, 0.015]))
@@ -211,7 +207,7 @@ def _raised(low: Array, high: Array, cell: Array, style: Style) -> Solid:
 
 
 def _leaf(
-    rng: np.random.Generator,
+    rng: Rng,
     door: Assembly,
     name: str,
     side: float,
@@ -254,7 +250,7 @@ def _knuckles(low: Array, high: Array, edge: float, side: float) -> Solid:
     return solid
 
 
-def _escutcheon(rng: np.random.Generator, low: Array, high: Array, y: float, z: float, stile: float) -> Solid:
+def _escutcheon(rng: Rng, low: Array, high: Array, y: float, z: float, stile: float) -> Solid:
     """Roses or long plates around the hole for the handle, on both sides."""
     if rng.random() < 0.5:
         return union(ring((x, y, z), (1, 0, 0), 0.0115, 0.026, 0.012, 20) for x in (low[0], high[0]))
@@ -268,14 +264,7 @@ def _escutcheon(rng: np.random.Generator, low: Array, high: Array, y: float, z: 
 
 
 def _turning_handle(
-    rng: np.random.Generator,
-    door: Assembly,
-    leaf: str,
-    kind: str,
-    front: float,
-    back: float,
-    center: tuple[float, float],
-    side: float,
+    rng: Rng, door: Assembly, leaf: str, kind: str, front: float, back: float, center: tuple[float, float], side: float
 ) -> None:
     """Lever or knob on both sides of a leaf, on one spindle through it."""
     y, z = center

@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.families.details import bar_handle, bow_handle, knob, panel
 from artsim.families.proportions import unusual_sides, with_tails
-from artsim.making.assembly import Assembly, prismatic
+from artsim.making.assembly import Assembly, Rng, prismatic
 from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull_of, tray, tube
 from artsim.model.kinematics import Array
 
@@ -123,7 +123,7 @@ class _Furniture:
         return furniture
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
     furniture = _Furniture(_style(rng))
     kinds = (_chest, _table, _desk)
@@ -131,7 +131,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return furniture.build()
 
 
-def _style(rng: np.random.Generator) -> _Style:
+def _style(rng: Rng) -> _Style:
     return _Style(
         front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
         overlay=bool(rng.random() < 0.5),
@@ -145,7 +145,7 @@ def _style(rng: np.random.Generator) -> _Style:
     )
 
 
-def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
+def _chest(rng: Rng, furniture: _Furniture) -> None:
     """One case from side to side; some of its rows may be open, or have fronts that do not move."""
     columns = int(rng.choice([1, 2, 3], p=[0.68, 0.23, 0.09]))
     rows = int(rng.integers(1, max(2, 6 // columns) + 1))
@@ -184,7 +184,7 @@ def _chest(rng: np.random.Generator, furniture: _Furniture) -> None:
         furniture.body += frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
 
 
-def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
+def _table(rng: Rng, furniture: _Furniture) -> None:
     """A top on four legs with a row of drawers in the apron, at the front, the back or both."""
     height = rng.uniform(0.35, 0.85)
     width = height * rng.uniform(0.7, 3.2)
@@ -233,7 +233,7 @@ def _table(rng: np.random.Generator, furniture: _Furniture) -> None:
         furniture.body += box((x0 + 0.25 * leg, x1 - 0.25 * leg), y - 0.25 * leg, (z, z + 0.018))
 
 
-def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
+def _desk(rng: Rng, furniture: _Furniture) -> None:
     """A top over one or two pedestals with drawers; legs or a panel elsewhere, perhaps flat drawers between."""
     height = rng.uniform(0.62, 0.82)
     width, depth = height * rng.uniform(1.4, 2.4), height * rng.uniform(0.55, 1.0)
@@ -292,14 +292,14 @@ def _desk(rng: np.random.Generator, furniture: _Furniture) -> None:
         )  # fmt: skip
 
 
-def _shares(rng: np.random.Generator, low: float, high: float, rows: int) -> Array:
+def _shares(rng: Rng, low: float, high: float, rows: int) -> Array:
     """(rows + 1,) levels: equal, at random, or growing downwards."""
     kind = rng.choice(3, p=[0.5, 0.3, 0.2])
     heights = (np.ones(rows), rng.dirichlet([12.0] * rows), np.linspace(rng.uniform(1.2, 2.0), 1.0, rows))[kind]
     return _levels(low, high, heights)
 
 
-def _widths(rng: np.random.Generator, low: float, high: float, columns: int) -> Array:
+def _widths(rng: Rng, low: float, high: float, columns: int) -> Array:
     """(columns + 1,) edges: of equal columns; the same from either end, as where knees go; or at random."""
     kind = rng.choice(3, p=[0.6, 0.25, 0.15])
     half = rng.uniform(0.7, 1.5, (columns + 1) // 2)
@@ -314,7 +314,7 @@ def _levels(low: float, high: float, shares: Array) -> Array:
     return levels
 
 
-def _top(rng: np.random.Generator, depth: float, width: float, low: float, high: float) -> Solid:
+def _top(rng: Rng, depth: float, width: float, low: float, high: float) -> Solid:
     radius = rng.choice([0.1, 0.45]) * (high - low)
     corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
     if rng.random() < 0.2:
@@ -322,7 +322,7 @@ def _top(rng: np.random.Generator, depth: float, width: float, low: float, high:
     return box(*corners, fillet=radius)
 
 
-def _legs(rng: np.random.Generator, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
+def _legs(rng: Rng, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
     """Four legs with their outer edges on a rectangle: square or round, straight, tapered or turned."""
     kind = str(rng.choice(["square", "tapered", "round", "turned"], p=[0.35, 0.25, 0.25, 0.15]))
     taper = rng.uniform(0.45, 0.9)

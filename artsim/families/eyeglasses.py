@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, power, sin
 from artsim.common.products import norm
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
 from artsim.model.kinematics import Array
 
@@ -64,7 +64,7 @@ class Front:
         return depth
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """Eyeglasses, open at rest; each temple turns inwards about its hinge."""
     style = str(rng.choice(["wire", "thick", "half", "rimless", "shield"], p=[0.27, 0.36, 0.15, 0.08, 0.14]))
     size = rng.uniform(0.87, 1.13) if rng.random() < 0.85 else rng.uniform(0.75, 0.9)
@@ -123,7 +123,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return glasses
 
 
-def _outline(rng: np.random.Generator) -> Array:
+def _outline(rng: Rng) -> Array:
     """(N, 2) y and z of the rim of the lens at +y, the outer side at larger y."""
     kind = str(rng.choice(["round", "rectangular", "aviator", "cat", "panto"]))
     wide = {"round": (42, 52), "aviator": (54, 62)}.get(kind, (47, 58))
@@ -145,7 +145,7 @@ def _outline(rng: np.random.Generator) -> Array:
     return np.stack([a * y, b * z], axis=1)
 
 
-def _front(rng: np.random.Generator, style: str, outline: Array, rim: float, size: float, flat: bool) -> Front:
+def _front(rng: Rng, style: str, outline: Array, rim: float, size: float, flat: bool) -> Front:
     height = rng.uniform(5.0, 13.0 if style == "shield" else 10.0) if flat else rng.uniform(2.2, 4.0)
     wrap = size * (rng.uniform(1.0, 20.0) if style == "shield" else rng.uniform(0.5, 9.0)) * MM
     low, high = outline[:, 1].min(), outline[:, 1].max()
@@ -177,7 +177,7 @@ def _sheet(front: Front, y: Array, low: Array, high: Array, thickness: float) ->
     return union(hull([*a, *b]) for a, b in pairwise(columns))
 
 
-def _glass(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float, depth: float) -> Solid:
+def _glass(rng: Rng, style: str, outline: Array, front: Front, rim: float, depth: float) -> Solid:
     """Lenses and rims."""
     inner, outer = outline[:, 0].min(), outline[:, 0].max()
     y = 0.5 * (inner + outer) - 0.5 * (outer - inner) * cos(np.linspace(0.08, np.pi - 0.08, 10))
@@ -224,7 +224,7 @@ def _octagon(a: float, b: float) -> Array:
     return np.array([*corners, (a, cut - b)])
 
 
-def _bridge(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float) -> Solid:
+def _bridge(rng: Rng, style: str, outline: Array, front: Front, rim: float) -> Solid:
     """One bar, two, or a thick saddle between the rims."""
     low, high = outline[:, 1].min(), outline[:, 1].max()
     inner = outline[: len(outline)]
@@ -247,7 +247,7 @@ def _bridge(rng: np.random.Generator, style: str, outline: Array, front: Front, 
     return solid
 
 
-def _nose_pads(rng: np.random.Generator, style: str, outline: Array, front: Front, rim: float) -> Solid:
+def _nose_pads(rng: Rng, style: str, outline: Array, front: Front, rim: float) -> Solid:
     """Two pads that slope along the nose, on wires or grown to the rims."""
     low, high = outline[:, 1].min(), outline[:, 1].max()
     z = low + rng.uniform(0.38, 0.55) * (high - low)
@@ -311,7 +311,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
     return fixed, knuckle(-third + 0.3 * MM, third - 0.3 * MM, GAP, 3.0 * MM)
 
 
-def _temple(rng: np.random.Generator, front: Front, bend: float, flat: bool) -> Solid:
+def _temple(rng: Rng, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
     length = 2 * front.half * (rng.uniform(0.92, 1.06) if rng.random() < 0.75 else rng.uniform(0.42, 0.92))
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import norm
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, tube, union
 
 GAP = 0.002
@@ -20,7 +20,7 @@ UP = np.array([0.0, 0.0, 1.0])
 FRONT = np.array([-1.0, 0.0, 0.0])
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A fan that blows towards -X (a ceiling fan: downward)."""
     kind = rng.choice(["head", "ceiling", "box"], p=[0.7, 0.17, 0.13])
     if kind == "ceiling":
@@ -28,7 +28,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return _box_fan(rng) if kind == "box" else _head_fan(rng)
 
 
-def _head_fan(rng: np.random.Generator) -> Assembly:
+def _head_fan(rng: Rng) -> Assembly:
     """A head with a cage on a neck, on a table stand or a tall column."""
     standing = rng.random() < 0.5
     cage = rng.uniform(0.17, 0.25) if standing else rng.uniform(0.13, 0.2)
@@ -101,9 +101,7 @@ def _neck(column: float, motor: float, z: float, level: float, side: float) -> S
     return solid
 
 
-def _head(
-    rng: np.random.Generator, cage: float, motor: float, level: float, pins: float, back: float
-) -> tuple[Solid, float]:
+def _head(rng: Rng, cage: float, motor: float, level: float, pins: float, back: float) -> tuple[Solid, float]:
     """Motor with the cage before it; and the x of the middle of the cage."""
     half = cage * rng.uniform(0.17, 0.26)
     middle = back - half
@@ -115,7 +113,7 @@ def _head(
     return solid.moved((0, 0, level)), middle
 
 
-def _cage(rng: np.random.Generator, cage: float, half: float, motor: float, wires: int) -> Solid:
+def _cage(rng: Rng, cage: float, half: float, motor: float, wires: int) -> Solid:
     """Wires before and behind the blades, about the X axis; the front badge at -X, the motor at +X."""
     wire = max(0.009 * cage, 0.0016)
     solid = tube(circle((0, 0, 0), FRONT, cage, 24), 2.2 * wire, 8, closed=True)
@@ -130,7 +128,7 @@ def _cage(rng: np.random.Generator, cage: float, half: float, motor: float, wire
     return solid + tube(circle((-half, 0, 0), FRONT, inner, 16), 1.1 * wire, 5, closed=True)
 
 
-def _blades(rng: np.random.Generator, cage: float, depth: float) -> Solid:
+def _blades(rng: Rng, cage: float, depth: float) -> Solid:
     """A propeller about the X axis, within a cage of the given radius and depth."""
     count = int(rng.integers(3, 7))
     hub, tip = cage * rng.uniform(0.13, 0.2), cage * rng.uniform(0.78, 0.86)
@@ -157,7 +155,7 @@ def _blades(rng: np.random.Generator, cage: float, depth: float) -> Solid:
     return solid + union(blade.turned(FRONT, 2.0 * np.pi * k / count) for k in range(count))
 
 
-def _box_fan(rng: np.random.Generator) -> Assembly:
+def _box_fan(rng: Rng) -> Assembly:
     """Blades in a square frame, with a knob by chance."""
     cage = rng.uniform(0.14, 0.26)
     half = cage * rng.uniform(0.22, 0.32)
@@ -194,7 +192,7 @@ def _box_fan(rng: np.random.Generator) -> Assembly:
     return fan
 
 
-def _ceiling_fan(rng: np.random.Generator) -> Assembly:
+def _ceiling_fan(rng: Rng) -> Assembly:
     """Long paddles under a ceiling at z = 0, by chance with a lamp below."""
     reach, drop = rng.uniform(0.45, 0.75), rng.uniform(0.12, 0.4)
     count, body = int(rng.integers(3, 7)), rng.uniform(0.08, 0.13)
@@ -217,7 +215,7 @@ def _ceiling_fan(rng: np.random.Generator) -> Assembly:
     return fan
 
 
-def _foot(rng: np.random.Generator, cage: float, standing: bool) -> Solid:
+def _foot(rng: Rng, cage: float, standing: bool) -> Solid:
     """Disc, or a cross of bars."""
     wide = cage * rng.uniform(0.85, 1.05)
     if standing and rng.random() < 0.4:

@@ -12,7 +12,7 @@ import numpy as np
 from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, JointSpec, continuous, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute, screw
 from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, hull_of, tube, union
 from artsim.model.kinematics import Array
 
@@ -22,13 +22,13 @@ FRONT = np.array([-1.0, 0.0, 0.0])
 BRASS = 3000.0  # kg/m^3, as the pieces are solid and real ones are hollow
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A faucet; the water comes out towards -X. All handles are shut at rest."""
     layouts = (_basin_mixer, _kitchen_mixer, _three_piece, _pillar_tap, _wall_tap)
     return layouts[int(rng.choice(5, p=[0.34, 0.26, 0.2, 0.1, 0.1]))](rng)
 
 
-def _basin_mixer(rng: np.random.Generator) -> Assembly:
+def _basin_mixer(rng: Rng) -> Assembly:
     """A body with a fixed spout, and one handle on its top."""
     radius, height = with_tails(rng, (0.017, 0.028), (0.01, 0.028), 0.2), with_tails(rng, (0.06, 0.2), (0.04, 0.5), 0.3)
     reach = with_tails(rng, (0.08, 0.17), (0.05, 0.8), 0.3)
@@ -65,7 +65,7 @@ def _basin_mixer(rng: np.random.Generator) -> Assembly:
     return tap
 
 
-def _kitchen_mixer(rng: np.random.Generator) -> Assembly:
+def _kitchen_mixer(rng: Rng) -> Assembly:
     """A column with a high spout, which mostly turns, and a handle at its side."""
     radius, height = rng.uniform(0.018, 0.026), rng.uniform(0.07, 0.14)
     body, top = _body(rng, radius, height)
@@ -100,12 +100,12 @@ def _kitchen_mixer(rng: np.random.Generator) -> Assembly:
     return tap
 
 
-def _swing(rng: np.random.Generator, origin: Vector) -> JointSpec:
+def _swing(rng: Rng, origin: Vector) -> JointSpec:
     limit = rng.uniform(0.9, 2.6)
     return revolute("base", UP, origin, -limit, limit)
 
 
-def _three_piece(rng: np.random.Generator) -> Assembly:
+def _three_piece(rng: Rng) -> Assembly:
     """A spout between two handles on one plate."""
     spread = with_tails(rng, (0.08, 0.13), (0.07, 0.38), 0.25)
     foot_radius, foot_height = rng.uniform(0.018, 0.026), rng.uniform(0.02, 0.07)
@@ -140,7 +140,7 @@ def _three_piece(rng: np.random.Generator) -> Assembly:
     return tap
 
 
-def _pillar_tap(rng: np.random.Generator) -> Assembly:
+def _pillar_tap(rng: Rng) -> Assembly:
     """A single tap with a knob on its top that rises as it is turned open."""
     radius, height = rng.uniform(0.014, 0.022), rng.uniform(0.06, 0.11)
     body, top = _body(rng, radius, height)
@@ -161,7 +161,7 @@ def _pillar_tap(rng: np.random.Generator) -> Assembly:
     return tap
 
 
-def _wall_tap(rng: np.random.Generator) -> Assembly:
+def _wall_tap(rng: Rng) -> Assembly:
     """A bar on two wall flanges, a knob at each end, and a spout that swings below."""
     half, radius = with_tails(rng, (0.08, 0.13), (0.05, 0.5), 0.4), with_tails(rng, (0.016, 0.024), (0.011, 0.024), 0.3)
     body = tube([(0, -half, 0), (0, half, 0)], radius, 20)
@@ -190,7 +190,7 @@ def _wall_tap(rng: np.random.Generator) -> Assembly:
     return tap
 
 
-def _body(rng: np.random.Generator, radius: float, height: float) -> tuple[Solid, float]:
+def _body(rng: Rng, radius: float, height: float) -> tuple[Solid, float]:
     """Upright body on a foot; and the height of its top."""
     foot = radius * rng.uniform(1.1, 1.5)
     thick = rng.uniform(0.004, 0.012)
@@ -208,7 +208,7 @@ def _body(rng: np.random.Generator, radius: float, height: float) -> tuple[Solid
     return solid, height
 
 
-def _gooseneck(rng: np.random.Generator, foot: Array, r: float, reach: float, tip: float) -> Solid:
+def _gooseneck(rng: Rng, foot: Array, r: float, reach: float, tip: float) -> Solid:
     """High spout that stands on ``foot``, bends over and ends at height ``tip``."""
     z0 = foot[2] + GAP
     bow = 0.5 * reach
@@ -231,15 +231,13 @@ def _gooseneck(rng: np.random.Generator, foot: Array, r: float, reach: float, ti
     return solid + _nozzle(rng, path[-1] - 0.3 * ending, ending, 1.15 * r, 1.2 * r)
 
 
-def _nozzle(rng: np.random.Generator, start: Array, direction: Array, radius: float, length: float) -> Solid:
+def _nozzle(rng: Rng, start: Array, direction: Array, radius: float, length: float) -> Solid:
     """The aerator at the mouth."""
     wide = radius * rng.uniform(1.0, 1.15)
     return cylinder(start, start + length * unit(direction), wide, sections=18)
 
 
-def _handle(
-    rng: np.random.Generator, pivot: Array, axis: Array, start: Array, radius: float, length: float, crowned: bool
-) -> Solid:
+def _handle(rng: Rng, pivot: Array, axis: Array, start: Array, radius: float, length: float, crowned: bool) -> Solid:
     """A handle on a hub: a lever, a paddle, or a knob.
 
     Parameters
@@ -287,7 +285,7 @@ def _dome(center: Array, axis: Array, radius: float) -> Solid:
                      for h, s in levels))  # fmt: skip
 
 
-def _knob(rng: np.random.Generator, pivot: Array, axis: Array, radius: float) -> Solid:
+def _knob(rng: Rng, pivot: Array, axis: Array, radius: float) -> Solid:
     """A cross or a round knob to turn with the whole hand."""
     foot = pivot + GAP * axis
     u = np.eye(3)[np.argmin(np.abs(axis))]

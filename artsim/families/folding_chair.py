@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
 
@@ -46,19 +46,19 @@ class _Bar:
         return box((x - size, x + size), half, (z - size, z + size))
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A folding chair, unfolded at rest; one sits down facing -X."""
     kinds = (_crossed, _under, _tip_up, _stool)
     return kinds[rng.choice(4, p=[0.45, 0.2, 0.2, 0.15])](rng)
 
 
-def _bar(rng: np.random.Generator) -> _Bar:
+def _bar(rng: Rng) -> _Bar:
     tubular = rng.random() < 0.55
     thick = rng.uniform(0.009, 0.014) if tubular else rng.uniform(0.008, 0.014)
     return _Bar(tubular, thick, thick if tubular else rng.uniform(0.012, 0.022))
 
 
-def _panel(rng: np.random.Generator, low: Array, high: Array, axis: int) -> Solid:
+def _panel(rng: Rng, low: Array, high: Array, axis: int) -> Solid:
     """A seat or a back within a box: board, slats along Y, a frame with a board, or a bulging cushion.
 
     ``axis`` is the direction that slats follow one another in.
@@ -92,7 +92,7 @@ def _panel(rng: np.random.Generator, low: Array, high: Array, axis: int) -> Soli
     return box(low, high, fillet=rng.uniform(0.01, 0.09), axis=thick, steps=4)
 
 
-def _crossed(rng: np.random.Generator) -> Assembly:
+def _crossed(rng: Rng) -> Assembly:
     """Two pairs of legs that cross; the front legs go on up to the back rest."""
     bar = _bar(rng)
     half = rng.uniform(0.19, 0.27)  # to the middle of the outer bars
@@ -174,7 +174,7 @@ def _crossed(rng: np.random.Generator) -> Assembly:
     return chair
 
 
-def _under(rng: np.random.Generator) -> Assembly:
+def _under(rng: Rng) -> Assembly:
     """A seat whose back folds down on it and whose legs fold up under it."""
     bar = _bar(rng)
     half, depth = rng.uniform(0.2, 0.3), rng.uniform(0.36, 0.5)
@@ -229,7 +229,7 @@ def _under(rng: np.random.Generator) -> Assembly:
     return chair
 
 
-def _tip_up(rng: np.random.Generator) -> Assembly:
+def _tip_up(rng: Rng) -> Assembly:
     """Seats that tip up between fixed sides, as in a hall; one or more in a row."""
     count = int(rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))
     width, depth = rng.uniform(0.42, 0.56), rng.uniform(0.36, 0.48)
@@ -285,7 +285,7 @@ def _tip_up(rng: np.random.Generator) -> Assembly:
     return chair
 
 
-def _stool(rng: np.random.Generator) -> Assembly:
+def _stool(rng: Rng) -> Assembly:
     """Two crossed frames; the seat hangs on one of them and rests on the other."""
     bar = _bar(rng)
     half, height = rng.uniform(0.16, 0.26), rng.uniform(0.35, 0.6)

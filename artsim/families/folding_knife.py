@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, power, sin
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, loft, prism, union
 from artsim.model.kinematics import Array
 
@@ -18,7 +18,7 @@ GAP = 0.0005
 RING = 16
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
     length = rng.uniform(0.06, 0.26)
     half = 0.5 * length * (rng.uniform(0.11, 0.42) if rng.random() < 0.9 else rng.uniform(0.42, 0.54))
@@ -101,7 +101,7 @@ def _back(outline: Array, spine: float, reach: Array) -> list[Array]:
     return [np.concatenate([top[k : k + 2], bottom[k : k + 2]]) for k in range(len(x) - 1)]
 
 
-def _blade(rng: np.random.Generator, length: float, low: float, high: float, pin: float, kind: str) -> list[Array]:
+def _blade(rng: Rng, length: float, low: float, high: float, pin: float, kind: str) -> list[Array]:
     """Convex outlines of a blade along +X from its pin at the origin: its back at ``low``, its edge at ``high``."""
     x = np.linspace(0.0, 1.0, 10)
     if kind == "tool":
@@ -131,7 +131,7 @@ def _blade(rng: np.random.Generator, length: float, low: float, high: float, pin
     return [tang, *(np.concatenate([lower[k : k + 2], upper[k : k + 2]]) for k in range(9))]
 
 
-def _details(rng: np.random.Generator, outline: Array, pins: Array, top: float) -> Solid:
+def _details(rng: Rng, outline: Array, pins: Array, top: float) -> Solid:
     """Rivets, bolsters or a badge on both faces of the handle."""
     solid = Solid()
     x, half = 0.5 * (pins[0, 0] + pins[1, 0]), pins[1, 0] - pins[0, 0]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
-from artsim.making.assembly import JointSpec, prismatic, revolute
+from artsim.making.assembly import JointSpec, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tray
 from artsim.model.kinematics import Array
 
@@ -84,7 +84,7 @@ class Style:
     """Handles of doors lie level rather than upright."""
 
 
-def drawer(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def drawer(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """A drawer that slides out towards -X."""
     low, high = _front_box(cell, style)
     solid = _face(low, high, style)
@@ -101,14 +101,14 @@ def drawer(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, l
     return Solid(), [("drawer", solid, prismatic("body", OUTWARD, 0.0, style.travel * depth, tuple(middle)))]
 
 
-def door(rng: np.random.Generator, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
+def door(rng: Rng, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
     """One door, hinged at its "left", "right" (as one stands before it), "top" or "bottom"."""
     inside, trays = _interior(rng, cell, style)
     leaf = _leaf(rng, cell, style, hinge, *_front_box(cell, style))
     return inside, [leaf, *trays]
 
 
-def double_door(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def double_door(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Two doors that meet in the middle."""
     inside, trays = _interior(rng, cell, style)
     low, high = _front_box(cell, style)
@@ -121,7 +121,7 @@ def double_door(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Sol
     return inside, [*leaves, *trays]
 
 
-def sliding_doors(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def sliding_doors(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Two doors on two tracks, one behind the other."""
     thickness, clear = 0.016, 0.003
     width = 0.5 * cell.sides[0] + rng.uniform(0.01, 0.03)
@@ -149,7 +149,7 @@ def sliding_doors(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[S
     return _shelves(rng, cell, style.face + depth + 0.015, style), leaves
 
 
-def shelves(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def shelves(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """An open cell."""
     return _shelves(rng, cell, style.face + rng.uniform(0.0, 0.02), style), []
 
@@ -164,7 +164,7 @@ def fixed(cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     return _face(low, high, style) + joint, []
 
 
-def _interior(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def _interior(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Behind a door: shelves, or trays that stay inside even when they are pulled out behind a closed door."""
     front = style.face + style.thickness + 0.02
     room = style.back - 0.008 - front
@@ -184,7 +184,7 @@ def _interior(rng: np.random.Generator, cell: Cell, style: Style) -> tuple[Solid
     return Solid(), trays
 
 
-def _shelves(rng: np.random.Generator, cell: Cell, front: float, style: Style) -> Solid:
+def _shelves(rng: Rng, cell: Cell, front: float, style: Style) -> Solid:
     width, height = cell.sides
     count = int(rng.integers(0, int(height // 0.2) + 1)) if height > 0.2 else 0
     solid = Solid()
@@ -238,7 +238,7 @@ _HINGES = {
 }
 
 
-def _leaf(rng: np.random.Generator, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
+def _leaf(rng: Rng, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
     """A hinged panel with its handle near the edge that opens."""
     across, at_high, axis = _HINGES[hinge]
     along = 3 - across

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, unit
-from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, revolute
 from artsim.making.solids import (
     Solid,
     box,
@@ -30,7 +30,7 @@ GAP = 0.0015
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A globe; its axis leans to one side, the front faces -X."""
     radius = rng.uniform(0.06, 0.2)
     tilt = np.deg2rad(rng.choice([23.4, rng.uniform(0.0, 40.0)]))
@@ -67,7 +67,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return globe
 
 
-def _continents(rng: np.random.Generator, radius: float) -> Solid:
+def _continents(rng: Rng, radius: float) -> Solid:
     """Blobs that stand out of the sphere by a hundredth."""
     solid = Solid()
     for _ in range(int(rng.integers(5, 9))):
@@ -88,7 +88,7 @@ def _continents(rng: np.random.Generator, radius: float) -> Solid:
     return solid
 
 
-def _arc(rng: np.random.Generator, radius: float, thick: float, tilt: float) -> Solid:
+def _arc(rng: Rng, radius: float, thick: float, tilt: float) -> Solid:
     """The meridian from pole to pole, in the plane x = 0; on the side that the axis leans away from, or all round."""
     whole = rng.random() < 0.25
     flat = rng.random() < 0.5
@@ -115,7 +115,7 @@ def _arc(rng: np.random.Generator, radius: float, thick: float, tilt: float) -> 
     return solid
 
 
-def _stand(rng: np.random.Generator, radius: float, top: float, thick: float) -> Solid:
+def _stand(rng: Rng, radius: float, top: float, thick: float) -> Solid:
     """Column below the arc, on a foot."""
     height = radius * rng.uniform(0.15, 0.9)
     low = top - height
@@ -146,7 +146,7 @@ def _stand(rng: np.random.Generator, radius: float, top: float, thick: float) ->
     return solid
 
 
-def _horizon(rng: np.random.Generator, inner: float, foot: float, thick: float, radius: float) -> Solid:
+def _horizon(rng: Rng, inner: float, foot: float, thick: float, radius: float) -> Solid:
     """A flat ring around the globe, on legs that reach out from the column."""
     solid = revolved([(inner, -0.5 * thick), (inner + 3 * thick, -0.5 * thick), (inner + 3 * thick, 0.5 * thick),
                       (inner, 0.5 * thick)], sections=28)  # fmt: skip

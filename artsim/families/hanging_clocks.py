@@ -7,14 +7,14 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.clock_faces import FRONT, add_hands, dial_plate, glass_door, outline, pendulum, rim
 from artsim.families.details import side_hinge
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import box, cylinder, ellipsoid, frame, hull_of, prism, tube
 
 GAP = 0.001
 DENSITY = 500.0
 
 
-def wall_clock(rng: np.random.Generator) -> Assembly:
+def wall_clock(rng: Rng) -> Assembly:
     """A plain case, or a face with rays."""
     radius = rng.uniform(0.07, 0.25)
     center = np.zeros(3)
@@ -51,7 +51,7 @@ def wall_clock(rng: np.random.Generator) -> Assembly:
     return clock
 
 
-def pendulum_clock(rng: np.random.Generator) -> Assembly:
+def pendulum_clock(rng: Rng) -> Assembly:
     """A case on the wall with a box below, in which a pendulum hangs; or the pendulum hangs free."""
     radius = rng.uniform(0.06, 0.14)
     center = np.zeros(3)
@@ -108,7 +108,7 @@ def pendulum_clock(rng: np.random.Generator) -> Assembly:
     return clock
 
 
-def cuckoo_clock(rng: np.random.Generator) -> Assembly:
+def cuckoo_clock(rng: Rng) -> Assembly:
     """A house with a steep roof, a small door for the bird, a leaf as a pendulum, and cones on chains."""
     radius = rng.uniform(0.035, 0.06)
     deep, half = rng.uniform(0.06, 0.1), radius * rng.uniform(1.4, 2.0)

@@ -15,7 +15,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -38,7 +38,7 @@ class Pot:
         return float(np.interp(z, [level[0] for level in self.levels], [level[1] for level in self.levels]))
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A kettle with its lid on at rest; it pours towards -X."""
     kind = str(rng.choice(["stove", "electric", "teapot"], p=[0.38, 0.37, 0.25]))
     standing = kind == "electric" and rng.random() < 0.6  # on a base of its own
@@ -88,7 +88,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return kettle
 
 
-def _pot(rng: np.random.Generator, kind: str, foot: float) -> Pot:
+def _pot(rng: Rng, kind: str, foot: float) -> Pot:
     """Proportions, from the foot up to a rim."""
     wide = rng.uniform(0.065, 0.12) if kind == "stove" else rng.uniform(0.055, 0.095)
     share = {"stove": (0.8, 1.7), "electric": (1.7, 3.2), "teapot": (0.9, 1.9)}[kind]
@@ -120,7 +120,7 @@ def _pot(rng: np.random.Generator, kind: str, foot: float) -> Pot:
     return Pot(levels, mouth * wide, foot, foot + height)
 
 
-def _spout(rng: np.random.Generator, kind: str, pot: Pot) -> tuple[Solid, tuple[Array, Array, float] | None]:
+def _spout(rng: Rng, kind: str, pot: Pot) -> tuple[Solid, tuple[Array, Array, float] | None]:
     """Beak at the rim, or a tube from the belly; the mouth of a straight one: its middle, direction and radius."""
     height = pot.top - pot.foot
     choice = str(rng.choice(["tube", "goose", "beak"], p=[0.55, 0.3, 0.15]))
@@ -157,7 +157,7 @@ def _spout(rng: np.random.Generator, kind: str, pot: Pot) -> tuple[Solid, tuple[
     return tube(path, (np.linspace(1.5, 0.65, 10) * wide).tolist(), 12), None
 
 
-def _whistle(rng: np.random.Generator, kettle: Assembly, mouth: tuple[Array, Array, float]) -> None:
+def _whistle(rng: Rng, kettle: Assembly, mouth: tuple[Array, Array, float]) -> None:
     """A cover of the spout that turns up."""
     tip, ahead, radius = mouth
     up = np.array([ahead[2], 0.0, -ahead[0]])  # across the spout, away from the pot's foot
@@ -171,7 +171,7 @@ def _whistle(rng: np.random.Generator, kettle: Assembly, mouth: tuple[Array, Arr
     kettle.add("whistle", cover + lift, revolute("body", (0, 1, 0), pivot, 0.0, rng.uniform(0.6, 1.5)), density=1500.0)
 
 
-def _lid(rng: np.random.Generator, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
+def _lid(rng: Rng, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
     """The lid and the height of its top; ``low`` keeps the knob short."""
     z = pot.top + GAP
     radius = pot.mouth * rng.uniform(0.9, 1.04)
@@ -231,7 +231,7 @@ def _lugs(pot: Pot) -> Solid:
     return solid
 
 
-def _lid_joint(rng: np.random.Generator, kind: str, pot: Pot, room: float) -> JointSpec:
+def _lid_joint(rng: Rng, kind: str, pot: Pot, room: float) -> JointSpec:
     at = np.array([0.0, 0.0, pot.top])
     travel = min(pot.mouth * rng.uniform(0.3, 1.5), 0.8 * room)
     if travel < 0.004:  # the bow holds it down
@@ -256,7 +256,7 @@ def _bow_path(room: float, reach: float, lift: float, square: bool) -> list[tupl
     return [(reach * cos(a), lift + (room - lift) * sin(a)) for a in angles.tolist()]
 
 
-def _bow(rng: np.random.Generator, pot: Pot, room: float) -> tuple[Solid, float]:
+def _bow(rng: Rng, pot: Pot, room: float) -> tuple[Solid, float]:
     """A fixed bow from front to back over the lid, and how high it is above the lid's edge."""
     z = pot.foot + 0.8 * (pot.top - pot.foot)
     reach = pot.radius(z)
@@ -280,7 +280,7 @@ class Pins:
     rod: float
 
 
-def _pins(rng: np.random.Generator, pot: Pot, room: float) -> Pins:
+def _pins(rng: Rng, pot: Pot, room: float) -> Pins:
     z = pot.foot + rng.uniform(0.6, 0.9) * (pot.top - pot.foot)
     widest = max(level[2] for level in pot.levels)
     rod = rng.uniform(0.003, 0.006)
@@ -288,7 +288,7 @@ def _pins(rng: np.random.Generator, pot: Pot, room: float) -> Pins:
     return Pins(widest + rod + 0.004, z, max(room + 2.4 * rod, z + 1.2 * widest + 2.4 * rod) + 0.01, rod)
 
 
-def _swinging_bow(rng: np.random.Generator, kettle: Assembly, pins: Pins, pot: Pot) -> None:
+def _swinging_bow(rng: Rng, kettle: Assembly, pins: Pins, pot: Pot) -> None:
     """A bow that hangs on two pins at the sides, upright at rest, and swings down to the back."""
     rise, r = pins.top - pins.z, pins.rod
     if rng.random() < 0.4:
@@ -305,7 +305,7 @@ def _swinging_bow(rng: np.random.Generator, kettle: Assembly, pins: Pins, pot: P
     kettle.add("handle", bow, revolute("body", (0, 1, 0), (0, 0, pins.z), low, limit), density=1500.0)
 
 
-def _back_grip(rng: np.random.Generator, pot: Pot, hinged: bool, kind: str) -> Solid:
+def _back_grip(rng: Rng, pot: Pot, hinged: bool, kind: str) -> Solid:
     """A handle at the back, below the hinge of the lid."""
     height = pot.top - pot.foot
     high = pot.foot + height * rng.uniform(0.78, 0.92)
@@ -329,7 +329,7 @@ def _back_grip(rng: np.random.Generator, pot: Pot, hinged: bool, kind: str) -> S
     return grip_loop(points, wide, thick)
 
 
-def _base(rng: np.random.Generator, kettle: Assembly, pot: Pot) -> None:
+def _base(rng: Rng, kettle: Assembly, pot: Pot) -> None:
     """The stand below an electric kettle: it turns, or the kettle lifts off it."""
     radius = pot.levels[0][1] * rng.uniform(0.98, 1.25)
     tall = pot.foot - GAP
@@ -342,7 +342,7 @@ def _base(rng: np.random.Generator, kettle: Assembly, pot: Pot) -> None:
     kettle.add("base", base, joint)
 
 
-def _switch(rng: np.random.Generator, pot: Pot) -> tuple[Solid, str, Solid, JointSpec]:
+def _switch(rng: Rng, pot: Pot) -> tuple[Solid, str, Solid, JointSpec]:
     """A rocker or a button at the side of the foot: its mount on the body, its name, solid and joint."""
     z = pot.foot + rng.uniform(0.1, 0.25) * (pot.top - pot.foot)
     side = float(rng.choice([-1.0, 1.0]))

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from artsim.making.assembly import Rng
 from artsim.model.kinematics import Array
 
 MOST_KEYS = 40
@@ -21,7 +22,7 @@ def grid_layout(u: float, v: float, columns: int, rows: int) -> list[list[Cell]]
     return [[(u + c + 0.5, v - r - 0.5, 1.0, 1.0)] for r in range(rows) for c in range(columns)]
 
 
-def key_row(rng: np.random.Generator, u: float, v: float, units: float, space: bool) -> list[Cell]:
+def key_row(rng: Rng, u: float, v: float, units: float, space: bool) -> list[Cell]:
     """Keys from u on, ``units`` pitches together, with wider ones at the ends or a space bar in the middle."""
     if space:
         sides = int(rng.integers(1, 4))
@@ -35,7 +36,7 @@ def key_row(rng: np.random.Generator, u: float, v: float, units: float, space: b
     return [(0.5 * (a + b), v - 0.5, b - a, 1.0) for a, b in pairwise(edges)]
 
 
-def full_layout(rng: np.random.Generator) -> list[list[Cell]]:
+def full_layout(rng: Rng) -> list[list[Cell]]:
     """Rows that move as one each; the space bar and some keys by themselves; blocks to the right."""
     units, rows = float(rng.integers(12, 16)), int(rng.integers(4, 6))
     groups = [key_row(rng, 0.0, float(rows - r), units, r == rows - 1) for r in range(rows)]
@@ -60,7 +61,7 @@ def full_layout(rng: np.random.Generator) -> list[list[Cell]]:
     return groups
 
 
-def compact_layout(rng: np.random.Generator) -> list[list[Cell]]:
+def compact_layout(rng: Rng) -> list[list[Cell]]:
     """Three or four rows of single keys."""
     rows = int(rng.integers(3, 5))
     units = float(rng.integers(8, 13 if rows == 3 else 11))
@@ -68,7 +69,7 @@ def compact_layout(rng: np.random.Generator) -> list[list[Cell]]:
     return groups + [[cell] for cell in key_row(rng, 0.0, 1.0, units, units > 8)]
 
 
-def number_layout(rng: np.random.Generator) -> list[list[Cell]]:
+def number_layout(rng: Rng) -> list[list[Cell]]:
     """A number pad; at times with a double 0 and tall keys."""
     rows, columns = int(rng.integers(4, 7)), int(rng.integers(3, 6))
     groups = grid_layout(0.0, float(rows), columns, rows)
@@ -83,7 +84,7 @@ def number_layout(rng: np.random.Generator) -> list[list[Cell]]:
     return groups
 
 
-def macro_layout(rng: np.random.Generator) -> list[list[Cell]]:
+def macro_layout(rng: Rng) -> list[list[Cell]]:
     """A few keys in a grid."""
     return grid_layout(0.0, 0.0, int(rng.integers(1, 7)), int(rng.integers(1, 5)))
 
@@ -95,7 +96,7 @@ def extent(groups: Sequence[Sequence[Cell]]) -> Array:
     return extent
 
 
-def half_layout(rng: np.random.Generator) -> list[list[Cell]]:
+def half_layout(rng: Rng) -> list[list[Cell]]:
     """Keys of one half: single ones, or rows."""
     rows, units = int(rng.integers(3, 6)), float(rng.integers(4, 8))
     if rows * units <= 0.5 * MOST_KEYS:

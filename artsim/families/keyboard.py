@@ -25,7 +25,7 @@ from artsim.families.key_layouts import (
     number_layout,
 )
 from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull, rounded_rectangle, tube, union
 from artsim.model.kinematics import Array
 
@@ -60,7 +60,7 @@ class _Caps:
     step: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A keyboard; no key is pressed and the feet are folded in at rest."""
     kinds = ["full", "compact", "numbers", "macro", "pivot", "folding", "angled"]
     kind = str(rng.choice(kinds, p=[0.2, 0.2, 0.16, 0.16, 0.1, 0.08, 0.1]))
@@ -101,7 +101,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return keyboard
 
 
-def _draw_caps(rng: np.random.Generator) -> _Caps:
+def _draw_caps(rng: Rng) -> _Caps:
     pitch = rng.triangular(0.011, 0.018, 0.026)
     tall = rng.random() < 0.5
     height = pitch * (rng.uniform(0.35, 0.65) if tall else rng.uniform(0.1, 0.25))
@@ -142,7 +142,7 @@ def _add_keys(
         keyboard.add(f"{label}_{number}", solid, press(face, parent, at[0], at[1], caps.travel))
 
 
-def _plate(rng: np.random.Generator, face: Face, low: Array, high: Array, bottom: float) -> Solid:
+def _plate(rng: Rng, face: Face, low: Array, high: Array, bottom: float) -> Solid:
     """The body under a deck: from its outline down to a flat bottom."""
     size = high - low
     radius = float(size.min()) * rng.choice([rng.uniform(0.005, 0.05), rng.uniform(0.05, 0.3)])
@@ -187,7 +187,7 @@ def _rim(face: Face, low: Array, high: Array, wide: float, height: float) -> Sol
     return union(_slab(face, a, b, (-0.0005, height)) for a, b in spans)
 
 
-def _trimmings(rng: np.random.Generator, face: Face, low: Array, high: Array, level: float) -> Solid:
+def _trimmings(rng: Rng, face: Face, low: Array, high: Array, level: float) -> Solid:
     """A cable, a bar behind the keys."""
     solid = Solid()
     back = face.at(0.0, high[1])
@@ -204,7 +204,7 @@ def _trimmings(rng: np.random.Generator, face: Face, low: Array, high: Array, le
 
 
 def _controls(
-    rng: np.random.Generator, keyboard: Assembly, face: Face, low: Array, high: Array, margin: float, keys_end: float
+    rng: Rng, keyboard: Assembly, face: Face, low: Array, high: Array, margin: float, keys_end: float
 ) -> None:
     """Knobs, a roller or a fader on a wide strip behind the keys."""
     room = margin - 0.006
@@ -227,7 +227,7 @@ def _controls(
             keyboard.add(f"slider_{k}", solid, slide, density=1200.0)
 
 
-def _feet(rng: np.random.Generator, keyboard: Assembly, low: Array, high: Array, room: float) -> None:
+def _feet(rng: Rng, keyboard: Assembly, low: Array, high: Array, room: float) -> None:
     """Two feet below the back edge that fold down."""
     thick = room - 2.0 * GAP
     length, wide = rng.uniform(0.014, 0.03), rng.uniform(0.01, 0.03)
@@ -241,9 +241,7 @@ def _feet(rng: np.random.Generator, keyboard: Assembly, low: Array, high: Array,
         keyboard.add(f"foot_{k}", solid, revolute("body", (0, -1, 0), (x, y, z), 0.0, limit), density=1000.0)
 
 
-def _wrist_rest(
-    rng: np.random.Generator, keyboard: Assembly, low: Array, high: Array, end: float, height: float
-) -> None:
+def _wrist_rest(rng: Rng, keyboard: Assembly, low: Array, high: Array, end: float, height: float) -> None:
     """A cushion that ends at x = ``end`` before the keyboard and pulls off to -X."""
     deep, rise = rng.uniform(0.04, 0.09), height * rng.uniform(0.6, 1.1)
     half = 0.5 * float(high[0] - low[0]) * rng.uniform(0.85, 1.0)
@@ -261,7 +259,7 @@ def _half_size(groups: Sequence[Sequence[Cell]], caps: _Caps, margin: float) -> 
     return size
 
 
-def _pivot(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
+def _pivot(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """Two halves that a pivot at the back lets splay."""
     margin = caps.pitch * rng.uniform(0.2, 0.8)
     groups = half_layout(rng)
@@ -288,7 +286,7 @@ def _pivot(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     _add_keys(keyboard, "right", bodies[1][1], groups, caps, len(groups))
 
 
-def _folding(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
+def _folding(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """Two flat halves; the right one folds over the left one."""
     caps = replace(caps, height=min(caps.height, 0.003), travel=min(caps.travel, 0.0012), step=0.0)
     margin = caps.pitch * rng.uniform(0.2, 0.6)
@@ -315,7 +313,7 @@ def _folding(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
     _add_keys(keyboard, "right", faces[1], groups, caps, len(groups))
 
 
-def _angled(rng: np.random.Generator, keyboard: Assembly, caps: _Caps) -> None:
+def _angled(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """One body with a deck for each hand, turned inwards and lower at its outer side."""
     margin = caps.pitch * rng.uniform(0.2, 0.8)
     groups = half_layout(rng)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, prismatic
+from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic
 from artsim.making.solids import Solid, Vector, hull, prism, rounded_rectangle, union
 from artsim.model.kinematics import Array
 
@@ -108,7 +108,7 @@ def key_cells(
 
 
 def add_keypad(
-    rng: np.random.Generator, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
+    rng: Rng, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
     height: float, first: int = 0,
 ) -> int:  # fmt: skip
     """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
@@ -130,9 +130,8 @@ def add_keypad(
 
 
 def add_function_keys(
-    rng: np.random.Generator, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
-    height: float, number: int,
-) -> int:  # fmt: skip
+    rng: Rng, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float], height: float, number: int
+) -> int:
     """Two keys with a larger one between them; returns the next free number."""
     travel, deep, middle = 0.0003, v[1] - v[0], 0.5 * (v[0] + v[1])
     wide = 0.5 * half

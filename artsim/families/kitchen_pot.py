@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube, union, vessel
 from artsim.model.kinematics import Array
 
@@ -19,7 +19,7 @@ GAP = 0.0012
 STEEL = 2500.0  # kg/m^3, as walls are thicker than real ones
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A pot with its lid on at rest; it faces -X."""
     radius = with_tails(rng, (0.08, 0.16), (0.06, 0.24), 0.2)
     shape = str(rng.choice(["straight", "flared", "bellied", "round"], p=[0.4, 0.2, 0.2, 0.2]))
@@ -61,7 +61,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return assembly
 
 
-def _profile(rng: np.random.Generator, shape: str, radius: float, height: float) -> Array:
+def _profile(rng: Rng, shape: str, radius: float, height: float) -> Array:
     """(N, 2) outer radius and height, from the bottom up."""
     foot = rng.uniform(0.75, 0.9)
     if shape == "flared":
@@ -78,7 +78,7 @@ def _profile(rng: np.random.Generator, shape: str, radius: float, height: float)
     return np.array(points)
 
 
-def _handles(rng: np.random.Generator, radius: float, height: float, hinged: bool) -> Solid:
+def _handles(rng: Rng, radius: float, height: float, hinged: bool) -> Solid:
     """One long handle, with a short one opposite by chance, or two short ones at the sides."""
     z = height - rng.uniform(0.014, 0.025)
     if not hinged and rng.random() < 0.3:
@@ -91,7 +91,7 @@ def _handles(rng: np.random.Generator, radius: float, height: float, hinged: boo
     return one + one.mirrored(1)
 
 
-def _stick(rng: np.random.Generator, radius: float, z: float) -> Solid:
+def _stick(rng: Rng, radius: float, z: float) -> Solid:
     """Long handle along -X, a little upward."""
     length, rise = radius * rng.uniform(1.1, 1.7), rng.uniform(-0.05, 0.2)
     half, thick = rng.uniform(0.009, 0.013), rng.uniform(0.005, 0.008)
@@ -102,7 +102,7 @@ def _stick(rng: np.random.Generator, radius: float, z: float) -> Solid:
     return hull_of(slabs[0], slabs[1]) + hull_of(slabs[1], slabs[2])
 
 
-def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Solid:
+def _short(rng: Rng, kind: str, radius: float, z: float) -> Solid:
     """Short handle at -X."""
     spread, reach = rng.uniform(0.25, 0.45), with_tails(rng, (0.022, 0.045), (0.012, 0.06), 0.3)
     inside = radius - 0.003
@@ -124,9 +124,7 @@ def _short(rng: np.random.Generator, kind: str, radius: float, z: float) -> Soli
     return hull_of(start_box, far)
 
 
-def _lid(
-    rng: np.random.Generator, radius: float, height: float, wall: float, mouth: float, hinged: bool
-) -> tuple[Solid, float, float]:
+def _lid(rng: Rng, radius: float, height: float, wall: float, mouth: float, hinged: bool) -> tuple[Solid, float, float]:
     """The lid, its radius, and the height of its top."""
     lid_radius = radius + with_tails(rng, (-0.5 * wall, 0.004), (-0.5 * wall, 0.01), 0.2)
     z = height + GAP

@@ -15,7 +15,7 @@ from artsim.common.elementary import arcsin, arctan2, cos, sin
 from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
-from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, revolute
 from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
@@ -24,12 +24,12 @@ UP = np.array([0.0, 0.0, 1.0])
 SIDE = np.array([0.0, 1.0, 0.0])
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A lamp; what leans, leans forward to -X at rest."""
     return (_desk, standing, spotlight)[rng.choice(3, p=[0.5, 0.32, 0.18])](rng)
 
 
-def _desk(rng: np.random.Generator) -> Assembly:
+def _desk(rng: Rng) -> Assembly:
     """Base, arms and shade."""
     while True:
         links, half, r, foot = _links(rng)
@@ -43,7 +43,7 @@ def _desk(rng: np.random.Generator) -> Assembly:
     return lamp
 
 
-def _links(rng: np.random.Generator) -> tuple[list[Link], float, float, Array | None]:
+def _links(rng: Rng) -> tuple[list[Link], float, float, Array | None]:
     """All links, half width and radius of their knuckles, and the foot of the parallel rod, if there is one."""
     half, r = rng.uniform(0.006, 0.009), rng.uniform(0.010, 0.015)
     links = [Link("base")]
@@ -93,7 +93,7 @@ def _lean(angle: float) -> Array:
     return apply(rotation_about(SIDE, angle), UP)
 
 
-def _base(rng: np.random.Generator, link: Link, r: float) -> float:
+def _base(rng: Rng, link: Link, r: float) -> float:
     """The foot; returns the height of its top."""
     wide, thick = rng.uniform(0.06, 0.1), rng.uniform(0.012, 0.03)
     kind = rng.choice(["disc", "dome", "square", "clamp"], p=[0.4, 0.2, 0.25, 0.15])
@@ -145,9 +145,7 @@ def _arm(
     return end
 
 
-def _shade(
-    rng: np.random.Generator, links: list[Link], at: Array, side: float, arm_angle: float, half: float, r: float
-) -> None:
+def _shade(rng: Rng, links: list[Link], at: Array, side: float, arm_angle: float, half: float, r: float) -> None:
     """The last link: knuckle, stem and shade. It turns as far as its rim keeps clear of the arm."""
     stem = rng.uniform(0.04, 0.06)
     kind = str(rng.choice(["cone", "bell", "panel"], p=[0.45, 0.3, 0.25]))

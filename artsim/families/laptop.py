@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import tan
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
 
 GAP = 0.0008
@@ -37,7 +37,7 @@ class _Shape:
     tilt: float  # of the base, its front lower, radians
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A laptop, closed at rest. The lid opens about the Y axis at the back."""
     shape = _shape(rng)
     laptop = Assembly("base", _propped(rng, shape) if shape.tilt else _base(rng, shape), 1400.0)
@@ -48,7 +48,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return laptop
 
 
-def _shape(rng: np.random.Generator) -> _Shape:
+def _shape(rng: Rng) -> _Shape:
     width = rng.uniform(0.18, 0.48)
     if rng.random() < 0.4:
         depth = width * rng.triangular(0.54, 0.67, 0.9)
@@ -76,13 +76,10 @@ def _shape(rng: np.random.Generator) -> _Shape:
     elif odd < 0.3:
         front += rng.uniform(0.005, 0.06) * depth
     corner = depth * rng.choice([rng.uniform(0.005, 0.03), rng.uniform(0.03, 0.13)])
-    return _Shape(width, depth, height, lid, front, base_front, back, corner,
-                  hinge_x, height + 0.5 * GAP, radius, tilt)  # fmt: skip
+    return _Shape(width, depth, height, lid, front, base_front, back, corner, hinge_x, height + 0.5 * GAP, radius, tilt)
 
 
-def _shell(
-    rng: np.random.Generator, low: tuple[float, ...], high: tuple[float, ...], corner: float, side: int
-) -> Solid:
+def _shell(rng: Rng, low: tuple[float, ...], high: tuple[float, ...], corner: float, side: int) -> Solid:
     """Plate whose upper (side 1) or lower (-1) edges are bevelled or, seen from the side, wedge-shaped."""
     plate = box(low, high, fillet=corner, axis=2)
     kind = rng.choice(["plain", "bevel", "wedge"], p=[0.45, 0.4, 0.15])
@@ -104,7 +101,7 @@ def _shell(
     )  # fmt: skip
 
 
-def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
+def _base(rng: Rng, shape: _Shape) -> Solid:
     """The lower shell: keys and touchpad lie in a sunken deck, so that the lid can close on the rim."""
     width, height, front, back = shape.width, shape.height, shape.base_front, shape.back
     sink = min(0.0015, 0.2 * height)
@@ -133,7 +130,7 @@ def _base(rng: np.random.Generator, shape: _Shape) -> Solid:
     return solid
 
 
-def _propped(rng: np.random.Generator, shape: _Shape) -> Solid:
+def _propped(rng: Rng, shape: _Shape) -> Solid:
     """A tilted plate with the keyboard, held up by a bar below its back edge."""
     half, height, back = shape.width / 2, shape.height, shape.back
     deck = height - 0.0015
@@ -146,7 +143,7 @@ def _propped(rng: np.random.Generator, shape: _Shape) -> Solid:
     return plate.turned((0, 1, 0), -shape.tilt, (back, 0, height)) + cylinder((x, -end, z), (x, end, z), radius)
 
 
-def _keyboard(rng: np.random.Generator, shape: _Shape, deck: float, rim: float) -> Solid:
+def _keyboard(rng: Rng, shape: _Shape, deck: float, rim: float) -> Solid:
     """Five or six rows of keys, a touchpad before them where there is room, its buttons."""
     top = shape.height - 0.0003
     length = shape.back - shape.base_front
@@ -182,7 +179,7 @@ def _keyboard(rng: np.random.Generator, shape: _Shape, deck: float, rim: float) 
     return solid
 
 
-def _lid(rng: np.random.Generator, shape: _Shape) -> Solid:
+def _lid(rng: Rng, shape: _Shape) -> Solid:
     """The upper shell with a frame around the screen, a badge or ribs on its back."""
     low = shape.height + GAP
     top = low + shape.lid
@@ -213,7 +210,7 @@ def _lid(rng: np.random.Generator, shape: _Shape) -> Solid:
     return solid
 
 
-def _hinges(rng: np.random.Generator, shape: _Shape) -> Solid:
+def _hinges(rng: Rng, shape: _Shape) -> Solid:
     """Barrels on the hinge axis, joined to the lid by short arms above the gap."""
     inner, outer = rng.uniform(0.2, 0.34), rng.uniform(0.38, 0.46)
     spans = [(-outer, -inner), (inner, outer)] if rng.random() < 0.4 else [(-outer, outer)]

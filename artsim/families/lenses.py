@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, ring
 
 FRONT = np.array([-1.0, 0.0, 0.0])
@@ -26,7 +26,7 @@ class Lens:
         "tubes" (one to three that slide in a collar), "prime" (rings that turn), or "zoom" (both).
     """
 
-    def __init__(self, rng: np.random.Generator, center: Vector, radius: float, style: str):
+    def __init__(self, rng: Rng, center: Vector, radius: float, style: str):
         self.center = np.asarray(center, dtype=np.float64)
         self.fixed = Solid()
         self.parts: list[tuple[str, Solid, JointSpec]] = []
@@ -67,7 +67,7 @@ class Lens:
         if hollow:
             self._sliding(rng, bore - 0.0008, 0.12 * long, long, int(rng.integers(1, 3)))
 
-    def _ribs(self, rng: np.random.Generator, radius: float, near: float, far: float) -> Solid:
+    def _ribs(self, rng: Rng, radius: float, near: float, far: float) -> Solid:
         solid = Solid()
         count = int(rng.choice([0, 6, 10]))
         for k in range(count):
@@ -85,14 +85,14 @@ class Lens:
         self.fixed += ring(self.center - (front + 0.03 * radius, 0, 0), FRONT, 0.8 * radius, radius, 0.08 * radius, 24)
         self.fixed += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.7 * radius, 0.7 * radius), 16)
 
-    def _tubes(self, rng: np.random.Generator, radius: float, near: float, long: float, count: int) -> None:
+    def _tubes(self, rng: Rng, radius: float, near: float, long: float, count: int) -> None:
         wall = 0.1 * radius
         self._pipe(radius, radius - wall, near, long)
         if rng.random() < 0.6:
             self._pipe(1.15 * radius if radius < 0.02 else radius * 1.05, radius - wall, near - 0.001, 0.35 * long)
         self._sliding(rng, radius - wall - 0.0006, 0.0, long, count)
 
-    def _sliding(self, rng: np.random.Generator, radius: float, near: float, long: float, count: int) -> None:
+    def _sliding(self, rng: Rng, radius: float, near: float, long: float, count: int) -> None:
         """Tubes in each other, the first in a bore from ``near`` to ``long`` before the body's front."""
         parent, outer = "body", long
         for k in range(count):
@@ -118,7 +118,7 @@ class Lens:
                 self._cap(rng, part, radius, max(front + 0.06 * radius, long))
             parent, outer, radius = part, front, radius - wall - 0.0006
 
-    def _cap(self, rng: np.random.Generator, parent: str, radius: float, front: float) -> None:
+    def _cap(self, rng: Rng, parent: str, radius: float, front: float) -> None:
         """A lid before the glass: it pulls off, or swings aside."""
         thick = 0.12 * radius
         near = self.center - (front + 0.0006, 0, 0)

@@ -10,14 +10,14 @@ import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.elementary import power as raised
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A lighter that stands upright; what one presses or opens is towards -X at its top."""
     kinds = (_pocket, _disposable, _long, _table)
     return kinds[rng.choice(4, p=[0.36, 0.3, 0.22, 0.12])](rng)
@@ -46,7 +46,7 @@ def _fork(center: Array, inner: float, thick: float, low: float, radius: float) 
     return cheeks
 
 
-def _outline(rng: np.random.Generator, half_x: float, half_y: float) -> Array:
+def _outline(rng: Rng, half_x: float, half_y: float) -> Array:
     """(N, 2) cross-section: oval, rounded rectangle or with a round front."""
     count = 20
     power = rng.choice([2.0, rng.uniform(2.2, 4.0), rng.uniform(5.0, 12.0)])
@@ -62,7 +62,7 @@ def _layers(outline: Array, levels: list[tuple[float, float]]) -> Solid:
     return loft([np.column_stack([scale * outline, np.full(len(outline), z)]) for scale, z in levels])
 
 
-def _pocket(rng: np.random.Generator) -> Assembly:
+def _pocket(rng: Rng) -> Assembly:
     """A case with a lid that swings over the chimney; the hinge is behind, at +X."""
     half_x = rng.uniform(0.013, 0.03)
     half_y = max(half_x * rng.uniform(0.25, 0.6), 0.0055)
@@ -124,7 +124,7 @@ def _pocket(rng: np.random.Generator) -> Assembly:
     return lighter
 
 
-def _disposable(rng: np.random.Generator) -> Assembly:
+def _disposable(rng: Rng) -> Assembly:
     """A tank with a metal hood, a wheel and a lever or button under the thumb."""
     half_x, half_y = rng.uniform(0.009, 0.017), rng.uniform(0.005, 0.0085)
     height = rng.uniform(0.045, 0.085)
@@ -196,7 +196,7 @@ def _disposable(rng: np.random.Generator) -> Assembly:
     return lighter
 
 
-def _long(rng: np.random.Generator) -> Assembly:
+def _long(rng: Rng) -> Assembly:
     """A handle with a trigger and a long nozzle that points up; it may be bent."""
     handle, nozzle = rng.uniform(0.08, 0.14), rng.uniform(0.06, 0.2)
     half_x, half_y = rng.uniform(0.01, 0.02), rng.uniform(0.006, 0.011)
@@ -265,7 +265,7 @@ def _long(rng: np.random.Generator) -> Assembly:
     return lighter
 
 
-def _table(rng: np.random.Generator) -> Assembly:
+def _table(rng: Rng) -> Assembly:
     """A torch or a table lighter: a stout body with a button on top and sometimes a flap over the flame."""
     half_x, half_y = rng.uniform(0.012, 0.028), rng.uniform(0.01, 0.024)
     height = rng.uniform(0.03, 0.1)

@@ -11,14 +11,14 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A microwave oven, closed at rest. The back of its door is the plane x = 0."""
     width, depth = rng.uniform(0.42, 0.62), with_tails(rng, (0.30, 0.48), (0.16, 0.62))
     height = with_tails(rng, (0.23, 0.37), (0.2, 0.46))
@@ -76,14 +76,7 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _body(
-    rng: np.random.Generator,
-    right: float,
-    left: float,
-    low: float,
-    high: float,
-    depth: float,
-    inner: Array,
-    outer: Array,
+    rng: Rng, right: float, left: float, low: float, high: float, depth: float, inner: Array, outer: Array
 ) -> Solid:
     """Case around the hollow from ``inner`` to ``outer``, which is open to the front."""
     shell = 0.012
@@ -103,7 +96,7 @@ def _body(
     return solid
 
 
-def _door(rng: np.random.Generator, low: Array, high: Array, drops: bool, handle: str) -> Solid:
+def _door(rng: Rng, low: Array, high: Array, drops: bool, handle: str) -> Solid:
     """Door with a window, handle at the side away from its hinge."""
     tall, wide = high[2] - low[2], high[1] - low[1]
     edge = rng.uniform(0.02, 0.06)
@@ -124,9 +117,7 @@ def _door(rng: np.random.Generator, low: Array, high: Array, drops: bool, handle
     return solid + front_handle(handle, start, end, reach, radius)
 
 
-def _controls(
-    rng: np.random.Generator, low: Array, high: Array, opener: bool
-) -> tuple[Solid, list[tuple[str, Solid, Array]]]:
+def _controls(rng: Rng, low: Array, high: Array, opener: bool) -> tuple[Solid, list[tuple[str, Solid, Array]]]:
     """What stays on the panel, and what moves: names, solids and places."""
     upright = high[2] - low[2] > high[1] - low[1]
     long, short = (2, 1) if upright else (1, 2)
@@ -170,7 +161,7 @@ def _controls(
     return fixed, movers
 
 
-def _turntable(rng: np.random.Generator, low: Array, high: Array, center: Array) -> Solid:
+def _turntable(rng: Rng, low: Array, high: Array, center: Array) -> Solid:
     """Glass plate with a raised rim of beads, 3 mm above the floor."""
     x, y, z = center[0], center[1], low[2] + 0.002
     radius = 0.5 * min(high[0] - low[0], high[1] - low[1]) - rng.uniform(0.006, 0.02)

@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import apply
 from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
-from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
@@ -80,7 +80,7 @@ class _Dome:
         return loft([self.cut(x, *clamp, **more) for x in (first, *inside, last)])  # type: ignore[arg-type]
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A mouse; no button is pressed at rest."""
     dome = _draw_dome(rng)
     parts = _Parts(_roll(rng))
@@ -133,14 +133,14 @@ class _Parts:
         return mouse
 
 
-def _roll(rng: np.random.Generator) -> Array | None:
+def _roll(rng: Rng) -> Array | None:
     """(3, 3) roll of an upright mouse; None for the usual ones."""
     if rng.random() < 0.86:
         return None
     return rotation_about((1.0, 0.0, 0.0), float(rng.choice([-1.0, 1.0], p=[0.85, 0.15])) * rng.uniform(0.25, 0.85))
 
 
-def _draw_dome(rng: np.random.Generator) -> _Dome:
+def _draw_dome(rng: Rng) -> _Dome:
     length = rng.uniform(0.07, 0.14)
     half = 0.5 * length * rng.triangular(0.4, 0.58, 0.85)
     height = length * rng.triangular(0.13, 0.32, 0.5)
@@ -161,7 +161,7 @@ def _draw_dome(rng: np.random.Generator) -> _Dome:
                  rng.uniform(0.15, 0.55))  # fmt: skip
 
 
-def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
+def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:
     """Body, buttons and what sits between them."""
     front, back = float(dome.stations[0]), float(dome.stations[-1])
     length = back - front
@@ -222,7 +222,7 @@ def _shell(rng: np.random.Generator, parts: _Parts, dome: _Dome) -> None:
 
 
 def _wheel(
-    rng: np.random.Generator, dome: _Dome, y: float, slot: float, split: float, floor: float
+    rng: Rng, dome: _Dome, y: float, slot: float, split: float, floor: float
 ) -> tuple[float, float, float, float] | None:
     """X and Z of the axle, radius and half of the width of a wheel between the buttons."""
     front = float(dome.stations[0])
@@ -238,7 +238,7 @@ def _wheel(
     return x, height + proud - radius, radius, wide
 
 
-def _underside(rng: np.random.Generator, dome: _Dome) -> Solid:
+def _underside(rng: Rng, dome: _Dome) -> Solid:
     """Glides below and a cable in front, on some."""
     front, back = float(dome.stations[0]), float(dome.stations[-1])
     solid = Solid()
@@ -261,7 +261,7 @@ def _underside(rng: np.random.Generator, dome: _Dome) -> Solid:
     return solid
 
 
-def _extras(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
+def _extras(rng: Rng, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
     """Keys on the side, and on top where that is free."""
     length = float(dome.stations[-1] - dome.stations[0])
     travel = 0.0007
@@ -279,7 +279,7 @@ def _extras(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, 
         parts.add(f"key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
 
 
-def _side_keys(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
+def _side_keys(rng: Rng, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
     """Keys for the thumb, on the left (+Y)."""
     back = float(dome.stations[-1])
     count = int(rng.integers(1, 4))
@@ -299,7 +299,7 @@ def _side_keys(rng: np.random.Generator, parts: _Parts, dome: _Dome, split: floa
         parts.add(f"side_key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
 
 
-def _well(rng: np.random.Generator, dome: _Dome, split: float) -> tuple[Array, float] | None:
+def _well(rng: Rng, dome: _Dome, split: float) -> tuple[Array, float] | None:
     """Centre (3,) and radius of a ball that is sunk into the back, where there is room for one."""
     back = float(dome.stations[-1])
     x = split + rng.uniform(0.4, 0.6) * (back - split)

@@ -13,14 +13,14 @@ import numpy as np
 from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """An oven, closed at rest. The back of its doors is the plane x = 0."""
     if rng.random() < 0.12:
         return _cooktop(rng)
@@ -82,7 +82,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return oven
 
 
-def _cooktop(rng: np.random.Generator) -> Assembly:
+def _cooktop(rng: Rng) -> Assembly:
     """A hob to stand on a worktop or to sink into it: a slab with a row of dials, at one side or in front."""
     half, depth, height = rng.uniform(0.14, 0.46), rng.uniform(0.28, 0.56), rng.uniform(0.02, 0.12)
     strip = rng.uniform(0.06, 0.1)  # for the dials
@@ -118,9 +118,7 @@ def _shell(half: float, depth: float, low: float, high: float, wall: float) -> S
     return tray((GAP, -half, low), (depth, half, high), wall, 0.02, axis=0, side=-1)
 
 
-def _hob(
-    rng: np.random.Generator, half: float, depth: float, z: float, thick: float, rise: float | None = None
-) -> Solid:
+def _hob(rng: Rng, half: float, depth: float, z: float, thick: float, rise: float | None = None) -> Solid:
     """Worktop with two to six burners, ``rise`` above the height ``z``."""
     top = z + (rng.uniform(0.008, 0.03) if rise is None else rise)
     over = rng.uniform(0.0, 0.012)
@@ -156,7 +154,7 @@ def _grate(x: float, y: float, long: float, wide: float, low: float) -> Solid:
     return solid + union(box((u, u + bar), (v, v + bar), (low - 0.001, lift + 0.001)) for u, v in feet)
 
 
-def _door(rng: np.random.Generator, low: Array, high: Array, kind: str, reach: float) -> tuple[Solid, float]:
+def _door(rng: Rng, low: Array, high: Array, kind: str, reach: float) -> tuple[Solid, float]:
     """Door with a window or a board, and the height of its handle."""
     tall, half = high[2] - low[2], high[1]
     grip = high[2] - rng.uniform(0.03, 0.05)
@@ -173,7 +171,7 @@ def _door(rng: np.random.Generator, low: Array, high: Array, kind: str, reach: f
     return solid + front_handle(kind, (low[0], -span, grip), (low[0], span, grip), reach, radius), float(grip)
 
 
-def _hinge(rng: np.random.Generator, low: Array, high: Array, sideways: bool, grip: float, reach: float) -> JointSpec:
+def _hinge(rng: Rng, low: Array, high: Array, sideways: bool, grip: float, reach: float) -> JointSpec:
     """Hinge at the side, or along the lower front edge; its handle must not sink by ``reach`` onto a door below."""
     if sideways:
         left = bool(rng.random() < 0.5)
@@ -185,7 +183,7 @@ def _hinge(rng: np.random.Generator, low: Array, high: Array, sideways: bool, gr
 
 
 def _drawer(
-    rng: np.random.Generator, half: float, depth: float, thick: float, wall: float, low: float, high: float, kind: str
+    rng: Rng, half: float, depth: float, thick: float, wall: float, low: float, high: float, kind: str
 ) -> Solid:
     """Drawer below the oven, for trays."""
     solid = box((-thick, 0.0), half - 0.001, (low + GAP, high - GAP), fillet=0.005)
@@ -198,7 +196,7 @@ def _drawer(
     return solid
 
 
-def _dials(rng: np.random.Generator, oven: Assembly, half: float, face: float, z: float, room: float) -> None:
+def _dials(rng: Rng, oven: Assembly, half: float, face: float, z: float, room: float) -> None:
     """A row of dials, perhaps around a display, and perhaps buttons."""
     count = int(rng.integers(2, 8))
     reach = with_tails(rng, (0.018, 0.035), (0.01, 0.055))

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute, screw
 from artsim.making.solids import Solid, box, hull, loft, union
 from artsim.model.kinematics import Array
 
@@ -48,7 +48,7 @@ class _Section:
         return np.column_stack([self.flat * cos(angles), sin(angles), np.zeros(self.sides)])
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A pen; its long axis is upright. Half of those with a cap stand on their end."""
     length = rng.uniform(0.08, 0.2)
     slim = rng.random() < 0.3
@@ -70,7 +70,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return _clicked(rng, section, length, radius)
 
 
-def _barrel(rng: np.random.Generator, low: float, high: float, first: float, last: float) -> Array:
+def _barrel(rng: Rng, low: float, high: float, first: float, last: float) -> Array:
     """(N, 2) radius and height of a barrel between two radii: straight, bulging, waisted or stepped."""
     count = int(rng.choice([2, 4, 6]))
     shares = np.linspace(0.0, 1.0, count)
@@ -80,7 +80,7 @@ def _barrel(rng: np.random.Generator, low: float, high: float, first: float, las
     return np.column_stack([radii, low + shares * (high - low)])
 
 
-def _tip(rng: np.random.Generator, section: _Section, radius: float, length: float) -> Solid:
+def _tip(rng: Rng, section: _Section, radius: float, length: float) -> Solid:
     """What writes, from z = 0 up to where its neck is ``radius`` wide: a cone, a nib, a felt block or a ball."""
     kind = str(rng.choice(["cone", "nib", "felt", "stub"], p=[0.45, 0.15, 0.2, 0.2]))
     if kind == "nib":
@@ -95,7 +95,7 @@ def _tip(rng: np.random.Generator, section: _Section, radius: float, length: flo
     return section.rod([(point, 0.0), (bend * radius, 0.5 * length), (radius, length + 0.0002)])
 
 
-def _clip(rng: np.random.Generator, section: _Section, radius: float, top: float, length: float) -> Solid:
+def _clip(rng: Rng, section: _Section, radius: float, top: float, length: float) -> Solid:
     """A strip beside the barrel, held at its top end, on the side of -X."""
     if rng.random() < 0.2:
         return Solid()
@@ -123,7 +123,7 @@ def _clip(rng: np.random.Generator, section: _Section, radius: float, top: float
     return strip + box((reach - 0.5 * thick, 0.4 * near), 0.8 * half, (top - 1.6 * thick, top))
 
 
-def _capped(rng: np.random.Generator, section: _Section, length: float, radius: float, turning: bool) -> Assembly:
+def _capped(rng: Rng, section: _Section, length: float, radius: float, turning: bool) -> Assembly:
     """A body with a cap over its tip, which slides off or unscrews."""
     covered = length * rng.uniform(0.18, 0.6)
     wall = radius * rng.uniform(0.1, 0.18)
@@ -169,7 +169,7 @@ def _capped(rng: np.random.Generator, section: _Section, length: float, radius: 
     return pen
 
 
-def _double(rng: np.random.Generator, section: _Section, length: float, radius: float) -> Assembly:
+def _double(rng: Rng, section: _Section, length: float, radius: float) -> Assembly:
     """A marker with a tip and a cap at either end."""
     wall = 0.12 * radius
     wide = radius * rng.uniform(0.85, 1.15)
@@ -197,9 +197,7 @@ def _double(rng: np.random.Generator, section: _Section, length: float, radius: 
     return pen
 
 
-def _shell(
-    rng: np.random.Generator, section: _Section, length: float, radius: float, bore: float
-) -> tuple[Solid, float]:
+def _shell(rng: Rng, section: _Section, length: float, radius: float, bore: float) -> tuple[Solid, float]:
     """Barrel with a bore at the bottom for the refill; returns it and how far up the bore goes."""
     cone = min(length * rng.uniform(0.08, 0.25), 5.0 * radius)
     waist = radius * rng.uniform(0.75, 1.0)
@@ -214,7 +212,7 @@ def _shell(
     return shell, cone
 
 
-def _clicked(rng: np.random.Generator, section: _Section, length: float, radius: float) -> Assembly:
+def _clicked(rng: Rng, section: _Section, length: float, radius: float) -> Assembly:
     """A button at the end, which sometimes pushes the tip out; it may be a second one at the side instead."""
     bore = 0.22 * radius
     shell, cone = _shell(rng, section, length, radius, bore)
@@ -247,7 +245,7 @@ def _clicked(rng: np.random.Generator, section: _Section, length: float, radius:
     return pen
 
 
-def _twisted(rng: np.random.Generator, section: _Section, length: float, radius: float) -> Assembly:
+def _twisted(rng: Rng, section: _Section, length: float, radius: float) -> Assembly:
     """An upper barrel that turns on the lower one, which carries the tip."""
     split = length * rng.uniform(0.35, 0.7)
     tip = min(length * rng.uniform(0.06, 0.2), 5.0 * radius)
@@ -270,7 +268,7 @@ def _twisted(rng: np.random.Generator, section: _Section, length: float, radius:
     return pen
 
 
-def _sliders(rng: np.random.Generator, length: float, radius: float) -> Assembly:
+def _sliders(rng: Rng, length: float, radius: float) -> Assembly:
     """A pen of several colours: sliders in slots around its end."""
     section = _Section(_ROUND, 1.0)
     count = int(rng.integers(2, 7))

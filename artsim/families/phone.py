@@ -14,14 +14,14 @@ import numpy as np
 from artsim.common.elementary import exp
 from artsim.families.desk_phone import desk_set
 from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
-from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull, loft, union
 
 GAP = 0.0005
 KINDS = ("bar", "flip", "slider", "swivel", "fold", "smartphone", "cordless", "desk")
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A telephone; closed, its handset in place and no key pressed at rest."""
     kind = str(rng.choice(KINDS, p=[0.15, 0.17, 0.12, 0.07, 0.08, 0.1, 0.11, 0.2]))
     phone = Assembly(density=1300.0)
@@ -36,9 +36,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return phone
 
 
-def _slab(
-    rng: np.random.Generator, half: float, x: tuple[float, float], z: tuple[float, float], curve: int = 0
-) -> Solid:
+def _slab(rng: Rng, half: float, x: tuple[float, float], z: tuple[float, float], curve: int = 0) -> Solid:
     """Upright plate with round edges; where ``curve`` is 1 its back (+X) bulges, where it is -1 its front does."""
     levels = np.array([0.0, 0.03, 0.2, 0.5, 0.8, 0.97, 1.0])
     corner = rng.uniform(0.0, 0.35) * np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.3, 1.0])
@@ -59,7 +57,7 @@ def _slab(
     return loft(cross_sections(z[0] + levels * (z[1] - z[0]), fronts, backs, halves, rng.uniform(0.1, 0.8)))
 
 
-def _side_keys(rng: np.random.Generator, phone: Assembly, parent: str, half: float, x: float, z: tuple[float, float],
+def _side_keys(rng: Rng, phone: Assembly, parent: str, half: float, x: float, z: tuple[float, float],
                thick: float, sides: Sequence[float] = (-1.0, 1.0)) -> None:  # fmt: skip
     """Keys on the right (-1) and left (1) edges of an upright body."""
     for side in sides:
@@ -71,14 +69,14 @@ def _side_keys(rng: np.random.Generator, phone: Assembly, parent: str, half: flo
             add_key(phone, parent, name, face, (0.0, v), outline, 0.0014, 0.0004)
 
 
-def _size(rng: np.random.Generator) -> tuple[float, float, float]:
+def _size(rng: Rng) -> tuple[float, float, float]:
     """Length, half of the width and thickness of a mobile phone."""
     length = 0.12 * exp(rng.uniform(-0.45, 0.7))
     half = 0.5 * length * rng.triangular(0.28, 0.45, 0.72)
     return length, half, length * rng.triangular(0.06, 0.13, 0.36)
 
 
-def _aerial(rng: np.random.Generator, phone: Assembly, half: float, x: float, length: float, thick: float) -> None:
+def _aerial(rng: Rng, phone: Assembly, half: float, x: float, length: float, thick: float) -> None:
     """A rod along one side that swings up about its upper end, on some."""
     if rng.random() < 0.55:
         return
@@ -91,7 +89,7 @@ def _aerial(rng: np.random.Generator, phone: Assembly, half: float, x: float, le
     phone.add("antenna", rod, turn, density=2000.0)
 
 
-def _stand(rng: np.random.Generator, phone: Assembly, half: float, x: float, length: float) -> None:
+def _stand(rng: Rng, phone: Assembly, half: float, x: float, length: float) -> None:
     """A leaf on the back that folds out, on some."""
     if rng.random() < 0.55:
         return
@@ -101,7 +99,7 @@ def _stand(rng: np.random.Generator, phone: Assembly, half: float, x: float, len
     phone.add("stand", leaf, revolute("body", (0, -1, 0), (x + GAP, 0, z), 0.0, rng.uniform(0.5, 1.5)), density=1500.0)
 
 
-def _bar(rng: np.random.Generator, phone: Assembly) -> None:
+def _bar(rng: Rng, phone: Assembly) -> None:
     """One piece with keys below a display."""
     length, half, thick = _size(rng)
     body = _slab(rng, half, (0.0, thick), (0.0, length), 1)
@@ -119,12 +117,12 @@ def _bar(rng: np.random.Generator, phone: Assembly) -> None:
     _stand(rng, phone, half, thick, length)
 
 
-def _lid_height(rng: np.random.Generator) -> float:
+def _lid_height(rng: Rng) -> float:
     """How far the keys under a lid stand out."""
     return rng.uniform(0.001, 0.0016)
 
 
-def _flip(rng: np.random.Generator, phone: Assembly) -> None:
+def _flip(rng: Rng, phone: Assembly) -> None:
     """A lid with the display before the keys, hinged at the top (or, at times, half-way up)."""
     length, half, thick = _size(rng)
     length *= 0.8
@@ -163,7 +161,7 @@ def _flip(rng: np.random.Generator, phone: Assembly) -> None:
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
 
 
-def _slider(rng: np.random.Generator, phone: Assembly) -> None:
+def _slider(rng: Rng, phone: Assembly) -> None:
     """The half with the display slides off the keys, up or to the side."""
     length, half, thick = _size(rng)
     lower = thick * rng.uniform(0.4, 0.65)
@@ -193,7 +191,7 @@ def _slider(rng: np.random.Generator, phone: Assembly) -> None:
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
 
 
-def _swivel(rng: np.random.Generator, phone: Assembly) -> None:
+def _swivel(rng: Rng, phone: Assembly) -> None:
     """The half with the display turns off the keys in its own plane."""
     length, half, thick = _size(rng)
     lower = thick * rng.uniform(0.4, 0.6)
@@ -212,7 +210,7 @@ def _swivel(rng: np.random.Generator, phone: Assembly) -> None:
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
 
 
-def _fold(rng: np.random.Generator, phone: Assembly) -> None:
+def _fold(rng: Rng, phone: Assembly) -> None:
     """Two halves like a book's covers, hinged at one side."""
     length, half, thick = _size(rng)
     side = float(rng.choice([-1.0, 1.0]))
@@ -241,7 +239,7 @@ def _fold(rng: np.random.Generator, phone: Assembly) -> None:
     _side_keys(rng, phone, "body", half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
 
 
-def _smartphone(rng: np.random.Generator, phone: Assembly) -> None:
+def _smartphone(rng: Rng, phone: Assembly) -> None:
     """A display with keys on the edges, at times below it, and a camera on the back."""
     length, half, thick = _size(rng)
     length, thick = 1.25 * length, max(0.7 * thick, 0.006)
@@ -267,7 +265,7 @@ def _smartphone(rng: np.random.Generator, phone: Assembly) -> None:
     _stand(rng, phone, half, thick + 0.0045, length)
 
 
-def _cordless(rng: np.random.Generator, phone: Assembly) -> None:
+def _cordless(rng: Rng, phone: Assembly) -> None:
     """A handset that stands in a dock, and is drawn out upwards."""
     length, half, thick = _size(rng)
     length = 1.1 * length

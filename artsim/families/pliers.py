@@ -10,14 +10,14 @@ import numpy as np
 
 from artsim.common.elementary import power, sin
 from artsim.common.products import norm
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0006
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """Pliers, closed at rest. One lever turns about the vertical rivet."""
     length = rng.uniform(0.09, 0.38)
     kind = str(rng.choice(["combination", "nose", "flat", "cutting", "hollow"]))
@@ -60,7 +60,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return pliers
 
 
-def _jaw(rng: np.random.Generator, kind: str, length: float, disc: float) -> list[Array]:
+def _jaw(rng: Rng, kind: str, length: float, disc: float) -> list[Array]:
     """Convex outlines of the jaw at -Y, clear of the joint's disc, from the joint to the tip."""
     share = np.linspace(0.0, 1.0, 11)
     start, tip = {
@@ -81,7 +81,7 @@ def _jaw(rng: np.random.Generator, kind: str, length: float, disc: float) -> lis
     return [np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(10)]
 
 
-def _grip(rng: np.random.Generator, reach: float, disc: float, length: float) -> tuple[Array, Array]:
+def _grip(rng: Rng, reach: float, disc: float, length: float) -> tuple[Array, Array]:
     """(N, 2) middle line of the handle at +Y and (N,) its half width."""
     half = length * rng.uniform(0.014, 0.034)
     share = np.linspace(0.0, 1.0, 12)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
-from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull, prism, rounded_rectangle, tray, union
 from artsim.model.kinematics import Array
 
@@ -59,7 +59,7 @@ class _Band:
     height: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A printer; drawers, lids and flaps are shut and no key is pressed at rest."""
     kind = str(rng.choice(["inkjet", "laser", "copier", "small"], p=[0.4, 0.24, 0.18, 0.18]))
     size = {
@@ -100,7 +100,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return printer
 
 
-def _bands(rng: np.random.Generator, kind: str, size: float) -> list[_Band]:
+def _bands(rng: Rng, kind: str, size: float) -> list[_Band]:
     """The front from the bottom up."""
     deep = {"inkjet": (0.03, 0.06), "laser": (0.04, 0.08), "copier": (0.09, 0.16), "small": (0.02, 0.04)}[kind]
     drawers = {"inkjet": (0, 3), "laser": (1, 4), "copier": (1, 5), "small": (0, 2)}[kind]
@@ -134,9 +134,8 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
 
 
 def _fill(
-    rng: np.random.Generator, printer: Assembly, case: _Case, band: _Band, number: int, low: float, half: float,
-    cavity: float,
-) -> None:  # fmt: skip
+    rng: Rng, printer: Assembly, case: _Case, band: _Band, number: int, low: float, half: float, cavity: float
+) -> None:
     """What moves in a band of the front."""
     front, high = -case.x, low + band.height
     wide = half - GAP
@@ -179,7 +178,7 @@ def _fill(
         _keys(rng, printer, "body", front, half, low, high)
 
 
-def _pull(rng: np.random.Generator, front: float, half: float, low: float, high: float) -> Solid:
+def _pull(rng: Rng, front: float, half: float, low: float, high: float) -> Solid:
     """Handle of a drawer: a lip, a bar or nothing."""
     kind, reach = rng.random(), rng.uniform(0.006, 0.016)
     if kind < 0.35:
@@ -191,9 +190,7 @@ def _pull(rng: np.random.Generator, front: float, half: float, low: float, high:
     return Solid()
 
 
-def _keys(
-    rng: np.random.Generator, printer: Assembly, parent: str, front: float, half: float, low: float, high: float
-) -> None:
+def _keys(rng: Rng, printer: Assembly, parent: str, front: float, half: float, low: float, high: float) -> None:
     """Keys on a panel in front: a group on one side, or on both."""
     face = front_face(front, 0.0, 0.5 * (low + high))
     rise = high - low
@@ -229,7 +226,7 @@ def _slope(case: _Case, top: float, rise: float, side: float) -> Solid:
     return solid + hull([(x * case.x, s * (side + 1e-4), z) for x, z in slope for s in (-1, 1)])
 
 
-def _paper_stop(rng: np.random.Generator, printer: Assembly, case: _Case, level: float) -> None:
+def _paper_stop(rng: Rng, printer: Assembly, case: _Case, level: float) -> None:
     """A flap that lies on the front end of the slope and folds up, on some."""
     if rng.random() < 0.3:
         return
@@ -240,7 +237,7 @@ def _paper_stop(rng: np.random.Generator, printer: Assembly, case: _Case, level:
     printer.add("paper_stop", flap, hinge, density=900.0)
 
 
-def _lid(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, top: float) -> None:
+def _lid(rng: Rng, printer: Assembly, case: _Case, kind: str, top: float) -> None:
     """The lid of a scanner, at times with a feeder; keys before it and a paper support behind it."""
     seam = top + GAP
     back = case.x
@@ -283,7 +280,7 @@ def _lid(rng: np.random.Generator, printer: Assembly, case: _Case, kind: str, to
         printer.add("feeder_tray", solid, turn, density=600.0)
 
 
-def _top_keys(rng: np.random.Generator, printer: Assembly, case: _Case, top: float, back: float) -> None:
+def _top_keys(rng: Rng, printer: Assembly, case: _Case, top: float, back: float) -> None:
     """Keys on top, before the lid."""
     room = back + case.x
     pitch = min(0.6 * room, 0.03)
@@ -298,7 +295,7 @@ def _top_keys(rng: np.random.Generator, printer: Assembly, case: _Case, top: flo
         add_key(printer, "body", f"top_button_{column}", face, (u, v), outline, travel + 0.002, travel)
 
 
-def _paper_support(rng: np.random.Generator, printer: Assembly, case: _Case, seam: float, front: float) -> None:
+def _paper_support(rng: Rng, printer: Assembly, case: _Case, seam: float, front: float) -> None:
     """A flap that lies over the paper's slot at the back and folds up and back."""
     thick, wide = rng.uniform(0.004, 0.01), case.y * rng.uniform(0.5, 0.85)
     solid = box((front + GAP, case.x - 0.004), wide, (seam, seam + thick), fillet=0.01, axis=2)

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from artsim.common.elementary import arccos, arcsin, cos, sin
+from artsim.making.assembly import Rng
 from artsim.model.kinematics import Array
 
 
-def with_tails(
-    rng: np.random.Generator, usual: tuple[float, float], widest: tuple[float, float], share: float = 0.25
-) -> float:
+def with_tails(rng: Rng, usual: tuple[float, float], widest: tuple[float, float], share: float = 0.25) -> float:
     """A number from the usual range, or with chance ``share`` from one of the tails up to the widest range."""
     tails = [t for t in ((widest[0], usual[0]), (usual[1], widest[1])) if t[0] < t[1]]
     if not tails or rng.random() >= share:
@@ -24,9 +23,7 @@ def with_tails(
     return float(rng.uniform(*tails[int(rng.integers(len(tails)))]))
 
 
-def unusual_sides(
-    rng: np.random.Generator, low: Sequence[float], high: Sequence[float], least: Sequence[float]
-) -> Array:
+def unusual_sides(rng: Rng, low: Sequence[float], high: Sequence[float], least: Sequence[float]) -> Array:
     """Sides of a box, one of which is near the end of its range.
 
     Parameters

@@ -16,7 +16,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
-from artsim.making.assembly import Assembly, JointSpec
+from artsim.making.assembly import Assembly, JointSpec, Rng
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
@@ -71,7 +71,7 @@ class _Branch:
     """Branch, joint, and where the branch's frame stands: rotation (3, 3) and position (3,)."""
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A random articulated object."""
     count = int(rng.integers(2, 13))
     parents = _parents(rng, count, int(rng.integers(1, 7)))
@@ -82,7 +82,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return tree
 
 
-def _parents(rng: np.random.Generator, count: int, depth: int) -> list[int]:
+def _parents(rng: Rng, count: int, depth: int) -> list[int]:
     """Parent of every part; -1 for the root. Long chains are as likely as bushes."""
     parents, depths = [-1], [0]
     eager = rng.uniform(0.0, 1.0)
@@ -96,7 +96,7 @@ def _parents(rng: np.random.Generator, count: int, depth: int) -> list[int]:
     return parents
 
 
-def _grow(rng: np.random.Generator, k: int, parents: list[int], scale: float) -> _Branch:
+def _grow(rng: Rng, k: int, parents: list[int], scale: float) -> _Branch:
     """Part ``k`` with everything that hangs on it."""
     size = scale * rng.uniform(0.6, 1.5, 3) * (1.6 if k == 0 else 1.0)
     solid = _shape(rng, size)
@@ -128,7 +128,7 @@ def _grow(rng: np.random.Generator, k: int, parents: list[int], scale: float) ->
     return branch
 
 
-def _shape(rng: np.random.Generator, size: Array) -> Solid:
+def _shape(rng: Rng, size: Array) -> Solid:
     """A simple solid about the origin with roughly the given sides."""
     kind = str(rng.choice(SHAPES))
     half = 0.5 * size
@@ -160,7 +160,7 @@ def _shape(rng: np.random.Generator, size: Array) -> Solid:
     return box(-half, half)
 
 
-def _motion(rng: np.random.Generator, branch: _Branch, siblings: list[_Motion]) -> _Motion:
+def _motion(rng: Rng, branch: _Branch, siblings: list[_Motion]) -> _Motion:
     """A joint for a branch; by chance one that follows the joint of a sibling."""
     bounds = branch.boxes[0]
     extent = float((bounds[1] - bounds[0]).max())
@@ -188,12 +188,7 @@ def _motion(rng: np.random.Generator, branch: _Branch, siblings: list[_Motion]) 
 
 
 def _attach(
-    rng: np.random.Generator,
-    parent: _Branch,
-    child: _Branch,
-    motion: _Motion,
-    faces: list[tuple[int, int]],
-    bounds: Array,
+    rng: Rng, parent: _Branch, child: _Branch, motion: _Motion, faces: list[tuple[int, int]], bounds: Array
 ) -> tuple[int, int] | None:
     """Hang a branch on a free face of its parent, on a stub just long enough to keep all boxes apart.
 

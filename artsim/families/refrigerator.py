@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.families.details import front_handle, rounded_shell, side_hinge
-from artsim.making.assembly import Assembly, prismatic
+from artsim.making.assembly import Assembly, Rng, prismatic
 from artsim.making.solids import Solid, box, cylinder, frame, tray, union
 from artsim.model.kinematics import Array
 
@@ -37,7 +37,7 @@ class Style:
     radius: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A refrigerator, closed at rest. The back of its doors is the plane x = 0."""
     layout = str(rng.choice(["single", "stacked", "beside", "french"], p=[0.38, 0.27, 0.17, 0.18]))
     small = layout == "single" and rng.random() < 0.65
@@ -106,7 +106,7 @@ def build(rng: np.random.Generator) -> Assembly:
 
 
 def _body(
-    rng: np.random.Generator,
+    rng: Rng,
     half: float,
     depth: float,
     low: float,
@@ -146,9 +146,7 @@ def _body(
     return solid
 
 
-def _door(
-    rng: np.random.Generator, low: Array, high: Array, style: Style, side: int, grip_at_top: bool, inner_edge: bool
-) -> Solid:
+def _door(rng: Rng, low: Array, high: Array, style: Style, side: int, grip_at_top: bool, inner_edge: bool) -> Solid:
     """Door with its handle at the side away from the hinge."""
     solid = box(low, high, fillet=style.corner, axis=None if rng.random() < 0.5 else 2)
     wide, tall = high[1] - low[1], high[2] - low[2]
@@ -176,7 +174,7 @@ def _door(
     return solid
 
 
-def _drawer(rng: np.random.Generator, low: Array, high: Array, depth: float, style: Style) -> Solid:
+def _drawer(rng: Rng, low: Array, high: Array, depth: float, style: Style) -> Solid:
     """Freezer drawer: a front with a tray behind it."""
     solid = box(low, high, fillet=style.corner, axis=None if rng.random() < 0.5 else 2)
     half = high[1] - style.wall - 0.012

@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import exp, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, cross_sections, front_face, key, key_cells, key_outline
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, loft, ring
 from artsim.model.kinematics import Array
 
@@ -47,7 +47,7 @@ class _Body:
         return loft(cross_sections(levels, fronts, backs - inset, halves, self.roundness))
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A remote control; no key is pressed and all covers are closed at rest."""
     body = _draw_body(rng)
     remote = Assembly(density=1100.0)
@@ -62,7 +62,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return remote
 
 
-def _draw_body(rng: np.random.Generator) -> _Body:
+def _draw_body(rng: Rng) -> _Body:
     length = 0.17 * exp(rng.uniform(-0.75, 0.6))
     half = 0.5 * length * rng.triangular(0.16, 0.26, 0.62)
     thick = max(length * rng.triangular(0.035, 0.1, 0.26), 0.006)
@@ -101,7 +101,7 @@ def _draw_body(rng: np.random.Generator) -> _Body:
     return _Body(levels, fronts, backs, half * widths, roundness, low * length, high * length, keys)
 
 
-def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> bool:
+def _battery_cover(rng: Rng, remote: Assembly, body: _Body) -> bool:
     """Add the body with a recess in the back and a cover over it; False where there is none."""
     length = float(body.levels[-1])
     thick = min(rng.uniform(0.0012, 0.0022), 0.3 * float((body.backs - body.fronts).min()))
@@ -133,7 +133,7 @@ def _battery_cover(rng: np.random.Generator, remote: Assembly, body: _Body) -> b
     return True
 
 
-def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
+def _keys(rng: Rng, remote: Assembly, body: _Body) -> float:
     """Bands of keys from the top down; returns how far they stand out."""
     face, half = front_face(0.0), body.key_half
     height, travel = rng.uniform(0.0009, 0.0035), rng.uniform(0.0003, 0.0008)
@@ -174,7 +174,7 @@ def _keys(rng: np.random.Generator, remote: Assembly, body: _Body) -> float:
     return tallest
 
 
-def _plan(rng: np.random.Generator, half: float, room: float, pitch: float) -> list[tuple[str, int, int, float]]:
+def _plan(rng: Rng, half: float, room: float, pitch: float) -> list[tuple[str, int, int, float]]:
     """Kind, columns, rows and height of each band of keys; at least one, at most ``MOST_KEYS`` keys."""
     wanted = list(rng.permutation(["pad", "numbers", "rockers", "row", "row", "slider"]))[: int(rng.integers(1, 6))]
     wanted = ["row", *wanted, "numbers", "row"][: int(rng.integers(1, 9))]
@@ -196,9 +196,7 @@ def _plan(rng: np.random.Generator, half: float, room: float, pitch: float) -> l
     return bands or [("row", 1, 1, min(room, 2.0 * half))]
 
 
-def _pad(
-    rng: np.random.Generator, remote: Assembly, face: Face, v: float, radius: float, height: float, travel: float
-) -> float:
+def _pad(rng: Rng, remote: Assembly, face: Face, v: float, radius: float, height: float, travel: float) -> float:
     """Four keys about a fifth, or a dial; returns how far that stands out."""
     center = tuple(face.at(0.0, v))
     if rng.random() < 0.2:
@@ -218,7 +216,7 @@ def _pad(
     return max(high, height)
 
 
-def _front_cover(rng: np.random.Generator, remote: Assembly, body: _Body, height: float) -> None:
+def _front_cover(rng: Rng, remote: Assembly, body: _Body, height: float) -> None:
     """A cover over the lower keys, which swings down or slides down."""
     low, high = body.key_low, body.key_low + rng.uniform(0.3, 0.7) * (body.key_high - body.key_low)
     _, _, halves = body.at(np.linspace(low, high, 8))
@@ -233,7 +231,7 @@ def _front_cover(rng: np.random.Generator, remote: Assembly, body: _Body, height
     remote.add("cover", cover, joint, density=1000.0)
 
 
-def _antenna(rng: np.random.Generator, remote: Assembly, body: _Body) -> None:
+def _antenna(rng: Rng, remote: Assembly, body: _Body) -> None:
     """A rod at the top that turns from side to side."""
     length = float(body.levels[-1])
     radius = rng.uniform(0.0015, 0.003)

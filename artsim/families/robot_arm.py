@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
     box,
@@ -36,7 +36,7 @@ SCARAS = ("PPS", "PPSR", "PPPS", "PPPSR")
 class _Chain:
     """Links built one after the other, each from a pose: a point, a direction along the link, a lateral axis."""
 
-    def __init__(self, rng: np.random.Generator, radius: float):
+    def __init__(self, rng: Rng, radius: float):
         self.rng = rng
         self.radius = radius
         self.at: Array = np.zeros(3)
@@ -137,7 +137,7 @@ class _Chain:
         self.link.rod(mouth + GAP * d, mouth + 0.6 * r * d, 0.9 * r)
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A robot arm, stretched out or bent at rest."""
     while True:
         reach = rng.uniform(0.4, 1.6)
@@ -190,7 +190,7 @@ def _arm(chain: _Chain, reach: float, kinds: str) -> None:
             chain.limb(1.5 * chain.radius, chain.radius)
 
 
-def _rest_angles(rng: np.random.Generator, bends: int) -> Array:
+def _rest_angles(rng: Rng, bends: int) -> Array:
     """Angle of every bend at rest: upright, or as a crane stoops."""
     if rng.random() < 0.25:
         return np.zeros(bends)

@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
-from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -54,7 +54,7 @@ class Shape:
         return -GAP, self.half
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A safe, closed at rest."""
     kind = str(rng.choice(["small", "cube", "tall"], p=[0.35, 0.35, 0.3]))
     width = {"small": (0.3, 0.45), "cube": (0.35, 0.6), "tall": (0.45, 0.75)}[kind]
@@ -119,7 +119,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return safe
 
 
-def _body(rng: np.random.Generator, s: Shape) -> Solid:
+def _body(rng: Rng, s: Shape) -> Solid:
     corner = min(rng.choice([0.004, rng.uniform(0.01, 0.05)]), 0.9 * s.wall)
     solid = rounded_shell((0.0, -s.half, s.low), (s.depth, s.half, s.high), s.wall, corner, 3)
     solid += box((s.depth - s.wall, s.depth), s.half - 0.002, (s.low + 0.002, s.high - 0.002), fillet=corner, axis=0)
@@ -157,7 +157,7 @@ def _knuckles(s: Shape, of_door: bool) -> list[tuple[float, float]]:
     return spans
 
 
-def _door(rng: np.random.Generator, s: Shape, combination: bool, opener: str) -> Solid:
+def _door(rng: Rng, s: Shape, combination: bool, opener: str) -> Solid:
     low, high = s.door
     wide, tall = high[1] - low[1], high[2] - low[2]
     if s.inset:
@@ -197,7 +197,7 @@ def _door(rng: np.random.Generator, s: Shape, combination: bool, opener: str) ->
     return solid
 
 
-def _combination(rng: np.random.Generator, x: float, y: float, z: float, radius: float) -> Solid:
+def _combination(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:
     """Combination dial: a skirt, a grip and the mark it is read at."""
     x -= 0.0045
     skirt, reach = rng.uniform(0.006, 0.012), rng.uniform(0.02, 0.03)
@@ -210,7 +210,7 @@ def _combination(rng: np.random.Generator, x: float, y: float, z: float, radius:
     )
 
 
-def _wheel(rng: np.random.Generator, x: float, y: float, z: float, radius: float) -> Solid:
+def _wheel(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:
     """Hub with three to five spokes that end in balls or in a rim."""
     x -= 0.0045
     reach, spokes = rng.uniform(0.03, 0.05), int(rng.integers(3, 6))
@@ -227,7 +227,7 @@ def _wheel(rng: np.random.Generator, x: float, y: float, z: float, radius: float
     return solid
 
 
-def _lever(rng: np.random.Generator, x: float, y: float, z: float, radius: float) -> Solid:
+def _lever(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:
     """Lever on a round boss, level at rest."""
     x -= 0.0045
     reach = rng.uniform(0.025, 0.04)

@@ -15,7 +15,7 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
 from artsim.common.products import dot, matmul, norm
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
 from artsim.model.kinematics import Array
 
@@ -45,7 +45,7 @@ class Ring:
     egg: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """Scissors, closed at rest. One blade turns about the vertical pivot."""
     length = rng.uniform(0.09, 0.3)
     blade = length * rng.uniform(0.36, 0.6)
@@ -90,7 +90,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return scissors
 
 
-def _blade(rng: np.random.Generator, length: float, width: float) -> tuple[Array, ...]:
+def _blade(rng: Rng, length: float, width: float) -> tuple[Array, ...]:
     """Convex outlines of the blade whose handle is at +Y: the edge just beyond the middle, the back at -Y."""
     edge, back = 0.2 * width, -0.8 * width
     kind = str(rng.choice(["straight", "bellied", "blunt", "narrow"]))
@@ -110,7 +110,7 @@ def _blade(rng: np.random.Generator, length: float, width: float) -> tuple[Array
     return tuple(np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(8))
 
 
-def _ring(rng: np.random.Generator, reach: float, bar: float, kind: str, k: int, plastic: bool) -> Ring:
+def _ring(rng: Rng, reach: float, bar: float, kind: str, k: int, plastic: bool) -> Ring:
     """Ring at the +Y side, clear of the middle by its bar."""
     long = kind != "same" and k == 1
     along = reach * (rng.uniform(0.27, 0.35) if long else rng.uniform(0.17, 0.27)) * (1.1 if plastic else 1.0)

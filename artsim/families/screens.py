@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from artsim.making.assembly import Rng
 from artsim.making.solids import Solid, box, frame, hull
 
 
@@ -31,7 +32,7 @@ class Panel:
     bend: float
 
 
-def draw_panel(rng: np.random.Generator, most: float = 0.95) -> Panel:
+def draw_panel(rng: Rng, most: float = 0.95) -> Panel:
     width = rng.triangular(0.22, 0.52, most)
     ratio = rng.choice([rng.uniform(0.36, 0.48), rng.uniform(0.54, 0.68), rng.uniform(0.72, 0.85)], p=[0.2, 0.5, 0.3])
     thick = width * rng.triangular(0.015, 0.05, 0.16)
@@ -39,7 +40,7 @@ def draw_panel(rng: np.random.Generator, most: float = 0.95) -> Panel:
     return Panel(0.5 * width, 0.5 * width * ratio, thick, bend)
 
 
-def screen(rng: np.random.Generator, panel: Panel, chin: float) -> Solid:
+def screen(rng: Rng, panel: Panel, chin: float) -> Solid:
     """The panel: a shell with a frame around the sunken screen, and a hump on its back."""
     half, rise, thick = panel.half, panel.rise, panel.thick
     rim = rng.uniform(0.008, 0.07) * half + 0.002

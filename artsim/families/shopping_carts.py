@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from artsim.families.wheels import STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 
-def shopping_cart(rng: np.random.Generator) -> Assembly:
+def shopping_cart(rng: Rng) -> Assembly:
     """A basket that narrows to the front, over a frame on four wheels."""
     length, half = rng.uniform(0.55, 0.95), rng.uniform(0.2, 0.32)
     narrow, track = rng.uniform(0.7, 0.98), rng.uniform(0.75, 0.95) * half

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
 
 GAP = 0.002
@@ -17,7 +17,7 @@ UP = (0.0, 0.0, 1.0)
 SIDE = (0.0, 1.0, 0.0)
 
 
-def standing(rng: np.random.Generator) -> Assembly:
+def standing(rng: Rng) -> Assembly:
     """A shade on top of a pole or a body."""
     height = rng.uniform(0.22, 0.6) if rng.random() < 0.55 else rng.uniform(0.9, 1.7)
     radius = rng.uniform(0.006, 0.014) * (1.0 if height < 0.7 else 1.4)
@@ -74,9 +74,7 @@ def standing(rng: np.random.Generator) -> Assembly:
     return lamp
 
 
-def _foot(
-    rng: np.random.Generator, kind: str, wide: float, thick: float, height: float, radius: float
-) -> tuple[Solid, float]:
+def _foot(rng: Rng, kind: str, wide: float, thick: float, height: float, radius: float) -> tuple[Solid, float]:
     """Solid, and the height at which the pole begins."""
     if kind == "disc":
         return cylinder((0, 0, 0), (0, 0, thick), wide, rng.uniform(0.8, 1.0) * wide, 36), thick
@@ -101,7 +99,7 @@ def _foot(
     return tube(path, radii.tolist(), 20), top
 
 
-def _shade(rng: np.random.Generator, kind: str, rim: float, tall: float, low: float) -> Solid:
+def _shade(rng: Rng, kind: str, rim: float, tall: float, low: float) -> Solid:
     """Open below, with a holder across its inside; it begins at ``low``."""
     if kind == "ball":
         return ellipsoid((0, 0, low + 0.8 * rim), (rim, rim, 0.8 * rim), 24)
@@ -119,7 +117,7 @@ def _shade(rng: np.random.Generator, kind: str, rim: float, tall: float, low: fl
     return shell + spokes + bulb + cylinder((0, 0, low), (0, 0, holder + 0.25 * tall), 0.012, sections=14)
 
 
-def _switch(rng: np.random.Generator, lamp: Assembly, radius: float, height: float) -> None:
+def _switch(rng: Rng, lamp: Assembly, radius: float, height: float) -> None:
     """A dial at the pole, or a chain below the shade."""
     z = height - rng.uniform(0.03, 0.06)
     if rng.random() < 0.5:
@@ -135,7 +133,7 @@ def _switch(rng: np.random.Generator, lamp: Assembly, radius: float, height: flo
     lamp.add("chain", chain.moved((-0.004, 0, 0)), joint, density=900.0)
 
 
-def spotlight(rng: np.random.Generator) -> Assembly:
+def spotlight(rng: Rng) -> Assembly:
     """A head that tips in a yoke, which turns on a mount."""
     radius, long = rng.uniform(0.03, 0.09), rng.uniform(0.06, 0.2)
     thick = 0.08 * radius + 0.002

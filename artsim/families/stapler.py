@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_rectangle
 from artsim.model.kinematics import Array
 
@@ -59,7 +59,7 @@ class Layout:
     back: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A stapler, closed at rest; what turns about the hinge opens upwards."""
     length = rng.uniform(0.065, 0.25)
     width = rng.uniform(0.009, 0.018)
@@ -95,7 +95,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return stapler
 
 
-def _back(rng: np.random.Generator, length: float, tail: float) -> float:
+def _back(rng: Rng, length: float, tail: float) -> float:
     """How far the base reaches behind the hinge: hardly, a little, or as a long plate."""
     kind = rng.random()
     if kind < 0.45:
@@ -116,7 +116,7 @@ def _opening(solid: Solid, lay: Layout) -> float:
     return float(angles[np.argmax(low) - 1]) if low.any() else float(angles[-1])
 
 
-def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
+def _base(rng: Rng, lay: Layout, arm_width: float) -> Solid:
     """Plate with an anvil at the front and cheeks beside the hinge."""
     front = -lay.length - rng.uniform(0.0, 0.012)
     back = lay.back
@@ -154,7 +154,7 @@ def _base(rng: np.random.Generator, lay: Layout, arm_width: float) -> Solid:
     return solid
 
 
-def _magazine(rng: np.random.Generator, lay: Layout) -> Solid:
+def _magazine(rng: Rng, lay: Layout) -> Solid:
     """Channel of the staples: a long box that ends in a round tongue at the hinge."""
     half = 0.5 * lay.width
     low = lay.base + rng.uniform(0.0025, 0.005)
@@ -166,7 +166,7 @@ def _magazine(rng: np.random.Generator, lay: Layout) -> Solid:
     return solid + box((start - 0.0015, start + 0.001), 0.8 * half, (low + 0.001, high - 0.001))
 
 
-def _arm(rng: np.random.Generator, lay: Layout, width: float) -> Solid:
+def _arm(rng: Rng, lay: Layout, width: float) -> Solid:
     """Shell above the magazine, with skirts that reach down beside it; narrow between the cheeks."""
     low = lay.magazine + GAP
     tall = lay.length * rng.uniform(0.06, 0.28)

@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import Assembly
+from artsim.making.assembly import Assembly, Rng
 from artsim.making.solids import Solid, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
 
@@ -30,7 +30,7 @@ KINDS: dict[str, tuple[tuple[tuple[float, float], ...], float, float]] = {
 MOST_MOVING = 9
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A body with one to nine drawers, doors and trays, all closed at rest."""
     kind = str(rng.choice(list(KINDS), p=[common for _, _, common in KINDS.values()]))
     ranges, drawers, _ = KINDS[kind]
@@ -61,7 +61,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return furniture
 
 
-def _style(rng: np.random.Generator, kind: str, depth: float) -> Style:
+def _style(rng: Rng, kind: str, depth: float) -> Style:
     framed = rng.random() < 0.25  # wide boards around the fronts
     place = {"base": 0.85, "wall": 0.15}.get(kind, 0.5)
     return Style(
@@ -84,7 +84,7 @@ def _style(rng: np.random.Generator, kind: str, depth: float) -> Style:
     )
 
 
-def _divide(rng: np.random.Generator, cell: Cell, style: Style, level: int) -> tuple[list[tuple[Cell, int]], Solid]:
+def _divide(rng: Rng, cell: Cell, style: Style, level: int) -> tuple[list[tuple[Cell, int]], Solid]:
     """Cells, each with the seed of what it holds, and the boards between them. Equal cells often hold the same."""
     width, height = cell.sides
     large = max(width / 0.55, height / 0.75)
@@ -120,9 +120,7 @@ def _divide(rng: np.random.Generator, cell: Cell, style: Style, level: int) -> t
     return cells, boards
 
 
-def _fill(
-    rng: np.random.Generator, cell: Cell, style: Style, drawers: float, must_move: bool
-) -> tuple[Solid, list[Moving]]:
+def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -> tuple[Solid, list[Moving]]:
     """What stands in a cell: chosen by its shape."""
     width, height = cell.sides
     low_and_wide = 0.08 < height < 0.45 and width > 0.18 and height < 1.2 * width
@@ -155,14 +153,7 @@ def _fill(
 
 
 def _carcass(
-    rng: np.random.Generator,
-    kind: str,
-    width: float,
-    depth: float,
-    height: float,
-    stand: float,
-    style: Style,
-    furniture: Assembly,
+    rng: Rng, kind: str, width: float, depth: float, height: float, stand: float, style: Style, furniture: Assembly
 ) -> Solid:
     """Outer boards, top and what it stands on."""
     x0, x1, y, board = style.face, depth / 2, width / 2, style.board
@@ -192,7 +183,7 @@ def _carcass(
     return solid + (_stand(rng, kind, x0, x1, y, stand, board, furniture) if stand > 0 else Solid())
 
 
-def _top(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
+def _top(rng: Rng, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
     if kind == "wall" or rng.random() < 0.25:
         return Solid()
     over = rng.uniform(0.0, 0.035)
@@ -209,14 +200,7 @@ def _top(rng: np.random.Generator, kind: str, x0: float, x1: float, y: float, to
 
 
 def _stand(
-    rng: np.random.Generator,
-    kind: str,
-    x0: float,
-    x1: float,
-    y: float,
-    height: float,
-    board: float,
-    furniture: Assembly,
+    rng: Rng, kind: str, x0: float, x1: float, y: float, height: float, board: float, furniture: Assembly
 ) -> Solid:
     """Plinth or legs below the body."""
     if kind == "base" or (height < 0.1 and rng.random() < 0.6):

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
     about,
@@ -30,12 +30,12 @@ from artsim.model.kinematics import Array
 GAP = 0.001
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A trolley, a briefcase or a bag."""
     return (_trolley, _briefcase, _bag)[int(rng.choice(3, p=[0.5, 0.3, 0.2]))](rng)
 
 
-def _shells(rng: np.random.Generator, x: float, y: float, low: float, high: float, seam: float) -> tuple[Solid, Solid]:
+def _shells(rng: Rng, x: float, y: float, low: float, high: float, seam: float) -> tuple[Solid, Solid]:
     """Front and back half with round corners, open towards one another at X = ``seam``; ribs stand out of both."""
     radius = rng.uniform(0.05, 0.5) * min(y, 0.15)
     front, back = seam - GAP / 2 + x, x - seam - GAP / 2
@@ -61,7 +61,7 @@ def _shells(rng: np.random.Generator, x: float, y: float, low: float, high: floa
     return halves[0], halves[1]
 
 
-def _trolley(rng: np.random.Generator) -> Assembly:
+def _trolley(rng: Rng) -> Assembly:
     y, x = rng.uniform(0.16, 0.26), rng.uniform(0.1, 0.16)
     lift = rng.uniform(0.045, 0.06)
     high = lift + 2 * y * rng.uniform(1.35, 1.65)
@@ -130,7 +130,7 @@ def _housing(x: float, half: float, low: float, high: float) -> Solid:
     return solid + union(box((x - 0.002, x + 0.0225), (s * y - 0.002, s * y + 0.002), (z0, z1)) for s in (-1, 1))
 
 
-def _telescope(rng: np.random.Generator, case: Assembly, x: float, half: float, low: float, high: float) -> None:
+def _telescope(rng: Rng, case: Assembly, x: float, half: float, low: float, high: float) -> None:
     """Two rods with a grip, pulled out upward; with two stages, the inner rods follow the outer tubes."""
     z0, z1 = low + 0.035, high - 0.012
     travel = rng.uniform(0.6, 0.8) * (z1 - z0)
@@ -175,7 +175,7 @@ def _caster(case: Assembly, number: int, x: float, y: float, top: float, parent:
     case.add(f"wheel_{number}", wheel, continuous(f"caster_{number}", (0, 1, 0), tuple(center)), density=900.0)
 
 
-def _briefcase(rng: np.random.Generator) -> Assembly:
+def _briefcase(rng: Rng) -> Assembly:
     y, z = rng.uniform(0.16, 0.34), rng.uniform(0.24, 0.6)
     x = rng.uniform(0.035, 0.14)
     seam = float(rng.uniform(-0.55, 0.35)) * x
@@ -231,7 +231,7 @@ def _bail(
     return handle, lugs
 
 
-def _bag(rng: np.random.Generator) -> Assembly:
+def _bag(rng: Rng) -> Assembly:
     """Bag with a closed body and one or two bails."""
     y = rng.uniform(0.13, 0.26)
     z, x = y * rng.uniform(0.8, 1.8), y * rng.uniform(0.22, 0.7)

@@ -12,14 +12,14 @@ import numpy as np
 
 from artsim.common.elementary import arctan, sin, tan
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A switch on a wall at x = 0; its front faces -X. A switch is off, its upper half out, or
     in the middle at rest."""
     kind = str(rng.choice(["rocker", "toggle", "dimmer"], p=[0.65, 0.25, 0.1]))
@@ -100,7 +100,7 @@ def _bar(first: Array, second: Array, axis: int, depth: float) -> Solid:
     return box((-0.9 * depth, *low), (0, *high))
 
 
-def _plate(rng: np.random.Generator, width: float, height: float, depth: float, screws: bool) -> Solid:
+def _plate(rng: Rng, width: float, height: float, depth: float, screws: bool) -> Solid:
     """The back, a rounded rim, and screws by chance."""
     half = 0.5 * np.array([width, height])
     rim = 0.0065
@@ -117,7 +117,7 @@ def _plate(rng: np.random.Generator, width: float, height: float, depth: float, 
     return solid
 
 
-def _rocker(rng: np.random.Generator, cell: Array, depth: float, tilt: float) -> Solid:
+def _rocker(rng: Rng, cell: Array, depth: float, tilt: float) -> Solid:
     """A plate bent in its middle: at rest its upper half stands out, and tips in when pressed."""
     low, high = cell
     x, center = -0.8 * depth, cell.mean(axis=0)
@@ -139,7 +139,7 @@ def _rocker(rng: np.random.Generator, cell: Array, depth: float, tilt: float) ->
     return solid.moved((0, *center)).turned((0, 1, 0), -tilt, (x, *center))
 
 
-def _toggle(rng: np.random.Generator, center: Array, depth: float) -> Solid:
+def _toggle(rng: Rng, center: Array, depth: float) -> Solid:
     """A bat on a round hub, straight out."""
     x = -depth - 0.006
     wide, r = rng.uniform(0.0035, 0.006), 0.0045
@@ -151,7 +151,7 @@ def _toggle(rng: np.random.Generator, center: Array, depth: float) -> Solid:
     return (hub + hull_of(root, tip)).moved((0, *center))
 
 
-def _dimmer(rng: np.random.Generator, center: Array, depth: float, radius: float) -> Solid:
+def _dimmer(rng: Rng, center: Array, depth: float, radius: float) -> Solid:
     """A round knob with a pointer."""
     r, tall = min(radius, rng.uniform(0.012, 0.02)), rng.uniform(0.009, 0.016)
     x = -depth - GAP

@@ -16,7 +16,7 @@ from artsim.common.elementary import power as raised
 from artsim.families.fronts import Style
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, Table, drop_leaves, four_legs, keyboard_tray, table_top, wheels
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
 
 UP = (0.0, 0.0, 1.0)
@@ -24,7 +24,7 @@ LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 """Depth, width and height of unusual tables over their diagonal."""
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A table, all drawers and doors closed at rest."""
     table = Table()
     kinds = (_apron, _pedestals, _case, _column)
@@ -37,7 +37,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return assembly
 
 
-def _style(rng: np.random.Generator, deep: bool = False) -> Style:
+def _style(rng: Rng, deep: bool = False) -> Style:
     """Of all fronts; the drawers of a deep table come out nearly wholly."""
     return Style(
         face=0.0,
@@ -59,7 +59,7 @@ def _style(rng: np.random.Generator, deep: bool = False) -> Style:
     )
 
 
-def _apron(rng: np.random.Generator, table: Table) -> None:
+def _apron(rng: Rng, table: Table) -> None:
     """Legs with a low case between them under the top; leaves at the ends, a shelf below, wheels."""
     height = rng.uniform(0.32, 0.95)
     width, depth = height * rng.uniform(0.65, 3.4), height * rng.uniform(0.4, 1.7)
@@ -115,7 +115,7 @@ def _apron(rng: np.random.Generator, table: Table) -> None:
         wheels(table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size)
 
 
-def _pedestals(rng: np.random.Generator, table: Table) -> None:
+def _pedestals(rng: Rng, table: Table) -> None:
     """A desk: cases at one or both ends, legs or a panel elsewhere, a flat case or a tray between."""
     height = rng.uniform(0.62, 0.85)
     width, depth = height * rng.uniform(1.3, 3.4), height * rng.uniform(0.5, 1.4)
@@ -192,7 +192,7 @@ def _pedestals(rng: np.random.Generator, table: Table) -> None:
         table.body += box((back, x), y, (height + rise - 0.02, height + rise))
 
 
-def _case(rng: np.random.Generator, table: Table) -> None:
+def _case(rng: Rng, table: Table) -> None:
     """A low table or a console: one case from side to side on legs, a plinth or wheels."""
     height = rng.uniform(0.3, 0.95)
     width, depth = height * rng.uniform(0.6, 3.2), height * rng.uniform(0.4, 1.6)
@@ -234,7 +234,7 @@ def _case(rng: np.random.Generator, table: Table) -> None:
         wheels(table, [(sx * (x - 0.06), sy * (y - 0.06)) for sx in (-1, 1) for sy in (-1, 1)], low, 0.05)
 
 
-def _column(rng: np.random.Generator, table: Table) -> None:
+def _column(rng: Rng, table: Table) -> None:
     """A top on a column that turns, tips or rises, on feet, a disc or wheels."""
     height, wide = rng.uniform(0.45, 1.1), rng.uniform(0.22, 0.6)
     thick = rng.uniform(0.015, 0.05)

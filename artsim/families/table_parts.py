@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import continuous, prismatic, revolute
+from artsim.making.assembly import Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 from artsim.model.kinematics import Array
 
@@ -24,7 +24,7 @@ class Table:
 
     def add_case(
         self,
-        rng: np.random.Generator,
+        rng: Rng,
         low: Array,
         high: Array,
         style: Style,
@@ -72,7 +72,7 @@ class Table:
         self.moving += [_mirrored(part) for part in parts] if back else parts
 
 
-def _divided(rng: np.random.Generator, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
+def _divided(rng: Rng, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
     """Cells side by side (axis 0) or one above the other (axis 1), and the boards between them."""
     room = cell.sides[axis]
     count = max(1, min(count, int(room / (0.16 if axis == 0 else 0.085))))
@@ -93,9 +93,7 @@ def _divided(rng: np.random.Generator, cell: Cell, axis: int, count: int, style:
     return cells, boards
 
 
-def _fill(
-    rng: np.random.Generator, cell: Cell, style: Style, doors: float, must_move: bool
-) -> tuple[Solid, list[Moving]]:
+def _fill(rng: Rng, cell: Cell, style: Style, doors: float, must_move: bool) -> tuple[Solid, list[Moving]]:
     """What a cell holds."""
     width, height = cell.sides
     if not must_move and rng.random() < 0.12:
@@ -122,7 +120,7 @@ def _mirrored(part: Moving) -> Moving:
     return label, solid.mirrored(0), replace(joint, axis=axis, origin=tuple(origin.tolist()))
 
 
-def table_top(rng: np.random.Generator, depth: float, width: float, low: float, high: float) -> Solid:
+def table_top(rng: Rng, depth: float, width: float, low: float, high: float) -> Solid:
     """A board with round corners or round edges, from height ``low`` to ``high``."""
     corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
     if rng.random() < 0.25:
@@ -130,7 +128,7 @@ def table_top(rng: np.random.Generator, depth: float, width: float, low: float, 
     return box(*corners, fillet=rng.choice([0.1, 0.3, 0.49]) * (high - low))
 
 
-def four_legs(rng: np.random.Generator, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
+def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
     """Four legs within a rectangle: square, tapered, round, turned or a loop at either end."""
     kind = str(rng.choice(["square", "tapered", "round", "turned", "loops"], p=[0.3, 0.22, 0.22, 0.13, 0.13]))
     half, taper = size / 2, rng.uniform(0.4, 0.9)
@@ -168,7 +166,7 @@ def four_legs(rng: np.random.Generator, x: float, y: float, low: float, high: fl
     return solid
 
 
-def drop_leaves(rng: np.random.Generator, table: Table, depth: float, width: float, top: float, height: float) -> None:
+def drop_leaves(rng: Rng, table: Table, depth: float, width: float, top: float, height: float) -> None:
     """Leaves at one or both ends that hang down when they turn."""
     long = rng.uniform(0.15, 0.4) * width
     long = min(long, top - 0.05)
@@ -179,9 +177,7 @@ def drop_leaves(rng: np.random.Generator, table: Table, depth: float, width: flo
         table.moving.append(("leaf", leaf, joint))
 
 
-def keyboard_tray(
-    rng: np.random.Generator, table: Table, front: float, near: float, far: float, top: float, deep: float
-) -> None:
+def keyboard_tray(rng: Rng, table: Table, front: float, near: float, far: float, top: float, deep: float) -> None:
     """A board that slides out below the top between two rails."""
     room = far - near
     wide = room * rng.uniform(0.6, 0.96)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.details import dial, push_button
-from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import (
     Solid,
     box,
@@ -26,7 +26,7 @@ from artsim.model.kinematics import Array
 GAP = 0.001
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A toaster with its levers up at rest. The slots run along X, the levers are at -X."""
     kind = str(rng.choice(["two", "four", "long"], p=[0.6, 0.2, 0.2]))
     count = {"two": 2, "four": 4, "long": int(rng.integers(1, 3))}[kind]
@@ -82,9 +82,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return toaster
 
 
-def _block(
-    rng: np.random.Generator, shape: str, low: Array, high: Array, count: int, pitch: float, wide: float
-) -> Solid:
+def _block(rng: Rng, shape: str, low: Array, high: Array, count: int, pitch: float, wide: float) -> Solid:
     """Convex body, still without slots; its top is level where they will be."""
     side = high[1] - 0.5 * (count - 1) * pitch - 0.5 * wide
     if shape == "arch":  # round edges along the slots
@@ -128,7 +126,7 @@ def _slotted(block: Solid, slots: Array, wide: float, span: tuple[float, float],
     return solid
 
 
-def _lever_style(rng: np.random.Generator) -> Solid:
+def _lever_style(rng: Rng) -> Solid:
     """Lever before the plane x = 0, centred on the origin, with a tongue in its guide."""
     solid = box((-0.014, -GAP), 0.0035, 0.006)
     half = rng.uniform(0.012, 0.026)
@@ -141,9 +139,7 @@ def _lever_style(rng: np.random.Generator) -> Solid:
     return solid + cylinder((-0.006, 0, 0), (-0.026, 0, 0), 0.5 * half + 0.003, 0.6 * half + 0.004, 18)
 
 
-def _controls(
-    rng: np.random.Generator, toaster: Assembly, places: list[float], half: float, top: float, foot: float
-) -> None:
+def _controls(rng: Rng, toaster: Assembly, places: list[float], half: float, top: float, foot: float) -> None:
     """A dial below each lever or beside it, and buttons in a row."""
     room = top - foot - 0.004
     buttons = 0

@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
-from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, tray, tube, union
 from artsim.model.kinematics import Array
 
@@ -40,7 +40,7 @@ class _Cover:
         return 0.5 * self.thick + GAP + self.lid
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A toilet; one sits down facing -X. Seat and lid lie on the bowl at rest."""
     length, width = rng.uniform(0.38, 0.56), rng.uniform(0.33, 0.42)
     height = rng.uniform(0.34, 0.48)
@@ -85,9 +85,7 @@ def _rim(outer: tuple[Array, Array], inner: tuple[Array, Array], first: int = 0,
     )
 
 
-def _bowl(
-    rng: np.random.Generator, length: float, width: float, height: float, power: float, back: float, hung: bool
-) -> Solid:
+def _bowl(rng: Rng, length: float, width: float, height: float, power: float, back: float, hung: bool) -> Solid:
     """Hollow bowl on a foot, with a deck behind it that carries the hinges."""
     wall = rng.uniform(0.03, 0.05)
     low = height * rng.uniform(0.35, 0.5)
@@ -142,7 +140,7 @@ def _bowl(
     return solid
 
 
-def _low_cistern(rng: np.random.Generator, moving: list[Moving], back: float, width: float, height: float) -> Solid:
+def _low_cistern(rng: Rng, moving: list[Moving], back: float, width: float, height: float) -> Solid:
     """On the deck, right behind the bowl."""
     deep, tall = rng.uniform(0.14, 0.22), rng.uniform(0.28, 0.42)
     half = 0.5 * width * rng.uniform(0.85, 1.35)
@@ -194,7 +192,7 @@ def _low_cistern(rng: np.random.Generator, moving: list[Moving], back: float, wi
     return solid
 
 
-def _lever(rng: np.random.Generator, foot: Array, out: Array, along: Array) -> Moving:
+def _lever(rng: Rng, foot: Array, out: Array, along: Array) -> Moving:
     """A handle on a pivot in a wall; pressed down it turns."""
     long, thick = rng.uniform(0.05, 0.1), rng.uniform(0.004, 0.008)
     reach = 0.02
@@ -207,7 +205,7 @@ def _lever(rng: np.random.Generator, foot: Array, out: Array, along: Array) -> M
 
 
 def _button_lid(
-    rng: np.random.Generator, low: Point, high: Point, middle: tuple[float, float], count: int
+    rng: Rng, low: Point, high: Point, middle: tuple[float, float], count: int
 ) -> tuple[Solid, list[Solid]]:
     """Lid with a square well and the buttons in it."""
     half = rng.uniform(0.02, 0.035)
@@ -235,7 +233,7 @@ def _button_lid(
     return well, buttons
 
 
-def _high_cistern(rng: np.random.Generator, moving: list[Moving], back: float, height: float) -> Solid:
+def _high_cistern(rng: Rng, moving: list[Moving], back: float, height: float) -> Solid:
     """Up on a pipe, with a chain to pull."""
     up = rng.uniform(0.6, 1.3)
     half, deep, tall = rng.uniform(0.17, 0.26), rng.uniform(0.15, 0.2), rng.uniform(0.2, 0.32)
@@ -262,9 +260,7 @@ def _high_cistern(rng: np.random.Generator, moving: list[Moving], back: float, h
     return solid
 
 
-def _wall(
-    rng: np.random.Generator, moving: list[Moving], back: float, width: float, height: float, hung: bool
-) -> Solid:
+def _wall(rng: Rng, moving: list[Moving], back: float, width: float, height: float, hung: bool) -> Solid:
     """A panel behind the bowl with a plate for one or two buttons, or only a deck with a lever."""
     half, top = 0.5 * width + rng.uniform(0.03, 0.2), height + rng.uniform(0.45, 0.75)
     solid = box(
@@ -287,13 +283,7 @@ def _wall(
 
 
 def _seat_and_lid(
-    rng: np.random.Generator,
-    length: float,
-    width: float,
-    height: float,
-    power: float,
-    cover: _Cover,
-    limit: float,
+    rng: Rng, length: float, width: float, height: float, power: float, cover: _Cover, limit: float
 ) -> tuple[Solid, list[Moving]]:
     """What of seat and lid belongs to the body, and what turns about one axis behind the bowl.
 
@@ -339,7 +329,7 @@ def _seat_and_lid(
     return Solid(), covers
 
 
-def _ring(rng: np.random.Generator, long: float, wide: float, power: float, low: float, top: float) -> Solid:
+def _ring(rng: Rng, long: float, wide: float, power: float, low: float, top: float) -> Solid:
     """Seat: a ring, closed or open at the front."""
     broad = rng.uniform(0.16, 0.24)
     inner_long, inner_wide = long - broad * rng.uniform(0.8, 1.0), wide - broad * rng.uniform(0.7, 0.95)
@@ -349,7 +339,7 @@ def _ring(rng: np.random.Generator, long: float, wide: float, power: float, low:
     return _rim(outer, inner, first, first + _AROUND - 4) if rng.random() < 0.2 else _rim(outer, inner)
 
 
-def _lid(rng: np.random.Generator, long: float, wide: float, power: float, low: float, thick: float) -> Solid:
+def _lid(rng: Rng, long: float, wide: float, power: float, low: float, thick: float) -> Solid:
     """A plate whose upper edge is bevelled."""
     scale = rng.uniform(0.96, 1.02)
     long, wide = scale * long, scale * wide

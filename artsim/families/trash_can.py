@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.families.details import rounded_tray
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 
 GAP = 0.0015
@@ -32,7 +32,7 @@ class Bin:
     steps: int
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A bin, closed at rest."""
     kind = str(rng.choice(["pedal", "swing", "wheelie", "halves"], p=[0.45, 0.2, 0.2, 0.15]))
     if kind == "wheelie":
@@ -49,7 +49,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return can
 
 
-def _size(rng: np.random.Generator) -> Bin:
+def _size(rng: Rng) -> Bin:
     x, y = rng.uniform(0.09, 0.24), rng.uniform(0.09, 0.28)
     height = min(with_tails(rng, (1.3, 4.2), (0.9, 4.5), 0.2) * max(x, y), 0.8)
     if rng.random() < 0.15:  # slim and tall
@@ -68,7 +68,7 @@ def _size(rng: np.random.Generator) -> Bin:
     )
 
 
-def _body(rng: np.random.Generator, size: Bin) -> Solid:
+def _body(rng: Rng, size: Bin) -> Solid:
     x, y, wall = size.x, size.y, 0.003
     body = rounded_tray((-x, -y, size.foot), (x, y, size.height), wall, size.radius, [(0.0, size.taper), (1.0, 0.0)],
                         steps=size.steps)  # fmt: skip
@@ -81,7 +81,7 @@ def _body(rng: np.random.Generator, size: Bin) -> Solid:
     return body
 
 
-def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -> None:
+def _pedal_bin(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
     """A lid hinged at the back, mostly with a pedal."""
     x, seam = size.x, size.height + GAP
     hinge = (x + 0.013, 0.0, seam)
@@ -122,7 +122,7 @@ def _pedal_bin(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) 
     can.add("pedal", pedal, turn, density=800.0)
 
 
-def _swinging_flap(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -> None:
+def _swinging_flap(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
     """A hood that narrows to an opening, in which a flap turns about its middle."""
     rise = rng.uniform(0.3, 1.0) * size.x
     shrink = rng.uniform(0.1, 0.3) * size.x
@@ -139,7 +139,7 @@ def _swinging_flap(rng: np.random.Generator, can: Assembly, body: Solid, size: B
     can.add("flap", flap, revolute("body", (0, 1, 0), (0, 0, top - 0.009), -limit, limit), label="lid", density=500.0)
 
 
-def _two_lids(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -> None:
+def _two_lids(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
     """Two leaves that turn at the left and the right and meet in the middle."""
     seam, thick = size.height + GAP, rng.uniform(0.006, 0.012)
     can.add("body", body, density=500.0)
@@ -155,7 +155,7 @@ def _two_lids(rng: np.random.Generator, can: Assembly, body: Solid, size: Bin) -
         can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit), density=500.0)
 
 
-def _wheelie(rng: np.random.Generator) -> Assembly:
+def _wheelie(rng: Rng) -> Assembly:
     """Household bin: tapered body, lid hinged at the grip, two wheels below the back."""
     x, y = rng.uniform(0.22, 0.34), rng.uniform(0.2, 0.32)
     height = rng.uniform(0.75, 1.05)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.families.keys import key_outline, sleeve
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
     Solid,
     box,
@@ -50,7 +50,7 @@ class _Stick:
     plug: _Plug
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A USB stick that lies flat, its connector covered or drawn in at rest."""
     scale = rng.uniform(0.75, 1.9)  # novelty sticks are larger than their connectors ask for
     plug = _PLUGS[str(rng.choice(list(_PLUGS), p=[0.7, 0.2, 0.1]))]
@@ -91,7 +91,7 @@ def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
     return solid + box((first, last), plug.half - 0.5 * wall, (-0.05 * plug.thick, 0.5 * plug.thick))
 
 
-def _outline(kind: str, x0: float, x1: float, half: float, rng: np.random.Generator) -> list[Array]:
+def _outline(kind: str, x0: float, x1: float, half: float, rng: Rng) -> list[Array]:
     """Convex outlines in x and y whose union is the body's, seen from above."""
     radius = half * rng.uniform(0.1, 0.95)
     if kind == "oval":
@@ -114,7 +114,7 @@ def _outline(kind: str, x0: float, x1: float, half: float, rng: np.random.Genera
     return [rounded_rectangle((x0, -half), (x1, half), min(radius, 0.4 * (x1 - x0)), 3)]
 
 
-def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: bool = False) -> Solid:
+def _body(rng: Rng, stick: _Stick, x0: float, x1: float, plain: bool = False) -> Solid:
     """The body between two x, with bevels, ribs or studs unless it is to be plain."""
     kinds = ["rectangle", "tapered", "waisted", "oval", "round end", "drum"]
     kind = "rectangle" if plain else str(rng.choice(kinds, p=[0.3, 0.14, 0.16, 0.12, 0.16, 0.12]))
@@ -150,7 +150,7 @@ def _body(rng: np.random.Generator, stick: _Stick, x0: float, x1: float, plain: 
     return solid
 
 
-def _capped(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _capped(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A cap that pulls off to -X."""
     body = _body(rng, stick, 0.0, stick.length) + _plug(stick.plug, 0.0)
     usb.add("body", body + _eyelet(rng, stick, stick.length))
@@ -159,7 +159,7 @@ def _capped(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     _switch(rng, usb, stick)
 
 
-def _two_caps(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _two_caps(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A connector and a cap at either end."""
     body = _body(rng, stick, 0.0, stick.length)
     usb.add("body", body + _plug(stick.plug, 0.0) + _plug(stick.plug, stick.length, 1.0))
@@ -167,7 +167,7 @@ def _two_caps(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     _cap(rng, usb, stick, "cap_1", stick.length, 1.0)
 
 
-def _cap(rng: np.random.Generator, usb: Assembly, stick: _Stick, name: str, x: float, sign: float) -> None:
+def _cap(rng: Rng, usb: Assembly, stick: _Stick, name: str, x: float, sign: float) -> None:
     """A cap over the connector that stands out from the plane at x."""
     plug = stick.plug
     half = max(stick.half * rng.uniform(0.85, 1.15), 1.2 * plug.half + GAP)
@@ -185,7 +185,7 @@ def _cap(rng: np.random.Generator, usb: Assembly, stick: _Stick, name: str, x: f
     usb.add(name, solid, prismatic("body", (sign, 0, 0), 0.0, pull, (x, 0, 0)), density=1100.0)
 
 
-def _swivel(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _swivel(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A bent sheet about the stick that turns about an upright pivot."""
     half = stick.half
     back = stick.length
@@ -216,7 +216,7 @@ def _swivel(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     usb.add("cover", cover, turn, density=4000.0)
 
 
-def _sleeved(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _sleeved(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A sleeve over body and connector that slides back."""
     half, thick, plug = stick.half, stick.thick, stick.plug
     length = max(stick.length, 1.5 * plug.reach)
@@ -239,7 +239,7 @@ def _sleeved(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     usb.add("sleeve", shell, prismatic("body", (1, 0, 0), 0.0, travel, (0, 0, 0)), density=1500.0)
 
 
-def _retracting(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _retracting(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A connector on a slider with a knob, inside a hollow body: it comes out to -X."""
     plug = stick.plug
     wall = rng.uniform(0.0012, 0.0022)
@@ -277,7 +277,7 @@ def _retracting(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     usb.add("connector", slider, prismatic("body", OUT, 0.0, plug.reach, (plug.reach, 0, 0)), density=2000.0)
 
 
-def _eyelet(rng: np.random.Generator, stick: _Stick, x: float) -> Solid:
+def _eyelet(rng: Rng, stick: _Stick, x: float) -> Solid:
     """A ring at the back for a cord, on some."""
     if rng.random() < 0.6:
         return Solid()
@@ -286,7 +286,7 @@ def _eyelet(rng: np.random.Generator, stick: _Stick, x: float) -> Solid:
     return ring((x + 0.75 * outer, 0, 0), (0, 0, 1), 0.55 * outer, outer, thick, 14)
 
 
-def _bail(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _bail(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A hinged wire loop at the back, on some."""
     if rng.random() < 0.75:
         return
@@ -298,7 +298,7 @@ def _bail(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
     usb.add("loop", tube(np.array(path), wire, 8), revolute("body", (0, 1, 0), (x, 0, 0), -0.2, 0.2), density=7000.0)
 
 
-def _switch(rng: np.random.Generator, usb: Assembly, stick: _Stick) -> None:
+def _switch(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     """A small slide switch on top, on some."""
     if rng.random() < 0.8:
         return

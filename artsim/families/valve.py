@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, continuous, revolute, screw
+from artsim.making.assembly import Assembly, Rng, continuous, revolute, screw
 from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
@@ -20,7 +20,7 @@ FLANGE = 1.9
 """Radius of the widest flange over that of the pipe."""
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """Valves on a pipe along Y, with their stems up or towards the front; all are shut at rest."""
     pipe = rng.uniform(0.02, 0.05)  # outer radius
     count = int(rng.choice([1, 2, 3], p=[0.7, 0.2, 0.1]))
@@ -53,7 +53,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return valve
 
 
-def _ends(rng: np.random.Generator, half: float, pipe: float) -> Solid:
+def _ends(rng: Rng, half: float, pipe: float) -> Solid:
     """Flanges with bolts, or threaded collars with six sides, at both ends of the pipe."""
     solid = Solid()
     flanged = rng.random() < 0.65
@@ -73,7 +73,7 @@ def _ends(rng: np.random.Generator, half: float, pipe: float) -> Solid:
     return solid
 
 
-def _gate_valve(rng: np.random.Generator, pipe: float, room: float) -> tuple[Solid, Solid, Array, float]:
+def _gate_valve(rng: Rng, pipe: float, room: float) -> tuple[Solid, Solid, Array, float]:
     """Body and bonnet; the handwheel with its stem; where they join; how far the wheel rises."""
     belly = pipe * rng.uniform(1.15, 1.45)
     solid = ellipsoid((0, 0, 0), (belly, 1.25 * belly, belly * rng.uniform(1.0, 1.3)), 20)
@@ -108,7 +108,7 @@ def _gate_valve(rng: np.random.Generator, pipe: float, room: float) -> tuple[Sol
     return solid, wheel, np.array([0.0, 0.0, hub]), travel
 
 
-def _wheel(rng: np.random.Generator, hub: float, radius: float, stem: float, pipe: float) -> Solid:
+def _wheel(rng: Rng, hub: float, radius: float, stem: float, pipe: float) -> Solid:
     """Handwheel: a rim, spokes (dished by chance) and a hub with a nut."""
     rim = radius * rng.uniform(0.07, 0.12)
     spokes = int(rng.integers(3, 7))
@@ -132,7 +132,7 @@ def _wheel(rng: np.random.Generator, hub: float, radius: float, stem: float, pip
     return solid
 
 
-def _ball_valve(rng: np.random.Generator, pipe: float, room: float) -> tuple[Solid, Solid, Array, float]:
+def _ball_valve(rng: Rng, pipe: float, room: float) -> tuple[Solid, Solid, Array, float]:
     """Body and neck; the lever on its nut; where they join."""
     belly = pipe * rng.uniform(1.25, 1.5)
     solid = ellipsoid((0, 0, 0), (belly, 1.2 * belly, belly), 18)

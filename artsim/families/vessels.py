@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
+from artsim.making.assembly import Rng
 from artsim.making.solids import Solid, about, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -130,7 +131,7 @@ def dome(radius: float, low: float, rise: float, sections: int = 20) -> Solid:
     return hull_of(*discs)
 
 
-def pump_head(rng: np.random.Generator, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
+def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
     """Head of a pump with a nozzle towards -X, above its stem.
 
     Parameters

@@ -7,13 +7,13 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.families.details import rounded_tray
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import box, cylinder, hull_of, tube
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def wagon(rng: np.random.Generator) -> Assembly:
+def wagon(rng: Rng) -> Assembly:
     """A tray on four wheels; the front axle steers with the drawbar."""
     wheels = Wheels(rng, rng.uniform(0.07, 0.15), rng.uniform(0.03, 0.06))
     length, half = rng.uniform(0.7, 1.1), rng.uniform(0.2, 0.32)
@@ -81,7 +81,7 @@ def wagon(rng: np.random.Generator) -> Assembly:
     return cart
 
 
-def hand_cart(rng: np.random.Generator) -> Assembly:
+def hand_cart(rng: Rng) -> Assembly:
     """A box or a bed between two large wheels, with shafts to the front, and by chance a tailgate that folds down."""
     wheels = Wheels(rng, rng.uniform(0.2, 0.45), rng.uniform(0.03, 0.07))
     wheels.style = str(rng.choice(["spokes", "spokes", "rim"]))

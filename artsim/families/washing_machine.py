@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull, ring, tray, union, vessel
 from artsim.model.kinematics import Array
 
@@ -31,7 +31,7 @@ class Shape:
     high: float
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A washing machine, closed at rest."""
     low = rng.uniform(0.012, 0.03)
     front_loader = rng.random() < 0.7
@@ -54,7 +54,7 @@ def _feet(shape: Shape) -> Solid:
 # --- front loaders ---------------------------------------------------------------------------------------------------
 
 
-def _front_loader(rng: np.random.Generator, s: Shape) -> Assembly:
+def _front_loader(rng: Rng, s: Shape) -> Assembly:
     left = bool(rng.random() < 0.75)
     sign = 1.0 if left else -1.0
     strip = s.high - rng.uniform(0.1, 0.15)  # lower edge of the strip of controls
@@ -134,7 +134,7 @@ def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: flo
     return solid
 
 
-def _porthole(rng: np.random.Generator, z: float, hole: float, outer: float, thick: float, bowl: float) -> Solid:
+def _porthole(rng: Rng, z: float, hole: float, outer: float, thick: float, bowl: float) -> Solid:
     """Door with its hinge at +Y; the glass reaches into the hole."""
     x0, x1 = -GAP - thick, -GAP
     glass = hole * rng.uniform(0.72, 0.9)
@@ -163,7 +163,7 @@ def _porthole(rng: np.random.Generator, z: float, hole: float, outer: float, thi
 # --- top loaders -----------------------------------------------------------------------------------------------------
 
 
-def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
+def _top_loader(rng: Rng, s: Shape) -> Assembly:
     console = rng.uniform(0.09, 0.16)  # depth of the console at the back
     rise = rng.uniform(0.08, 0.18)
     back = s.depth - console
@@ -217,7 +217,7 @@ def _top_loader(rng: np.random.Generator, s: Shape) -> Assembly:
     return machine
 
 
-def _agitator(rng: np.random.Generator, center: Array, radius: float, s: Shape) -> Solid:
+def _agitator(rng: Rng, center: Array, radius: float, s: Shape) -> Solid:
     """Drum with a column and its vanes, or with a low impeller."""
     low, high, r = s.low + 0.05, s.high - 0.08, radius - 0.01
     solid = vessel([(r, low), (r, high)], 0.006, (*center, 0.0), 16)
@@ -230,9 +230,7 @@ def _agitator(rng: np.random.Generator, center: Array, radius: float, s: Shape) 
     return solid
 
 
-def _controls(
-    rng: np.random.Generator, machine: Assembly, free: tuple[float, float], x: float, low: float, high: float
-) -> None:
+def _controls(rng: Rng, machine: Assembly, free: tuple[float, float], x: float, low: float, high: float) -> None:
     """A dial and a row of buttons on a strip that faces -X."""
     z, room = 0.5 * (low + high), high - low
     places = np.linspace(free[0], free[1], 9)[1:-1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, continuous
+from artsim.making.assembly import Assembly, Rng, continuous
 from artsim.making.solids import Solid, Vector, box, cylinder, hull_of, ring, tube
 
 GAP = 0.003
@@ -18,7 +18,7 @@ ROLL = np.array([0.0, -1.0, 0.0])
 class Wheels:
     """The wheels of one cart: all of one form, numbered as they come."""
 
-    def __init__(self, rng: np.random.Generator, radius: float, wide: float):
+    def __init__(self, rng: Rng, radius: float, wide: float):
         self.rng, self.radius, self.wide = rng, radius, wide
         self.style = str(rng.choice(["disc", "rim", "spokes"]))
         self.spokes = int(rng.integers(3, 7))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits
-from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame
 from artsim.model.kinematics import Array
 
@@ -24,7 +24,7 @@ HINGES = {
 """Of each hinge: the axis of the front across which it lies, its end there, and its direction."""
 
 
-def build(rng: np.random.Generator) -> Assembly:
+def build(rng: Rng) -> Assembly:
     """A window, mostly closed at rest."""
     kind = str(rng.choice(["hinged", "sliding", "hung"], p=[0.6, 0.22, 0.18]))
     count = int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2]))
@@ -51,7 +51,7 @@ def build(rng: np.random.Generator) -> Assembly:
     return window
 
 
-def _frame(rng: np.random.Generator, width: float, height: float, depth: float, bar: float) -> Solid:
+def _frame(rng: Rng, width: float, height: float, depth: float, bar: float) -> Solid:
     """Frame around an opening of ``width`` x ``height`` above Z = 0, with a sill, a casing or a piece of wall."""
     x0, x1, y = -depth / 2, depth / 2, width / 2
     solid = frame((x0, -y - bar, -bar), (x1, y + bar, height + bar), [bar] * 4)
@@ -81,7 +81,7 @@ def _sash(low: Array, high: Array, rail: float, glazing: tuple[int, int]) -> Sol
 
 
 def _hinged(
-    rng: np.random.Generator, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
+    rng: Rng, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
     rail: float, count: int, glazing: tuple[int, int],
 ) -> None:  # fmt: skip
     """Lights side by side between mullions; each hinged or fixed. Two may meet without a mullion between them."""
@@ -163,7 +163,7 @@ def _leaf(
 
 
 def _sliding(
-    rng: np.random.Generator, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
+    rng: Rng, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
     rail: float, count: int, glazing: tuple[int, int],
 ) -> None:  # fmt: skip
     """Sashes on as many tracks; each may slide over all others."""
@@ -187,7 +187,7 @@ def _sliding(
 
 
 def _hung(
-    rng: np.random.Generator, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
+    rng: Rng, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
     rail: float, glazing: tuple[int, int],
 ) -> None:  # fmt: skip
     """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
@@ -216,8 +216,4 @@ def _hung(
         prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1]),
     )
     if both:
-        window.add(
-            "sash_1",
-            solids[1][0],
-            prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1]),
-        )
+        window.add("sash_1", solids[1][0], prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1]))

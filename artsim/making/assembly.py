@@ -13,6 +13,9 @@ from artsim.making.solids import Solid, Vector, rotation_about
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 
+Rng = np.random.Generator
+"""What families draw from: an explicit generator, never a global one."""
+
 
 @dataclass(frozen=True)
 class JointSpec:
