@@ -14,12 +14,10 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, about, box, cylinder, ellipsoid, hull_of, prism, ring, tube
+from artsim.making.solids import FRONT, UP, Solid, about, box, cylinder, ellipsoid, hull_of, prism, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
-UP = np.array([0.0, 0.0, 1.0])
-FRONT = np.array([-1.0, 0.0, 0.0])
 DENSITY = 900.0
 
 

@@ -17,9 +17,7 @@ from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, tray, tube, union
-
-UP = np.array([0.0, 0.0, 1.0])
+from artsim.making.solids import UP, Solid, box, cylinder, hull_of, tray, tube, union
 
 
 def build(rng: Rng) -> Assembly:

@@ -11,12 +11,10 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, tube
+from artsim.making.solids import SIDE, UP, Solid, box, cylinder, frame, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0025
-UP = np.array([0.0, 0.0, 1.0])
-SIDE = np.array([0.0, 1.0, 0.0])
 
 
 def build(rng: Rng) -> Assembly:

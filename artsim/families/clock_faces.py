@@ -7,10 +7,9 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
+from artsim.making.solids import FRONT, Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
 from artsim.model.kinematics import Array
 
-FRONT = np.array([-1.0, 0.0, 0.0])
 CLOCKWISE = np.array([1.0, 0.0, 0.0])
 """Axis of the hands: a turn about it takes the top to someone's right who looks at the face."""
 GAP = 0.001

@@ -14,6 +14,7 @@ from artsim.common.elementary import power
 from artsim.families.details import dial
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
+    FRONT,
     Solid,
     box,
     cylinder,
@@ -28,7 +29,6 @@ from artsim.making.solids import (
 )
 
 GAP = 0.0015
-OUT = (-1.0, 0.0, 0.0)
 
 
 def build(rng: Rng) -> Assembly:
@@ -47,7 +47,7 @@ def _drip_tray(rng: Rng, machine: Assembly, x0: float, depth: float, y: float, l
             (high - 0.004, high - 0.0005),
         )
     solid += box((x0 - 0.006, x0 + 0.002), y, (low, high), fillet=0.003)
-    machine.add("drip_tray", solid, prismatic("body", OUT, 0.0, 0.8 * depth, (x0, 0, low)), density=900.0)
+    machine.add("drip_tray", solid, prismatic("body", FRONT, 0.0, 0.8 * depth, (x0, 0, low)), density=900.0)
 
 
 def _base(x: float, y: float, height: float, radius: float, tray_y: float, front: float) -> Solid:
@@ -132,7 +132,7 @@ def _controls(rng: Rng, machine: Assembly, face: float, y: float, low: float, hi
         if rng.random() < 0.5:
             size = min(rng.uniform(0.012, 0.024), room, 0.2 * y)
             machine.add(
-                f"knob_{number}", dial(center, OUT, 0.018, size), continuous("body", OUT, center), density=900.0
+                f"knob_{number}", dial(center, FRONT, 0.018, size), continuous("body", FRONT, center), density=900.0
             )
         else:
             size = min(rng.uniform(0.008, 0.012), room)
@@ -172,7 +172,7 @@ def _drip(rng: Rng) -> Assembly:
     carafe = _carafe(rng, center, pot, base + 0.003 + GAP, head_low - GAP)
     machine = Assembly("body", body + carafe.moved((0, 0, -GAP - 0.0005)) if plain else body, 700.0)
     if not plain:
-        draw = prismatic("body", OUT, 0.0, rng.uniform(1.0, 2.4) * pot, (center, 0, base))
+        draw = prismatic("body", FRONT, 0.0, rng.uniform(1.0, 2.4) * pot, (center, 0, base))
         machine.add("carafe", carafe, draw, density=1500.0)
 
     seam, thick = height + GAP, rng.uniform(0.012, 0.06)

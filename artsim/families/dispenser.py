@@ -12,9 +12,9 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
-from artsim.families.vessels import GAP, UP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
+from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
+from artsim.making.solids import UP, Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -285,8 +285,7 @@ def _water_cooler(rng: Rng) -> Assembly:
     body = box((niche, depth), half, (shelf - 0.01, roof + 0.01))
     body += box(depth, half, (roof, height), fillet=rng.uniform(0.01, 0.05), axis=2)
     for s in (-1.0, 1.0):
-        y0, y1 = sorted((s * half, s * (half - 0.012)))
-        body += box((-depth + 0.01, depth), (y0, y1), (shelf - 0.01, roof + 0.01))
+        body += box((-depth + 0.01, depth), (s * half, s * (half - 0.012)), (shelf - 0.01, roof + 0.01))
     door = tall and rng.random() < 0.7
     inset = 0.03 if door else 0.0
     if shelf > 0.1:

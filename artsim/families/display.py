@@ -15,6 +15,7 @@ from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
+    FRONT,
     Solid,
     box,
     cylinder,
@@ -29,7 +30,6 @@ from artsim.making.solids import (
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
-OUT = (-1.0, 0.0, 0.0)
 
 
 def build(rng: Rng) -> Assembly:
@@ -347,8 +347,8 @@ def _tube(rng: Rng, display: Assembly) -> None:
         for k in range(int(rng.integers(1, 4))):
             size = min(0.3 * side, 0.2 * rise)
             center = face.at(0.0, (0.65 - 0.5 * k) * rise)
-            knob = dial(center, OUT, rng.uniform(0.6, 1.2) * size, size, 18)
-            display.add(f"knob_{k}", knob, continuous(name, OUT, tuple(center)), density=900.0)
+            knob = dial(center, FRONT, rng.uniform(0.6, 1.2) * size, size, 18)
+            display.add(f"knob_{k}", knob, continuous(name, FRONT, tuple(center)), density=900.0)
     else:
         keys = _keys(
             rng,

@@ -13,11 +13,9 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, tube, union
+from artsim.making.solids import FRONT, UP, Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, tube, union
 
 GAP = 0.002
-UP = np.array([0.0, 0.0, 1.0])
-FRONT = np.array([-1.0, 0.0, 0.0])
 
 
 def build(rng: Rng) -> Assembly:

@@ -13,12 +13,10 @@ from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute, screw
-from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, hull_of, tube, union
+from artsim.making.solids import FRONT, UP, Solid, Vector, box, cylinder, ellipsoid, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
-UP = np.array([0.0, 0.0, 1.0])
-FRONT = np.array([-1.0, 0.0, 0.0])
 BRASS = 3000.0  # kg/m^3, as the pieces are solid and real ones are hollow
 
 

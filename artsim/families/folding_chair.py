@@ -14,11 +14,10 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull, union
+from artsim.making.solids import SIDE, Solid, Vector, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004
-SIDE = np.array([0.0, 1.0, 0.0])  # a positive turn lifts what is towards -X
 
 
 @dataclass(frozen=True)

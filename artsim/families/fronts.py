@@ -12,11 +12,10 @@ import numpy as np
 
 from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, Rng, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, tray
+from artsim.making.solids import FRONT, Solid, box, cylinder, hull_of, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
-OUTWARD = (-1.0, 0.0, 0.0)
 Moving = tuple[str, Solid, JointSpec]
 """Label, solid and joint of a moving part; its parent is "body"."""
 
@@ -98,7 +97,7 @@ def drawer(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     rise = height * rng.choice([0.0, 0.0, 0.25])
     half = 0.5 * min(style.handle_length, 0.75 * (high[1] - low[1]))
     solid += _handle(style, (low[0], middle[1], middle[2] + rise), 1, half, low, high)
-    return Solid(), [("drawer", solid, prismatic("body", OUTWARD, 0.0, style.travel * depth, tuple(middle)))]
+    return Solid(), [("drawer", solid, prismatic("body", FRONT, 0.0, style.travel * depth, tuple(middle)))]
 
 
 def door(rng: Rng, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
@@ -180,7 +179,7 @@ def _interior(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
         z = cell.low[1] + number * pitch + 0.006
         low = (style.back - 0.008 - share * room, cell.low[0] + 0.006, z)
         solid = tray(low, (style.back - 0.008, cell.high[0] - 0.006, z + min(wall, 0.2)), 0.01)
-        trays.append(("drawer", solid, prismatic("body", OUTWARD, 0.0, 0.95 * (1 - share) * room, low)))
+        trays.append(("drawer", solid, prismatic("body", FRONT, 0.0, 0.95 * (1 - share) * room, low)))
     return Solid(), trays
 
 
@@ -281,11 +280,11 @@ def _handle(
     radius = min(style.grip, 0.45 * margin)
     reach = style.reach + (style.recess if framed else 0.0)
     if style.handle == "bar":
-        return bar_handle(center - ahead, center + ahead, OUTWARD, reach, radius)
+        return bar_handle(center - ahead, center + ahead, FRONT, reach, radius)
     if style.handle == "bow":
-        return bow_handle(center - ahead, center + ahead, OUTWARD, reach, radius)
+        return bow_handle(center - ahead, center + ahead, FRONT, reach, radius)
     if style.handle == "knob":
-        return knob(center, OUTWARD, reach, min(2.4 * style.grip, 0.8 * margin))
+        return knob(center, FRONT, reach, min(2.4 * style.grip, 0.8 * margin))
     if style.handle == "block":
         wide = np.full(3, radius)
         wide[along] = half

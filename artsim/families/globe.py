@@ -14,6 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, unit
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
 from artsim.making.solids import (
+    UP,
     Solid,
     box,
     cylinder,
@@ -27,7 +28,6 @@ from artsim.making.solids import (
 )
 
 GAP = 0.0015
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def build(rng: Rng) -> Assembly:

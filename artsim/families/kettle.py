@@ -16,11 +16,10 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
+from artsim.making.solids import UP, Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
-UP = np.array([0.0, 0.0, 1.0])
 DENSITY = 500.0  # kg/m^3, as the pieces are solid and real ones are hollow
 
 
@@ -350,8 +349,7 @@ def _switch(rng: Rng, pot: Pot) -> tuple[Solid, str, Solid, JointSpec]:
     half = rng.uniform(0.006, 0.012)
 
     def between(near: float, far: float, x: float, high: float, low: float) -> Solid:
-        y0, y1 = sorted((side * near, side * far))
-        return box(x, (y0, y1), (z - low, z + high), fillet=0.002)
+        return box(x, (side * near, side * far), (z - low, z + high), fillet=0.002)
 
     mount = between(0.6 * y, y, 1.5 * half, half + 0.004, half + 0.004)
     if rng.random() < 0.5:

@@ -16,12 +16,10 @@ from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
-from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rotation_about, tube, union
+from artsim.making.solids import SIDE, UP, box, cylinder, ellipsoid, hull_of, revolved, rotation_about, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
-UP = np.array([0.0, 0.0, 1.0])
-SIDE = np.array([0.0, 1.0, 0.0])
 
 
 def build(rng: Rng) -> Assembly:

@@ -6,9 +6,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, ring
+from artsim.making.solids import FRONT, Solid, Vector, box, cylinder, ellipsoid, ring
 
-FRONT = np.array([-1.0, 0.0, 0.0])
 DENSITY = 900.0
 
 

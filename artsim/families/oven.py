@@ -39,7 +39,7 @@ def build(rng: Rng) -> Assembly:
 
     oven = Assembly()
     oven.record(handles=True)
-    body = _shell(half, depth, plinth, height, wall)
+    body = tray((GAP, -half, plinth), (depth, half, height), wall, 0.02, axis=0, side=-1)
     body += box((-thick, 0.02), half, (ceiling, height), fillet=0.004, axis=1)
     feet = ((x, y) for x in (0.05, depth - 0.05) for y in (0.05 - half, half - 0.05))
     body += union(cylinder((x, y, 0), (x, y, plinth + 0.01), 0.02, sections=14) for x, y in feet)
@@ -92,8 +92,7 @@ def _cooktop(rng: Rng) -> Assembly:
     body = _hob(rng, half, depth, height, front, 0.008) + box((-front, depth), half, (0, height), fillet=0.008)
     level = height + 0.008
     if beside:
-        ends = sorted((side * (half - 0.01), side * (half + strip)))
-        body += box((-front, depth), (ends[0], ends[1]), (0.0, level), fillet=0.006)
+        body += box((-front, depth), (side * (half - 0.01), side * (half + strip)), (0.0, level), fillet=0.006)
     cooktop = Assembly()
     count, room = int(rng.integers(1, 7)), (depth if beside else 1.8 * half)
     gap = min(room / (count + 1), rng.uniform(0.05, 0.12))
@@ -112,10 +111,6 @@ def _cooktop(rng: Rng) -> Assembly:
         turn = revolute("body", axis, foot, 0.0, 5.0) if stops else continuous("body", axis, foot)
         cooktop.add(f"knob_{number}", dial(foot, (0, 0, 1), reach, radius), turn)
     return cooktop
-
-
-def _shell(half: float, depth: float, low: float, high: float, wall: float) -> Solid:
-    return tray((GAP, -half, low), (depth, half, high), wall, 0.02, axis=0, side=-1)
 
 
 def _hob(rng: Rng, half: float, depth: float, z: float, thick: float, rise: float | None = None) -> Solid:

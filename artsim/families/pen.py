@@ -14,10 +14,9 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import Solid, box, hull, loft, union
+from artsim.making.solids import UP, Solid, box, hull, loft, union
 from artsim.model.kinematics import Array
 
-UP = (0.0, 0.0, 1.0)
 GAP = 0.0004
 _ROUND = 16  # sides of a barrel that looks round
 

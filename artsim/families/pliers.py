@@ -49,8 +49,7 @@ def build(rng: Rng) -> Assembly:
         solid += _handle(path * (1, side), radii, thick, covered, guard, side)
         if teeth:  # ribs across the front of the jaw, in front of its hollow
             for x in np.linspace(-0.6 * jaw, -0.95 * jaw, 6):
-                y = sorted((-side * 0.3 * GAP, -side * 0.003))
-                solid += box((x - 0.0006, x + 0.0006), (y[0], y[1]), (0.1 * thick, 0.9 * thick))
+                solid += box((x - 0.0006, x + 0.0006), (-side * 0.3 * GAP, -side * 0.003), (0.1 * thick, 0.9 * thick))
         face, outward = (0.0, -1) if k == 0 else (thick, 1)
         solid += cylinder((0, 0, face - 0.001 * outward), (0, 0, face + 0.001 * outward), rivet, 0.85 * rivet)
         joint = None

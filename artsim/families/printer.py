@@ -14,12 +14,11 @@ import numpy as np
 
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull, prism, rounded_rectangle, tray, union
+from artsim.making.solids import FRONT, Solid, box, cylinder, hull, prism, rounded_rectangle, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
 SHELF = 0.005
-OUT = (-1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +145,7 @@ def _fill(
         rise = (high - low) * rng.uniform(0.5, 0.85)
         solid += tray((front + 0.5 * thick, -0.96 * wide, low + GAP), (front + depth, 0.96 * wide, low + rise), 0.003)
         solid += _pull(rng, front, 0.35 * wide, low + GAP, high - GAP)
-        slide = prismatic("body", OUT, 0.0, depth * rng.uniform(0.6, 0.9), (front, 0, low))
+        slide = prismatic("body", FRONT, 0.0, depth * rng.uniform(0.6, 0.9), (front, 0, low))
         printer.add(f"drawer_{number}", solid, slide, density=700.0)
     elif band.kind == "flap":
         solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
@@ -168,7 +167,9 @@ def _fill(
         z = low + GAP
         solid = box((front, front + depth), 0.9 * wide, (z, z + 0.004))
         solid += box((front, front + 0.005), 0.9 * wide, (z, z + min(0.3 * band.height, 0.014)))
-        printer.add(f"tray_{number}", solid, prismatic("body", OUT, 0.0, 0.85 * depth, (front, 0, low)), density=900.0)
+        printer.add(
+            f"tray_{number}", solid, prismatic("body", FRONT, 0.0, 0.85 * depth, (front, 0, low)), density=900.0
+        )
     elif band.kind == "tilting panel":
         solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, rng.uniform(0.4, 1.2))

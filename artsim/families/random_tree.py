@@ -210,7 +210,10 @@ def _attach(
             break
         axis, side = faces[choice]
         turn = rng.uniform(0, 2 * np.pi) if rng.random() < 0.3 else 0.5 * np.pi * rng.integers(4)
-        rotation = matmul(_towards(side * np.eye(3)[axis]), rotation_about((0, 0, 1), turn))
+        # (3, 3) rotation that takes z to a coordinate direction.
+        normal = side * np.eye(3)[axis]
+        u = np.abs(np.roll(normal, 1))
+        rotation = matmul(np.column_stack([u, np.cross(normal, u), normal]), rotation_about((0, 0, 1), turn))
         reach = np.array([_box_around(matmul(_corners(b), rotation.T)) for b in swept])
         across = np.arange(3) != axis
         surface = float(bounds[1, axis] if side > 0 else bounds[0, axis])
@@ -249,12 +252,6 @@ def _meet(first: Array, second: Array) -> bool:
     below = (first[:, None, 0] < second[None, :, 1] + 0.9 * GAP).all(axis=-1)
     above = (second[None, :, 0] < first[:, None, 1] + 0.9 * GAP).all(axis=-1)
     return bool((below & above).any())
-
-
-def _towards(normal: Array) -> Array:
-    """(3, 3) rotation that takes z to a coordinate direction."""
-    u = np.abs(np.roll(normal, 1))
-    return np.column_stack([u, np.cross(normal, u), normal])
 
 
 def _put(

@@ -119,8 +119,7 @@ def _body(
     solid = rounded_shell((GAP, -half, low), (depth, half, high), wall, min(style.corner, 0.9 * wall), 2)
     solid += box((depth - wall, depth - 0.001), half - 0.01, (low + 0.01, high - 0.01))
     inner_back, inner = depth - wall + 0.002, half - wall + 0.002
-    for z in {front[3] for front in fronts} - {low}:
-        solid += box((GAP, inner_back), inner, (z - 0.02, z + 0.02))
+    solid += union(box((GAP, inner_back), inner, (z - 0.02, z + 0.02)) for z in {front[3] for front in fronts} - {low})
     beside = [f for f in fronts if f[0] == -1 and f[3] == low and f[2] < 0.9 * half]
     if beside:
         solid += box((GAP, inner_back), (beside[0][2] - 0.02, beside[0][2] + 0.02), (low + 0.01, high - 0.01))

@@ -10,11 +10,9 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
+from artsim.making.solids import SIDE, UP, Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
 
 GAP = 0.002
-UP = (0.0, 0.0, 1.0)
-SIDE = (0.0, 1.0, 0.0)
 
 
 def standing(rng: Rng) -> Assembly:

@@ -17,9 +17,8 @@ from artsim.families.fronts import Style
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, Table, drop_leaves, four_legs, keyboard_tray, table_top, wheels
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
+from artsim.making.solids import UP, Solid, box, cylinder, hull_of, loft, ring, union
 
-UP = (0.0, 0.0, 1.0)
 LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 """Depth, width and height of unusual tables over their diagonal."""
 
@@ -104,8 +103,7 @@ def _apron(rng: Rng, table: Table) -> None:
         )
         table.body += box(x - 0.5 * size, (s * half - rail, s * half + rail), (top - apron, top + 0.001))
         for near in (-x + inset, x - inset - 0.012):
-            a, b = sorted((s * (high[1] - 0.002), s * half))
-            table.body += box((near, near + 0.012), (a, b), (top - apron, top + 0.001))
+            table.body += box((near, near + 0.012), (s * (high[1] - 0.002), s * half), (top - apron, top + 0.001))
     if rng.random() < 0.25:
         z = foot + rng.uniform(0.1, 0.4) * (top - apron - foot)
         table.body += box(x - 0.3 * size, y - 0.3 * size, (z, z + 0.018))
@@ -162,8 +160,7 @@ def _pedestals(rng: Rng, table: Table) -> None:
         table.body += four_legs(rng, x, y, 0.0, top + 0.001, size, splay=False)
     elif len(sides) == 1:
         panel = rng.uniform(0.02, 0.05)
-        a, b = sorted((-sides[0] * y, -sides[0] * (y - panel)))
-        table.body += box((-x + overhang, x), (a, b), (0.0, top + 0.001))
+        table.body += box((-x + overhang, x), (-sides[0] * y, -sides[0] * (y - panel)), (0.0, top + 0.001))
     near = -outer + (broad if -1 in sides else panel) - 0.001
     far = outer - (broad if 1 in sides else panel) + 0.001
     table.body += box(

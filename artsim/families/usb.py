@@ -14,6 +14,7 @@ import numpy as np
 from artsim.families.keys import key_outline, sleeve
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import (
+    FRONT,
     Solid,
     box,
     cylinder,
@@ -28,7 +29,6 @@ from artsim.making.solids import (
 from artsim.model.kinematics import Array
 
 GAP = 0.0004
-OUT = (-1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -274,7 +274,7 @@ def _retracting(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     slider += box((knob_start, knob_end), slot - GAP, (0, knob_top))
     across = (-rng.uniform(0.8, 1.6) * slot, rng.uniform(0.8, 1.6) * slot)
     slider += box((knob_start, knob_end), across, (thick + GAP, knob_top + 0.0006), fillet=0.001, axis=2)
-    usb.add("connector", slider, prismatic("body", OUT, 0.0, plug.reach, (plug.reach, 0, 0)), density=2000.0)
+    usb.add("connector", slider, prismatic("body", FRONT, 0.0, plug.reach, (plug.reach, 0, 0)), density=2000.0)
 
 
 def _eyelet(rng: Rng, stick: _Stick, x: float) -> Solid:

@@ -10,12 +10,11 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, revolute, screw
-from artsim.making.solids import Solid, box, circle, cylinder, ellipsoid, hull_of, ring, tube
+from artsim.making.solids import UP, Solid, box, circle, cylinder, ellipsoid, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
 IRON = 4000.0  # kg/m^3, as real ones are hollow
-UP = np.array([0.0, 0.0, 1.0])
 FLANGE = 1.9
 """Radius of the widest flange over that of the pipe."""
 

@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
 from artsim.making.assembly import Rng
-from artsim.making.solids import Solid, about, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
+from artsim.making.solids import UP, Solid, about, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
 """Metres between a neck and its cap, and between a stem and its bore: bottles are small."""
-UP = np.array([0.0, 0.0, 1.0])
 SECTIONS = 24
 
 Level = tuple[float, float, float, float]

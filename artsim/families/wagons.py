@@ -8,9 +8,7 @@ from artsim.common.elementary import arctan2, cos, sin
 from artsim.families.details import rounded_tray
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import box, cylinder, hull_of, tube
-
-UP = np.array([0.0, 0.0, 1.0])
+from artsim.making.solids import UP, box, cylinder, hull_of, tube, union
 
 
 def wagon(rng: Rng) -> Assembly:
@@ -30,10 +28,8 @@ def wagon(rng: Rng) -> Assembly:
             z0 = floor + 0.02 + (k + 0.3) * tall / boards
             z1 = z0 + 0.6 * tall / boards
             for s in (-1.0, 1.0):
-                y0, y1 = sorted((s * half, s * (half - 0.015)))
-                body += box(0.5 * length, (y0, y1), (z0, z1))
-                a, b = sorted((s * 0.5 * length, s * (0.5 * length - 0.015)))
-                body += box((a, b), half, (z0, z1))
+                body += box(0.5 * length, (s * half, s * (half - 0.015)), (z0, z1))
+                body += box((s * 0.5 * length, s * (0.5 * length - 0.015)), half, (z0, z1))
         for sx in (-1.0, 1.0):
             for sy in (-1.0, 1.0):
                 x, y = sx * (0.5 * length - 0.025), sy * (half - 0.025)
@@ -109,8 +105,7 @@ def hand_cart(rng: Rng) -> Assembly:
             body += tube([(front, s * (half - 0.5 * wall + flare), top), (back, s * (half - 0.5 * wall + flare), top)],
                          0.5 * wall, 8)  # fmt: skip
         ends = [front] if gate else [front, back - wall]
-        for x in ends:
-            body += box((x, x + wall), half, (low, top - (0.0 if rng.random() < 0.5 else 0.3 * tall)))
+        body += union(box((x, x + wall), half, (low, top - (0.0 if rng.random() < 0.5 else 0.3 * tall))) for x in ends)
     x_axle = rng.uniform(-0.1, 0.15) * length
     y_wheel = half + flare + 0.5 * wheels.wide + 0.012
     z = wheels.radius

@@ -6,11 +6,10 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous
-from artsim.making.solids import Solid, Vector, box, cylinder, hull_of, ring, tube
+from artsim.making.solids import UP, Solid, Vector, box, cylinder, hull_of, ring, tube
 
 GAP = 0.003
 STEEL = 1500.0  # kg/m^3, as real tubes are hollow
-UP = np.array([0.0, 0.0, 1.0])
 ROLL = np.array([0.0, -1.0, 0.0])
 """Axis of wheels: a cart that moves towards -X turns them by a positive angle."""
 

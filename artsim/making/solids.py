@@ -21,6 +21,10 @@ from artsim.common.products import apply, dot, matmul, unit
 from artsim.model.kinematics import Array, cross_matrix
 
 Vector = Sequence[float] | Array
+FRONT = np.array([-1.0, 0.0, 0.0])
+SIDE = np.array([0.0, 1.0, 0.0])
+UP = np.array([0.0, 0.0, 1.0])
+"""Directions of an object in its rest frame: its front, the left of who looks at it, and up."""
 Span = float | tuple[float, float]
 """Two ends along an axis, in either order, or half of a width about 0."""
 
