@@ -46,12 +46,9 @@ def build(rng: Rng) -> Assembly:
     styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
     style = str(rng.choice(styles.get(kind, ["tubes", "prime", "zoom", "zoom"])))
     lens = Lens(rng, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
-    seats, controls = _top_controls(rng, shell, top, kind)
-    camera = Assembly("body", body + lens.fixed + seats, DENSITY)
+    camera = Assembly("body", body + lens.fixed, DENSITY)
     lens.add_to(camera)
-    for name, solid, joint in controls:
-        label = "button" if name.endswith("button") else name.partition("_")[0]
-        camera.add(name, solid, joint, label=label)
+    _add_controls(rng, camera, shell, top, kind)
     _back(rng, camera, shell)
     if kind != "compact" and top[1] - top[0] > 0.01 and rng.random() < 0.5:
         _flash(rng, camera, shell, top)
@@ -129,10 +126,8 @@ def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float,
     return body, span
 
 
-def _top_controls(
-    rng: Rng, shell: Shell, middle: tuple[float, float, float], kind: str
-) -> tuple[Solid, list[tuple[str, Solid, JointSpec]]]:
-    """Shutter button and dials on the deck, beside what stands on its middle: their seats, and the parts."""
+def _add_controls(rng: Rng, camera: Assembly, shell: Shell, middle: tuple[float, float, float], kind: str) -> None:
+    """Shutter button and dials, on seats on the deck, beside what stands on its middle."""
     half, depth = shell.half, shell.depth
     z = shell.height * (1.06 if kind == "rangefinder" else 1.0) + GAP
     # The crest is 0.4 of the prism's foot wide, and 0.6 of an instant camera's top.
@@ -140,11 +135,11 @@ def _top_controls(
     center, foot = 0.5 * (middle[0] + middle[1]), 0.5 * (middle[1] - middle[0]) / share
     least = 0.0 if kind == "instant" else 0.35 * half
     left, right = min(center - foot, -least), max(center + foot, least)
-    seats = Solid()
-    parts: list[tuple[str, Solid, JointSpec]] = []
 
-    def seat(at: Array, radius: float) -> Solid:
-        return cylinder(at - (0, 0, 0.4 * depth), at - (0, 0, GAP), 1.05 * radius, sections=16)
+    def add(name: str, solid: Solid, joint: JointSpec, radius: float, label: str = "dial") -> None:
+        at = np.asarray(joint.origin)
+        camera.body += cylinder(at - (0, 0, 0.4 * depth), at - (0, 0, GAP), 1.05 * radius, sections=16)
+        camera.add(name, solid, joint, label)
 
     size = min(0.3 * depth, 0.18 * (half - right), 0.011)
     if size > 0.0015:
@@ -152,13 +147,11 @@ def _top_controls(
         r = size * rng.uniform(0.6, 0.9)
         at = np.array([depth * rng.uniform(0.3, 0.6), spots.pop(), z])
         button = cylinder(at + (0, 0, 0.0016), at + (0, 0, 0.0016 + 0.5 * r), r, 0.9 * r, 18)
-        seats += seat(at, r)
-        parts.append(("shutter_button", button, prismatic("body", -UP, 0.0, 0.0015, at)))
+        add("shutter_button", button, prismatic("body", -UP, 0.0, 0.0015, at), r, "button")
         for number, y in enumerate(spots):
             if rng.random() < 0.75:
                 at = np.array([rng.uniform(0.4, 0.6) * depth, y, z])
-                seats += seat(at, size)
-                parts.append((f"dial_{number}", _dial(rng, at, size), continuous("body", UP, at)))
+                add(f"dial_{number}", _dial(rng, at, size), continuous("body", UP, at), size)
     room = half + left
     if kind in ("reflex", "rangefinder") and room > 0.012 and rng.random() < 0.65:
         size = min(0.3 * depth, 0.4 * room, 0.012)
@@ -170,9 +163,7 @@ def _top_controls(
                 at + (0.15 * size, 0.9 * size, 1.2 * size),
                 fillet=0.1 * size,
             )
-        seats += seat(at, size)
-        parts.append(("knob", crank, continuous("body", UP, at)))
-    return seats, parts
+        add("knob", crank, continuous("body", UP, at), size, "knob")
 
 
 def _dial(rng: Rng, foot: Array, radius: float) -> Solid:

@@ -16,7 +16,7 @@ from artsim.families.details import front_handle, side_hinge
 from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.solids import UP, Solid, box, cylinder, hull_of, tray, tube, union
 
 
@@ -156,7 +156,7 @@ def _service_trolley(rng: Rng) -> Assembly:
     posts = rng.uniform(0.008, 0.016)
     body = Solid()
     closed = rng.random() < 0.5
-    moving: list[tuple[str, Solid, JointSpec]] = []
+    cart = Assembly("body", density=500.0)
     if closed:
         wall = rng.uniform(0.006, 0.015)
         body += tray((-depth, -half, base), (depth, half, top), wall, axis=0, side=-1)
@@ -170,7 +170,7 @@ def _service_trolley(rng: Rng) -> Assembly:
             if row < rows - 1:
                 body += box((-depth, depth - 0.5 * wall), half - 0.5 * wall, (z1 + 0.0005, z1 + 0.0035))
             if doors and row == rows - 1:
-                _doors(rng, moving, depth, half, wall, z0, z1, face, kind)
+                _add_doors(rng, cart, depth, half, z0, z1, face, kind)
                 continue
             inner = half - wall - 0.003
             drawer = box((-depth - face, -depth - GAP), half - 0.002, (z0, z1))
@@ -180,14 +180,13 @@ def _service_trolley(rng: Rng) -> Assembly:
             z = 0.5 * (z0 + z1)
             drawer += front_handle(kind, (-depth - face, -span, z), (-depth - face, span, z), 0.03, 0.005)
             slide = prismatic("body", (-1, 0, 0), 0.0, 2.0 * depth * rng.uniform(0.4, 0.8), (-depth, 0, z))
-            moving.append((f"drawer_{row}", drawer, slide))
+            cart.add_numbered("drawer", drawer, slide)
         if rng.random() < 0.6:
             body += box(depth + 0.01, half + 0.01, (top - 0.002, top + 0.018), fillet=0.01, axis=2)
     else:
-        for sx in (-1.0, 1.0):
-            for sy in (-1.0, 1.0):
-                x, y = sx * (depth - posts), sy * (half - posts)
-                body += cylinder((x, y, base), (x, y, top), posts, sections=10)
+        x, y = depth - posts, half - posts
+        for corner in ((-x, -y), (-x, y), (x, -y), (x, y)):
+            body += cylinder((*corner, base), (*corner, top), posts, sections=10)
         count = int(rng.integers(2, 5))
         for z in np.linspace(base + 0.01, top - 0.06 * rng.integers(0, 2), count).tolist():
             rail = rng.choice([0.0, rng.uniform(0.02, 0.09)])
@@ -202,25 +201,15 @@ def _service_trolley(rng: Rng) -> Assembly:
         r = max(0.8 * posts, 0.007)
         y = 0.9 * half if closed else half - posts
         body += tube([(depth - 0.01, -y, z - 0.03), (out, -y, z), (out, y, z), (depth - 0.01, y, z - 0.03)], r, 10)
-    cart = Assembly("body", body, 500.0)
-    for name, solid, joint in moving:
-        cart.add(name, solid, joint)
+    cart.body = body
     reach = 1.7 * wheels.radius
     for sx, sy in ((1, -1), (1, 1), (-1, -1), (-1, 1)):
         wheels.add_caster(cart, sx * (depth - reach), sy * (half - reach), base)
     return cart
 
 
-def _doors(
-    rng: Rng,
-    moving: list[tuple[str, Solid, JointSpec]],
-    depth: float,
-    half: float,
-    wall: float,
-    z0: float,
-    z1: float,
-    face: float,
-    kind: str,
+def _add_doors(
+    rng: Rng, cart: Assembly, depth: float, half: float, z0: float, z1: float, face: float, kind: str
 ) -> None:
     """One or two doors before a compartment."""
     two = rng.random() < 0.6
@@ -229,12 +218,12 @@ def _doors(
     leaves = (
         [(0.001, half - 0.002, True), (-half + 0.002, -0.001, False)] if two else [(-half + 0.002, half - 0.002, True)]
     )
-    for number, (y0, y1, left) in enumerate(leaves):
+    for y0, y1, left in leaves:
         leaf = box((x, -depth - GAP), (y0, y1), (z0, z1))
         y = y0 + 0.03 if left else y1 - 0.03
         middle, span = 0.5 * (z0 + z1), 0.2 * (z1 - z0)
         leaf += front_handle(kind, (x, y, middle - span), (x, y, middle + span), 0.03, 0.005)
-        moving.append((f"door_{number}", leaf, side_hinge(x, y1 if left else y0, limit, left)))
+        cart.add_numbered("door", leaf, side_hinge(x, y1 if left else y0, limit, left))
 
 
 def _wheelbarrow(rng: Rng) -> Assembly:

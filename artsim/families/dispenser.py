@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import UP, Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
+from artsim.making.solids import UP, Solid, about, box, cylinder, ellipsoid, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -282,6 +282,7 @@ def _water_cooler(rng: Rng) -> Assembly:
     shelf = height - rng.uniform(0.28, 0.34) if tall else rng.uniform(0.03, 0.06)
     roof = height - rng.uniform(0.05, 0.09)
     niche = -depth + rng.uniform(0.08, 0.13)
+    cooler = Assembly("body", density=250.0)
     body = box((niche, depth), half, (shelf - 0.01, roof + 0.01))
     body += box(depth, half, (roof, height), fillet=rng.uniform(0.01, 0.05), axis=2)
     for s in (-1.0, 1.0):
@@ -298,34 +299,25 @@ def _water_cooler(rng: Rng) -> Assembly:
     spots = (np.linspace(-1.0, 1.0, count) * 0.4 * half).tolist()
     style = str(rng.choice(["lever", "button", "tap"]))
     z = roof - (0.075 if style == "tap" else 0.02)
-    taps: list[tuple[Solid, JointSpec]] = []
-    for y in spots:
+    for number, y in enumerate(spots):
         nose = niche - 0.045
         body += cylinder((niche + 0.005, y, z), (nose, y, z), 0.01, sections=14)
         body += cylinder((nose, y, z + 0.01), (nose, y, z - 0.03), 0.009, sections=14)
         if style == "lever":  # a paddle below the tap, which the cup pushes back
             pivot = (niche - 0.012, y, z - 0.04)
-            paddle = box((pivot[0] - 0.003, pivot[0] + 0.003), (y - 0.02, y + 0.02), (z - 0.11, z - 0.045))
-            paddle += cylinder((pivot[0], y - 0.012, pivot[2]), (pivot[0], y + 0.012, pivot[2]), 0.006, sections=12)
-            taps.append((paddle, revolute("body", (0, -1, 0), pivot, 0.0, 0.09)))
+            tap = box((pivot[0] - 0.003, pivot[0] + 0.003), (y - 0.02, y + 0.02), (z - 0.11, z - 0.045))
+            tap += cylinder((pivot[0], y - 0.012, pivot[2]), (pivot[0], y + 0.012, pivot[2]), 0.006, sections=12)
+            joint = revolute("body", (0, -1, 0), pivot, 0.0, 0.09)
         elif style == "tap":
-            taps.append(_tap_handle("flip", np.array([nose, y, z + 0.011]), 0.009, 0.03, rng))
+            tap, joint = _tap_handle("flip", np.array([nose, y, z + 0.011]), 0.009, 0.03, rng)
         else:
             face = -depth - 0.001
             middle = 0.5 * (roof + height)
             size = min(0.3 * (height - roof), 0.02)
-            button = box(
-                (face - 0.008, face - 0.003),
-                (y - 1.3 * size, y + 1.3 * size),
-                (middle - size, middle + size),
-                fillet=0.003,
-                axis=0,
-            )
-            taps.append((button, prismatic("body", (1, 0, 0), 0.0, 0.002, (face, y, middle))))
-    cooler = Assembly("body", body, 250.0)
-    name = {"lever": "lever", "tap": "tap", "button": "button"}[style]
-    for number, (solid, joint) in enumerate(taps):
-        cooler.add(f"{name}_{number}", solid, joint, label="button" if style == "button" else "lever", density=900.0)
+            tap = box((face - 0.008, face - 0.003), about(y, 1.3 * size), about(middle, size), fillet=0.003, axis=0)
+            joint = prismatic("body", (1, 0, 0), 0.0, 0.002, (face, y, middle))
+        cooler.add(f"{style}_{number}", tap, joint, label="button" if style == "button" else "lever", density=900.0)
+    cooler.body = body
     if rng.random() < 0.75:
         _big_bottle(rng, cooler, height, min(depth, half))
     if door:

@@ -107,7 +107,7 @@ def build(rng: Rng) -> Assembly:
         tilt, reach = 0.0, float(temple.bounds()[1, 0])
         limit = min(limit, arcsin(min((front.half - front.thickness - 1.0 * MM) / reach, 1.0)))
     hinge = _hinge(front)
-    parts = {}
+    glasses = Assembly("frame", density=1200.0)
     for name, side in (("temple_left", -1), ("temple_right", 1)):
         place = np.array([0.0, side * front.half, front.hinge_z])
         fixed, moving = (half if side > 0 else half.mirrored(1) for half in hinge)
@@ -116,10 +116,8 @@ def build(rng: Rng) -> Assembly:
         arm = temple if side > 0 else temple.mirrored(1)
         axis = (0.0, -side * sin(tilt), -side * cos(tilt))
         solid = arm.moved(place) + moving.turned((1, 0, 0), -tilt).moved(place)
-        parts[name] = solid, revolute("frame", axis, place, 0.0, limit)
-    glasses = Assembly("frame", frame, 1200.0)
-    for name, (solid, joint) in parts.items():
-        glasses.add(name, solid, joint)
+        glasses.add(name, solid, revolute("frame", axis, place, 0.0, limit))
+    glasses.body = frame
     return glasses
 
 

@@ -240,6 +240,7 @@ def _tip_up(rng: Rng) -> Assembly:
     pitch = width + side_thick
     start = -0.5 * count * pitch
     body = Solid()
+    chair = Assembly("frame", density=700.0)
     x0, x1 = -0.5 * depth, 0.5 * depth
     on_post = rng.random() < 0.5
     for k in range(count + 1):
@@ -263,7 +264,6 @@ def _tip_up(rng: Rng) -> Assembly:
             )
         body += box((x0 + 0.02, x1 + 0.04), (a - 0.006, b + 0.006), (arm_z - 0.002, arm_z + 0.03), fillet=0.01)
     hinge_x = x1 - 0.04
-    seats = []
     lift = seat_z + thick + 0.02
     for k in range(count):
         a, b = start + k * pitch + 0.5 * side_thick, start + (k + 1) * pitch - 0.5 * side_thick
@@ -277,10 +277,9 @@ def _tip_up(rng: Rng) -> Assembly:
         seat += cylinder((at[0], a + GAP, at[2]), (at[0], b - GAP, at[2]), 0.012, sections=12)
         room = x1 + 0.01 - hinge_x
         limit = np.pi / 2 - max(0.0, (0.5 * thick + 0.006 - room)) / 0.1 - 0.05
-        seats.append((seat, revolute("frame", SIDE, at, 0.0, min(limit, 1.45) * rng.uniform(0.9, 1.0))))
-    chair = Assembly("frame", body, 700.0)
-    for k, (seat, joint) in enumerate(seats):
+        joint = revolute("frame", SIDE, at, 0.0, min(limit, 1.45) * rng.uniform(0.9, 1.0))
         chair.add(f"seat_{k}" if count > 1 else "seat", seat, joint, density=400.0)
+    chair.body = body
     return chair
 
 

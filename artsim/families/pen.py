@@ -172,8 +172,7 @@ def _double(rng: Rng, section: _Section, length: float, radius: float) -> Assemb
     """A marker with a tip and a cap at either end."""
     wall = 0.12 * radius
     wide = radius * rng.uniform(0.85, 1.15)
-    body = section.rod(_barrel(rng, -0.25 * length, 0.25 * length, wide, wide))
-    caps = []
+    pen = Assembly("body", section.rod(_barrel(rng, -0.25 * length, 0.25 * length, wide, wide)), 1000.0)
     for side in (-1, 1):
         covered = length * rng.uniform(0.16, 0.25)
         neck = (radius - wall - GAP) * 0.97
@@ -188,11 +187,9 @@ def _double(rng: Rng, section: _Section, length: float, radius: float) -> Assemb
             [(radius * rng.uniform(0.4, 0.9), low - rng.uniform(0.2, 1.2) * radius), (0.94 * radius, low + 0.0003)]
         )
         travel = covered + radius
-        body += half if side < 0 else half.mirrored(2)
-        caps.append((cap if side < 0 else cap.mirrored(2), (0.0, 0.0, float(side)), travel))
-    pen = Assembly("body", body, 1000.0)
-    for number, (cap, direction, travel) in enumerate(caps):
-        pen.add(f"cap_{number}", cap, prismatic("body", direction, 0.0, travel))
+        pen.body += half if side < 0 else half.mirrored(2)
+        slide = prismatic("body", (0.0, 0.0, float(side)), 0.0, travel)
+        pen.add_numbered("cap", cap if side < 0 else cap.mirrored(2), slide)
     return pen
 
 

@@ -40,24 +40,19 @@ def build(rng: Rng) -> Assembly:
     edge = style.board
     whole = Cell((-width / 2 + edge, stand + edge), (width / 2 - edge, stand + height - edge))
 
-    cells, body = _divide(rng, whole, style, 0)
-    moving: list[Moving] = []
+    furniture = Assembly("body", density=650.0)
+    furniture.record(handles=style.handle != "none")
+    cells, furniture.body = _divide(rng, whole, style, 0)
     cells.sort(key=lambda item: -item[0].sides[0] * item[0].sides[1])
     for cell, recipe in cells:  # the largest, and those like it, are not left open
         must_move = recipe == cells[0][1]
         inside, parts = _fill(np.random.default_rng(recipe), cell, style, drawers, must_move)
-        if len(moving) + len(parts) > MOST_MOVING:
+        if len(furniture) + len(parts) > 1 + MOST_MOVING:
             inside, parts = fronts.shelves(rng, cell, style)
-        body += inside
-        moving += parts
-    furniture = Assembly(density=650.0)
-    body += _carcass(rng, kind, width, depth, height, stand, style, furniture)
-    furniture.record(handles=style.handle != "none")
-    furniture.add("body", body)
-    count: dict[str, int] = {}
-    for label, solid, joint in moving:
-        number = count[label] = count.get(label, -1) + 1
-        furniture.add(f"{label}_{number}", solid, joint)
+        furniture.body += inside
+        for part in parts:
+            furniture.add_numbered(*part)
+    furniture.body += _carcass(rng, kind, width, depth, height, stand, style, furniture)
     return furniture
 
 

@@ -253,7 +253,7 @@ def _bag(rng: Rng) -> Assembly:
         if kind == 1:  # rounded top
             rings += [_outline(0.75 * x, 0.85 * flare * y, 1.1 * z), _outline(0.3 * x, 0.6 * flare * y, 1.16 * z)]
         body = loft(rings)
-    bag = Assembly()
+    bag = Assembly("body", body, 150.0)
     upright = kind == 2 or rng.random() < 0.45  # one bail on the crown, instead of bails on the sides
     wire = rng.uniform(0.004, 0.007)
     half = rng.uniform(0.35, 0.92 if kind == 0 else 0.6) * (flare if kind == 0 else 1.0) * y
@@ -261,22 +261,18 @@ def _bag(rng: Rng) -> Assembly:
     if upright:
         crown, most = body.bounds()[1, 2], rng.uniform(1.0, 1.57)
         handle, lugs = _bail((0.0, 0.0, crown + wire + 0.004), half, height, wire, (0, 0, -1), wire + 0.02)
-        bag.add("body", body + lugs, density=150.0)
+        bag.body += lugs
         bag.add("handle", handle, revolute("body", (0, 1, 0), (0, 0, crown + wire + 0.004), -most, most), density=500.0)
         return bag
     pivot = rng.uniform(0.62, 0.8) * z
     face = x * (1.0 + (top - 1.0) * (pivot / z - 0.12) / 0.88)
     slope = float(arctan2((1.0 - top) * x, 0.88 * z))  # of the sides, which the bails hang down to
     limit = rng.uniform(0.55, 1.0) * (np.pi - 0.15 - slope)
-    solids = []
     for s in ((-1.0, 1.0), (-1.0,), (1.0,))[int(rng.choice(3, p=[0.55, 0.3, 0.15]))]:
         place = (s * (face + wire + 0.004), 0.0, pivot)
         handle, lugs = _bail(place, half, height, wire, (-s, 0, 0), wire + 0.02)
-        body += lugs
-        solids.append((handle, place, s))
-    bag.add("body", body, density=150.0)
-    for number, (handle, place, s) in enumerate(solids):
-        bag.add(f"handle_{number}", handle, revolute("body", (0, s, 0), place, 0.0, limit), density=500.0)
+        bag.body += lugs
+        bag.add_numbered("handle", handle, revolute("body", (0, s, 0), place, 0.0, limit), density=500.0)
     return bag
 
 

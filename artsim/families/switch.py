@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan, sin, tan
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, JointSpec, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
 from artsim.model.kinematics import Array
 
@@ -43,7 +43,7 @@ def build(rng: Rng) -> Assembly:
         plate += union(_bar(a, b, 1 if upright else 0, depth) for a, b in pairwise(cells))
     else:
         plate += box((-depth, 0), width / 2, height / 2, fillet=0.004)
-    buttons: list[tuple[Solid, JointSpec]] = []
+    switch = Assembly("frame", density=1200.0)
     # The end of a rocker that is pressed in stays before the plate's back.
     room = 0.8 * depth - 0.0028 - 0.3 * min(0.3 * depth, 0.004)
     steepest = arctan(2.0 * room / (0.5 * (cells[0][1, 1] - cells[0][0, 1])))
@@ -70,12 +70,10 @@ def build(rng: Rng) -> Assembly:
             solid = _dimmer(alike, center, depth, min(0.4 * pitch, 0.35 * height))
             joint = revolute("frame", (-1, 0, 0), (-depth, *center), 0.0, alike.uniform(3.5, 5.2))
         if place < live:
-            buttons.append((solid, joint))
+            switch.add_numbered("button", solid, joint)
         else:
             plate += solid
-    switch = Assembly("frame", plate, 1200.0)
-    for number, (solid, joint) in enumerate(buttons):
-        switch.add(f"button_{number}", solid, joint)
+    switch.body = plate
     return switch
 
 

@@ -15,9 +15,9 @@ from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
 from artsim.families.fronts import Style
 from artsim.families.proportions import unusual_sides, with_tails
-from artsim.families.table_parts import GAP, Table, drop_leaves, four_legs, keyboard_tray, table_top, wheels
+from artsim.families.table_parts import GAP, add_case, drop_leaves, four_legs, keyboard_tray, table_top, wheels
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import UP, Solid, box, cylinder, hull_of, loft, ring, union
+from artsim.making.solids import UP, Solid, about, box, cylinder, hull_of, loft, ring, union
 
 LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 """Depth, width and height of unusual tables over their diagonal."""
@@ -25,15 +25,10 @@ LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 
 def build(rng: Rng) -> Assembly:
     """A table, all drawers and doors closed at rest."""
-    table = Table()
+    table = Assembly("body", density=650.0)
     kinds = (_apron, _pedestals, _case, _column)
     kinds[rng.choice(4, p=[0.36, 0.27, 0.25, 0.12])](rng, table)
-    assembly = Assembly("body", table.body, 650.0)
-    count: dict[str, int] = {}
-    for label, solid, joint in table.moving:
-        number = count[label] = count.get(label, -1) + 1
-        assembly.add(f"{label}_{number}", solid, joint)
-    return assembly
+    return table
 
 
 def _style(rng: Rng, deep: bool = False) -> Style:
@@ -58,7 +53,7 @@ def _style(rng: Rng, deep: bool = False) -> Style:
     )
 
 
-def _apron(rng: Rng, table: Table) -> None:
+def _apron(rng: Rng, table: Assembly) -> None:
     """Legs with a low case between them under the top; leaves at the ends, a shelf below, wheels."""
     height = rng.uniform(0.32, 0.95)
     width, depth = height * rng.uniform(0.65, 3.4), height * rng.uniform(0.4, 1.7)
@@ -93,14 +88,11 @@ def _apron(rng: Rng, table: Table) -> None:
         low[1], high[1] = -0.1, 0.1
     for back in (False, True):
         if both or back == rear:
-            table.add_case(rng, low, high, style, grid, 0.25, back)
+            add_case(rng, table, low, high, style, grid, 0.25, back)
     rail = min(0.008, 0.4 * size)
     for s in (-1, 1):  # rails into the legs, beside and behind the case
-        table.body += (
-            box((s * (x - inset) - 0.008, s * (x - inset) + 0.008), half, (top - apron, top + 0.001))
-            if (s > 0 and not both and not rear) or (s < 0 and rear)
-            else Solid()
-        )
+        if (s > 0 and not both and not rear) or (s < 0 and rear):
+            table.body += box(about(s * (x - inset), 0.008), half, (top - apron, top + 0.001))
         table.body += box(x - 0.5 * size, (s * half - rail, s * half + rail), (top - apron, top + 0.001))
         for near in (-x + inset, x - inset - 0.012):
             table.body += box((near, near + 0.012), (s * (high[1] - 0.002), s * half), (top - apron, top + 0.001))
@@ -113,7 +105,7 @@ def _apron(rng: Rng, table: Table) -> None:
         wheels(table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size)
 
 
-def _pedestals(rng: Rng, table: Table) -> None:
+def _pedestals(rng: Rng, table: Assembly) -> None:
     """A desk: cases at one or both ends, legs or a panel elsewhere, a flat case or a tray between."""
     height = rng.uniform(0.62, 0.85)
     width, depth = height * rng.uniform(1.3, 3.4), height * rng.uniform(0.5, 1.4)
@@ -140,8 +132,9 @@ def _pedestals(rng: Rng, table: Table) -> None:
     for side in sides:
         a, b = sorted((side * outer, side * (outer - broad)))
         draw = np.random.default_rng(recipe) if alike else rng
-        table.add_case(
+        add_case(
             draw,
+            table,
             np.array([front, a, low_z]),
             np.array([front + deep - overhang, b, top + 0.001]),
             style,
@@ -173,8 +166,9 @@ def _pedestals(rng: Rng, table: Table) -> None:
         between = "nothing"
     if between == "case":
         flat = rng.uniform(0.085, 0.14)
-        table.add_case(
+        add_case(
             rng,
+            table,
             np.array([front, near, top - flat]),
             np.array([front + 0.8 * deep - 0.04, far, top + 0.001]),
             style,
@@ -189,7 +183,7 @@ def _pedestals(rng: Rng, table: Table) -> None:
         table.body += box((back, x), y, (height + rise - 0.02, height + rise))
 
 
-def _case(rng: Rng, table: Table) -> None:
+def _case(rng: Rng, table: Assembly) -> None:
     """A low table or a console: one case from side to side on legs, a plinth or wheels."""
     height = rng.uniform(0.3, 0.95)
     width, depth = height * rng.uniform(0.6, 3.2), height * rng.uniform(0.4, 1.6)
@@ -211,8 +205,9 @@ def _case(rng: Rng, table: Table) -> None:
     end = -0.002 if both else x
     for back in (False, True):
         if both or not back:
-            table.add_case(
+            add_case(
                 rng,
+                table,
                 np.array([-x + ahead, -y, low]),
                 np.array([end, y, top + 0.001]),
                 style,
@@ -231,7 +226,7 @@ def _case(rng: Rng, table: Table) -> None:
         wheels(table, [(sx * (x - 0.06), sy * (y - 0.06)) for sx in (-1, 1) for sy in (-1, 1)], low, 0.05)
 
 
-def _column(rng: Rng, table: Table) -> None:
+def _column(rng: Rng, table: Assembly) -> None:
     """A top on a column that turns, tips or rises, on feet, a disc or wheels."""
     height, wide = rng.uniform(0.45, 1.1), rng.uniform(0.22, 0.6)
     thick = rng.uniform(0.015, 0.05)
@@ -280,7 +275,7 @@ def _column(rng: Rng, table: Table) -> None:
         base += cylinder((0, 0, foot + 0.01), (0, 0, low + 0.01), radius + GAP)
         travel = rng.uniform(0.3, 0.6) * (sleeve - low)
         rod = cylinder((0, 0, sleeve - travel - 0.05), (0, 0, top + 0.002), inner, sections=16)
-        table.moving.append(("top", rod + slab(top), prismatic("body", UP, 0.0, travel, (0, 0, top))))
+        table.add_numbered("top", rod + slab(top), prismatic("body", UP, 0.0, travel, (0, 0, top)))
     elif kind == "turning":
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - GAP), radius)
         base += cylinder((0, 0, top - 0.02 - GAP), (0, 0, top - GAP), min(3 * radius, 0.5 * wide))
@@ -289,7 +284,7 @@ def _column(rng: Rng, table: Table) -> None:
             if rng.random() < 0.6
             else revolute("body", UP, (0, 0, top), -1.57, 1.57)
         )
-        table.moving.append(("top", slab(top), joint))
+        table.add_numbered("top", slab(top), joint)
     else:
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - 0.05), radius)
         base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))
@@ -304,7 +299,7 @@ def _column(rng: Rng, table: Table) -> None:
         )
         base += box((0.0, hinge[0] + 0.005), 1.1 * radius, (top - 0.04, top - 0.025))
         # Beyond the hinge's axis the top comes down before the column.
-        table.moving.append(("top", slab(top) + lugs, revolute("body", (0, 1, 0), hinge, 0.0, rng.uniform(0.5, 0.9))))
+        table.add_numbered("top", slab(top) + lugs, revolute("body", (0, 1, 0), hinge, 0.0, rng.uniform(0.5, 0.9)))
     table.body += base
     if rolling:
         wheels(table, spots, foot, 0.03)

@@ -2,74 +2,68 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
 
 
-@dataclass
-class Table:
-    """A body under construction, and what moves on it."""
+def add_case(
+    rng: Rng,
+    table: Assembly,
+    low: Array,
+    high: Array,
+    style: Style,
+    grid: tuple[int, int],
+    doors: float,
+    back: bool = False,
+    free: tuple[bool, bool] = (False, False),
+) -> None:
+    """A case, open towards -X, with a grid of cells.
 
-    body: Solid = field(default_factory=Solid)
-    moving: list[Moving] = field(default_factory=list)
-
-    def add_case(
-        self,
-        rng: Rng,
-        low: Array,
-        high: Array,
-        style: Style,
-        grid: tuple[int, int],
-        doors: float,
-        back: bool = False,
-        free: tuple[bool, bool] = (False, False),
-    ) -> None:
-        """A case, open towards -X, with a grid of cells.
-
-        Parameters
-        ----------
-        low, high : (3,) float
-            Outer corners.
-        grid : 2 int
-            Columns and rows.
-        doors : float
-            How likely a cell that is high enough has doors.
-        back : bool
-            Turns it to open towards +X, reflected in the plane x = 0.
-        free : 2 bool
-            Whether nothing stands beside it at -Y and +Y, so that doors there open beyond a right angle.
-        """
-        board = style.board
-        style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)
-        solid = box((style.back, low[1], low[2]), high)
-        solid += union(box((style.face, high[0]), (low[1], high[1]), (z, z + board)) for z in (low[2], high[2] - board))
-        solid += union(box((style.face, high[0]), (y, y + board), (low[2], high[2])) for y in (low[1], high[1] - board))
-        whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
-                     (free[0], True), (free[1], True))  # fmt: skip
-        columns, boards = _divided(rng, whole, 0, grid[0], style)
+    Parameters
+    ----------
+    low, high : (3,) float
+        Outer corners.
+    grid : 2 int
+        Columns and rows.
+    doors : float
+        How likely a cell that is high enough has doors.
+    back : bool
+        Turns it to open towards +X, reflected in the plane x = 0.
+    free : 2 bool
+        Whether nothing stands beside it at -Y and +Y, so that doors there open beyond a right angle.
+    """
+    board = style.board
+    style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)
+    solid = box((style.back, low[1], low[2]), high)
+    solid += union(box((style.face, high[0]), (low[1], high[1]), (z, z + board)) for z in (low[2], high[2] - board))
+    solid += union(box((style.face, high[0]), (y, y + board), (low[2], high[2])) for y in (low[1], high[1] - board))
+    whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
+                 (free[0], True), (free[1], True))  # fmt: skip
+    columns, boards = _divided(rng, whole, 0, grid[0], style)
+    solid += boards
+    recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
+    parts: list[Moving] = []
+    for column in columns:
+        draw = np.random.default_rng(recipe) if alike else rng
+        rows = grid[1] if alike else int(rng.integers(1, grid[1] + 1))
+        cells, boards = _divided(draw, column, 1, rows, style)
         solid += boards
-        recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
-        parts: list[Moving] = []
-        for column in columns:
-            draw = np.random.default_rng(recipe) if alike else rng
-            rows = grid[1] if alike else int(rng.integers(1, grid[1] + 1))
-            cells, boards = _divided(draw, column, 1, rows, style)
-            solid += boards
-            for cell in cells:
-                inside, more = _fill(draw, cell, style, doors, must_move=not parts)
-                solid += inside
-                parts += more
-        self.body += solid.mirrored(0) if back else solid
-        self.moving += [_mirrored(part) for part in parts] if back else parts
+        for cell in cells:
+            inside, more = _fill(draw, cell, style, doors, must_move=not parts)
+            solid += inside
+            parts += more
+    table.body += solid.mirrored(0) if back else solid
+    for part in parts:
+        table.add_numbered(*(_mirrored(part) if back else part))
 
 
 def _divided(rng: Rng, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
@@ -166,7 +160,7 @@ def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float
     return solid
 
 
-def drop_leaves(rng: Rng, table: Table, depth: float, width: float, top: float, height: float) -> None:
+def drop_leaves(rng: Rng, table: Assembly, depth: float, width: float, top: float, height: float) -> None:
     """Leaves at one or both ends that hang down when they turn."""
     long = rng.uniform(0.15, 0.4) * width
     long = min(long, top - 0.05)
@@ -174,10 +168,10 @@ def drop_leaves(rng: Rng, table: Table, depth: float, width: float, top: float, 
         near, far = side * (width / 2 + GAP), side * (width / 2 + GAP + long)
         leaf = box(depth / 2, (min(near, far), max(near, far)), (top, height), fillet=0.2 * (height - top))
         joint = revolute("body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * rng.uniform(0.9, 1.0))
-        table.moving.append(("leaf", leaf, joint))
+        table.add_numbered("leaf", leaf, joint)
 
 
-def keyboard_tray(rng: Rng, table: Table, front: float, near: float, far: float, top: float, deep: float) -> None:
+def keyboard_tray(rng: Rng, table: Assembly, front: float, near: float, far: float, top: float, deep: float) -> None:
     """A board that slides out below the top between two rails."""
     room = far - near
     wide = room * rng.uniform(0.6, 0.96)
@@ -187,12 +181,11 @@ def keyboard_tray(rng: Rng, table: Table, front: float, near: float, far: float,
     for y in (y0 - 0.012, y1):
         table.body += box((front + 0.01, front + deep), (y, y + 0.012), (z - 0.005, top + 0.001))
     board = box((front + 0.005, front + deep), (y0 + GAP, y1 - GAP), (z, z + 0.018), fillet=0.004)
-    table.moving.append(
-        ("drawer", board, prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z)))
-    )
+    joint = prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z))
+    table.add_numbered("drawer", board, joint)
 
 
-def wheels(table: Table, spots: list[tuple[float, float]], height: float, size: float) -> None:
+def wheels(table: Assembly, spots: list[tuple[float, float]], height: float, size: float) -> None:
     """A wheel between two cheeks under each spot, which is ``height`` above the floor."""
     radius = 0.42 * height
     half, thick = 0.3 * radius, 0.004
@@ -208,4 +201,4 @@ def wheels(table: Table, spots: list[tuple[float, float]], height: float, size: 
         body += cylinder((x, y, height - 0.001), (x, y, height + 0.01), 0.4 * size, sections=12)
         table.body += body
         wheel = cylinder((x, y - half, radius), (x, y + half, radius), radius, sections=18)
-        table.moving.append(("wheel", wheel, continuous("body", (0, 1, 0), (x, y, radius))))
+        table.add_numbered("wheel", wheel, continuous("body", (0, 1, 0), (x, y, radius)))

@@ -27,20 +27,17 @@ def build(rng: Rng) -> Assembly:
     spacing = pipe * rng.uniform(5.5, 7.5)
     room = 0.47 * spacing if count > 1 else np.inf
     half = 0.5 * count * spacing * (1.0 if count > 1 else rng.uniform(0.55, 0.9))
-    body = tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(rng, half, pipe)
+    valve = Assembly("body", tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(rng, half, pipe), IRON)
     style, joint_style = int(rng.integers(1 << 30)), int(rng.integers(1 << 30))
-    parts = []
+    rises = rng.random() < 0.75
+    direction = float(rng.choice([-1.0, 1.0]))
     for k in range(count):
         y = (k - 0.5 * (count - 1)) * spacing
         alike = np.random.default_rng([style, joint_style])
         make = _ball_valve if lever else _gate_valve
-        fixed, moving, pivot, height = make(alike, pipe, room)
-        body += fixed.moved((0, y, 0))
-        parts.append((moving.moved((0, y, 0)), pivot + (0, y, 0), height))
-    valve = Assembly("body", body, IRON)
-    rises = rng.random() < 0.75
-    direction = float(rng.choice([-1.0, 1.0]))
-    for k, (solid, pivot, travel) in enumerate(parts):
+        fixed, moving, pivot, travel = make(alike, pipe, room)
+        valve.body += fixed.moved((0, y, 0))
+        pivot = pivot + (0, y, 0)
         if lever:
             joint = revolute("body", -UP, pivot, 0.0, 0.5 * np.pi)
         elif rises:
@@ -48,7 +45,7 @@ def build(rng: Rng) -> Assembly:
             joint = screw("body", UP, pivot, 0.0, turns, travel / turns)
         else:
             joint = continuous("body", direction * UP, pivot)
-        valve.add(f"{'lever' if lever else 'handwheel'}_{k}", solid, joint)
+        valve.add_numbered("lever" if lever else "handwheel", moving.moved((0, y, 0)), joint)
     return valve
 
 

@@ -67,8 +67,8 @@ class Assembly:
     ----------
     root : str, optional
         Name of the root; it may be added later, as any part.
-    solid : Solid
-        Of the root.
+    solid : Solid, optional
+        Of the root; it may be empty at first, and grow: ``assembly.body += box(...)``.
     density : float
         kg/m^3: of the root, and of each part that is added without one.
     """
@@ -82,7 +82,16 @@ class Assembly:
         self._joints: list[JointSpec | None] = []
         self._features: dict[str, bool] = {}
         if root is not None:
-            self.add(root, solid or Solid())
+            self._append(root, solid or Solid(), None, root, density)
+
+    @property
+    def body(self) -> Solid:
+        """The root's solid."""
+        return self._solids[0]
+
+    @body.setter
+    def body(self, solid: Solid) -> None:
+        self._solids[0] = solid
 
     def record(self, **features: bool) -> None:
         """Note whether the object has handles or legs, which are no parts of their own: ``record(handles=True)``."""
@@ -125,15 +134,25 @@ class Assembly:
         """
         if name in self._names:
             raise KinematicsError(f"two parts are called {name!r}")
-        if not solid.pieces or any(piece.is_empty() for piece in solid.pieces):
-            raise AssetError("a piece of its solid encloses nothing", name, "look for swapped corners or flat outlines")
+        _check_filled(name, solid)
         stem, _, number = name.rpartition("_")
-        self._names.append(name)
-        self._labels.append(label or (stem if number.isdigit() else name))
-        self._solids.append(solid)
-        self._densities.append(self.density if density is None else density)
-        self._joints.append(joint)
+        label = label or (stem if number.isdigit() else name)
+        self._append(name, solid, joint, label, self.density if density is None else density)
         return name
+
+    def add_numbered(self, label: str, solid: Solid, joint: JointSpec, density: float | None = None) -> str:
+        """Add the next part of a label: "drawer_0", then "drawer_1"; see :meth:`add`."""
+        return self.add(f"{label}_{self._labels.count(label)}", solid, joint, density=density)
+
+    def _append(self, name: str, solid: Solid, joint: JointSpec | None, label: str, density: float) -> None:
+        self._names.append(name)
+        self._labels.append(label)
+        self._solids.append(solid)
+        self._densities.append(density)
+        self._joints.append(joint)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
     @property
     def joint_types(self) -> tuple[str, ...]:
@@ -183,9 +202,12 @@ class Assembly:
 
         Raises
         ------
+        AssetError
+            When the root is empty.
         KinematicsError
             When the joints do not form a tree.
         """
+        _check_filled(self._names[0], self._solids[0])
         whole = [self._part(k) for k in range(len(self._names))]
         bounds = np.stack([part.bounds for part in whole])
         center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
@@ -230,3 +252,8 @@ class Assembly:
             pitch=float(spec.pitch),
             mimic=mimic,
         )
+
+
+def _check_filled(name: str, solid: Solid) -> None:
+    if not solid.pieces or any(piece.is_empty() for piece in solid.pieces):
+        raise AssetError("a piece of its solid encloses nothing", name, "look for swapped corners or flat outlines")
