@@ -16,7 +16,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import UP, Solid, box, cylinder, ellipsoid, hull_of, ring, tube
+from artsim.making.outlines import UP
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
 
 DENSITY = 300.0  # kg/m^3, as the pieces are solid and real ones are hollow
 SHAPES = ("wine", "beer", "water", "shampoo", "cone", "ball", "jar", "flask", "tube", "waist")

@@ -13,7 +13,8 @@ from artsim.families.carton import LEAST_SHARES, MOST_SHARES, carton
 from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, tray, union
+from artsim.making.outlines import about
+from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, tray, union
 
 GAP = 0.0015
 
@@ -124,17 +125,14 @@ def _feet(rng: Rng, x: float, y: float, wall: float) -> Solid:
     """Plinth, blocks or balls below the corners, or nothing."""
     kind = str(rng.choice(["none", "plinth", "blocks", "balls"], p=[0.5, 0.2, 0.2, 0.1]))
     drop = wall * rng.uniform(1.0, 3.0)
-    corners = [(s * (x - 2 * wall), t * (y - 2 * wall)) for s in (-1, 1) for t in (-1, 1)]
     if kind == "plinth":
         out = 0.0 if rng.random() < 0.3 else 0.8 * wall
         return frame((-x - out, -y - out, -drop), (x, y + out, wall), [2 * wall + out] * 4, 0, 1)
     if kind == "blocks":
-        return union(
-            box((a - 1.9 * wall, a + 1.9 * wall), (b - 1.9 * wall, b + 1.9 * wall), (-drop, 0.5 * wall))
-            for a, b in corners
-        )
+        corners = [(s * (x - 2 * wall), t * (y - 2 * wall)) for s in (-1, 1) for t in (-1, 1)]
+        return union(box(about(a, 1.9 * wall), about(b, 1.9 * wall), (-drop, 0.5 * wall)) for a, b in corners)
     if kind == "balls":
-        return union(cylinder((a, b, -drop), (a, b, 0.5 * wall), 1.2 * wall, 1.8 * wall, 16) for a, b in corners)
+        return posts(x - 2 * wall, y - 2 * wall, (-drop, 0.5 * wall), 1.2 * wall, 1.8 * wall, 16)
     return Solid()
 
 

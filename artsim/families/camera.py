@@ -14,7 +14,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import FRONT, UP, Solid, about, box, cylinder, ellipsoid, hull_of, prism, ring, tube
+from artsim.making.outlines import FRONT, UP, about, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -171,8 +172,7 @@ def _dial(rng: Rng, foot: Array, radius: float) -> Solid:
     tall = radius * rng.uniform(0.4, 1.1)
     solid = cylinder(foot, foot + tall * UP, radius, radius * rng.uniform(0.9, 1.0), 20)
     if rng.random() < 0.5:
-        for k in range(10):
-            a = 2.0 * np.pi * k / 10
+        for a in turns(10):
             edge = foot + (radius * cos(a), radius * sin(a), 0)
             solid += cylinder(edge + 0.1 * tall * UP, edge + 0.9 * tall * UP, 0.07 * radius, sections=4)
     if rng.random() < 0.4:

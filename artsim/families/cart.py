@@ -17,7 +17,8 @@ from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.solids import UP, Solid, box, cylinder, hull_of, tray, tube, union
+from artsim.making.outlines import UP
+from artsim.making.solids import Solid, box, cylinder, hull_of, posts, tray, tube, union
 
 
 def build(rng: Rng) -> Assembly:
@@ -153,7 +154,7 @@ def _service_trolley(rng: Rng) -> Assembly:
     base = wheels.caster_height + 0.004
     height = rng.uniform(0.45, 0.9)
     top = base + height
-    posts = rng.uniform(0.008, 0.016)
+    post = rng.uniform(0.008, 0.016)
     body = Solid()
     closed = rng.random() < 0.5
     cart = Assembly("body", density=500.0)
@@ -184,9 +185,7 @@ def _service_trolley(rng: Rng) -> Assembly:
         if rng.random() < 0.6:
             body += box(depth + 0.01, half + 0.01, (top - 0.002, top + 0.018), fillet=0.01, axis=2)
     else:
-        x, y = depth - posts, half - posts
-        for corner in ((-x, -y), (-x, y), (x, -y), (x, y)):
-            body += cylinder((*corner, base), (*corner, top), posts, sections=10)
+        body += posts(depth - post, half - post, (base, top), post, sections=10)
         count = int(rng.integers(2, 5))
         for z in np.linspace(base + 0.01, top - 0.06 * rng.integers(0, 2), count).tolist():
             rail = rng.choice([0.0, rng.uniform(0.02, 0.09)])
@@ -198,8 +197,8 @@ def _service_trolley(rng: Rng) -> Assembly:
     if rng.random() < 0.75:  # a handle at the pusher's side
         z = top - rng.uniform(0.0, 0.06)
         out = depth + rng.uniform(0.04, 0.09)
-        r = max(0.8 * posts, 0.007)
-        y = 0.9 * half if closed else half - posts
+        r = max(0.8 * post, 0.007)
+        y = 0.9 * half if closed else half - post
         body += tube([(depth - 0.01, -y, z - 0.03), (out, -y, z), (out, y, z), (depth - 0.01, y, z - 0.03)], r, 10)
     cart.body = body
     reach = 1.7 * wheels.radius

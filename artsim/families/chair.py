@@ -11,7 +11,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import SIDE, UP, Solid, box, cylinder, frame, hull_of, ring, tube
+from artsim.making.outlines import SIDE, UP
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0025

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from artsim.common.elementary import cos
 from artsim.common.products import dot, matmul, norm, unit
 from artsim.making.assembly import JointSpec, Rng
-from artsim.making.solids import Solid, Vector, cylinder
+from artsim.making.outlines import Vector
+from artsim.making.solids import Solid, cylinder
 from artsim.model.kinematics import Array, Joint, KinematicTree
 
 Index = NDArray[np.int64]

@@ -17,7 +17,8 @@ from artsim.families.clock_faces import CLOCKWISE, add_hands, dial_plate, glass_
 from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import FRONT, Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
+from artsim.making.outlines import FRONT
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
 
 GAP = 0.001
 DENSITY = 500.0

@@ -7,7 +7,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous
-from artsim.making.solids import FRONT, Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
+from artsim.making.outlines import FRONT
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
 from artsim.model.kinematics import Array
 
 CLOCKWISE = np.array([1.0, 0.0, 0.0])

@@ -13,20 +13,8 @@ import numpy as np
 from artsim.common.elementary import power
 from artsim.families.details import dial
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import (
-    FRONT,
-    Solid,
-    box,
-    cylinder,
-    hull,
-    hull_of,
-    ring,
-    rounded_rectangle,
-    tray,
-    tube,
-    union,
-    vessel,
-)
+from artsim.making.outlines import FRONT, lifted, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, tray, tube, union, vessel
 
 GAP = 0.0015
 
@@ -203,7 +191,7 @@ def _percolator(rng: Rng) -> Assembly:
     levels = [(half, 0.0), (rng.uniform(0.75, 1.0) * half, foot)]
     if rng.random() < 0.6:
         corner = rng.uniform(0.005, 0.03)
-        rings = [np.column_stack([rounded_rectangle((-w, -w), (w, w), corner, 3), np.full(16, z)]) for w, z in levels]
+        rings = [lifted(rounded_rectangle((-w, -w), (w, w), corner, 3), z) for w, z in levels]
         body = hull(np.concatenate(rings))
     else:
         body = cylinder((0, 0, 0), (0, 0, foot), levels[0][0], levels[1][0])
@@ -240,7 +228,7 @@ def _tapered(
 ) -> Solid:
     """Block with round upright edges whose two sides lean inward."""
     outlines = [
-        np.column_stack([rounded_rectangle((low[0], low[1] + s), (high[0], high[1] - s), radius, 4), np.full(20, z)])
+        lifted(rounded_rectangle((low[0], low[1] + s), (high[0], high[1] - s), radius, 4), z)
         for s, z in zip((0.0, shrink), heights, strict=True)
     ]
     return hull(np.concatenate(outlines))

@@ -10,7 +10,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin, tan
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic
-from artsim.making.solids import Solid, box, cylinder, prism, rounded_rectangle, union
+from artsim.making.outlines import rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, prism, union
 
 GAP = 0.0005
 

@@ -11,18 +11,8 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import JointSpec, revolute
-from artsim.making.solids import (
-    Solid,
-    Vector,
-    box,
-    cylinder,
-    frame,
-    hull,
-    prism,
-    rounded_rectangle,
-    tube,
-    union,
-)
+from artsim.making.outlines import Vector, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, frame, hull, prism, tube, union
 from artsim.model.kinematics import Array
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import hypot
 from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, tray, union
+from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
 
 GAP = 0.002
 
@@ -156,8 +156,7 @@ def _body(rng: Rng, s: Shape, strip: float, flush: bool, flanked: bool, compact:
         solid += box((front + 0.01, back), half, (foot, base + 0.002))
         solid += box((face + rng.uniform(0.02, 0.06), back - 0.02), half - 0.01, (0.0, foot + 0.01))
     elif compact or rng.random() < 0.25:
-        feet = ((x, y) for x in (front + 0.05, back - 0.05) for y in (-half + 0.05, half - 0.05))
-        solid += union(cylinder((x, y, 0), (x, y, base + 0.003), 0.018, sections=14) for x, y in feet)
+        solid += posts((front + 0.05, back - 0.05), half - 0.05, (0, base + 0.003), 0.018)
     else:
         recess = front + rng.uniform(0.0, 0.08)
         solid += box((recess, back), half - 0.002, (0, base + 0.003))

@@ -14,7 +14,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import UP, Solid, about, box, cylinder, ellipsoid, hull_of, ring, tube, union
+from artsim.making.outlines import UP, about, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -264,8 +265,7 @@ def _stand(rng: Rng, wide: float, foot: float) -> Solid:
     solid = ring((0, 0, foot - 0.006), UP, 0.75 * wide, 1.0 * wide, 0.016, 20)
     count = int(rng.integers(3, 5))
     spread = rng.uniform(0.9, 1.25)
-    for k in range(count):
-        a = 2.0 * np.pi * (k + 0.5) / count
+    for a in turns(count, 0.5):
         x, y = cos(a) * wide, sin(a) * wide
         solid += tube([(0.88 * x, 0.88 * y, foot - 0.004), (spread * x, spread * y, 0.004)], 0.006, 8)
     return solid

@@ -14,19 +14,8 @@ from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import (
-    FRONT,
-    Solid,
-    box,
-    cylinder,
-    frame,
-    hull,
-    loft,
-    ring,
-    rounded_rectangle,
-    tube,
-    union,
-)
+from artsim.making.outlines import FRONT, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015

@@ -15,7 +15,8 @@ import numpy as np
 from artsim.families.details import bar_handle, bow_handle, knob, panel
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, Rng, prismatic
-from artsim.making.solids import Solid, Vector, box, cylinder, frame, hull_of, tray, tube
+from artsim.making.outlines import Vector
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, tray, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.002

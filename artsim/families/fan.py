@@ -13,7 +13,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import FRONT, UP, Solid, box, circle, cylinder, ellipsoid, frame, loft, ring, tube, union
+from artsim.making.outlines import FRONT, UP, circle
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, loft, ring, tube, union
 
 GAP = 0.002
 

@@ -13,7 +13,8 @@ from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute, screw
-from artsim.making.solids import FRONT, UP, Solid, Vector, box, cylinder, ellipsoid, hull_of, tube, union
+from artsim.making.outlines import FRONT, UP, Vector
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001

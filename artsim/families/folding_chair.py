@@ -14,7 +14,8 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import SIDE, Solid, Vector, box, cylinder, frame, hull, union
+from artsim.making.outlines import SIDE, Vector
+from artsim.making.solids import Solid, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004

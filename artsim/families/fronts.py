@@ -12,7 +12,8 @@ import numpy as np
 
 from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, Rng, prismatic, revolute
-from artsim.making.solids import FRONT, Solid, box, cylinder, hull_of, tray
+from artsim.making.outlines import FRONT
+from artsim.making.solids import Solid, box, cylinder, hull_of, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015

@@ -13,19 +13,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, unit
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
-from artsim.making.solids import (
-    UP,
-    Solid,
-    box,
-    cylinder,
-    ellipsoid,
-    hull,
-    revolved,
-    ring,
-    rotation_about,
-    tube,
-    union,
-)
+from artsim.making.outlines import UP, rotation_about, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, revolved, ring, tube, union
 
 GAP = 0.0015
 
@@ -151,8 +140,7 @@ def _horizon(rng: Rng, inner: float, foot: float, thick: float, radius: float) -
     solid = revolved([(inner, -0.5 * thick), (inner + 3 * thick, -0.5 * thick), (inner + 3 * thick, 0.5 * thick),
                       (inner, 0.5 * thick)], sections=28)  # fmt: skip
     count = int(rng.integers(3, 5))
-    for k in range(count):
-        a = 2.0 * np.pi * (k + 0.5) / count
+    for a in turns(count, 0.5):
         out = np.array([cos(a), sin(a), 0.0])
         at = inner + 1.5 * thick
         path = np.outer([at, at, 0.0], out) + np.outer([0.0, 0.6 * foot, foot - 0.06 * radius], UP)

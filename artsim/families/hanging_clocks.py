@@ -8,7 +8,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.clock_faces import add_hands, dial_plate, glass_door, outline, pendulum, rim
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import FRONT, box, cylinder, ellipsoid, frame, hull_of, prism, tube
+from artsim.making.outlines import FRONT
+from artsim.making.solids import box, cylinder, ellipsoid, frame, hull_of, prism, tube
 
 GAP = 0.001
 DENSITY = 500.0

@@ -16,7 +16,8 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import UP, Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
+from artsim.making.outlines import UP
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015

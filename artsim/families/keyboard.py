@@ -26,7 +26,8 @@ from artsim.families.key_layouts import (
 )
 from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull, rounded_rectangle, tube, union
+from artsim.making.outlines import rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic
-from artsim.making.solids import Solid, Vector, hull, prism, rounded_rectangle, union
+from artsim.making.outlines import Vector, lifted, rounded_rectangle
+from artsim.making.solids import Solid, hull, prism, union
 from artsim.model.kinematics import Array
 
 CLEAR = 0.0003
@@ -189,5 +190,5 @@ def cross_sections(levels: ArrayLike, fronts: ArrayLike, backs: ArrayLike, halve
     for z, front, back, half in rows:
         radius = roundness * 0.5 * min(back - front, 2.0 * half)
         plane = rounded_rectangle((front, -half), (back, half), radius, steps)
-        rings.append(np.column_stack([plane, np.full(len(plane), z)]))
+        rings.append(lifted(plane, z))
     return rings

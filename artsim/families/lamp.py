@@ -16,7 +16,8 @@ from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
-from artsim.making.solids import SIDE, UP, box, cylinder, ellipsoid, hull_of, revolved, rotation_about, tube, union
+from artsim.making.outlines import SIDE, UP, rotation_about
+from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001

@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import tan
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts
 
 GAP = 0.0008
 
@@ -119,11 +119,8 @@ def _base(rng: Rng, shape: _Shape) -> Solid:
         solid += box((back - 0.02, reach), half, (0.15 * room, room), fillet=0.3 * room)
     if rng.random() < 0.7:
         foot = 0.02 * width
-        solid += union(
-            cylinder((x, y, -0.15 * foot), (x, y, 0.5 * height), foot, sections=16)
-            for x in (front + 3.5 * foot, back - 2.5 * foot)
-            for y in (-width / 2 + 3.5 * foot, width / 2 - 3.5 * foot)
-        )
+        across = (front + 3.5 * foot, back - 2.5 * foot)
+        solid += posts(across, width / 2 - 3.5 * foot, (-0.15 * foot, 0.5 * height), foot, sections=16)
     if rng.random() < 0.15:  # a catch or a lip at the front
         half, reach = rng.uniform(0.03, 0.2) * width, rng.uniform(0.002, 0.012)
         solid += box((front - reach, front + 0.2 * shape.depth), half, (0.3 * deck, 0.8 * deck))

@@ -6,7 +6,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import FRONT, Solid, Vector, box, cylinder, ellipsoid, ring
+from artsim.making.outlines import FRONT, Vector, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring
 
 DENSITY = 900.0
 
@@ -69,8 +70,7 @@ class Lens:
     def _ribs(self, rng: Rng, radius: float, near: float, far: float) -> Solid:
         solid = Solid()
         count = int(rng.choice([0, 6, 10]))
-        for k in range(count):
-            a = 2.0 * np.pi * k / count
+        for a in turns(count):
             out = self.center + (0, radius * cos(a), radius * sin(a))
             inset = 0.15 * (far - near)
             solid += cylinder(out - (near + inset, 0, 0), out - (far - inset, 0, 0), 0.06 * radius, sections=4)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin
-from artsim.common.elementary import power as raised
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.outlines import lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -48,18 +48,13 @@ def _fork(center: Array, inner: float, thick: float, low: float, radius: float) 
 
 def _outline(rng: Rng, half_x: float, half_y: float) -> Array:
     """(N, 2) cross-section: oval, rounded rectangle or with a round front."""
-    count = 20
     power = rng.choice([2.0, rng.uniform(2.2, 4.0), rng.uniform(5.0, 12.0)])
-    angles = np.arange(count) * 2.0 * np.pi / count
-    c, s = cos(angles), sin(angles)
-    return np.column_stack(
-        [np.sign(c) * raised(np.abs(c), 2.0 / power) * half_x, np.sign(s) * raised(np.abs(s), 2.0 / power) * half_y]
-    )
+    return superellipse(power, half_x, half_y, 20)
 
 
 def _layers(outline: Array, levels: list[tuple[float, float]]) -> Solid:
     """Loft of one outline, scaled, at several heights."""
-    return loft([np.column_stack([scale * outline, np.full(len(outline), z)]) for scale, z in levels])
+    return loft([lifted(scale * outline, z) for scale, z in levels])
 
 
 def _pocket(rng: Rng) -> Assembly:
@@ -106,12 +101,7 @@ def _pocket(rng: Rng) -> Assembly:
     for k in range(len(plan)):
         corners = [np.append(o[k - j], z) for o in (plan, inside) for j in (0, 1) for z in (low, high - wall)]
         lid += hull(corners)
-    lid += loft(
-        [
-            np.column_stack([plan, np.full(len(plan), high - wall - 0.0002)]),
-            np.column_stack([plan * (0.85 if dome else 0.97), np.full(len(plan), high + dome)]),
-        ]
-    )
+    lid += loft([lifted(plan, high - wall - 0.0002), lifted(plan * (0.85 if dome else 0.97), high + dome)])
     for side in (-1, 1):
         y0, y1 = sorted((side * 0.53 * half_y, side * 0.85 * half_y))
         lid += cylinder((hinge_x, y0, height), (hinge_x, y1, height), knuckle, sections=10)

@@ -12,7 +12,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, tray, union
+from artsim.making.outlines import turns
+from artsim.making.solids import Solid, box, cylinder, posts, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -86,8 +87,7 @@ def _body(
     solid += box((GAP, outer[0] + 0.01), (inner[1] - 0.01, left - 0.002), (outer[2], high - 0.002))
     solid += box((GAP, outer[0] + 0.01), (outer[1], left - 0.002), (low + 0.002, high - 0.002))
     solid += box((outer[0], depth - 0.002), (inner[1] - 0.01, left - 0.002), (low + 0.002, high - 0.002))
-    spots = ((x, y) for x in (0.05, depth - 0.05) for y in (right + 0.05, left - 0.05))
-    solid += union(cylinder((x, y, 0), (x, y, low + 0.004), 0.015, sections=14) for x, y in spots)
+    solid += posts((0.05, depth - 0.05), (right + 0.05, left - 0.05), (0, low + 0.004), 0.015)
     if rng.random() < 0.4:  # ribs over the vents
         for x in np.linspace(0.4, 0.8, 7) * depth:
             solid += box(
@@ -167,8 +167,7 @@ def _turntable(rng: Rng, low: Array, high: Array, center: Array) -> Solid:
     radius = 0.5 * min(high[0] - low[0], high[1] - low[1]) - rng.uniform(0.006, 0.02)
     solid = cylinder((x, y, z + 0.006), (x, y, z + 0.012), 0.93 * radius, radius, 32)
     solid += cylinder((x, y, z), (x, y, z + 0.008), rng.uniform(0.03, 0.05), sections=12)
-    for k in range(3):
-        a = 2.0 * np.pi * k / 3
+    for a in turns(3):
         point = np.array([x + 0.8 * radius * cos(a), y + 0.8 * radius * sin(a), z + 0.012])
         solid += box(point - (0.012, 0.006, 0.003), point + (0.012, 0.006, 0.0015))
     return solid

@@ -15,7 +15,8 @@ from artsim.common.products import apply
 from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rotation_about, tube, union
+from artsim.making.outlines import rotation_about
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007

@@ -14,7 +14,7 @@ from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, tray, union
+from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -41,8 +41,7 @@ def build(rng: Rng) -> Assembly:
     oven.record(handles=True)
     body = tray((GAP, -half, plinth), (depth, half, height), wall, 0.02, axis=0, side=-1)
     body += box((-thick, 0.02), half, (ceiling, height), fillet=0.004, axis=1)
-    feet = ((x, y) for x in (0.05, depth - 0.05) for y in (0.05 - half, half - 0.05))
-    body += union(cylinder((x, y, 0), (x, y, plinth + 0.01), 0.02, sections=14) for x, y in feet)
+    body += posts((0.05, depth - 0.05), half - 0.05, (0, plinth + 0.01), 0.02)
     if not built_in:
         body += _hob(rng, half, depth, height, thick)
         if rng.random() < 0.6:  # a plinth set back

@@ -14,7 +14,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute, screw
-from artsim.making.solids import UP, Solid, box, hull, loft, union
+from artsim.making.outlines import UP
+from artsim.making.solids import Solid, box, hull, loft, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0004

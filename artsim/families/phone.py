@@ -15,6 +15,7 @@ from artsim.common.elementary import exp
 from artsim.families.desk_phone import desk_set
 from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.outlines import lifted
 from artsim.making.solids import Solid, box, cylinder, hull, loft, union
 
 GAP = 0.0005
@@ -283,9 +284,7 @@ def _cordless(rng: Rng, phone: Assembly) -> None:
             across = opening[1] if axis == 0 else 0.5 * size[1]
             foot = np.array([(a, b) for a in (near, far) for b in (-across, across)])
             crown = np.array([(a, b) for a in (near, near + taper * 0.5 * (far - near)) for b in (-across, across)])
-            points = [
-                np.column_stack([ring_, np.full(4, z)]) for ring_, z in ((foot, floor - 1e-4), (crown, floor + rise))
-            ]
+            points = [lifted(ring_, z) for ring_, z in ((foot, floor - 1e-4), (crown, floor + rise))]
             flat = np.concatenate(points)
             dock += hull(flat if axis == 0 else flat[:, [1, 0, 2]])
     phone.add("dock", dock, density=900.0)

@@ -14,7 +14,8 @@ import numpy as np
 
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.solids import FRONT, Solid, box, cylinder, hull, prism, rounded_rectangle, tray, union
+from artsim.making.outlines import FRONT, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull, prism, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002

@@ -17,7 +17,8 @@ import numpy as np
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.making.assembly import Assembly, JointSpec, Rng
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, rotation_about, tube, union
+from artsim.making.outlines import rotation_about
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002

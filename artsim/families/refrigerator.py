@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, Rng, prismatic
-from artsim.making.solids import Solid, box, cylinder, frame, tray, union
+from artsim.making.solids import Solid, box, frame, posts, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
@@ -137,8 +137,7 @@ def _body(
     if rng.random() < 0.5:
         solid += box((rng.uniform(0.0, 0.05) + GAP, depth - 0.01), half - 0.01, (0.0, low + 0.01))
     else:
-        spots = ((x, y) for x in (0.06, depth - 0.06) for y in (0.06 - half, half - 0.06))
-        solid += union(cylinder((x, y, 0), (x, y, low + 0.01), 0.022, sections=14) for x, y in spots)
+        solid += posts((0.06, depth - 0.06), half - 0.06, (0, low + 0.01), 0.022)
     if small and rng.random() < 0.4:  # a top that lies over the door
         solid += box((-style.thick * rng.uniform(0.0, 1.2), -half - 0.002, high - 0.001),
                              (depth, half + 0.002, high + rng.uniform(0.012, 0.03)), fillet=0.004)  # fmt: skip

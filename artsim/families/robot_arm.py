@@ -11,16 +11,8 @@ import numpy as np
 from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.solids import (
-    Solid,
-    box,
-    cylinder,
-    hull,
-    hull_of,
-    ring,
-    rotation_about,
-    rounded_rectangle,
-)
+from artsim.making.outlines import rotation_about, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring
 from artsim.model.kinematics import Array
 
 GAP = 0.0015

@@ -14,7 +14,8 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring, tube, union
+from artsim.making.outlines import turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, posts, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -133,7 +134,9 @@ def _body(rng: Rng, s: Shape) -> Solid:
         spots = [(x, y) for x in (0.16 * s.half, s.depth - 0.16 * s.half) for y in (-0.82 * s.half, 0.82 * s.half)]
         radius = 0.1 * s.half
         if rng.random() < 0.5:
-            solid += union(cylinder((x, y, 0), (x, y, s.low + 0.004), radius, sections=16) for x, y in spots)
+            solid += posts(
+                (0.16 * s.half, s.depth - 0.16 * s.half), 0.82 * s.half, (0, s.low + 0.004), radius, sections=16
+            )
         else:
             solid += union(
                 box((x - radius, x + radius), (y - radius, y + radius), (0, s.low + 0.004)) for x, y in spots
@@ -217,8 +220,7 @@ def _wheel(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:
     solid = cylinder((x, y, z), (x - reach, y, z), 0.3 * radius, 0.22 * radius, 18)
     rim = rng.random() < 0.4
     hub = np.array([x - 0.8 * reach, y, z])
-    for k in range(spokes):
-        a = 2.0 * np.pi * (k + 0.25) / spokes
+    for a in turns(spokes, 0.25):
         end = hub + radius * np.array([0.0, cos(a), sin(a)])
         solid += tube(np.stack([hub, end]), 0.006, 10)
         solid += Solid() if rim else ellipsoid(end, 0.011, 12)

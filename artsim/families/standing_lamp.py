@@ -10,7 +10,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import SIDE, UP, Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
+from artsim.making.outlines import SIDE, UP
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
 
 GAP = 0.002
 

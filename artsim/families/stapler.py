@@ -14,7 +14,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rounded_rectangle
+from artsim.making.outlines import rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism
 from artsim.model.kinematics import Array
 
 GAP = 0.0008

@@ -13,18 +13,8 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import (
-    Solid,
-    about,
-    box,
-    cylinder,
-    frame,
-    hull,
-    loft,
-    rounded_rectangle,
-    tube,
-    union,
-)
+from artsim.making.outlines import about, lifted, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -278,5 +268,4 @@ def _bag(rng: Rng) -> Assembly:
 
 def _outline(x: float, y: float, z: float) -> Array:
     """(N, 3) rounded rectangle at a height."""
-    plane = rounded_rectangle((-x, -y), (x, y), 0.5 * min(x, y), 3)
-    return np.column_stack([plane, np.full(len(plane), z)])
+    return lifted(rounded_rectangle((-x, -y), (x, y), 0.5 * min(x, y), 3), z)

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.common.elementary import power as raised
 from artsim.families.fronts import Style
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, add_case, drop_leaves, four_legs, keyboard_tray, table_top, wheels
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import UP, Solid, about, box, cylinder, hull_of, loft, ring, union
+from artsim.making.outlines import UP, about, lifted, superellipse, turns
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
 
 LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 """Depth, width and height of unusual tables over their diagonal."""
@@ -231,17 +231,12 @@ def _column(rng: Rng, table: Assembly) -> None:
     height, wide = rng.uniform(0.45, 1.1), rng.uniform(0.22, 0.6)
     thick = rng.uniform(0.015, 0.05)
     power = float(rng.choice([2.0, 4.0, 12.0]))
-    count = 32
-    angles = np.arange(count) * 2.0 * np.pi / count
-    c, s = cos(angles), sin(angles)
     long = wide * rng.choice([1.0, rng.uniform(1.0, 2.2)])
-    outline = np.column_stack(
-        [np.sign(c) * raised(np.abs(c), 2.0 / power) * wide, np.sign(s) * raised(np.abs(s), 2.0 / power) * long]
-    )
+    outline = superellipse(power, wide, long, 32)
 
     def slab(z: float) -> Solid:
         rings = [
-            np.column_stack([k * outline, np.full(count, h)])
+            lifted(k * outline, h)
             for k, h in ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))
         ]
         return loft(rings)
@@ -254,8 +249,7 @@ def _column(rng: Rng, table: Assembly) -> None:
     base = Solid()
     low = foot + 0.05
     spots = []
-    for k in range(feet):
-        angle = 2.0 * np.pi * (k + 0.5) / feet
+    for angle in turns(feet, 0.5):
         leg = hull_of(
             box((0, 0.01), 0.6 * radius, (low, low + rng.uniform(0.05, 0.15))),
             box((span - 0.02, span + 0.015), 0.02, (foot, foot + 0.03)),

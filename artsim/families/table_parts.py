@@ -46,8 +46,7 @@ def add_case(
     solid = box((style.back, low[1], low[2]), high)
     solid += union(box((style.face, high[0]), (low[1], high[1]), (z, z + board)) for z in (low[2], high[2] - board))
     solid += union(box((style.face, high[0]), (y, y + board), (low[2], high[2])) for y in (low[1], high[1] - board))
-    whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board),
-                 (free[0], True), (free[1], True))  # fmt: skip
+    whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board), (free[0], True), (free[1], True))
     columns, boards = _divided(rng, whole, 0, grid[0], style)
     solid += boards
     recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6

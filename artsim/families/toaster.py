@@ -10,17 +10,8 @@ import numpy as np
 
 from artsim.families.details import dial, push_button
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.solids import (
-    Solid,
-    box,
-    cylinder,
-    frame,
-    hull_of,
-    prism,
-    rounded_rectangle,
-    tube,
-    union,
-)
+from artsim.making.outlines import rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts, prism, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -43,8 +34,7 @@ def build(rng: Rng) -> Assembly:
     slots = np.asarray((np.arange(count) - 0.5 * (count - 1)) * pitch, dtype=np.float64)
     body = _slotted(block, slots, wide, (margin, length - margin), foot + 0.03)
     if rng.random() < 0.6:
-        spots = ((x, y) for x in (0.04, length - 0.04) for y in (0.75 * -half, 0.75 * half))
-        body += union(cylinder((x, y, 0), (x, y, foot + 0.012), 0.011, 0.014, 14) for x, y in spots)
+        body += posts((0.04, length - 0.04), 0.75 * half, (0, foot + 0.012), 0.011, 0.014)
         base = False
     else:
         body += box((0.012, length - 0.012), half - 0.008, (0.0, foot + 0.012), fillet=0.01, axis=2)

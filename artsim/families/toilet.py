@@ -12,9 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.common.elementary import cos, sin
-from artsim.common.elementary import power as raised
 from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
+from artsim.making.outlines import lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, tray, tube, union
 from artsim.model.kinematics import Array
 
@@ -70,11 +69,7 @@ def build(rng: Rng) -> Assembly:
 
 def _oval(length: float, width: float, power: float, z: float, shift: float = 0.0) -> Array:
     """(N, 3) outline, a superellipse about x = shift, longer towards the front."""
-    angles = np.arange(_AROUND) * 2.0 * np.pi / _AROUND
-    c, s = cos(angles), sin(angles)
-    x = np.sign(c) * raised(np.abs(c), 2.0 / power) * 0.5 * length
-    y = np.sign(s) * raised(np.abs(s), 2.0 / power) * 0.5 * width
-    return np.column_stack([x + shift, y, np.full(_AROUND, z)])
+    return lifted(superellipse(power, 0.5 * length, 0.5 * width, _AROUND) + (shift, 0.0), z)
 
 
 def _rim(outer: tuple[Array, Array], inner: tuple[Array, Array], first: int = 0, last: int = _AROUND) -> Solid:

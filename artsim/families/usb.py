@@ -13,19 +13,8 @@ import numpy as np
 
 from artsim.families.keys import key_outline, sleeve
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import (
-    FRONT,
-    Solid,
-    box,
-    cylinder,
-    hull,
-    hull_of,
-    prism,
-    ring,
-    rounded_rectangle,
-    tube,
-    union,
-)
+from artsim.making.outlines import FRONT, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull, hull_of, prism, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0004

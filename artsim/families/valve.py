@@ -10,7 +10,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, revolute, screw
-from artsim.making.solids import UP, Solid, box, circle, cylinder, ellipsoid, hull_of, ring, tube
+from artsim.making.outlines import UP, circle, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -114,8 +115,7 @@ def _wheel(rng: Rng, hub: float, radius: float, stem: float, pipe: float) -> Sol
     solid += cylinder((0, 0, hub), (0, 0, hub + tall), 2.0 * stem, 1.7 * stem, 16)
     solid += cylinder((0, 0, hub + tall - 0.001), (0, 0, hub + tall + 0.8 * stem), 1.2 * stem, sections=6)
     flat = rng.random() < 0.5
-    for k in range(spokes):
-        angle = 2.0 * np.pi * k / spokes
+    for angle in turns(spokes):
         out = np.array([cos(angle), sin(angle), 0.0])
         root, tip = out * stem + (0, 0, hub + 0.5 * tall), out * (radius - rim) + (0, 0, level)
         if flat:

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
 from artsim.making.assembly import Rng
-from artsim.making.solids import UP, Solid, about, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
+from artsim.making.outlines import UP, about, lifted, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -70,7 +71,7 @@ def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Soli
     rings = []
     for z, x, y, roundness in levels:
         plane = ((1.0 - roundness) * outline + roundness * circle) * (x, y) + ((1.0 - roundness) * shift, 0.0)
-        rings.append(np.column_stack([plane, np.full(len(plane), z)]))
+        rings.append(lifted(plane, z))
     return loft(rings)
 
 
@@ -113,8 +114,7 @@ def cap(
 def ribs(radius: float, low: float, high: float, count: int, size: float) -> Solid:
     """Upright ribs around a cap."""
     solid = Solid()
-    for k in range(count):
-        a = 2.0 * np.pi * k / count
+    for a in turns(count):
         x, y = radius * cos(a), radius * sin(a)
         solid += cylinder((x, y, low), (x, y, high), size, sections=6)
     return solid

@@ -8,7 +8,8 @@ from artsim.common.elementary import arctan2, cos, sin
 from artsim.families.details import rounded_tray
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.solids import UP, box, cylinder, hull_of, tube, union
+from artsim.making.outlines import UP
+from artsim.making.solids import box, cylinder, hull_of, tube, union
 
 
 def wagon(rng: Rng) -> Assembly:

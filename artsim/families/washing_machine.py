@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull, ring, tray, union, vessel
+from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, ring, tray, vessel
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -46,9 +46,8 @@ def build(rng: Rng) -> Assembly:
     return _front_loader(rng, shape) if front_loader else _top_loader(rng, shape)
 
 
-def _feet(shape: Shape) -> Solid:
-    spots = ((x, y) for x in (0.06, shape.depth - 0.06) for y in (0.06 - shape.half, shape.half - 0.06))
-    return union(cylinder((x, y, 0), (x, y, shape.low + 0.01), 0.025, sections=14) for x, y in spots)
+def _feet(s: Shape) -> Solid:
+    return posts((0.06, s.depth - 0.06), s.half - 0.06, (0, s.low + 0.01), 0.025)
 
 
 # --- front loaders ---------------------------------------------------------------------------------------------------

@@ -6,7 +6,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous
-from artsim.making.solids import UP, Solid, Vector, box, cylinder, hull_of, ring, tube
+from artsim.making.outlines import UP, Vector, turns
+from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube
 
 GAP = 0.003
 STEEL = 1500.0  # kg/m^3, as real tubes are hollow
@@ -38,8 +39,7 @@ class Wheels:
             web = cylinder(middle - 0.3 * half, middle + 0.3 * half, 0.85 * r, sections=self.sections)
             return web + ring(middle, (0, 1, 0), 0.78 * r, r, 0.9 * self.wide, self.sections) + hub
         solid = ring(middle, (0, 1, 0), 0.8 * r, r, 0.9 * self.wide, self.sections) + hub
-        for k in range(self.spokes):
-            a = 2.0 * np.pi * k / self.spokes
+        for a in turns(self.spokes):
             out = np.array([cos(a), 0.0, sin(a)])
             solid += tube([middle + 0.5 * self.hub * out, middle + 0.85 * r * out], 0.22 * self.wide, 4)
         return solid

@@ -9,7 +9,8 @@ import numpy as np
 
 from artsim.common.products import apply, unit
 from artsim.errors import AssetError, KinematicsError
-from artsim.making.solids import Solid, Vector, rotation_about
+from artsim.making.outlines import Vector, rotation_about
+from artsim.making.solids import Solid
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 

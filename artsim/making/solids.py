@@ -17,16 +17,9 @@ from manifold3d import Manifold, OpType
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.elementary import cos, sin
-from artsim.common.products import apply, dot, matmul, unit
-from artsim.model.kinematics import Array, cross_matrix
-
-Vector = Sequence[float] | Array
-FRONT = np.array([-1.0, 0.0, 0.0])
-SIDE = np.array([0.0, 1.0, 0.0])
-UP = np.array([0.0, 0.0, 1.0])
-"""Directions of an object in its rest frame: its front, the left of who looks at it, and up."""
-Span = float | tuple[float, float]
-"""Two ends along an axis, in either order, or half of a width about 0."""
+from artsim.common.products import apply, dot, unit
+from artsim.making.outlines import Span, Vector, circle, ends, frame_about, rotation_about, rounded_rectangle
+from artsim.model.kinematics import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +87,6 @@ def mesh_of(manifold: Manifold) -> tuple[Array, NDArray[np.int32]]:
     return vertices, np.ascontiguousarray(mesh.tri_verts, dtype=np.int32)
 
 
-def rotation_about(axis: Vector, angle: float) -> Array:
-    """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
-    cross = cross_matrix(unit(axis))
-    rotation: Array = np.eye(3) + sin(angle) * cross + (1.0 - cos(angle)) * matmul(cross, cross)
-    return rotation
-
-
 def union(solids: Iterable[Solid]) -> Solid:
     """All pieces of several solids."""
     return Solid(tuple(p for solid in solids for p in solid.pieces))
@@ -140,7 +126,7 @@ def box(*extent: Any, fillet: float | None = None, axis: int | None = None, step
         Segments of a quarter circle.
     """
     if len(extent) == 3:
-        extent = tuple(zip(*(sorted(s) if isinstance(s, tuple) else (-s, s) for s in extent), strict=True))
+        extent = tuple(zip(*map(ends, extent), strict=True))
     low, high = (np.asarray(corner, dtype=np.float64) for corner in extent)
     sides = high - low
     if fillet is None:
@@ -156,22 +142,6 @@ def box(*extent: Any, fillet: float | None = None, axis: int | None = None, step
     signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     half = 0.5 * sides - radius
     return hull((signs[:, None] * (half + radius * corner)).reshape(-1, 3) + 0.5 * (low + high))
-
-
-def about(middle: float, half: float) -> tuple[float, float]:
-    """Span of twice a half width about its middle."""
-    return middle - half, middle + half
-
-
-def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) -> Array:
-    """(N, 2) outline of a rectangle with round corners."""
-    center = 0.5 * (np.asarray(low, dtype=np.float64) + np.asarray(high))
-    half = 0.5 * (np.asarray(high, dtype=np.float64) - low)
-    radius = min(radius, float(half.min()))
-    angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
-    quarter = np.stack([cos(angles), sin(angles)], axis=1) * radius + (half - radius)
-    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    return np.concatenate([quarter[:: x * y] * (x, y) for x, y in signs]) + center
 
 
 def prism(outline: ArrayLike, low: float, high: float, axis: int = 2) -> Solid:
@@ -198,20 +168,6 @@ def cylinder(start: Vector, end: Vector, radius: float, end_radius: float | None
     return hull(np.concatenate(rings))
 
 
-def circle(center: Vector, normal: Vector, radius: float, sections: int = 24) -> Array:
-    """(sections, 3) points of a circle."""
-    u, v = _across(normal)
-    angles = np.arange(sections) * (2.0 * np.pi / sections)
-    return np.asarray(center) + radius * (cos(angles)[:, None] * u + sin(angles)[:, None] * v)
-
-
-def _across(normal: Vector) -> tuple[Array, Array]:
-    """Two unit vectors that complete a normal to a right-handed frame."""
-    w = unit(normal)
-    u = unit(np.cross(np.eye(3)[np.argmin(np.abs(w))], w))
-    return u, np.cross(w, u)
-
-
 def ellipsoid(center: Vector, radii: Vector | float, sections: int = 16) -> Solid:
     """Ellipsoid with its axes along x, y and z; a sphere when ``radii`` is one number."""
     factors = np.broadcast_to(np.asarray(radii, dtype=np.float64), (3,))
@@ -219,6 +175,13 @@ def ellipsoid(center: Vector, radii: Vector | float, sections: int = 16) -> Soli
 
 
 # --- shapes of several pieces ----------------------------------------------------------------------------------------
+
+
+def posts(x: Span, y: Span, z: Span, radius: float, end_radius: float | None = None, sections: int = 14) -> Solid:
+    """Four upright cylinders, or cones, on the corners of a rectangle: feet, legs."""
+    low, high = ends(z)
+    spots = ((px, py) for px in ends(x) for py in ends(y))
+    return union(cylinder((*spot, low), (*spot, high), radius, end_radius, sections) for spot in spots)
 
 
 def tube(path: ArrayLike, radius: float | Sequence[float], sections: int = 12, closed: bool = False) -> Solid:
@@ -241,7 +204,7 @@ def _rings(path: Array, radius: float | Sequence[float], sections: int, closed: 
     steps = unit(steps)
     before = np.roll(steps, 1, axis=0) if closed else np.concatenate([steps[:1], steps])
     after = steps if closed else np.concatenate([steps, steps[-1:]])
-    u, _ = _across(after[0])
+    u, _ = frame_about(after[0])
     angles = np.arange(sections) * (2.0 * np.pi / sections)
     rings = []
     for point, r, a, b in zip(path, radii, before, after, strict=True):
@@ -288,7 +251,7 @@ def revolved(
     arc : 2 float
         First and last angle, radians.
     """
-    u, v = _across(axis)
+    u, v = frame_about(axis)
     w = unit(axis)
     outline = np.asarray(outline, dtype=np.float64)
     angles = np.linspace(*arc, sections + 1)

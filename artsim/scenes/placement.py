@@ -12,7 +12,7 @@ import numpy as np
 from artsim.common.elementary import arccos, arctan2, cos
 from artsim.common.extras import needs
 from artsim.common.products import apply, dot, matmul, unit
-from artsim.making.solids import rotation_about
+from artsim.making.outlines import rotation_about
 from artsim.model.appearance import Coat
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part

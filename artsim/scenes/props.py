@@ -8,7 +8,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import matmul
-from artsim.making.solids import Solid, Vector, box, cylinder, ellipsoid, tube, vessel
+from artsim.making.outlines import Vector
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, tube, vessel
 from artsim.model.appearance import Coat, Material, plain_coat
 from artsim.model.appearance.finishes import draw_material, piece_of_face
 from artsim.model.kinematics import Array

@@ -9,7 +9,7 @@ import numpy as np
 
 from artsim.common.extras import import_mujoco
 from artsim.common.products import apply, matmul, norm
-from artsim.making.solids import rotation_about
+from artsim.making.outlines import rotation_about
 from artsim.model.appearance import Coat
 from artsim.model.convex_bodies import add_bodies, convex_hull
 from artsim.model.kinematics import Array, transform_points

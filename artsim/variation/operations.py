@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.making.solids import rotation_about
+from artsim.making.outlines import rotation_about
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.model.stretching import APART, SIDEWAYS, AxisMap, coupled_axes, draw_axis_map, stretchable_axes

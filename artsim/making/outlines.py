@@ -1,0 +1,81 @@
+"""What solids are drawn from: directions, spans, angles, and outlines, which are arrays of points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from artsim.common.elementary import cos, sin
+from artsim.common.elementary import power as raised
+from artsim.common.products import matmul, unit
+from artsim.model.kinematics import Array, cross_matrix
+
+Vector = Sequence[float] | Array
+FRONT = np.array([-1.0, 0.0, 0.0])
+SIDE = np.array([0.0, 1.0, 0.0])
+UP = np.array([0.0, 0.0, 1.0])
+"""Directions of an object in its rest frame: its front, the left of who looks at it, and up."""
+Span = float | tuple[float, float]
+"""Two ends along an axis, in either order, or half of a width about 0."""
+
+
+def ends(span: Span) -> tuple[float, float]:
+    """Low and high end of a span."""
+    return (min(span), max(span)) if isinstance(span, tuple) else (-span, span)
+
+
+def about(middle: float, half: float) -> tuple[float, float]:
+    """Span of twice a half width about its middle."""
+    return middle - half, middle + half
+
+
+def turns(count: int, start: float = 0.0) -> list[float]:
+    """Angles of equal steps of a full turn; the first is the share ``start`` of a step."""
+    return [2.0 * np.pi * (k + start) / count for k in range(count)]
+
+
+def rotation_about(axis: Vector, angle: float) -> Array:
+    """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
+    cross = cross_matrix(unit(axis))
+    rotation: Array = np.eye(3) + sin(angle) * cross + (1.0 - cos(angle)) * matmul(cross, cross)
+    return rotation
+
+
+def frame_about(normal: Vector) -> tuple[Array, Array]:
+    """Two unit vectors that complete a normal to a right-handed frame."""
+    w = unit(normal)
+    u = unit(np.cross(np.eye(3)[np.argmin(np.abs(w))], w))
+    return u, np.cross(w, u)
+
+
+def circle(center: Vector, normal: Vector, radius: float, sections: int = 24) -> Array:
+    """(sections, 3) points of a circle."""
+    u, v = frame_about(normal)
+    angles = np.arange(sections) * (2.0 * np.pi / sections)
+    return np.asarray(center) + radius * (cos(angles)[:, None] * u + sin(angles)[:, None] * v)
+
+
+def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) -> Array:
+    """(N, 2) outline of a rectangle with round corners."""
+    center = 0.5 * (np.asarray(low, dtype=np.float64) + np.asarray(high))
+    half = 0.5 * (np.asarray(high, dtype=np.float64) - low)
+    radius = min(radius, float(half.min()))
+    angles = np.linspace(0.0, 0.5 * np.pi, steps + 1)
+    quarter = np.stack([cos(angles), sin(angles)], axis=1) * radius + (half - radius)
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    return np.concatenate([quarter[:: x * y] * (x, y) for x, y in signs]) + center
+
+
+def superellipse(power: float, x: float, y: float, count: int) -> Array:
+    """(count, 2) outline of half widths x and y: an ellipse for a power of 2, nearly a rectangle for 10."""
+    angles = np.arange(count) * 2.0 * np.pi / count
+    c, s = cos(angles), sin(angles)
+    return np.column_stack(
+        [np.sign(c) * raised(np.abs(c), 2.0 / power) * x, np.sign(s) * raised(np.abs(s), 2.0 / power) * y]
+    )
+
+
+def lifted(outline: Array, z: float) -> Array:
+    """(N, 3) points of an (N, 2) outline at a height."""
+    return np.column_stack([outline, np.full(len(outline), z)])
