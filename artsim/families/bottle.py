@@ -262,8 +262,7 @@ def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
         bottle.add("collar", collar, _closing(rng, mouth, high - low))
     else:
         bottle.add("body", body + collar)
-    joint = revolute("collar" if turning else "body", (0, 1, 0), (x, 0, z), 0.0, limit)
-    bottle.add("lid", lid, joint)
+    bottle.add("lid", lid, revolute("collar" if turning else "body", (0, 1, 0), (x, 0, z), 0.0, limit))
 
 
 def _pump(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
@@ -285,8 +284,7 @@ def _pump(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     solid = pump_head(rng, head, stem, size, reach, down)
     bottle.add("body", body)
     bottle.add("collar", collar, _closing(rng, mouth, high - low))
-    pressed = prismatic("collar", -UP, 0.0, stroke, (0, 0, head))
-    bottle.add("pump", solid, pressed)
+    bottle.add("pump", solid, prismatic("collar", -UP, 0.0, stroke, (0, 0, head)))
 
 
 def _sprayer(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:

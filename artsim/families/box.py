@@ -211,9 +211,7 @@ def _latches(rng: Rng, chest: Assembly, front: float, y: float, seam: float, top
         axis_x = -front - 2.2 * pin
         z = seam + upper
         solid = cylinder((axis_x, middle - width, z), (axis_x, middle + width, z), pin, sections=12)
-        solid += box(
-            (axis_x - 0.002, axis_x + 0.001), (middle - width, middle + width), (seam - 1.4 * upper, z), fillet=0.001
-        )
+        solid += box((axis_x - 0.002, axis_x + 0.001), about(middle, width), (seam - 1.4 * upper, z), fillet=0.001)
         chest.add(
             f"latch_{number}",
             solid,

@@ -118,9 +118,7 @@ def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float,
         span = (-0.6 * wide, 0.6 * wide, height + rise)
     if kind in ("compact", "instant"):
         y = half * rng.uniform(0.3, 0.7) * rng.choice([-1.0, 1.0])
-        body += box(
-            (-0.0012, 0.003), (y - 0.14 * half, y + 0.14 * half), (0.8 * height, 0.93 * height), fillet=0.002, axis=0
-        )
+        body += box((-0.0012, 0.003), about(y, 0.14 * half), (0.8 * height, 0.93 * height), fillet=0.002, axis=0)
     if kind in ("reflex", "rangefinder") and rng.random() < 0.4:  # lugs for a strap
         for s in (-1.0, 1.0):
             body += ring((0.5 * depth, s * (half + 0.002), 0.85 * height), (1, 0, 0), 0.0018, 0.004, 0.0018, 12)
@@ -260,14 +258,7 @@ def _camcorder(rng: Rng) -> Assembly:
         ys = [half - 0.003, 0.6 * half + 0.4 * bulge, bulge, 0.6 * half + 0.4 * bulge, half - 0.003]
         wide = rng.uniform(0.2, 0.35) * height
         for k in range(4):
-            ends = [
-                box(
-                    (xs[i] - 0.001, xs[i] + 0.001),
-                    (ys[i] - 0.001, ys[i] + 0.001),
-                    (0.5 * height - wide, 0.5 * height + wide),
-                )
-                for i in (k, k + 1)
-            ]
+            ends = [box(about(xs[i], 0.001), about(ys[i], 0.001), about(0.5 * height, wide)) for i in (k, k + 1)]
             body += hull_of(*ends)
     back = rng.random() < 0.5
     if back:

@@ -17,7 +17,7 @@ from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.outlines import UP
+from artsim.making.outlines import UP, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, posts, tray, tube, union
 
 
@@ -39,9 +39,7 @@ def _platform_trolley(rng: Rng) -> Assembly:
     body = box(0.5 * length, half, (floor, top), fillet=rng.uniform(0.01, 0.06), axis=2)
     if rng.random() < 0.5:
         for y in np.linspace(-0.8, 0.8, int(rng.integers(3, 7))).tolist():
-            body += box(
-                (-0.46 * length, 0.4 * length), (y * half - 0.006, y * half + 0.006), (top - 0.001, top + 0.002)
-            )
+            body += box((-0.46 * length, 0.4 * length), about(y * half, 0.006), (top - 0.001, top + 0.002))
     x_front, x_back = -0.5 * length + 2.0 * wheels.radius, 0.5 * length - 2.0 * wheels.radius
     spread = half - 1.6 * wheels.radius - 0.5 * wheels.wide
     swivels = int(rng.choice([2, 4], p=[0.7, 0.3]))

@@ -17,7 +17,7 @@ from artsim.families.clock_faces import CLOCKWISE, add_hands, dial_plate, glass_
 from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.outlines import FRONT
+from artsim.making.outlines import FRONT, about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
 
 GAP = 0.001
@@ -104,9 +104,7 @@ def _knobs(rng: Rng, clock: Assembly, x: float, spread: float) -> None:
         y, z = (k - 0.5 * (count - 1)) * spread, rng.uniform(-0.6, 0.3) * spread
         r = 0.35 * spread * rng.uniform(0.6, 1.0)
         knob = cylinder((x + GAP, y, z), (x + GAP + 0.5 * r, y, z), 0.5 * r, sections=10)
-        knob += box(
-            (x + GAP + 0.4 * r, x + GAP + 1.4 * r), (y - r, y + r), (z - 0.25 * r, z + 0.25 * r), fillet=0.2 * r
-        )
+        knob += box((x + GAP + 0.4 * r, x + GAP + 1.4 * r), about(y, r), about(z, 0.25 * r), fillet=0.2 * r)
         name = f"knob_{k}" if count > 1 else "knob"
         clock.add(name, knob, continuous("body", CLOCKWISE, (x, y, z)), density=DENSITY)
 

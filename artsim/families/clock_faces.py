@@ -7,7 +7,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous
-from artsim.making.outlines import FRONT
+from artsim.making.outlines import FRONT, about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
 from artsim.model.kinematics import Array
 
@@ -142,9 +142,7 @@ def glass_door(rng: Rng, clock: Assembly, x: float, across: tuple[float, float],
     if rng.random() < 0.3:
         middle = 0.5 * (upright[0] + upright[1])
         door += box(
-            (low[0] + 0.002, high[0] - 0.002),
-            (across[0] + 0.5 * bar, across[1] - 0.5 * bar),
-            (middle - 0.3 * bar, middle + 0.3 * bar),
+            (low[0] + 0.002, high[0] - 0.002), (across[0] + 0.5 * bar, across[1] - 0.5 * bar), about(middle, 0.3 * bar)
         )
     left = rng.random() < 0.5
     y = across[0] + 0.5 * bar if left else across[1] - 0.5 * bar

@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import power
 from artsim.families.details import dial
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.outlines import FRONT, lifted, rounded_rectangle
+from artsim.making.outlines import FRONT, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, tray, tube, union, vessel
 
 GAP = 0.0015
@@ -29,11 +29,7 @@ def _drip_tray(rng: Rng, machine: Assembly, x0: float, depth: float, y: float, l
     solid = tray((x0, -y, low), (x0 + depth, y, high), 0.003)
     count = int(rng.integers(3, 7))
     for edge in np.linspace(-y, y, count + 1)[1:-1]:
-        solid += box(
-            (x0 + 0.001, x0 + depth - 0.001),
-            (edge - 0.25 * y / count * 2, edge + 0.25 * y / count * 2),
-            (high - 0.004, high - 0.0005),
-        )
+        solid += box((x0 + 0.001, x0 + depth - 0.001), about(edge, 0.25 * y / count * 2), (high - 0.004, high - 0.0005))
     solid += box((x0 - 0.006, x0 + 0.002), y, (low, high), fillet=0.003)
     machine.add("drip_tray", solid, prismatic("body", FRONT, 0.0, 0.8 * depth, (x0, 0, low)), density=900.0)
 
@@ -42,12 +38,7 @@ def _base(x: float, y: float, height: float, radius: float, tray_y: float, front
     """Base plate with a niche for the drip tray in front, ``front`` deep."""
     solid = box((-x + front, x), y, (0, height), fillet=radius, axis=2)
     solid += box((-x, -x + front + radius), y, (0, 0.008))
-    return solid + union(
-        box(
-            (-x, -x + front + radius), (min(s * y, s * (tray_y + GAP)), max(s * y, s * (tray_y + GAP))), (0.001, height)
-        )
-        for s in (-1, 1)
-    )
+    return solid + union(box((-x, -x + front + radius), (s * y, s * (tray_y + GAP)), (0.001, height)) for s in (-1, 1))
 
 
 def _espresso(rng: Rng) -> Assembly:

@@ -276,9 +276,7 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
         furniture.body += _legs(rng, x0, x1, y, top + 0.001, leg)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y
-        furniture.body += box(
-            (x0, x1), (min(edge, edge + sides[0] * wall), max(edge, edge + sides[0] * wall)), (0, top)
-        )
+        furniture.body += box((x0, x1), (edge, edge + sides[0] * wall), (0, top))
     if on_legs or rng.random() < 0.7:  # a board at the back
         furniture.body += box(
             (x1 - 0.06, x1 - 0.04), (left, right), (top - rng.uniform(0.15, 0.9) * (top - low), top + 0.001)

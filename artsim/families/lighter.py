@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.outlines import lifted, superellipse
+from artsim.making.outlines import about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -277,12 +277,7 @@ def _table(rng: Rng) -> Assembly:
     if rng.random() < 0.7:
         at = height + 0.0016
         body += union(
-            box(
-                (hinge_x - 0.0012, hinge_x + 0.0012),
-                (s * 0.5 * wide - 0.0015, s * 0.5 * wide + 0.0015),
-                (height - 0.001, at - 0.0004),
-            )
-            for s in (-1, 1)
+            box(about(hinge_x, 0.0012), about(s * 0.5 * wide, 0.0015), (height - 0.001, at - 0.0004)) for s in (-1, 1)
         )
         base = at + GAP
         flap = frame((split, -wide, base), (hinge_x - 0.0015, wide, base + flap_tall), [thin] * 4, 0, 1)

@@ -15,7 +15,7 @@ from artsim.common.elementary import exp
 from artsim.families.desk_phone import desk_set
 from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.outlines import lifted
+from artsim.making.outlines import about, lifted
 from artsim.making.solids import Solid, box, cylinder, hull, loft, union
 
 GAP = 0.0005
@@ -150,12 +150,7 @@ def _flip(rng: Rng, phone: Assembly) -> None:
         z = bottom + rng.uniform(0.45, 0.7) * (pivot - bottom)
         size = 0.45 * half
         lid += box(
-            (plane - upper - 0.0008, plane - 0.5 * upper),
-            size,
-            (z - size, z + size),
-            fillet=0.3 * size,
-            axis=0,
-            steps=2,
+            (plane - upper - 0.0008, plane - 0.5 * upper), size, about(z, size), fillet=0.3 * size, axis=0, steps=2
         )
     phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
@@ -250,9 +245,7 @@ def _smartphone(rng: Rng, phone: Assembly) -> None:
     if rng.random() < 0.7:  # the camera's bump
         bump, size = rng.uniform(0.0008, 0.004), rng.uniform(0.15, 0.45) * half
         y, z = rng.choice([0.0, 0.45]) * half, 0.88 * length - size
-        body += box(
-            (0.5 * thick, thick + bump), (y - size, y + size), (z - size, z + size), fillet=0.5 * size, axis=0, steps=2
-        )
+        body += box((0.5 * thick, thick + bump), about(y, size), about(z, size), fillet=0.5 * size, axis=0, steps=2)
     phone.add("body", body, density=1800.0)
     if chin > 0.1:
         add_function_keys(

@@ -13,6 +13,7 @@ import numpy as np
 
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, Rng, prismatic
+from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, frame, posts, tray, union
 from artsim.model.kinematics import Array
 
@@ -96,9 +97,7 @@ def build(rng: Rng) -> Assembly:
             solid += frame(
                 (-style.thick - 0.008, y - 0.08, z - 0.14), (0.5 * -style.thick, y + 0.08, z + 0.14), [0.014] * 4
             )
-            solid += box(
-                (-style.thick - 0.014, -0.5 * style.thick), (y - 0.05, y + 0.05), (z + 0.08, z + 0.13), fillet=0.004
-            )
+            solid += box((-style.thick - 0.014, -0.5 * style.thick), about(y, 0.05), (z + 0.08, z + 0.13), fillet=0.004)
         name = f"door_{doors}" if layout != "single" else "door"
         edge = left if side > 0 else right
         fridge.add(name, solid, side_hinge(0.0, edge, opening, side > 0), density=200.0)

@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
-from artsim.making.outlines import turns
+from artsim.making.outlines import about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, posts, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -138,9 +138,7 @@ def _body(rng: Rng, s: Shape) -> Solid:
                 (0.16 * s.half, s.depth - 0.16 * s.half), 0.82 * s.half, (0, s.low + 0.004), radius, sections=16
             )
         else:
-            solid += union(
-                box((x - radius, x + radius), (y - radius, y + radius), (0, s.low + 0.004)) for x, y in spots
-            )
+            solid += union(box(about(x, radius), about(y, radius), (0, s.low + 0.004)) for x, y in spots)
     if s.barrel > 0:
         x, y = s.hinge
         for low, high in _knuckles(s, of_door=False):
@@ -183,12 +181,7 @@ def _door(rng: Rng, s: Shape, combination: bool, opener: str) -> Solid:
             solid += box((x, 0.003), (y - 0.14 * wide, y), (bottom, top))
     if not combination:  # a keypad with its keys
         y, z, unit = low[1] + 0.66 * wide, low[2] + 0.66 * tall if tall > 0.85 * wide else low[2] + 0.5 * tall, 0.014
-        solid += box(
-            (low[0] - 0.008, low[0] + 0.003),
-            (y - 2.3 * unit, y + 2.3 * unit),
-            (z - 3 * unit, z + 3 * unit),
-            fillet=0.004,
-        )
+        solid += box((low[0] - 0.008, low[0] + 0.003), about(y, 2.3 * unit), about(z, 3 * unit), fillet=0.004)
         for row in range(4):
             for column in (-1, 0, 1):
                 center = np.array([low[0] - 0.008, y + column * 1.4 * unit, z + (row - 1.9) * 1.3 * unit])

@@ -14,6 +14,7 @@ import numpy as np
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import Assembly, Rng
+from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
 
@@ -156,9 +157,7 @@ def _carcass(
     to_floor = stand > 0 and rng.random() < 0.3
     sides_from = 0.0 if to_floor else stand
     solid = box((style.back, x1), y - 0.001, (stand + 0.001, top - 0.001))
-    solid += union(
-        box((x0, x1), (s - board / 2, s + board / 2), (sides_from, top)) for s in (board / 2 - y, y - board / 2)
-    )
+    solid += union(box((x0, x1), about(s, board / 2), (sides_from, top)) for s in (board / 2 - y, y - board / 2))
     solid += box((x0, x1), y - 0.001, (stand, stand + board))
     if kind == "base" and rng.random() < 0.4:  # open at the top, with rails for a worktop
         rail = rng.uniform(0.06, 0.12)

@@ -86,17 +86,10 @@ def _trolley(rng: Rng) -> Assembly:
     else:
         places = []
         for s in (-1.0, 1.0):  # feet in front, wheel arches behind
-            back += box(
-                (seam + 0.004, seam + 0.017),
-                (s * (y - 0.05) - 0.012, s * (y - 0.05) + 0.012),
-                (0.0, lift + 0.01),
-                fillet=0.003,
-            )
+            back += box((seam + 0.004, seam + 0.017), about(s * (y - 0.05), 0.012), (0.0, lift + 0.01), fillet=0.003)
             for cheek in (-0.022, 0.022):
                 back += box(
-                    (wheel_x - 0.02, wheel_x + 0.022),
-                    (s * (y - 0.04) + cheek - 0.004, s * (y - 0.04) + cheek + 0.004),
-                    (0.022, lift + 0.01),
+                    (wheel_x - 0.02, wheel_x + 0.022), about(s * (y - 0.04) + cheek, 0.004), (0.022, lift + 0.01)
                 )
     case = Assembly("body", back, 300.0)
     limit = np.deg2rad(rng.uniform(60.0, 175.0))
@@ -128,10 +121,7 @@ def _telescope(rng: Rng, case: Assembly, x: float, half: float, low: float, high
     grip_low, grip_high = (middle - 0.008, -half - 0.011, high + 0.004), (middle + 0.008, half + 0.011, high + 0.024)
     grip = box(grip_low, grip_high, fillet=0.006)
     if rng.random() < 0.6:
-        rods = union(
-            box((middle - 0.006, middle + 0.006), (s * half - 0.008, s * half + 0.008), (z0, high + 0.01))
-            for s in (-1, 1)
-        )
+        rods = union(box(about(middle, 0.006), about(s * half, 0.008), (z0, high + 0.01)) for s in (-1, 1))
         case.add("handle", grip + rods, prismatic("body", (0, 0, 1), 0.0, travel, (middle, 0, high)), density=800.0)
         return
     tubes = box((middle - 0.0075, middle + 0.0075), half, (z0, z0 + 0.012))

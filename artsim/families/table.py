@@ -284,12 +284,7 @@ def _column(rng: Rng, table: Assembly) -> None:
         base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))
         hinge = (radius + 0.01, 0.0, top - 0.03)
         lugs = union(
-            box(
-                (hinge[0] - 0.01, hinge[0] + 0.01),
-                (t * 1.3 * radius - 0.008, t * 1.3 * radius + 0.008),
-                (top - 0.04, top + 0.002),
-            )
-            for t in (-1, 1)
+            box(about(hinge[0], 0.01), about(t * 1.3 * radius, 0.008), (top - 0.04, top + 0.002)) for t in (-1, 1)
         )
         base += box((0.0, hinge[0] + 0.005), 1.1 * radius, (top - 0.04, top - 0.025))
         # Beyond the hinge's axis the top comes down before the column.

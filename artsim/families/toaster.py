@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.families.details import dial, push_button
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.outlines import rounded_rectangle
+from artsim.making.outlines import about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts, prism, tube, union
 from artsim.model.kinematics import Array
 
@@ -110,9 +110,7 @@ def _slotted(block: Solid, slots: Array, wide: float, span: tuple[float, float],
         for x in np.linspace(*span, 5)[1:-1]:  # wires that hold the bread
             for side in (-1, 1):
                 v = y + side * 0.5 * wide
-                solid += box(
-                    (x - 0.0015, x + 0.0015), (v - 0.002, v + 0.002), (floor - 0.001, block.bounds()[1, 2] - 0.012)
-                )
+                solid += box(about(x, 0.0015), about(v, 0.002), (floor - 0.001, block.bounds()[1, 2] - 0.012))
     return solid
 
 

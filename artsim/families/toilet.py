@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
-from artsim.making.outlines import lifted, superellipse
+from artsim.making.outlines import about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, tray, tube, union
 from artsim.model.kinematics import Array
 
@@ -243,9 +243,7 @@ def _high_cistern(rng: Rng, moving: list[Moving], back: float, height: float) ->
     side = rng.choice([-1.0, 1.0])
     y = side * (half + 0.03)
     solid += box(
-        (x - 0.012, x + 0.012),
-        (min(side * (half - 0.01), y + side * 0.012), max(side * (half - 0.01), y + side * 0.012)),
-        (low + 0.6 * tall, low + 0.6 * tall + 0.015),
+        about(x, 0.012), (side * (half - 0.01), y + side * 0.012), (low + 0.6 * tall, low + 0.6 * tall + 0.015)
     )
     long = rng.uniform(0.3, 0.55) * up + 0.2
     top = low + 0.6 * tall - GAP

@@ -8,7 +8,7 @@ from artsim.common.elementary import arctan2, cos, sin
 from artsim.families.details import rounded_tray
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, revolute
-from artsim.making.outlines import UP
+from artsim.making.outlines import UP, about
 from artsim.making.solids import box, cylinder, hull_of, tube, union
 
 
@@ -117,11 +117,7 @@ def hand_cart(rng: Rng) -> Assembly:
         sections=12,
     )
     for s in (-1.0, 1.0):
-        body += box(
-            (x_axle - 0.04, x_axle + 0.04),
-            (s * 0.7 * half - 0.02, s * 0.7 * half + 0.02),
-            (min(z, low) - 0.02, low + 0.002),
-        )
+        body += box(about(x_axle, 0.04), about(s * 0.7 * half, 0.02), (min(z, low) - 0.02, low + 0.002))
     r, reach = rng.uniform(0.012, 0.02), rng.uniform(0.5, 1.1)
     rise = rng.uniform(-0.1, 0.25)
     under = low - r

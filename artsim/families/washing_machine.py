@@ -15,6 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, ring, tray, vessel
 from artsim.model.kinematics import Array
 
@@ -100,11 +101,7 @@ def _front_loader(rng: Rng, s: Shape) -> Assembly:
                             (-proud - GAP, slot[0] + box_half - GAP, s.high - 0.012), fillet=0.004)  # fmt: skip
         inner = np.array([box_half - 0.004, room - 0.003])
         solid += tray((-proud - 0.006, *(slot - inner)), (0.55 * s.depth, *(slot + inner)), 0.003)
-        solid += box(
-            (-proud - 0.024, -proud - 0.012),
-            (slot[0] - 0.4 * box_half, slot[0] + 0.4 * box_half),
-            (strip + 0.022, strip + 0.032),
-        )
+        solid += box((-proud - 0.024, -proud - 0.012), about(slot[0], 0.4 * box_half), (strip + 0.022, strip + 0.032))
         travel = rng.uniform(0.3, 0.45) * s.depth
         machine.add("detergent_drawer", solid, prismatic("body", (-1, 0, 0), 0.0, travel, (0, *slot)))
         free = (slot[0] + box_half, s.half) if box_side < 0 else (-s.half, slot[0] - box_half)

@@ -6,7 +6,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous
-from artsim.making.outlines import UP, Vector, turns
+from artsim.making.outlines import UP, Vector, about, turns
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube
 
 GAP = 0.003
@@ -53,9 +53,7 @@ class Wheels:
             plate = box((x - 0.7 * r, x + 0.7 * r), (y0, y1), (top - 0.006, top))
             solid += hull_of(plate, cylinder((x, y0, r), (x, y1, r), 0.3 * r, sections=8))
         lid = max(2.0 * r + GAP, top - 0.006)
-        return solid + box(
-            (x - 0.7 * r, x + 0.7 * r), (y - 0.5 * self.wide - 0.007, y + 0.5 * self.wide + 0.007), (lid, top)
-        )
+        return solid + box(about(x, 0.7 * r), (y - 0.5 * self.wide - 0.007, y + 0.5 * self.wide + 0.007), (lid, top))
 
     def add(self, cart: Assembly, center: Vector, parent: str = "body") -> None:
         """A wheel that turns on its axle."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame
 from artsim.model.kinematics import Array
 
@@ -105,9 +106,7 @@ def _hinged(
         first = edges[k] + (mullion / 2 if k > 0 and not meeting else 0.0)
         last = edges[k + 1] - (mullion / 2 if k < count - 1 and not meeting else 0.0)
         if k < count - 1 and not meeting:
-            body += box(
-                (x0, depth / 2), (edges[k + 1] - mullion / 2, edges[k + 1] + mullion / 2), (-0.001, top + 0.001)
-            )
+            body += box((x0, depth / 2), about(edges[k + 1], mullion / 2), (-0.001, top + 0.001))
         if k == fixed:
             low, high = (
                 np.array([x0 + 0.01, first - 0.001, -0.001]),
