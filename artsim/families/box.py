@@ -53,7 +53,7 @@ def _rigid(rng: Rng) -> Assembly:
         limit = np.deg2rad(rng.uniform(80.0, 175.0))
         thick = wall * rng.uniform(0.6, 1.2)
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
-            lid = box(x, (min(sign * y, sign * GAP), max(sign * y, sign * GAP)), (seam, seam + thick))
+            lid = box(x, (sign * y, sign * GAP), (seam, seam + thick))
             lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)
             chest.add(f"lid_{number}", lid, revolute("body", axis, (0, sign * (y + band + 0.001), seam), 0.0, limit))
         return chest
@@ -161,13 +161,9 @@ def _lid(
         bevel = min(rng.choice([0.0, 0.6 * radius]), 0.5 * rise)
         profile = [(0.0, bevel), (0.3 * bevel / rise, 0.3 * bevel), (bevel / rise, 0.0), (1.0, 0.0)]
         shape = profile if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
-        return (
-            rounded_tray(
-                (-x, -y, seam), (x, y, seam + rise), wall, radius, shape, side=-1, floor=min(wall + bevel, 0.7 * rise)
-            ),
-            seam + rise,
-            False,
-        )
+        floor = min(wall + bevel, 0.7 * rise)
+        solid = rounded_tray((-x, -y, seam), (x, y, seam + rise), wall, radius, shape, side=-1, floor=floor)
+        return solid, seam + rise, False
     straight = height * rng.uniform(0.0, 0.25) + 2 * wall
     rise = x * rng.uniform(0.35, 0.95)
     angles = np.linspace(0.0, np.pi, 11)
@@ -212,9 +208,5 @@ def _latches(rng: Rng, chest: Assembly, front: float, y: float, seam: float, top
         z = seam + upper
         solid = cylinder((axis_x, middle - width, z), (axis_x, middle + width, z), pin, sections=12)
         solid += box((axis_x - 0.002, axis_x + 0.001), about(middle, width), (seam - 1.4 * upper, z), fillet=0.001)
-        chest.add(
-            f"latch_{number}",
-            solid,
-            revolute("lid", (0, 1, 0), (axis_x, middle, z), 0.0, np.deg2rad(85.0)),
-            density=2000.0,
-        )
+        turn = revolute("lid", (0, 1, 0), (axis_x, middle, z), 0.0, np.deg2rad(85.0))
+        chest.add(f"latch_{number}", solid, turn, density=2000.0)

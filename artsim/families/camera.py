@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, swivel
 from artsim.making.outlines import FRONT, UP, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, tube
 from artsim.model.kinematics import Array
@@ -321,11 +321,8 @@ def _swivel(rng: Rng) -> Assembly:
         base = cylinder((0, 0, foot - tall), (0, 0, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
         base += cylinder((0, 0, foot - tall - 0.2 * r), (0, 0, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
     camera = Assembly("body", base, DENSITY)
-    pan = continuous("body", UP, (0, 0, foot))
-    if rng.random() < 0.5:
-        limit = rng.uniform(0.8, 3.0)
-        pan = revolute("body", UP, (0, 0, foot), -limit, limit)
-    camera.add("fork", fork, pan)
+    pan = rng.uniform(0.8, 3.0) if rng.random() < 0.5 else None
+    camera.add("fork", fork, swivel("body", UP, (0, 0, foot), pan))
     limit = rng.uniform(0.3, 1.2)
     camera.add("head", head, revolute("fork", (0, 1, 0), (0, 0, 0), -limit, limit))
     return camera

@@ -130,17 +130,8 @@ def _longcase_clock(rng: Rng) -> Assembly:
         body += prism(outline("round", hood).clip((-hood, 0), (hood, hood)) + (0, hood - 0.01), -0.01, deep, 0)
     elif crest == "swan":
         for s in (-1.0, 1.0):
-            body += prism(
-                [
-                    (s * 1.08 * hood, hood - 0.001),
-                    (s * 0.2 * hood, hood - 0.001),
-                    (s * 0.2 * hood, 1.45 * hood),
-                    (s * 0.4 * hood, 1.5 * hood),
-                ],
-                0.0,
-                0.3 * deep,
-                0,
-            )
+            horn = ((1.08 * hood, hood - 0.001), (0.2 * hood, hood - 0.001), (0.2 * hood, 1.45 * hood))
+            body += prism([(s * y, z) for y, z in (*horn, (0.4 * hood, 1.5 * hood))], 0.0, 0.3 * deep, 0)
     body += box((-0.02, deep), 1.1 * hood, (hood - 0.02, hood + 0.02), fillet=0.01)
     if rng.random() < 0.5:
         for s in (-1.0, 1.0):

@@ -269,12 +269,9 @@ def _pod(rng: Rng) -> Assembly:
             (pivot[0] - length, pivot[0] + 0.006), (arm[0], arm[1]), (height + GAP, height + GAP + thick), fillet=0.004
         )
     lever += cylinder((pivot[0], -wide, height + 0.0075), (pivot[0], wide, height + 0.0075), 0.005, sections=12)
-    machine.add(
-        "lever",
-        lever,
-        revolute("body", (0, 1, 0), (pivot[0], 0, height + 0.0075), 0.0, np.deg2rad(rng.uniform(60.0, 105.0))),
-        density=900.0,
-    )
+    limit = np.deg2rad(rng.uniform(60.0, 105.0))
+    turn = revolute("body", (0, 1, 0), (pivot[0], 0, height + 0.0075), 0.0, limit)
+    machine.add("lever", lever, turn, density=900.0)
     top = height * rng.uniform(0.8, 0.98)
     tank = box((tank_x + GAP, x), 0.9 * y, (base + GAP, top), fillet=0.015, axis=2)
     tank += box((tank_x + GAP + 0.001, x - 0.001), 0.85 * y, (top - 0.001, top + 0.006), fillet=0.012, axis=2)

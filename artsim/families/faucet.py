@@ -12,8 +12,8 @@ import numpy as np
 from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute, screw
-from artsim.making.outlines import FRONT, UP, Vector
+from artsim.making.assembly import Assembly, Rng, revolute, screw, swivel
+from artsim.making.outlines import FRONT, UP
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, tube, union
 from artsim.model.kinematics import Array
 
@@ -86,7 +86,7 @@ def _kitchen_mixer(rng: Rng) -> Assembly:
     tap.add("base", body, density=BRASS)
     pivot = np.array([0.0, side * stem, level])
     if rng.random() < 0.75:
-        joint = continuous("base", UP, (0, 0, top)) if rng.random() < 0.5 else _swing(rng, (0, 0, top))
+        joint = swivel("base", UP, (0, 0, top), None if rng.random() < 0.5 else rng.uniform(0.9, 2.6))
         tap.add("spout", spout, joint, density=BRASS)
     else:
         tap = Assembly()
@@ -97,11 +97,6 @@ def _kitchen_mixer(rng: Rng) -> Assembly:
     axis = -out * side if start is UP else out * side  # towards the user, or up
     tap.add("handle", handle, revolute("base", axis, pivot, 0.0, travel), density=BRASS)
     return tap
-
-
-def _swing(rng: Rng, origin: Vector) -> JointSpec:
-    limit = rng.uniform(0.9, 2.6)
-    return revolute("base", UP, origin, -limit, limit)
 
 
 def _three_piece(rng: Rng) -> Assembly:
@@ -125,7 +120,7 @@ def _three_piece(rng: Rng) -> Assembly:
     turning = rng.random() < 0.6
     tap = Assembly("base", base if turning else base + spout.moved((0, 0, -GAP - 0.001)), BRASS)
     if turning:
-        joint = continuous("base", UP, (0, 0, column)) if rng.random() < 0.6 else _swing(rng, (0, 0, column))
+        joint = swivel("base", UP, (0, 0, column), None if rng.random() < 0.6 else rng.uniform(0.9, 2.6))
         tap.add("spout", spout, joint)
     style = int(rng.integers(1 << 30))
     outward = rng.random() < 0.6

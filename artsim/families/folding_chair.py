@@ -155,12 +155,8 @@ def _crossed(rng: Rng) -> Assembly:
 
     seat_half = inner - bar.thick - GAP
     hinge_at = np.array([joint_at[0] - 0.012 - bar.deep, 0.0, seat_low + 0.5 * seat_thick])
-    seat = _panel(
-        rng,
-        np.array([hinge_at[0] - depth, -seat_half, seat_low]),
-        np.array([hinge_at[0], seat_half, seat_low + seat_thick]),
-        0,
-    )
+    corners = np.array([(-depth, -seat_half, seat_low), (0.0, seat_half, seat_low + seat_thick)])
+    seat = _panel(rng, *(corners + (hinge_at[0], 0, 0)), 0)
     steep = np.pi / 2 + (lean - bend)
     swing = steep - 0.08 - float(arctan2(0.5 * seat_thick + thick + 0.02, back_low))
     how = str(rng.choice(["follows", "free", "fixed"], p=[0.4, 0.45, 0.15]))
@@ -212,12 +208,8 @@ def _under(rng: Rng) -> Assembly:
         hinge = np.array([x1 + rail + GAP + 0.012, 0.0, seat_z + thick + 0.012])
         back_thick = rng.uniform(0.012, 0.03)
         wide = half - 0.01
-        back = _panel(
-            rng,
-            np.array([hinge[0] - 0.5 * back_thick, -wide, hinge[2] + 0.05]),
-            np.array([hinge[0] + 0.5 * back_thick, wide, hinge[2] + tall]),
-            2,
-        )
+        low, high = hinge + (-0.5 * back_thick, -wide, 0.05), hinge + (0.5 * back_thick, wide, tall)
+        back = _panel(rng, low, high, 2)
         for t in (-1, 1):
             back += bar.between(
                 hinge + (0, t * (wide - bar.thick), 0), hinge + (0, t * (wide - bar.thick), tall - 0.02)
@@ -251,18 +243,8 @@ def _tip_up(rng: Rng) -> Assembly:
             body += box((-0.02, 0.06), (a, b), (0.0, arm_z)) + box((x0 + 0.05, x1 + 0.06), (a, b), (0.0, 0.025))
             body += box((-0.02, x1 + 0.03 + back_thick), (a, b), (seat_z - 0.05, seat_z + thick + 0.1))
         else:
-            body += hull(
-                [
-                    (x, t, z)
-                    for t in (a, b)
-                    for x, z in (
-                        (x0 + 0.05, 0.0),
-                        (x1 + 0.05, 0.0),
-                        (x1 + 0.05 + back_thick, arm_z),
-                        (x0 + 0.08, arm_z),
-                    )
-                ]
-            )
+            foot, arm = ((x0 + 0.05, 0.0), (x1 + 0.05, 0.0)), ((x1 + 0.05 + back_thick, arm_z), (x0 + 0.08, arm_z))
+            body += hull([(x, t, z) for t in (a, b) for x, z in foot + arm])
         body += box((x0 + 0.02, x1 + 0.04), (a - 0.006, b + 0.006), (arm_z - 0.002, arm_z + 0.03), fillet=0.01)
     hinge_x = x1 - 0.04
     lift = seat_z + thick + 0.02

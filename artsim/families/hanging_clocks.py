@@ -87,17 +87,8 @@ def pendulum_clock(rng: Rng) -> Assembly:
         body += frame((0.006, -room - 0.01, bottom - 0.012), (deep, room + 0.01, low + 0.01), [0.01] * 4)
         body += box((deep - 0.008, deep), room + 0.005, (bottom - 0.008, low + 0.005))
         if rng.random() < 0.6:
-            body += prism(
-                [
-                    (-room - 0.01, bottom - 0.01),
-                    (room + 0.01, bottom - 0.01),
-                    (0.5 * room, bottom - 0.5 * room),
-                    (-0.5 * room, bottom - 0.5 * room),
-                ],
-                0.006,
-                deep,
-                0,
-            )
+            edges = ((-room - 0.01, 0.01), (room + 0.01, 0.01), (0.5 * room, 0.5 * room), (-0.5 * room, 0.5 * room))
+            body += prism([(y, bottom - drop) for y, drop in edges], 0.006, deep, 0)
         body += box((deep - 0.03, deep), 0.003, (low - 0.003, low + 0.01))
         solid, swing = pendulum(rng, 0.5 * deep, low - 0.004, length - 0.006, room)
         clock.add("body", body, density=DENSITY)
@@ -122,12 +113,8 @@ def cuckoo_clock(rng: Rng) -> Assembly:
     slope = (ridge - eaves) / half
     for s in (-1.0, 1.0):
         edge = eaves - (over - 1.0) * half * slope
-        body += prism(
-            [(0, ridge), (0, ridge + 1.5 * thick), (s * over * half, edge), (s * over * half, edge + 1.5 * thick)],
-            -0.35 * deep,
-            deep,
-            0,
-        )
+        slab = [(y, z + t) for y, z in ((0, ridge), (s * over * half, edge)) for t in (0.0, 1.5 * thick)]
+        body += prism(slab, -0.35 * deep, deep, 0)
     body += rim(rng, 0.003, center, 1.005 * radius, 0.1 * radius, 0.006)
     top, wide = eaves + 0.25 * (ridge - eaves), 0.22 * half
     base = radius * 1.15

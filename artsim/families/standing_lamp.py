@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute, swivel
 from artsim.making.outlines import SIDE, UP
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
 
@@ -52,22 +52,13 @@ def standing(rng: Rng) -> Assembly:
         reach = rng.uniform(0.4, 1.0)
         lamp.add("shade", shade, revolute(parent, SIDE, at, -reach, reach), density=500.0)
     else:
-        joint = (
-            continuous(parent, UP, (0, 0, height))
-            if rng.random() < 0.7
-            else revolute(parent, UP, (0, 0, height), -1.57, 1.57)
-        )
+        joint = swivel(parent, UP, (0, 0, height), None if rng.random() < 0.7 else 1.57)
         lamp.add("shade", shade, joint, density=500.0)
     if button:
         size = rng.uniform(0.008, 0.014)
-        x = -0.62 * wide
-        top = thick + GAP
-        lamp.add(
-            "button",
-            cylinder((x, 0, top + 0.003), (x, 0, top + 0.008), size, sections=16),
-            prismatic("base", (0, 0, -1), 0.0, 0.003, (x, 0, top)),
-            density=900.0,
-        )
+        x, top = -0.62 * wide, thick + GAP
+        key = cylinder((x, 0, top + 0.003), (x, 0, top + 0.008), size, sections=16)
+        lamp.add("button", key, prismatic("base", (0, 0, -1), 0.0, 0.003, (x, 0, top)), density=900.0)
     if rng.random() < 0.5 and not tilts and not slides:
         _switch(rng, lamp, radius, height)
     return lamp

@@ -131,12 +131,8 @@ def _telescope(rng: Rng, case: Assembly, x: float, half: float, low: float, high
     rods = union(box(about(middle, 0.0045), about(s * half, 0.006), (z0 + 0.014, high + 0.01)) for s in (-1, 1))
     travel *= 0.9
     case.add("handle_stage", tubes, prismatic("body", (0, 0, 1), 0.0, travel, (middle, 0, high)), density=800.0)
-    case.add(
-        "handle",
-        grip + rods,
-        prismatic("handle_stage", (0, 0, 1), 0.0, travel, (middle, 0, high), mimic=("handle_stage", 1.0)),
-        density=800.0,
-    )
+    follows = prismatic("handle_stage", (0, 0, 1), 0.0, travel, (middle, 0, high), mimic=("handle_stage", 1.0))
+    case.add("handle", grip + rods, follows, density=800.0)
 
 
 def _caster(case: Assembly, number: int, x: float, y: float, top: float, parent: str) -> None:

@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.fronts import Style
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, add_case, drop_leaves, four_legs, keyboard_tray, table_top, wheels
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, prismatic, revolute, swivel
 from artsim.making.outlines import UP, about, lifted, superellipse, turns
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
 
@@ -78,14 +78,11 @@ def _apron(rng: Rng, table: Assembly) -> None:
     rear = not both and rng.random() < 0.1
     deep = (0.47 if both else rng.uniform(0.6, 1.0)) * (2 * x - 2 * inset)
     half = y - 0.5 * size
-    low = np.array([-x + inset, -half, top - apron])
-    high = np.array([-x + inset + deep, half, top + 0.001])
     grid = int(rng.choice([1, 2, 3, 4], p=[0.45, 0.25, 0.2, 0.1])), 1 if apron < 0.22 else int(rng.integers(1, 3))
     # The fronts lie between the legs.
     style = replace(style, overlay=style.overlay and inset > 0.02)
-    low[1], high[1] = -(y - size) + 0.001, y - size - 0.001
-    if high[1] - low[1] < 0.2:
-        low[1], high[1] = -0.1, 0.1
+    room = y - size - 0.001 if 2.0 * (y - size - 0.001) >= 0.2 else 0.1
+    low, high = (-x + inset, -room, top - apron), (-x + inset + deep, room, top + 0.001)
     for back in (False, True):
         if both or back == rear:
             add_case(rng, table, low, high, style, grid, 0.25, back)
@@ -95,7 +92,7 @@ def _apron(rng: Rng, table: Assembly) -> None:
             table.body += box(about(s * (x - inset), 0.008), half, (top - apron, top + 0.001))
         table.body += box(x - 0.5 * size, (s * half - rail, s * half + rail), (top - apron, top + 0.001))
         for near in (-x + inset, x - inset - 0.012):
-            table.body += box((near, near + 0.012), (s * (high[1] - 0.002), s * half), (top - apron, top + 0.001))
+            table.body += box((near, near + 0.012), (s * (room - 0.002), s * half), (top - apron, top + 0.001))
     if rng.random() < 0.25:
         z = foot + rng.uniform(0.1, 0.4) * (top - apron - foot)
         table.body += box(x - 0.3 * size, y - 0.3 * size, (z, z + 0.018))
@@ -132,16 +129,9 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
     for side in sides:
         a, b = sorted((side * outer, side * (outer - broad)))
         draw = np.random.default_rng(recipe) if alike else rng
-        add_case(
-            draw,
-            table,
-            np.array([front, a, low_z]),
-            np.array([front + deep - overhang, b, top + 0.001]),
-            style,
-            (1, int(draw.integers(1, 5))),
-            doors,
-            free=(side < 0 and not on_legs, side > 0 and not on_legs),
-        )
+        low, high = (front, a, low_z), (front + deep - overhang, b, top + 0.001)
+        free = (side < 0 and not on_legs, side > 0 and not on_legs)
+        add_case(draw, table, low, high, style, (1, int(draw.integers(1, 5))), doors, free=free)
         if not on_legs and not rolling and low_z > 0:
             table.body += box(
                 (front + 0.03, front + deep - overhang - 0.02), (a + 0.01, b - 0.01), (0.0, low_z + 0.001)
@@ -166,15 +156,8 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
         between = "nothing"
     if between == "case":
         flat = rng.uniform(0.085, 0.14)
-        add_case(
-            rng,
-            table,
-            np.array([front, near, top - flat]),
-            np.array([front + 0.8 * deep - 0.04, far, top + 0.001]),
-            style,
-            (int(rng.integers(1, 4)), 1),
-            0.0,
-        )
+        low, high = (front, near, top - flat), (front + 0.8 * deep - 0.04, far, top + 0.001)
+        add_case(rng, table, low, high, style, (int(rng.integers(1, 4)), 1), 0.0)
     elif between == "tray":
         keyboard_tray(rng, table, front, near, far, top, 0.6 * deep)
     if rng.random() < 0.15:  # shelves on the top
@@ -205,17 +188,9 @@ def _case(rng: Rng, table: Assembly) -> None:
     end = -0.002 if both else x
     for back in (False, True):
         if both or not back:
-            add_case(
-                rng,
-                table,
-                np.array([-x + ahead, -y, low]),
-                np.array([end, y, top + 0.001]),
-                style,
-                (columns, rows),
-                float(rng.choice([0.0, 0.5, 1.0])),
-                back,
-                free=(True, True),
-            )
+            corners = (-x + ahead, -y, low), (end, y, top + 0.001)
+            doors = float(rng.choice([0.0, 0.5, 1.0]))
+            add_case(rng, table, *corners, style, (columns, rows), doors, back, free=(True, True))
     size = rng.uniform(0.02, 0.05)
     if stand == "legs":
         table.body += four_legs(rng, x - ahead, y, 0.0, low + 0.002, size, splay=rng.random() < 0.3)
@@ -273,12 +248,7 @@ def _column(rng: Rng, table: Assembly) -> None:
     elif kind == "turning":
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - GAP), radius)
         base += cylinder((0, 0, top - 0.02 - GAP), (0, 0, top - GAP), min(3 * radius, 0.5 * wide))
-        joint = (
-            continuous("body", UP, (0, 0, top))
-            if rng.random() < 0.6
-            else revolute("body", UP, (0, 0, top), -1.57, 1.57)
-        )
-        table.add_numbered("top", slab(top), joint)
+        table.add_numbered("top", slab(top), swivel("body", UP, (0, 0, top), None if rng.random() < 0.6 else 1.57))
     else:
         base += cylinder((0, 0, foot + 0.01), (0, 0, top - 0.05), radius)
         base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))

@@ -9,8 +9,8 @@ import numpy as np
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.outlines import Vector
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.003
 
@@ -18,8 +18,8 @@ GAP = 0.003
 def add_case(
     rng: Rng,
     table: Assembly,
-    low: Array,
-    high: Array,
+    low: Vector,
+    high: Vector,
     style: Style,
     grid: tuple[int, int],
     doors: float,

@@ -91,12 +91,7 @@ def _bowl(rng: Rng, length: float, width: float, height: float, power: float, ba
         outer = (_oval(s0 * length, s0 * width, power, z0), _oval(s1 * length, s1 * width, power, z1))
         inner = tuple(_oval(s * length - 2 * wall, s * width - 2 * wall, power, z) for s, z in ((s0, z0), (s1, z1)))
         solid += _rim(outer, (inner[0], inner[1]))
-    solid += loft(
-        [
-            _oval(narrow * length, narrow * width, power, low - 0.02),
-            _oval(narrow * length, narrow * width, power, low + 0.02),
-        ]
-    )
+    solid += loft([_oval(narrow * length, narrow * width, power, z) for z in (low - 0.02, low + 0.02)])
     deck = rng.uniform(0.04, 0.12)
     half = 0.5 * width * rng.uniform(0.75, 1.0)
     solid += box((0.5 * length - wall, back), half, (height - deck, height))
@@ -123,12 +118,8 @@ def _bowl(rng: Rng, length: float, width: float, height: float, power: float, ba
             )
     elif kind == "skirt":
         shift = 0.5 * (back - 0.5 * foot * length) * 0.5
-        solid += loft(
-            [
-                _oval(foot * length + 0.1, foot * width, 4.0, 0.0, shift),
-                _oval(narrow * length, narrow * width, power, low),
-            ]
-        )
+        below = _oval(foot * length + 0.1, foot * width, 4.0, 0.0, shift)
+        solid += loft([below, _oval(narrow * length, narrow * width, power, low)])
         solid += box((0.1, back), 0.4 * foot * width, (0, low))
     else:
         solid += box((-0.4 * foot * length, back), 0.42 * foot * width, (0, low), fillet=0.05, axis=2)
@@ -337,10 +328,5 @@ def _lid(rng: Rng, long: float, wide: float, power: float, low: float, thick: fl
     scale = rng.uniform(0.96, 1.02)
     long, wide = scale * long, scale * wide
     bevel = rng.uniform(0.02, 0.25)
-    return loft(
-        [
-            _oval(long, wide, power, low),
-            _oval(long, wide, power, low + 0.6 * thick),
-            _oval((1.0 - bevel) * long, (1.0 - bevel) * wide, power, low + thick),
-        ]
-    )
+    levels = ((1.0, low), (1.0, low + 0.6 * thick), (1.0 - bevel, low + thick))
+    return loft([_oval(share * long, share * wide, power, z) for share, z in levels])

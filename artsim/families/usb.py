@@ -68,14 +68,8 @@ def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
     """Connector that stands out from a plane at x towards -X (sign -1) or +X: a shell around a tongue."""
     wall = 0.14 * plug.thick
     first, last = sorted((x - sign * 0.002, x + sign * plug.reach))
-    solid = sleeve(
-        (first, -plug.half, -plug.thick),
-        (last, plug.half, plug.thick),
-        (wall - plug.half, wall - plug.thick),
-        (plug.half - wall, plug.thick - wall),
-        0.2 * plug.thick,
-        1,
-    )
+    outer, hole = np.array([plug.half, plug.thick]), np.array([plug.half - wall, plug.thick - wall])
+    solid = sleeve((first, *-outer), (last, *outer), -hole, hole, 0.2 * plug.thick, 1)
     first, last = sorted((x - sign * 0.002, x + sign * 0.93 * plug.reach))
     return solid + box((first, last), plug.half - 0.5 * wall, (-0.05 * plug.thick, 0.5 * plug.thick))
 

@@ -209,10 +209,7 @@ def _hung(
             (meet, height + 0.001),
         )
     window.add("frame", body, density=700.0)
-    window.add(
-        "sash_0" if both else "sash",
-        solids[0][0],
-        prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1]),
-    )
+    up = prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1])
+    window.add("sash_0" if both else "sash", solids[0][0], up)
     if both:
         window.add("sash_1", solids[1][0], prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1]))

@@ -46,6 +46,13 @@ def continuous(parent: str, axis: Vector, origin: Vector, **more: Any) -> JointS
     return JointSpec("continuous", parent, axis, origin, **more)
 
 
+def swivel(parent: str, axis: Vector, origin: Vector, limit: float | None = None) -> JointSpec:
+    """Joint that turns freely, or by up to ``limit`` radians either way."""
+    if limit is None:
+        return continuous(parent, axis, origin)
+    return revolute(parent, axis, origin, -limit, limit)
+
+
 def prismatic(
     parent: str, axis: Vector, lower: float, upper: float, origin: Vector = (0.0, 0.0, 0.0), **more: Any
 ) -> JointSpec:
