@@ -93,12 +93,8 @@ def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float,
         low = [(y - wide, height - 0.002), (y + wide, height - 0.002)]
         crest = [(y + wide * rng.uniform(0.4, 0.85), height + rise), (y - wide * rng.uniform(0.4, 0.85), height + rise)]
         body += prism(low + crest, rng.uniform(-0.15, 0.2) * depth, rng.uniform(0.8, 1.1) * depth, 0)
-        body += box(
-            (depth - 0.004, 1.15 * depth),
-            (y - 0.5 * wide, y + 0.5 * wide),
-            (height - 0.2 * rise, height + 0.7 * rise),
-            fillet=0.004,
-        )
+        upright = (height - 0.2 * rise, height + 0.7 * rise)
+        body += box((depth - 0.004, 1.15 * depth), about(y, 0.5 * wide), upright, fillet=0.004)
         span = (y - 0.4 * wide, y + 0.4 * wide, height + rise)
     elif kind == "rangefinder":
         if rng.random() < 0.6:  # a raised deck
@@ -157,11 +153,9 @@ def _add_controls(rng: Rng, camera: Assembly, shell: Shell, middle: tuple[float,
         at = np.array([0.5 * depth, 0.5 * (left - half), z])
         crank = _dial(rng, at, size)
         if rng.random() < 0.4:
-            crank += box(
-                at + (-0.15 * size, -0.9 * size, 0.8 * size),
-                at + (0.15 * size, 0.9 * size, 1.2 * size),
-                fillet=0.1 * size,
-            )
+            bar = box(at + (-0.15 * size, -0.9 * size, 0.8 * size), at + (0.15 * size, 0.9 * size, 1.2 * size),
+                      fillet=0.1 * size)  # fmt: skip
+            crank += bar
         add("knob", crank, continuous("body", UP, at), size, "knob")
 
 

@@ -234,13 +234,8 @@ def _wheelbarrow(rng: Rng) -> Assembly:
     x0, x1 = 0.0, length
     floor = [(x0 + flare, -half + flare), (x0 + flare, half - flare), (x1 - 0.6 * flare, half - flare),
              (x1 - 0.6 * flare, -half + flare)]  # fmt: skip
-    rim = [
-        (x0 - rng.uniform(0.0, 0.15), -0.85 * half),
-        (x0 - rng.uniform(0.0, 0.15), 0.85 * half),
-        (x1, half),
-        (x1, -half),
-    ]
-    rim[1] = (rim[0][0], rim[1][1])
+    front, _ = x0 - rng.uniform(0.0, 0.15), rng.uniform(0.0, 0.15)
+    rim = [(front, -0.85 * half), (front, 0.85 * half), (x1, half), (x1, -half)]
     corners = [[np.array([*p, low]) for p in floor], [np.array([*p, low + deep]) for p in rim]]
     body = hull_of(*(box(p - thick, p + thick) for p in corners[0]))
     for k in range(4):
@@ -251,7 +246,7 @@ def _wheelbarrow(rng: Rng) -> Assembly:
     twin = rng.random() < 0.25
     # The wheel stands clear of the front wall, which leans forward.
     levels = np.linspace(low, 2.0 * wheels.radius, 12)
-    wall = x0 + flare + (rim[0][0] - x0 - flare) * (levels - low) / deep
+    wall = x0 + flare + (front - x0 - flare) * (levels - low) / deep
     chord = np.sqrt(np.maximum(levels * (2.0 * wheels.radius - levels), 0.0))
     axle_x = min(float((wall - chord).min()) - 0.03, x0) - rng.uniform(0.0, 0.1)
     track = (1.0 if twin else 0.5) * wheels.wide + r + 2.0 * GAP
@@ -268,16 +263,8 @@ def _wheelbarrow(rng: Rng) -> Assembly:
         body += tube(path, r, 10)
         body += tube([path[3], (reach + 0.1, s * 0.95 * half, grip)], 1.25 * r, 10)
         leg = 0.55 * (x0 + x1) + 0.1
-        body += tube(
-            [
-                (leg - 0.05, s * 0.75 * (half - flare), under),
-                (leg, s * 0.8 * half, r),
-                (leg + 0.08, s * 0.8 * half, r),
-                (x1 - 0.4 * flare, s * 0.85 * half, under),
-            ],
-            r,
-            8,
-        )
+        upper = (leg - 0.05, s * 0.75 * (half - flare), under), (x1 - 0.4 * flare, s * 0.85 * half, under)
+        body += tube([upper[0], (leg, s * 0.8 * half, r), (leg + 0.08, s * 0.8 * half, r), upper[1]], r, 8)
     spots = [0.0]
     if twin:
         spots = [s * 0.5 * (wheels.wide + GAP) for s in (-1.0, 1.0)]

@@ -189,11 +189,8 @@ def _seat(rng: Rng, depth: float, width: float, thick: float, low: float, stool:
     solid = box(0.1, 0.09, (low, z + 0.01)) + cylinder((0, 0, low), (0, 0, z), 0.06)
     if stool and rng.random() < 0.7:
         r = 0.5 * depth
-        return (
-            solid
-            + cylinder((0, 0, z), (0, 0, z + 0.7 * thick), r, sections=32)
-            + cylinder((0, 0, z + 0.69 * thick), (0, 0, z + thick), r, 0.88 * r, 32)
-        )
+        solid += cylinder((0, 0, z), (0, 0, z + 0.7 * thick), r, sections=32)
+        return solid + cylinder((0, 0, z + 0.69 * thick), (0, 0, z + thick), r, 0.88 * r, 32)
     corner = rng.uniform(0.05, 0.12)
     plan = box(0.5 * depth, 0.5 * width, (z, z + 0.65 * thick), fillet=corner, axis=2)
     a, b = 0.47 * depth, 0.46 * width

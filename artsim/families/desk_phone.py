@@ -81,23 +81,14 @@ def _handset(
         rise = thick + bow * (1.0 - s * s)
         center = foot + 0.5 * s * length * along + rise * out
         wide = grip * (0.75 + 0.25 * s * s)
-        rings.append(
-            np.array(
-                [center + a * wide * side + b * 0.5 * thick * out for a, b in ((-1, -1), (1, -1), (0.7, 1), (-0.7, 1))]
-            )
-        )
+        section = ((-1, -1), (1, -1), (0.7, 1), (-0.7, 1))
+        rings.append(np.array([center + a * wide * side + b * 0.5 * thick * out for a, b in section]))
     solid = loft(rings)
     for s in (-1.0, 1.0):
         center = foot + s * 0.5 * (length - 1.9 * grip) * along
         if square:
-            solid += hull(
-                [
-                    center + a * 0.95 * grip * along + b * grip * w * side + z * out
-                    for a in (-1, 1)
-                    for b in (-1, 1)
-                    for z, w in ((0.0, 0.9), (0.9 * thick, 1.0))
-                ]
-            )
+            solid += hull([center + a * 0.95 * grip * along + b * grip * w * side + z * out for a in (-1, 1)
+                           for b in (-1, 1) for z, w in ((0.0, 0.9), (0.9 * thick, 1.0))])  # fmt: skip
         else:
             solid += cylinder(center, center + 0.9 * thick * out, 0.95 * grip, 0.8 * grip, 20)
     phone.add("handset", solid, prismatic("base", out, 0.0, rng.uniform(0.06, 0.2), tuple(foot)), density=500.0)
@@ -114,11 +105,7 @@ def _dial(rng: Rng, phone: Assembly, face: Face, v: float, radius: float) -> Non
     for k in range(11):
         angle = 0.5 * k
         spoke = cos(angle) * face.right + sin(angle) * face.up
-        solid += tube(
-            [center + 0.6 * thick * out + 0.45 * radius * spoke, center + 0.6 * thick * out + 0.9 * radius * spoke],
-            0.35 * thick,
-            6,
-        )
+        solid += tube([center + 0.6 * thick * out + r * radius * spoke for r in (0.45, 0.9)], 0.35 * thick, 6)
     phone.add("dial", solid, revolute("base", -out, tuple(center), 0.0, rng.uniform(4.2, 5.4)), density=1200.0)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import hypot
-from artsim.families.details import bar_handle, bow_handle, dial, flat_handle, push_button, wire_shelf
+from artsim.families.details import dial, flat_handle, front_handle, push_button, wire_shelf
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
 
@@ -240,10 +240,8 @@ def _door(rng: Rng, s: Shape, controls_above: bool, machine: Assembly) -> Solid:
     span = half * rng.uniform(0.45, 0.93)
     reach, radius = rng.uniform(0.03, 0.06), rng.uniform(0.006, 0.013)
     left, right = (x, -span, z), (x, span, z)
-    if kind == "bar":
-        solid += bar_handle(left, right, (-1, 0, 0), reach, radius)
-    elif kind == "bow":
-        solid += bow_handle(left, right, (-1, 0, 0), reach, radius)
+    if kind in ("bar", "bow"):
+        solid += front_handle(kind, left, right, reach, radius)
     elif kind == "flat":
         solid += flat_handle(left, right, reach, rng.uniform(0.015, 0.04), rng.uniform(0.006, 0.014))
     elif kind == "edge":  # a lip along the upper edge

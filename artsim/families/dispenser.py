@@ -122,14 +122,8 @@ def _soap_box(rng: Rng) -> Assembly:
     cover = rounded_tray((face - thick, -half, low + 0.002 + CLEAR), (face, half, height), 0.003, radius,
                          ((0.0, rng.uniform(0.0, 0.25) * half), (0.35, 0.0), (1.0, 0.0)), axis=0, side=1)  # fmt: skip
     if rng.random() < 0.5:  # a window that shows how much is left
-        body_window = box(
-            (face - thick - 0.0015, face - thick + 0.002),
-            0.2 * half,
-            (low + 0.3 * (height - low), low + 0.8 * (height - low)),
-            fillet=0.003,
-            axis=0,
-        )
-        cover += body_window
+        upright = (low + 0.3 * (height - low), low + 0.8 * (height - low))
+        cover += box((face - thick - 0.0015, face - thick + 0.002), 0.2 * half, upright, fillet=0.003, axis=0)
     dispenser = Assembly("body", body, DENSITY)
     style = str(rng.choice(["bar", "lever", "button", "twin", "sensor"]))
     if style == "sensor":  # nothing to press, and the cover swings down

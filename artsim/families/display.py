@@ -14,7 +14,7 @@ from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
-from artsim.making.outlines import FRONT, rounded_rectangle
+from artsim.making.outlines import FRONT, UP, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -205,11 +205,7 @@ def _finish_screen(rng: Rng, chain: _Chain, panel: Panel, at: Array, number: int
         face = front_face(float(at[0]) - panel.thick, float(at[1]), float(at[2]) - panel.rise + 0.5 * chin)
         _keys(rng, chain.display, name, face, 0.9 * panel.half, 0.6 * chin)
     else:  # on the right edge
-        face = Face(
-            at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0),
-            np.array([1.0, 0.0, 0.0]),
-            np.array([0.0, 0.0, 1.0]),
-        )
+        face = Face(at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0), -FRONT, UP)
         _edge_keys(rng, chain.display, name, face, panel)
 
 
@@ -240,18 +236,13 @@ def _on_feet(rng: Rng, display: Assembly) -> None:
     for k, s in enumerate((-1.0, 1.0)):
         y = s * spread
         solid = hull([(x + a * reach, y + b * wide, z) for a in (-1, 1) for b in (-1, 1) for z in (0.0, 0.006)])
-        solid += (
-            hull(
-                [
-                    (x + a * (0.3 if z > 0.5 * foot else 0.8) * reach * 0.9, y + b * rod, z)
-                    for a in (-1, 1)
-                    for b in (-1, 1)
-                    for z in (0.004, foot)
-                ]
+        if rng.random() < 0.5:
+            levels = ((0.8, 0.004), (0.3, foot))
+            solid += hull(
+                [(x + a * r * reach * 0.9, y + b * rod, z) for a in (-1, 1) for b in (-1, 1) for r, z in levels]
             )
-            if rng.random() < 0.5
-            else cylinder((x, y, 0.004), (x, y, foot), rod, sections=14)
-        )
+        else:
+            solid += cylinder((x, y, 0.004), (x, y, foot), rod, sections=14)
         display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)
 
 
@@ -311,11 +302,8 @@ def _tube(rng: Rng, display: Assembly) -> None:
     lip = rng.uniform(0.006, 0.02)
     shell = box((front + lip, front + cabinet), half, (low, high), fillet=rng.uniform(0.02, 0.2) * rise, axis=0)
     inset = 0.08 * rise
-    shell += frame(
-        (front, inset - half, low + inset),
-        (front + lip + 0.001, half - inset, high - inset),
-        [rim + side, rim, rim + chin, rim],
-    )
+    corners = (front, inset - half, low + inset), (front + lip + 0.001, half - inset, high - inset)
+    shell += frame(*corners, [rim + side, rim, rim + chin, rim])
     shrink = rng.uniform(0.4, 0.8)
     shell += hull([(x, s * half * 0.96 * t, z) for x, t in ((front + cabinet - 0.001, 1.0), (front + depth, shrink))
                    for s in (-1, 1) for z in (low + 0.02 * rise, low + rise * (1.0 + 0.96 * t))])  # fmt: skip
@@ -339,14 +327,8 @@ def _tube(rng: Rng, display: Assembly) -> None:
             knob = dial(center, FRONT, rng.uniform(0.6, 1.2) * size, size, 18)
             display.add(f"knob_{k}", knob, continuous(name, FRONT, tuple(center)), density=900.0)
     else:
-        keys = _keys(
-            rng,
-            display,
-            name,
-            front_face(front, 0.0, low + inset + 0.5 * (chin + rim)),
-            half - inset,
-            0.5 * (chin + rim),
-        )
+        face = front_face(front, 0.0, low + inset + 0.5 * (chin + rim))
+        keys = _keys(rng, display, name, face, half - inset, 0.5 * (chin + rim))
     if rng.random() < 0.4 or not (swivels or side or keys):
         _rabbit_ears(rng, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from artsim.families.details import bar_handle, bow_handle, knob, panel
+from artsim.families.details import front_handle, knob, panel
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, Rng, prismatic
-from artsim.making.outlines import Vector
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, tray, tube
+from artsim.making.outlines import FRONT, Vector
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, tray, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -355,18 +355,11 @@ def _handle(style: _Style, low: Array, high: Array) -> Solid:
     sunken = 0.007 if style.front in ("shaker", "planks") and min(width, height) > 0.144 else 0.0
     half = 0.5 * min(style.size * width, 0.35)
     radius = min(0.006, 0.08 * height)
-    outward = (-1.0, 0.0, 0.0)
-    left, right = (x + sunken, y - half, z), (x + sunken, y + half, z)
-    if style.handle == "bar":
-        return bar_handle(left, right, outward, style.reach + sunken, radius)
-    if style.handle == "bow":
-        return bow_handle(left, right, outward, style.reach + sunken, radius)
-    button = min(0.018, 0.2 * height)
-    if style.handle == "knob" or (style.handle == "two knobs" and width < 0.35):
-        return knob((x + sunken, y, z), outward, style.reach + sunken, button)
-    if style.handle == "two knobs":
-        spots = [(x + sunken, y + s * 0.28 * width, z) for s in (-1, 1)]
-        return knob(spots[0], outward, style.reach + sunken, button) + knob(
-            spots[1], outward, style.reach + sunken, button
-        )
-    return Solid()
+    x, reach = x + sunken, style.reach + sunken
+    if style.handle in ("bar", "bow"):
+        return front_handle(style.handle, (x, y - half, z), (x, y + half, z), reach, radius)
+    if style.handle == "none":
+        return Solid()
+    two = style.handle == "two knobs" and width >= 0.35
+    spots = [(x, y + s * 0.28 * width, z) for s in (-1, 1)] if two else [(x, y, z)]
+    return union(knob(spot, FRONT, reach, min(0.018, 0.2 * height)) for spot in spots)

@@ -15,6 +15,7 @@ import numpy as np
 from artsim.common.elementary import arcsin, cos, hypot, power, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
 from artsim.model.kinematics import Array
 
@@ -267,12 +268,17 @@ def _nose_pads(rng: Rng, style: str, outline: Array, front: Front, rim: float) -
     return pad + wire + (pad + wire).mirrored(1)
 
 
-def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
-    """Corner from the lens or rim out and back to the hinge."""
+def _outer_edge(outline: Array, z: float) -> float:
+    """y of the outline's outer side at a height."""
     right = outline[outline[:, 0] > np.median(outline[:, 0])]
     right = right[np.argsort(right[:, 1], kind="stable")]
+    return float(np.interp(z, right[:, 1], right[:, 0]))
+
+
+def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
+    """Corner from the lens or rim out and back to the hinge."""
     h, z = 0.5 * front.height, front.hinge_z
-    y = float(np.interp(z, right[:, 1], right[:, 0]))
+    y = _outer_edge(outline, z)
     x = float(front.x(front.half))
     near, far = front.half + front.barrel, front.half + front.barrel + front.thickness
     x_lens = float(front.x(y))
@@ -286,11 +292,8 @@ def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
 
 def _plate_corner(front: Front, outline: Array, depth: float, side: int) -> Solid:
     """Corner of a frame that is a plate, from the lens out to the hinge within the plate."""
-    right = outline[outline[:, 0] > np.median(outline[:, 0])]
-    right = right[np.argsort(right[:, 1], kind="stable")]
-    h, z = 0.5 * front.height, front.hinge_z
-    y = float(np.interp(z, right[:, 1], right[:, 0]))
-    solid = box((-depth - GAP, -GAP), (y - 1.2 * MM, front.half + front.thickness), (z - h, z + h))
+    across = (_outer_edge(outline, front.hinge_z) - 1.2 * MM, front.half + front.thickness)
+    solid = box((-depth - GAP, -GAP), across, about(front.hinge_z, 0.5 * front.height))
     return solid if side > 0 else solid.mirrored(1)
 
 

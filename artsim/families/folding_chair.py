@@ -156,7 +156,7 @@ def _crossed(rng: Rng) -> Assembly:
     seat_half = inner - bar.thick - GAP
     hinge_at = np.array([joint_at[0] - 0.012 - bar.deep, 0.0, seat_low + 0.5 * seat_thick])
     corners = np.array([(-depth, -seat_half, seat_low), (0.0, seat_half, seat_low + seat_thick)])
-    seat = _panel(rng, *(corners + (hinge_at[0], 0, 0)), 0)
+    seat = _panel(rng, corners[0] + (hinge_at[0], 0, 0), corners[1] + (hinge_at[0], 0, 0), 0)
     steep = np.pi / 2 + (lean - bend)
     swing = steep - 0.08 - float(arctan2(0.5 * seat_thick + thick + 0.02, back_low))
     how = str(rng.choice(["follows", "free", "fixed"], p=[0.4, 0.45, 0.15]))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from artsim.families.details import bar_handle, bow_handle, knob, panel, swing_limits
+from artsim.families.details import front_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, Rng, prismatic, revolute
 from artsim.making.outlines import FRONT
 from artsim.making.solids import Solid, box, cylinder, hull_of, tray
@@ -280,10 +280,8 @@ def _handle(
     ahead[along] = half
     radius = min(style.grip, 0.45 * margin)
     reach = style.reach + (style.recess if framed else 0.0)
-    if style.handle == "bar":
-        return bar_handle(center - ahead, center + ahead, FRONT, reach, radius)
-    if style.handle == "bow":
-        return bow_handle(center - ahead, center + ahead, FRONT, reach, radius)
+    if style.handle in ("bar", "bow"):
+        return front_handle(style.handle, center - ahead, center + ahead, reach, radius)
     if style.handle == "knob":
         return knob(center, FRONT, reach, min(2.4 * style.grip, 0.8 * margin))
     if style.handle == "block":

@@ -17,7 +17,7 @@ from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
 from artsim.making.outlines import UP
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -66,11 +66,9 @@ def build(rng: Rng) -> Assembly:
         body += _lugs(pot)
     pins = _pins(rng, pot, max(room, knob_top + 0.012))
     if swinging:
-        body += union(
-            hull_of(cylinder((0, s * 0.6 * pins.reach, pins.z), (0, s * (pins.reach - pins.rod - GAP), pins.z), r))
-            for s in (-1.0, 1.0)
-            for r in (1.6 * pins.rod,)
-        )
+        for s in (-1.0, 1.0):
+            root, tip = (0, s * 0.6 * pins.reach, pins.z), (0, s * (pins.reach - pins.rod - GAP), pins.z)
+            body += hull_of(cylinder(root, tip, 1.6 * pins.rod))
     switch = _switch(rng, pot) if kind == "electric" else None
     if switch is not None:
         body += switch[0]

@@ -255,16 +255,16 @@ def _wrist_rest(rng: Rng, keyboard: Assembly, low: Array, high: Array, end: floa
 # --- keyboards of two halves -----------------------------------------------------------------------------------------
 
 
-def _half_size(groups: Sequence[Sequence[Cell]], caps: _Caps, margin: float) -> Array:
-    size: Array = 0.5 * extent(groups) * caps.pitch + margin
-    return size
+def _half(rng: Rng, caps: _Caps, most: float) -> tuple[list[list[Cell]], Array, float]:
+    """Keys of one half, half of its size along u and v, and the margin around the keys, at most in pitches."""
+    margin = caps.pitch * rng.uniform(0.2, most)
+    groups = half_layout(rng)
+    return groups, 0.5 * extent(groups) * caps.pitch + margin, margin
 
 
 def _pivot(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """Two halves that a pivot at the back lets splay."""
-    margin = caps.pitch * rng.uniform(0.2, 0.8)
-    groups = half_layout(rng)
-    half = _half_size(groups, caps, margin)
+    groups, half, _ = _half(rng, caps, 0.8)
     thick = rng.uniform(0.008, 0.028)
     radius = rng.uniform(0.012, 0.02)
     pivot = np.array([half[1] + radius + 0.001, 0.0])
@@ -290,9 +290,7 @@ def _pivot(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
 def _folding(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """Two flat halves; the right one folds over the left one."""
     caps = replace(caps, height=min(caps.height, 0.003), travel=min(caps.travel, 0.0012), step=0.0)
-    margin = caps.pitch * rng.uniform(0.2, 0.6)
-    groups = half_layout(rng)
-    half = _half_size(groups, caps, margin)
+    groups, half, margin = _half(rng, caps, 0.6)
     thick = rng.uniform(0.004, 0.012)
     axis = thick + caps.height + 2.0 * CLEAR
     radius = rng.uniform(0.003, 0.005)
@@ -316,9 +314,7 @@ def _folding(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
 
 def _angled(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """One body with a deck for each hand, turned inwards and lower at its outer side."""
-    margin = caps.pitch * rng.uniform(0.2, 0.8)
-    groups = half_layout(rng)
-    half = _half_size(groups, caps, margin)
+    groups, half, _ = _half(rng, caps, 0.8)
     yaw, tent, slope = rng.uniform(0.05, 0.4), rng.uniform(0.0, 0.35), rng.uniform(0.0, 0.12)
     low = rng.uniform(0.006, 0.02)
     body, faces, edges = Solid(), [], []

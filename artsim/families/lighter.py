@@ -211,13 +211,8 @@ def _long(rng: Rng) -> Assembly:
         body += tube(bow, 0.002, 10)
     radius = min(neck * half_x, neck * half_y, rng.uniform(0.0035, 0.006))
     lean = rng.uniform(0.0, 0.5) * rng.choice([0.0, 1.0])
-    path = np.array(
-        [
-            [0, 0, slot_high + 0.002],
-            [0, 0, handle + 0.3 * nozzle],
-            [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle],
-        ]
-    )
+    mouth = [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle]
+    path = np.array([[0, 0, slot_high + 0.002], [0, 0, handle + 0.3 * nozzle], mouth])
     body += tube(path, radius, 14)
     tip = path[2] - path[1]
     end = path[2] - 0.1 * tip
@@ -284,12 +279,8 @@ def _table(rng: Rng) -> Assembly:
         flap += box((split, hinge_x - 0.0015), wide, (base + flap_tall - thin, base + flap_tall))
         flap += box((hinge_x - 0.003, hinge_x + 0.001), 0.3 * wide, (base, base + 0.5 * flap_tall))
         lighter.add("body", body, density=2500.0)
-        lighter.add(
-            "lid",
-            flap,
-            revolute("body", (0, 1, 0), (hinge_x + 0.001, 0, at + GAP), 0.0, rng.uniform(1.2, 1.9)),
-            density=2500.0,
-        )
+        turn = revolute("body", (0, 1, 0), (hinge_x + 0.001, 0, at + GAP), 0.0, rng.uniform(1.2, 1.9))
+        lighter.add("lid", flap, turn, density=2500.0)
     else:
         body += frame((split, -wide, height - 0.001), (hinge_x, wide, height + flap_tall), [thin] * 4, 0, 1)
         lighter.add("body", body, density=2500.0)

@@ -206,15 +206,9 @@ def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:
         x, z, radius, wide = wheel
         solid = cylinder((x, drift - wide, z), (x, drift + wide, z), radius, sections=20)
         if rng.random() < 0.6:
-            solid += union(
-                cylinder(
-                    (x + 0.97 * radius * cos(a), drift - 0.9 * wide, z + 0.97 * radius * sin(a)),
-                    (x + 0.97 * radius * cos(a), drift + 0.9 * wide, z + 0.97 * radius * sin(a)),
-                    0.09 * radius,
-                    sections=5,
-                )
-                for a in np.arange(10) * 0.2 * np.pi
-            )
+            for a in np.arange(10) * 0.2 * np.pi:
+                at, side = np.array([x + 0.97 * radius * cos(a), drift, z + 0.97 * radius * sin(a)]), (0, 0.9 * wide, 0)
+                solid += cylinder(at - side, at + side, 0.09 * radius, sections=5)
         parts.add("wheel", solid, continuous("body", (0, 1, 0), (x, drift, z)))
     if ball is not None:
         solid = ellipsoid(ball[0], ball[1], 20)

@@ -114,12 +114,8 @@ def _clip(rng: Rng, section: _Section, radius: float, top: float, length: float)
                 for w, z in ((1.0, top), (0.5, top - length))
             ]
         )
-        strip += box(
-            (reach - thick, min(reach + 0.5 * thick, near - GAP)),
-            ball,
-            (top - length, top - length + 2 * ball),
-            fillet=0.4 * ball,
-        )
+        deep = (reach - thick, min(reach + 0.5 * thick, near - GAP))
+        strip += box(deep, ball, (top - length, top - length + 2 * ball), fillet=0.4 * ball)
     return strip + box((reach - 0.5 * thick, 0.4 * near), 0.8 * half, (top - 1.6 * thick, top))
 
 
@@ -229,14 +225,9 @@ def _clicked(rng: Rng, section: _Section, length: float, radius: float) -> Assem
     if wide and top - 0.35 * out - travel > length + collar + GAP:  # an eraser or a disc on it
         button += section.rod([(1.3 * push, top - 0.35 * out), (1.2 * push, top)])
     pen.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel * 0.98, (0, 0, top)), density=1000.0)
-    refill = (
-        section.rod(
-            [(0.35 * bore, -0.5 * travel), (0.9 * bore - 0.0001, 0.4 * cone), (0.9 * bore - 0.0001, cone - travel)]
-        )
-        if (cone > 3.0 * travel)
-        else None
-    )
-    if refill is not None:
+    if cone > 3.0 * travel:
+        wide_bore = 0.9 * bore - 0.0001
+        refill = section.rod([(0.35 * bore, -0.5 * travel), (wide_bore, 0.4 * cone), (wide_bore, cone - travel)])
         joint = prismatic("body", (0, 0, -1), 0.0, travel * 0.98, mimic=("button", 1.0))
         pen.add("tip", refill.moved((0, 0, 0.5 * travel)), joint, density=2000.0)
     return pen

@@ -19,6 +19,8 @@ from artsim.making.outlines import about, lifted
 from artsim.making.solids import Solid, box, cylinder, hull, loft, union
 
 GAP = 0.0005
+UNDER_LID = (0.001, 0.0016)
+"""How far keys under a lid stand out, metres."""
 KINDS = ("bar", "flip", "slider", "swivel", "fold", "smartphone", "cordless", "desk")
 
 
@@ -26,14 +28,8 @@ def build(rng: Rng) -> Assembly:
     """A telephone; closed, its handset in place and no key pressed at rest."""
     kind = str(rng.choice(KINDS, p=[0.15, 0.17, 0.12, 0.07, 0.08, 0.1, 0.11, 0.2]))
     phone = Assembly(density=1300.0)
-    if kind == "desk":
-        desk_set(rng, phone)
-    elif kind == "cordless":
-        _cordless(rng, phone)
-    else:
-        {"bar": _bar, "flip": _flip, "slider": _slider, "swivel": _swivel, "fold": _fold, "smartphone": _smartphone}[
-            kind
-        ](rng, phone)
+    makers = (_bar, _flip, _slider, _swivel, _fold, _smartphone, _cordless, desk_set)
+    makers[KINDS.index(kind)](rng, phone)
     return phone
 
 
@@ -43,12 +39,8 @@ def _slab(rng: Rng, half: float, x: tuple[float, float], z: tuple[float, float],
     corner = rng.uniform(0.0, 0.35) * np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.3, 1.0])
     waist = rng.uniform(-0.12, 0.12) * rng.choice([0.0, 1.0]) * np.array([0.0, 0.05, 0.6, 1.0, 0.6, 0.05, 0.0])
     thick = x[1] - x[0]
-    bow = (
-        rng.uniform(0.1, 0.7)
-        * thick
-        * rng.choice([0.0, 1.0])
-        * np.array([1.0, 0.9, 0.4, rng.uniform(0.0, 0.3), 0.4, 0.9, 1.0])
-    )
+    bow = rng.uniform(0.1, 0.7) * thick * rng.choice([0.0, 1.0])
+    bow = bow * np.array([1.0, 0.9, 0.4, rng.uniform(0.0, 0.3), 0.4, 0.9, 1.0])
     fronts, backs = np.full(7, x[0]), np.full(7, x[1])
     if curve > 0:
         backs = backs - bow
@@ -118,18 +110,13 @@ def _bar(rng: Rng, phone: Assembly) -> None:
     _stand(rng, phone, half, thick, length)
 
 
-def _lid_height(rng: Rng) -> float:
-    """How far the keys under a lid stand out."""
-    return rng.uniform(0.001, 0.0016)
-
-
 def _flip(rng: Rng, phone: Assembly) -> None:
     """A lid with the display before the keys, hinged at the top (or, at times, half-way up)."""
     length, half, thick = _size(rng)
     length *= 0.8
     lower = thick * rng.uniform(0.45, 0.65)
     upper = thick - lower
-    height = _lid_height(rng)
+    height = rng.uniform(*UNDER_LID)
     plane = -height - GAP  # the hinge's axis lies in the back of the lid
     radius = 0.45 * min(upper, lower) + 0.001
     top = length * rng.uniform(0.72, 1.0)
@@ -161,7 +148,7 @@ def _slider(rng: Rng, phone: Assembly) -> None:
     """The half with the display slides off the keys, up or to the side."""
     length, half, thick = _size(rng)
     lower = thick * rng.uniform(0.4, 0.65)
-    height = _lid_height(rng)
+    height = rng.uniform(*UNDER_LID)
     plane = -height - GAP
     body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
     sideways = rng.random() < 0.3
@@ -191,7 +178,7 @@ def _swivel(rng: Rng, phone: Assembly) -> None:
     """The half with the display turns off the keys in its own plane."""
     length, half, thick = _size(rng)
     lower = thick * rng.uniform(0.4, 0.6)
-    height = _lid_height(rng)
+    height = rng.uniform(*UNDER_LID)
     plane = -height - GAP
     pivot = length - half * rng.uniform(0.8, 1.0)
     body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
@@ -219,14 +206,8 @@ def _fold(rng: Rng, phone: Assembly) -> None:
     for low, high in ((first[0], first[1]), (first[4], first[5])):
         body += cylinder((0, y, low), (0, y, high), radius, sections=16)
         body += box((0.5 * gap, 0.5 * gap + 0.5 * (leaf - 0.5 * gap)), (reach[0], reach[1]), (low, high))
-    body += box(
-        (leaf - 0.0005, leaf + 0.0016),
-        (-0.6 * half, 0.1 * half),
-        (0.7 * length, 0.95 * length),
-        fillet=0.3 * half,
-        axis=0,
-        steps=2,
-    )
+    bump = (leaf - 0.0005, leaf + 0.0016), (-0.6 * half, 0.1 * half), (0.7 * length, 0.95 * length)
+    body += box(*bump, fillet=0.3 * half, axis=0, steps=2)
     phone.add("body", body, density=1500.0)
     lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
     lid += cylinder((0, y, first[1] + GAP), (0, y, first[4] - GAP), radius, sections=16)
@@ -288,13 +269,8 @@ def _cordless(rng: Rng, phone: Assembly) -> None:
     body += box((-0.5 * thick - 0.0005, 0.0), inner, (start + 0.68 * length, start + 0.9 * length))
     if rng.random() < 0.4:
         y = rng.choice([-0.6, 0.6]) * half
-        body += cylinder(
-            (0, y, start + 0.9 * length),
-            (0, y, start + length * rng.uniform(1.08, 1.4)),
-            0.25 * thick,
-            0.18 * thick,
-            12,
-        )
+        top = start + length * rng.uniform(1.08, 1.4)
+        body += cylinder((0, y, start + 0.9 * length), (0, y, top), 0.25 * thick, 0.18 * thick, 12)
     lift = prismatic("dock", (0, 0, 1), 0.0, length * rng.uniform(0.4, 1.2), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)
     add_keypad(rng, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), rng.uniform(0.0011, 0.002))

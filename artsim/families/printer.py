@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
-from artsim.making.outlines import FRONT, rounded_rectangle
+from artsim.making.outlines import FRONT, about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, prism, tray, union
 from artsim.model.kinematics import Array
 
@@ -153,14 +153,9 @@ def _fill(
         if rng.random() < 0.6:
             solid += box((front - 0.006, front + 0.5 * thick), 0.15 * wide, (high - GAP - 0.012, high - GAP - 0.004))
         if rng.random() < 0.4:  # guides for paper on its inner side
-            solid += union(
-                box(
-                    (front + thick - 0.001, front + thick + 0.006),
-                    (s * 0.7 * wide - 0.003, s * 0.7 * wide + 0.003),
-                    (low + 0.2 * band.height, high - 0.1 * band.height),
-                )
-                for s in (-1, 1)
-            )
+            deep = (front + thick - 0.001, front + thick + 0.006)
+            tall = (low + 0.2 * band.height, high - 0.1 * band.height)
+            solid += union(box(deep, about(s * 0.7 * wide, 0.003), tall) for s in (-1, 1))
         hinge = revolute("body", (0, -1, 0), (front, 0, low + GAP), 0.0, rng.uniform(0.9, 1.55))
         printer.add(f"flap_{number}", solid, hinge, density=900.0)
     elif band.kind == "sliding tray":
@@ -265,13 +260,8 @@ def _lid(rng: Rng, printer: Assembly, case: _Case, kind: str, top: float) -> Non
     if feeder:
         rise = rng.uniform(0.03, 0.09)
         y0, y1 = 0.15 * case.y, 0.8 * case.y
-        lid += box(
-            (front + 0.15 * case.x, edge - 0.1 * case.x),
-            (y0, y1),
-            (crown - 0.002, crown + rise),
-            fillet=0.3 * rise,
-            axis=0,
-        )
+        deep = (front + 0.15 * case.x, edge - 0.1 * case.x)
+        lid += box(deep, (y0, y1), (crown - 0.002, crown + rise), fillet=0.3 * rise, axis=0)
     printer.add("lid", lid, revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, rng.uniform(0.7, 1.5)), density=300.0)
     if feeder:
         z, wide = crown + GAP, 0.6 * (edge - front) * rng.uniform(0.5, 0.9)
@@ -301,11 +291,7 @@ def _paper_support(rng: Rng, printer: Assembly, case: _Case, seam: float, front:
     """A flap that lies over the paper's slot at the back and folds up and back."""
     thick, wide = rng.uniform(0.004, 0.01), case.y * rng.uniform(0.5, 0.85)
     solid = box((front + GAP, case.x - 0.004), wide, (seam, seam + thick), fillet=0.01, axis=2)
-    solid += cylinder(
-        (case.x - 0.004, -wide, seam + 0.5 * thick),
-        (case.x - 0.004, wide, seam + 0.5 * thick),
-        0.5 * thick,
-        sections=12,
-    )
-    hinge = revolute("body", (0, 1, 0), (case.x - 0.004, 0, seam + 0.5 * thick), 0.0, rng.uniform(1.3, 2.1))
+    x, z = case.x - 0.004, seam + 0.5 * thick
+    solid += cylinder((x, -wide, z), (x, wide, z), 0.5 * thick, sections=12)
+    hinge = revolute("body", (0, 1, 0), (x, 0, z), 0.0, rng.uniform(1.3, 2.1))
     printer.add("paper_support", solid, hinge, density=800.0)

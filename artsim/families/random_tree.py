@@ -264,15 +264,7 @@ def _put(
     for child, motion, R_branch_child, foot in branch.children:
         R, at = matmul(rotation, R_branch_child), apply(rotation, foot) + position
         mimic = None if motion.follows is None else (siblings[motion.follows], motion.multiplier)
-        spec = JointSpec(
-            motion.type,
-            name,
-            apply(R, motion.axis),
-            apply(R, motion.origin) + at,
-            motion.lower,
-            motion.upper,
-            motion.pitch,
-            mimic,
-        )
+        axis, origin = apply(R, motion.axis), apply(R, motion.origin) + at
+        spec = JointSpec(motion.type, name, axis, origin, motion.lower, motion.upper, motion.pitch, mimic)
         siblings.append(_put(tree, child, names, spec, R, at))
     return name

@@ -199,11 +199,8 @@ def _combination(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid
     skirt, reach = rng.uniform(0.006, 0.012), rng.uniform(0.02, 0.03)
     solid = cylinder((x, y, z), (x - skirt, y, z), radius, 0.85 * radius, 28)
     solid += cylinder((x - 0.5 * skirt, y, z), (x - skirt - reach, y, z), 0.55 * radius, 0.45 * radius, 16)
-    return solid + box(
-        (x - skirt - 0.002, x - 0.001),
-        (y - 0.03 * radius - 0.001, y + 0.03 * radius + 0.001),
-        (z + 0.5 * radius, z + 0.9 * radius),
-    )
+    mark = (y - 0.03 * radius - 0.001, y + 0.03 * radius + 0.001)
+    return solid + box((x - skirt - 0.002, x - 0.001), mark, (z + 0.5 * radius, z + 0.9 * radius))
 
 
 def _wheel(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:

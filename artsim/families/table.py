@@ -146,11 +146,8 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
         table.body += box((-x + overhang, x), (-sides[0] * y, -sides[0] * (y - panel)), (0.0, top + 0.001))
     near = -outer + (broad if -1 in sides else panel) - 0.001
     far = outer - (broad if 1 in sides else panel) + 0.001
-    table.body += box(
-        (front + deep - overhang - 0.03, front + deep - overhang - 0.012),
-        (near, far),
-        (top - rng.uniform(0.2, 0.8) * (top - low_z), top + 0.001),
-    )
+    deepest, drop = front + deep - overhang, rng.uniform(0.2, 0.8) * (top - low_z)
+    table.body += box((deepest - 0.03, deepest - 0.012), (near, far), (top - drop, top + 0.001))
     between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
     if far - near < 0.2:
         between = "nothing"

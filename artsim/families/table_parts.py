@@ -9,7 +9,7 @@ import numpy as np
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
-from artsim.making.outlines import Vector
+from artsim.making.outlines import Vector, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 
 GAP = 0.003
@@ -143,14 +143,11 @@ def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float
             elif kind == "round":
                 solid += cylinder(foot, head, taper * half, half, 16)
             elif kind == "tapered":
-                solid += (
-                    cylinder(foot, head, taper * half, 1.2 * half, 4)
-                    if out
-                    else hull_of(
-                        box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01)),
-                        box(head - (half, half, 0.25 * tall), head + (half, half, 0)),
-                    )
-                )
+                if out:
+                    solid += cylinder(foot, head, taper * half, 1.2 * half, 4)
+                    continue
+                below = box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01))
+                solid += hull_of(below, box(head - (half, half, 0.25 * tall), head + (half, half, 0)))
             else:
                 levels = low + np.array([0.0, 0.05, 0.12, 0.5, 0.56, 0.62, 0.75, 1.0]) * tall
                 radii = half * np.array([0.55, 0.85, 0.5, 0.95, 0.6, 0.95, 1.0, 1.0])
@@ -189,11 +186,8 @@ def wheels(table: Assembly, spots: list[tuple[float, float]], height: float, siz
     radius = 0.42 * height
     half, thick = 0.3 * radius, 0.004
     for x, y in spots:
-        body = box(
-            (x - 0.5 * radius, x + 0.5 * radius),
-            (y - half - thick - 0.002, y + half + thick + 0.002),
-            (height - 0.1 * radius, height + 0.012),
-        )
+        across = (y - half - thick - 0.002, y + half + thick + 0.002)
+        body = box(about(x, 0.5 * radius), across, (height - 0.1 * radius, height + 0.012))
         for s in (-1, 1):
             a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
             body += box((x - 0.35 * radius, x + 0.35 * radius), (a, b), (0.7 * radius, height))

@@ -206,16 +206,9 @@ def _button_lid(
     round_off = 0.99 if count == 1 and rng.random() < 0.5 else 0.2
     for y0, y1 in edges:
         corner = round_off * 0.5 * min(y1 - y0, 2 * half)
-        buttons.append(
-            box(
-                (x - half + GAP / 2, x + half - GAP / 2),
-                (y + y0 + GAP / 2, y + y1 - GAP / 2),
-                (low_z, high[2] + rng.uniform(0.0065, 0.01)),
-                fillet=corner,
-                axis=2,
-                steps=5,
-            )
-        )
+        deep, across = (x - half + GAP / 2, x + half - GAP / 2), (y + y0 + GAP / 2, y + y1 - GAP / 2)
+        upright = (low_z, high[2] + rng.uniform(0.0065, 0.01))
+        buttons.append(box(deep, across, upright, fillet=corner, axis=2, steps=5))
     return well, buttons
 
 

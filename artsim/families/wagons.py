@@ -65,12 +65,8 @@ def wagon(rng: Rng) -> Assembly:
     else:
         across = np.array([0.0, 0.06, 0.0])
         tip = pivot + long * out
-        drawbar += tube(
-            np.array([tip, tip + across + 0.06 * out, tip + 0.13 * out, tip - across + 0.06 * out]),
-            0.008,
-            6,
-            closed=True,
-        )
+        loop = [tip, tip + across + 0.06 * out, tip + 0.13 * out, tip - across + 0.06 * out]
+        drawbar += tube(np.array(loop), 0.008, 6, closed=True)
     cart.add("handle", drawbar, revolute("axle", (0, 1, 0), pivot, -0.8 * start, steepest - start), density=STEEL)
     for x, parent in ((x_front, "axle"), (x_back, "body")):
         for s in (-1.0, 1.0):
@@ -110,12 +106,8 @@ def hand_cart(rng: Rng) -> Assembly:
     x_axle = rng.uniform(-0.1, 0.15) * length
     y_wheel = half + flare + 0.5 * wheels.wide + 0.012
     z = wheels.radius
-    body += cylinder(
-        (x_axle, -y_wheel + 0.5 * wheels.wide + GAP, z),
-        (x_axle, y_wheel - 0.5 * wheels.wide - GAP, z),
-        0.015,
-        sections=12,
-    )
+    reach = y_wheel - 0.5 * wheels.wide - GAP
+    body += cylinder((x_axle, -reach, z), (x_axle, reach, z), 0.015, sections=12)
     for s in (-1.0, 1.0):
         body += box(about(x_axle, 0.04), about(s * 0.7 * half, 0.02), (min(z, low) - 0.02, low + 0.002))
     r, reach = rng.uniform(0.012, 0.02), rng.uniform(0.5, 1.1)

@@ -120,11 +120,8 @@ def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: flo
     for k in range(3):
         a = 2.0 * np.pi * k / 3 + 0.4
         out, across = np.array([0.0, cos(a), sin(a)]), np.array([0.0, -sin(a), cos(a)])
-        feet = [
-            np.array([x, 0, z]) + (radius - 0.005) * out + v * across
-            for x in (front + 0.03, back)
-            for v in (-0.03, 0.03)
-        ]
+        feet = [np.array([x, 0, z]) + (radius - 0.005) * out + v * across for x in (front + 0.03, back)
+                for v in (-0.03, 0.03)]  # fmt: skip
         tips = [np.array([x, 0, z]) + (radius - 0.05) * out for x in (front + 0.06, back)]
         solid += hull(feet + tips)
     return solid

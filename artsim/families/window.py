@@ -67,11 +67,8 @@ def _frame(rng: Rng, width: float, height: float, depth: float, bar: float) -> S
         )
     elif around < 0.55:  # a piece of wall, on each side as wide as it happens to be
         left, right, below, above = rng.uniform(0.05, 0.35 if around < 0.4 else 1.0, 4)
-        solid += frame(
-            (x0 + 0.005, -y - bar - left, -bar - below),
-            (x1 - 0.004, y + bar + right, height + bar + above),
-            [w + 0.002 for w in (left, right, below, above)],
-        )
+        low, high = (x0 + 0.005, -y - bar - left, -bar - below), (x1 - 0.004, y + bar + right, height + bar + above)
+        solid += frame(low, high, [w + 0.002 for w in (left, right, below, above)])
     return solid
 
 
@@ -203,11 +200,8 @@ def _hung(
                 solid += bar_handle((x, y - 0.04, z), (x, y + 0.04, z), (-1, 0, 0), 0.022, 0.005)
         solids.append((solid, tuple(0.5 * (low + high))))
     if not both:
-        body += solids[1][0] + box(
-            (-depth / 2 + 0.006 + sash + 2 * GAP, depth / 2 - 0.002),
-            (-width / 2 - 0.001, -width / 2 + 0.01),
-            (meet, height + 0.001),
-        )
+        stop = (-depth / 2 + 0.006 + sash + 2 * GAP, depth / 2 - 0.002), (-width / 2 - 0.001, -width / 2 + 0.01)
+        body += solids[1][0] + box(*stop, (meet, height + 0.001))
     window.add("frame", body, density=700.0)
     up = prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1])
     window.add("sash_0" if both else "sash", solids[0][0], up)
