@@ -15,7 +15,7 @@ from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
 from artsim.making.outlines import FRONT, UP, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -283,17 +283,10 @@ def _tube(rng: Rng, display: Assembly) -> None:
         splay = rng.uniform(1.0, 1.3)
         rod = rng.uniform(0.008, 0.02)
         x0 = -0.5 * cabinet
-        chain.solid = union(
-            cylinder(
-                (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0),
-                (x0 + a * 0.4 * cabinet, s * 0.75 * half, foot + 0.003),
-                0.7 * rod,
-                rod,
-                12,
-            )
-            for a in (-1, 1)
-            for s in (-1, 1)
-        )
+        for a, s in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            tip = (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0)
+            head = (x0 + a * 0.4 * cabinet, s * 0.75 * half, foot + 0.003)
+            chain.solid += cylinder(tip, head, 0.7 * rod, rod, 12)
     front = -0.5 * cabinet - 0.2 * depth if swivels else -cabinet
     low, high = foot, foot + 2.0 * rise
     rim = rng.uniform(0.06, 0.16) * half
@@ -309,14 +302,9 @@ def _tube(rng: Rng, display: Assembly) -> None:
                    for s in (-1, 1) for z in (low + 0.02 * rise, low + rise * (1.0 + 0.96 * t))])  # fmt: skip
     glass = np.array([front + lip, 0.5 * side, low + rise + 0.5 * chin])
     half_glass, rise_glass = half - inset - rim - 0.5 * side, rise - inset - rim - 0.5 * chin
-    shell += hull(
-        [
-            glass + (x, s * half_glass * t, u * rise_glass * t)
-            for x, t in ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
-            for s in (-1, 1)
-            for u in (-1, 1)
-        ]
-    )
+    bulge = ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
+    corners_of_glass = [(x, s * half_glass * t, u * rise_glass * t) for x, t in bulge for s in (-1, 1) for u in (-1, 1)]
+    shell += hull([glass + corner for corner in corners_of_glass])
     chain.solid += shell
     name, keys = chain.finish(), 0
     if side:

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.families.details import front_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, Rng, prismatic, revolute
-from artsim.making.outlines import FRONT
+from artsim.making.outlines import FRONT, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, tray
 from artsim.model.kinematics import Array
 
@@ -190,18 +190,12 @@ def _shelves(rng: Rng, cell: Cell, front: float, style: Style) -> Solid:
     solid = Solid()
     thick = min(style.board, 0.018)
     for z in np.linspace(cell.low[1], cell.high[1], count + 2)[1:-1]:
-        low, high = (
-            (front, cell.low[0] - 0.001, z - thick / 2),
-            (style.back + 0.001, cell.high[0] + 0.001, z + thick / 2),
-        )
-        solid += box(low, high)
+        across = (cell.low[0] - 0.001, cell.high[0] + 0.001)
+        solid += box((front, style.back + 0.001), across, about(z, thick / 2))
     if count == 0 and width > 0.8 and rng.random() < 0.5:
         y = 0.5 * (cell.low[0] + cell.high[0])
-        low, high = (
-            (front, y - thick / 2, cell.low[1] - 0.001),
-            (style.back + 0.001, y + thick / 2, cell.high[1] + 0.001),
-        )
-        solid += box(low, high)
+        upright = (cell.low[1] - 0.001, cell.high[1] + 0.001)
+        solid += box((front, style.back + 0.001), about(y, thick / 2), upright)
     return solid
 
 
@@ -209,10 +203,8 @@ def _front_box(cell: Cell, style: Style) -> tuple[Array, Array]:
     """Corners of a cell's front: before the boards, up to their middle, or between them."""
     if not style.overlay:
         margin = GAP + 0.001
-        return (
-            np.array([style.face, cell.low[0] + margin, cell.low[1] + margin]),
-            np.array([style.face + style.thickness, cell.high[0] - margin, cell.high[1] - margin]),
-        )
+        low, high = np.array([style.face, *cell.low]), np.array([style.face + style.thickness, *cell.high])
+        return low + (0, margin, margin), high - (0, margin, margin)
     grow_low, grow_high = (
         [min(style.lap, style.board - 0.0025 if outer else style.board / 2 - GAP) for outer in edges]
         for edges in (cell.outer_low, cell.outer_high)

@@ -326,11 +326,8 @@ def _angled(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
         face = Face(np.zeros(3), right, up)
         corners = face.raised(np.array([(u, v) for u in (-half[0], half[0]) for v in (-half[1], half[1])]), 0.0)
         inner = float((side * corners[:, 1]).min())
-        face = Face(
-            np.array([0.0, side * (0.001 + rng.uniform(0.0, 0.01)) - side * inner, low - corners[:, 2].min()]),
-            right,
-            up,
-        )
+        y = side * (0.001 + rng.uniform(0.0, 0.01)) - side * inner
+        face = Face(np.array([0.0, y, low - corners[:, 2].min()]), right, up)
         corners = corners + face.origin
         body += hull(np.concatenate([corners, corners * (1, 1, 0)]))
         faces.append(face)

@@ -106,14 +106,8 @@ def _clip(rng: Rng, section: _Section, radius: float, top: float, length: float)
     strip = box((reach - thick, reach), half, (top - length, top), fillet=0.4 * thick, axis=1)
     if rng.random() < 0.5:  # it narrows to a ball at the free end
         ball = 1.1 * thick
-        strip = hull(
-            [
-                (reach - a, s * half * w, z)
-                for a in (0.0, thick)
-                for s in (-1, 1)
-                for w, z in ((1.0, top), (0.5, top - length))
-            ]
-        )
+        ends = ((1.0, top), (0.5, top - length))
+        strip = hull([(reach - a, s * half * w, z) for a in (0.0, thick) for s in (-1, 1) for w, z in ends])
         deep = (reach - thick, min(reach + 0.5 * thick, near - GAP))
         strip += box(deep, ball, (top - length, top - length + 2 * ball), fillet=0.4 * ball)
     return strip + box((reach - 0.5 * thick, 0.4 * near), 0.8 * half, (top - 1.6 * thick, top))

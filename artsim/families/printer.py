@@ -15,7 +15,7 @@ import numpy as np
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, Rng, prismatic, revolute
 from artsim.making.outlines import FRONT, about, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull, prism, tray, union
+from artsim.making.solids import Solid, box, cylinder, hull, posts, prism, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -118,16 +118,16 @@ def _bands(rng: Rng, kind: str, size: float) -> list[_Band]:
 
 def _feet(case: _Case, height: float, casters: bool) -> Solid:
     """Four feet, or casters."""
-    spots = [(a * 0.75 * case.x, b * 0.75 * case.y) for a in (-1, 1) for b in (-1, 1)]
     if casters:
         radius = 0.45 * height
+        spots = [(a * 0.75 * case.x, b * 0.75 * case.y) for a in (-1, 1) for b in (-1, 1)]
         return union(
             cylinder((x, y - 0.4 * radius, radius), (x, y + 0.4 * radius, radius), radius, sections=14)
-            + box((x - 0.5 * radius, x + 0.5 * radius), (y - 0.6 * radius, y + 0.6 * radius), (radius, height + 0.001))
+            + box(about(x, 0.5 * radius), about(y, 0.6 * radius), (radius, height + 0.001))
             for x, y in spots
         )
     size = 0.1 * min(case.x, case.y)
-    return union(cylinder((x, y, 0.0), (x, y, height + 0.001), 0.8 * size, size, 12) for x, y in spots)
+    return posts(0.75 * case.x, 0.75 * case.y, (0, height + 0.001), 0.8 * size, size, 12)
 
 
 # --- the front -------------------------------------------------------------------------------------------------------

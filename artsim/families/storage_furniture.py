@@ -16,7 +16,6 @@ from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import Assembly, Rng
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, union
-from artsim.model.kinematics import Array
 
 # Of each kind: the ranges of width, depth and height of the body and of the height of what it stands on, in metres;
 # how likely a low cell is a drawer; how common the kind is.
@@ -199,11 +198,8 @@ def _stand(
     """Plinth or legs below the body."""
     if kind == "base" or (height < 0.1 and rng.random() < 0.6):
         setback = rng.uniform(0.03, 0.08) if kind == "base" else rng.uniform(-0.015, 0.03)
-        low, high = (
-            (x0 + setback, -y + 0.5 * abs(setback) - 0.01, 0),
-            (x1, y - 0.5 * abs(setback) + 0.01, height + 0.001),
-        )
-        return frame(low, high, [board] * 4, 0, 1)
+        wide = y - 0.5 * abs(setback) + 0.01
+        return frame((x0 + setback, -wide, 0), (x1, wide, height + 0.001), [board] * 4, 0, 1)
     if height < 0.2 and rng.random() < 0.25:  # brackets: an angle at each corner
         arm, thick = rng.uniform(0.06, 0.12), rng.uniform(0.018, 0.03)
         ends = [(a, b, sx, sy) for sx, a in ((1, x0), (-1, x1)) for sy, b in ((1, -y), (-1, y))]
@@ -217,13 +213,12 @@ def _stand(
     taper = rng.uniform(0.45, 1.0)
     splay = rng.choice([0.0, rng.uniform(0.0, 0.25)]) * height
     inset = radius + rng.uniform(0.0, 0.06)
-    corners: list[tuple[Array, Array]] = []
+    sections, legs = int(rng.choice([4, 16])), Solid()
     for sx, x in ((-1, x0 + inset), (1, x1 - inset)):
         for sy in (-1, 1):
             head = np.array([x, sy * (y - inset), height + 0.002])
-            corners.append((head + (0.8 * sx * splay, 0.8 * sy * splay, -height - 0.002), head))
-    sections = int(rng.choice([4, 16]))
-    legs = union(cylinder(foot, head, taper * radius, radius, sections) for foot, head in corners)
+            foot = head + (0.8 * sx * splay, 0.8 * sy * splay, -height - 0.002)
+            legs += cylinder(foot, head, taper * radius, radius, sections)
     if height > 0.12 and rng.random() < 0.5:  # apron
         drop = rng.uniform(0.02, 0.05)
         legs += frame((x0 + inset - 0.008, -y + inset - 0.008, height - drop),
