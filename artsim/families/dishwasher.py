@@ -23,23 +23,17 @@ GAP = 0.002
 class Shape:
     """Measures of one dishwasher, in metres; the back of its closed door is the plane x = 0."""
 
-    half: float
-    """Half the width of the body."""
+    half: float  # half the width of the body
     depth: float
-    height: float
-    """Of the body, without a worktop."""
+    height: float  # of the body, without a worktop
     wall: float
-    thick: float
-    """Of the door."""
+    thick: float  # of the door
     half_door: float
-    bottom: float
-    """Height of the door's lower edge."""
-    top: float
-    """Height of the door's upper edge."""
+    bottom: float  # height of the door's lower edge
+    top: float  # height of the door's upper edge
     hinge_x: float
     hinge_z: float
-    liner: float
-    """How far the inside of the door reaches into the tub; 0 for none."""
+    liner: float  # how far the inside of the door reaches into the tub; 0 for none
 
     @property
     def front(self) -> float:

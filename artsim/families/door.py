@@ -31,10 +31,8 @@ class Style:
     thickness: float
     stile: float
     columns: int
-    rows: tuple[float, ...]
-    """Heights of the crossbars, as shares of a leaf's height."""
-    board: float
-    """Thickness of the boards or panes."""
+    rows: tuple[float, ...]  # heights of the crossbars, as shares of a leaf's height
+    board: float  # thickness of the boards or panes
     raised: bool
     handle: str
     handle_z: float

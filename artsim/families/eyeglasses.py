@@ -31,28 +31,15 @@ APART = 0.12
 
 @dataclass(frozen=True)
 class Front:
-    """Measures of the front, metres. The hinges lie at x = 0, the lenses before them.
+    """Measures of the front, metres. The hinges lie at x = 0, the lenses before them."""
 
-    Attributes
-    ----------
-    half : float
-        From the middle to a hinge.
-    ahead, wrap : float
-        The front lies at x = -ahead in the middle, and further back by wrap at the hinges.
-    hinge_z : float
-    height, thickness : float
-        Of the temples at the hinges.
-    barrel : float
-        Radius of the hinges; 0 for those without knuckles, of slim temples.
-    """
-
-    half: float
-    ahead: float
-    wrap: float
+    half: float  # from the middle to a hinge
+    ahead: float  # the front lies at x = -ahead in the middle, and further back by wrap at the hinges
+    wrap: float  # the front lies at x = -ahead in the middle, and further back by wrap at the hinges
     hinge_z: float
-    height: float
-    thickness: float
-    barrel: float
+    height: float  # of the temples at the hinges
+    thickness: float  # of the temples at the hinges
+    barrel: float  # radius of the hinges; 0 for those without knuckles, of slim temples
 
     @property
     def slim(self) -> bool:

@@ -35,30 +35,15 @@ GAP = 0.0005
 
 @dataclass(frozen=True)
 class _Caps:
-    """Look of the keys.
+    """Look of the keys."""
 
-    Attributes
-    ----------
-    pitch : float
-        Distance of two keys.
-    height, travel : float
-    shrink : float
-        Share by which a cap's top is smaller than its foot.
-    fill : float
-        Share of a cell that the cap takes up.
-    kind : str
-        Outline; see :func:`artsim.families.keys.key_outline`.
-    step : float
-        By how much each row is higher than the one before it.
-    """
-
-    pitch: float
+    pitch: float  # distance of two keys
     height: float
     travel: float
-    shrink: float
-    fill: float
-    kind: str
-    step: float
+    shrink: float  # share by which a cap's top is smaller than its foot
+    fill: float  # share of a cell that the cap takes up
+    kind: str  # outline; see :func:`artsim.families.keys.key_outline`
+    step: float  # by how much each row is higher than the one before it
 
 
 def build(rng: Rng) -> Assembly:

@@ -24,22 +24,14 @@ GAP = 0.0007
 
 @dataclass(frozen=True, eq=False)
 class _Dome:
-    """The outer shape: height, half width and lateral shift at stations along X, front first.
-
-    Attributes
-    ----------
-    steep : float
-        0 for a round cross-section, 1 for one with upright sides.
-    shoulder : float
-        Share of the height up to which the sides stand upright.
-    """
+    """The outer shape: height, half width and lateral shift at stations along X, front first."""
 
     stations: Array
     heights: Array
     halves: Array
     shifts: Array
-    steep: float
-    shoulder: float
+    steep: float  # 0 for a round cross-section, 1 for one with upright sides
+    shoulder: float  # share of the height up to which the sides stand upright
 
     def at(self, x: float) -> tuple[float, float, float]:
         """Height, half width and shift at x."""

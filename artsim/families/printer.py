@@ -24,19 +24,11 @@ SHELF = 0.005
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """The body, seen from above.
+    """The body, seen from above."""
 
-    Attributes
-    ----------
-    x, y : float
-        Half of the depth and of the width.
-    outline : (N, 2) float
-        Rounded rectangle of x and y.
-    """
-
-    x: float
-    y: float
-    outline: Array
+    x: float  # half of the depth and of the width
+    y: float  # half of the depth and of the width
+    outline: Array  # (N, 2) rounded rectangle of x and y
 
     def block(
         self, low: float, high: float, x: tuple[float, float] = (-9.0, 9.0), y: tuple[float, float] = (-9.0, 9.0)

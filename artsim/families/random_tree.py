@@ -64,10 +64,8 @@ class _Branch:
     """A part with all that hangs on it. Its frame: z leads away from the parent, the part stands on the origin."""
 
     solid: Solid
-    boxes: list[Array]
-    """(2, 3) each; together they hold the part and all that hangs on it, in all states."""
-    hinge_height: float | None = None
-    """Where a hinge across z goes, if the part has a neck for one."""
+    boxes: list[Array]  # (2, 3) each; together they hold the part and all that hangs on it, in all states
+    hinge_height: float | None = None  # where a hinge across z goes, if the part has a neck for one
     children: list[tuple[_Branch, _Motion, Array, Array]] = field(default_factory=list)
     """Branch, joint, and where the branch's frame stands: rotation (3, 3) and position (3,)."""
 

@@ -25,15 +25,11 @@ class Style:
     """What the doors of one refrigerator share; lengths in metres."""
 
     thick: float
-    corner: float
-    """Radius of the edges."""
-    wall: float
-    """Of the body."""
-    bins: float
-    """How far the bins reach into the body; 0 for none."""
+    corner: float  # radius of the edges
+    wall: float  # of the body
+    bins: float  # how far the bins reach into the body; 0 for none
     handle: str
-    level: bool
-    """Whether handles lie level along an edge instead of upright."""
+    level: bool  # whether handles lie level along an edge instead of upright
     reach: float
     radius: float
 

@@ -30,12 +30,9 @@ class Shape:
     low: float
     high: float
     wall: float
-    thick: float
-    """Of the door."""
-    inset: bool
-    """Whether the door lies within the walls."""
-    barrel: float
-    """Radius of the barrels on the hinge axis; 0 for a hidden hinge."""
+    thick: float  # of the door
+    inset: bool  # whether the door lies within the walls
+    barrel: float  # radius of the barrels on the hinge axis; 0 for a hidden hinge
 
     @property
     def door(self) -> tuple[Array, Array]:

@@ -26,23 +26,12 @@ _POINTS_TO_Y = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 @dataclass(frozen=True)
 class Ring:
-    """A finger ring, in metres, at the +Y side.
+    """A finger ring, in metres, at the +Y side."""
 
-    Attributes
-    ----------
-    center : (2,) float
-    radii : (2,) float
-        Of its middle line, along and across.
-    turn : float
-        Angle of its long axis from X.
-    egg : float
-        By how much it is wider at the back than at the front.
-    """
-
-    center: Array
-    radii: Array
-    turn: float
-    egg: float
+    center: Array  # (2,)
+    radii: Array  # (2,) of its middle line, along and across
+    turn: float  # angle of its long axis from X
+    egg: float  # by how much it is wider at the back than at the front
 
 
 def build(rng: Rng) -> Assembly:

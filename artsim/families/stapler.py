@@ -25,39 +25,17 @@ SKIRT = 0.0016
 
 @dataclass(frozen=True)
 class Layout:
-    """Measures in metres. The hinge lies at x = 0, the front at x = -length.
+    """Measures in metres. The hinge lies at x = 0, the front at x = -length."""
 
-    Attributes
-    ----------
-    length : float
-        From the hinge to the front of the arm.
-    width : float
-        Of the magazine.
-    base : float
-        Height of the base.
-    hinge : float
-        Height of the hinge.
-    tail : float
-        Radius of what turns about the hinge.
-    magazine : float
-        Height of the magazine's top.
-    inside : float
-        From the middle to a cheek beside the hinge.
-    run : float
-        By how far the cheeks reach forward.
-    back : float
-        Rear end of the base.
-    """
-
-    length: float
-    width: float
-    base: float
-    hinge: float
-    tail: float
-    magazine: float
-    inside: float
-    run: float
-    back: float
+    length: float  # from the hinge to the front of the arm
+    width: float  # of the magazine
+    base: float  # height of the base
+    hinge: float  # height of the hinge
+    tail: float  # radius of what turns about the hinge
+    magazine: float  # height of the magazine's top
+    inside: float  # from the middle to a cheek beside the hinge
+    run: float  # by how far the cheeks reach forward
+    back: float  # rear end of the base
 
 
 def build(rng: Rng) -> Assembly:

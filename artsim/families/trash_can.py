@@ -27,8 +27,7 @@ class Bin:
     height: float
     radius: float
     taper: float
-    foot: float
-    """Height of the base."""
+    foot: float  # height of the base
     steps: int
 
 
