@@ -8,7 +8,7 @@ table as well; open compartments and fronts that do not move; legs, plinths and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,14 +42,13 @@ class _Style:
     travel: float  # over the drawer's length
 
 
-@dataclass
-class _Furniture:
-    """A body under construction, and its drawers with the direction in which they open and their travel."""
+class _Furniture(Assembly):
+    """Furniture whose drawers are all of one style."""
 
-    style: _Style
-    body: Solid = field(default_factory=Solid)
-    drawers: list[tuple[Solid, float, float]] = field(default_factory=list)
-    on_legs: bool = False
+    def __init__(self, style: _Style) -> None:
+        super().__init__("body", density=650.0)
+        self.style = style
+        self.record(handles=style.handle != "none", legs=False)
 
     def add_case(
         self,
@@ -88,7 +87,11 @@ class _Furniture:
                 cell_high = np.array([high[0] - wall / 2, edges_y[column + 1] - thin, edges_z[row + 1] - thin])
                 if content == "drawer":
                     drawer, travel = self._drawer(cell_low + GAP, cell_high - GAP, wall)
-                    self.drawers.append((drawer.mirrored(0) if back else drawer, 1.0 if back else -1.0, travel))
+                    drawer = drawer.mirrored(0) if back else drawer
+                    ends, way = drawer.bounds(), 1.0 if back else -1.0
+                    origin = (ends[1 if back else 0, 0], *(0.5 * (ends[0] + ends[1])[1:]))
+                    slide = prismatic("body", (way, 0, 0), 0.0, travel, origin)
+                    self.add_numbered("drawer", drawer, slide, density=600.0)
                 elif content == "fixed":
                     face = low[0] - GAP - (_FRONT if self.style.overlay else 0.0)
                     front_low = np.array([face, *(cell_low[1:] - thin / 2)])
@@ -112,24 +115,13 @@ class _Furniture:
         )
         return solid + _handle(style, front_low, front_high), style.travel * length
 
-    def build(self) -> Assembly:
-        """Body and drawers, the highest drawer first."""
-        furniture = Assembly()
-        furniture.record(handles=self.style.handle != "none", legs=self.on_legs)
-        furniture.add("body", self.body, density=650.0)
-        for number, (drawer, direction, travel) in enumerate(self.drawers):
-            low, high = drawer.bounds()
-            origin = (low[0] if direction < 0 else high[0], *(0.5 * (low + high)[1:]))
-            furniture.add(f"drawer_{number}", drawer, prismatic("body", (direction, 0, 0), 0.0, travel, origin))
-        return furniture
-
 
 def build(rng: Rng) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
     furniture = _Furniture(_style(rng))
     kinds = (_chest, _table, _desk)
     kinds[rng.choice(3, p=[0.45, 0.3, 0.25])](rng, furniture)
-    return furniture.build()
+    return furniture
 
 
 def _style(rng: Rng) -> _Style:
@@ -179,7 +171,7 @@ def _chest(rng: Rng, furniture: _Furniture) -> None:
     if raised:
         size = rng.uniform(0.02, 0.06)
         furniture.body += _legs(rng, x0, x1, y, legs + 0.001, size)
-        furniture.on_legs = True
+        furniture.record(legs=True)
     elif legs > 0.005:
         recess = rng.uniform(0.0, 0.05)
         furniture.body += frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
@@ -200,7 +192,7 @@ def _table(rng: Rng, furniture: _Furniture) -> None:
     apron = max(height * rng.uniform(0.11, 0.25), 0.075)
     wall = rng.uniform(0.012, 0.02)
     furniture.body += _top(rng, depth, width, top, height) + _legs(rng, x0, x1, y, top + 0.001, leg)
-    furniture.on_legs = True
+    furniture.record(legs=True)
     between = y - leg + 0.002  # the apron reaches into the legs
     inset = rng.uniform(0.0, 0.4) * leg
     span = max(between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9)), _NARROWEST / 2)
@@ -272,7 +264,7 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
     left = -outer + (pedestal if -1 in sides else wall) - 0.002
     right = outer - (pedestal if 1 in sides else wall) + 0.002
     if on_legs:
-        furniture.on_legs = True
+        furniture.record(legs=True)
         furniture.body += _legs(rng, x0, x1, y, top + 0.001, leg)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y
