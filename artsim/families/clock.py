@@ -39,9 +39,8 @@ def _mantel_clock(rng: Rng) -> Assembly:
     kind = str(rng.choice(["block", "arch", "tambour", "house", "drum", "lancet"]))
     half = radius * rng.uniform(1.12, 1.5)
     low = -radius * rng.uniform(1.12, 1.8)
-    center = np.zeros(3)
-    body = dial_plate(rng, 0.0, center, radius)
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
+    body = dial_plate(rng, radius)
+    body += rim(rng, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
     around = outline("round", half)
     corners = np.array([(-half, low), (half, low)])
     if kind == "drum":
@@ -77,8 +76,8 @@ def _mantel_clock(rng: Rng) -> Assembly:
     clock = Assembly()
     tilting = kind == "drum" and rng.random() < 0.4
     if tilting:  # the drum hangs in a fork
-        drum = dial_plate(rng, 0.0, center, radius) + cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
-        drum += rim(rng, 0.003, center, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
+        drum = dial_plate(rng, radius) + cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
+        drum += rim(rng, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
         x, r = 0.5 * deep, 0.08 * half
         arm = half + 0.004 + 2 * r
         clear = half + deep + 0.01
@@ -88,10 +87,10 @@ def _mantel_clock(rng: Rng) -> Assembly:
         clock.add("body", fork, density=1500.0)
         limit = rng.uniform(0.2, 0.6)
         clock.add("case", drum, revolute("body", (0, 1, 0), (x, 0, 0), -limit, limit), density=DENSITY)
-        add_hands(rng, clock, 0.0, center, 0.95 * radius, "case")
+        add_hands(rng, clock, 0.95 * radius, "case")
         return clock
     clock.add("body", body, density=DENSITY)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+    add_hands(rng, clock, 0.95 * radius, "body")
     if rng.random() < 0.45:
         _knobs(rng, clock, deep, 0.35 * radius)
     return clock
@@ -120,9 +119,8 @@ def _longcase_clock(rng: Rng) -> Assembly:
     plinth = rng.uniform(0.25, 0.45)
     low = -hood - rng.uniform(0.0, 0.05)
     bottom = low - length
-    center = np.zeros(3)
-    body = dial_plate(rng, 0.0, center, radius) + box((0.002, deep), hood, (low, hood))
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.08 * radius, 0.01 + 0.05 * radius)
+    body = dial_plate(rng, radius) + box((0.002, deep), hood, (low, hood))
+    body += rim(rng, 1.005 * radius, 0.08 * radius, 0.01 + 0.05 * radius)
     crest = str(rng.choice(["flat", "gable", "arch", "swan"]))
     if crest == "gable":
         body += prism([(-1.1 * hood, hood), (1.1 * hood, hood), (0, hood * rng.uniform(1.3, 1.7))], -0.02, deep, 0)
@@ -145,7 +143,7 @@ def _longcase_clock(rng: Rng) -> Assembly:
     top = low - 0.05
     body += box((0.5 * deep, deep - 0.005), 0.006, (top + 0.002, top + 0.004))
     clock = Assembly("body", body, DENSITY)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+    add_hands(rng, clock, 0.95 * radius, "body")
     room = trunk - 0.025
     solid, swing = pendulum(rng, 0.6 * deep, top, (top - bottom) * rng.uniform(0.65, 0.9) - 0.02, room)
     clock.add("pendulum", solid, revolute("body", FRONT, (0.6 * deep, 0, top), -swing, swing), density=2000.0)
@@ -159,9 +157,8 @@ def _alarm_clock(rng: Rng) -> Assembly:
     radius = rng.uniform(0.025, 0.06)
     deep = radius * rng.uniform(0.6, 1.3)
     half = radius * rng.uniform(1.08, 1.25)
-    center = np.zeros(3)
-    body = dial_plate(rng, 0.0, center, radius)
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.06 * radius, 0.003 + 0.12 * radius)
+    body = dial_plate(rng, radius)
+    body += rim(rng, 1.005 * radius, 0.06 * radius, 0.003 + 0.12 * radius)
     clock = Assembly()
     bells = rng.random() < 0.65
     middle = 0.5 * deep
@@ -182,7 +179,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
         wide = half * rng.uniform(0.2, 0.55)
         body += box((0.3 * deep, 0.7 * deep), 0.7 * wide, (0.9 * top, top + 0.0005))
         clock.add("body", body, density=DENSITY)
-        add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+        add_hands(rng, clock, 0.95 * radius, "body")
         button = box((0.2 * deep, 0.8 * deep), wide, (top + 0.004, top + 0.01), fillet=0.003)
         clock.add("button", button, prismatic("body", (0, 0, -1), 0.0, 0.003, (middle, 0, top)), density=DENSITY)
         if kind != "wedge":
@@ -209,7 +206,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
         span = half * sin(spread) + 0.5 * size
         body += tube([(middle, span * cos(a), lean + 0.2 * size + 0.9 * size * sin(a)) for a in angles.tolist()], r, 8)
     clock.add("body", body, density=1500.0)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+    add_hands(rng, clock, 0.95 * radius, "body")
     room = half * sin(spread) - size * cos(spread)
     if room > 0.12 * radius:
         z = half + 0.006
@@ -229,9 +226,8 @@ def _watch(rng: Rng) -> Assembly:
     radius = rng.uniform(0.016, 0.028)
     deep = radius * rng.uniform(0.25, 0.55)
     half = radius * rng.uniform(1.06, 1.18)
-    center = np.zeros(3)
     rise = 0.16 * radius
-    body = dial_plate(rng, 0.0, center, radius)
+    body = dial_plate(rng, radius)
     body += cylinder((0.0015, 0, 0), (0.5 * deep, 0, 0), half, sections=30)
     body += cylinder((0.5 * deep - 1e-4, 0, 0), (deep, 0, 0), half, 0.8 * half, 30)
     body += ring((0.0015 - 0.5 * rise, 0, 0), FRONT, 1.005 * radius, half, rise, 28)
@@ -246,7 +242,7 @@ def _watch(rng: Rng) -> Assembly:
                           0.05 * radius, sections=8) for s in (-1.0, 1.0))  # fmt: skip
     clock = Assembly("body", body + bow + ears if fixed else body, 3000.0)
     clock.add("crown", crown, continuous("body", (0, 0, 1), (x, 0, neck)), label="knob")
-    front = add_hands(rng, clock, 0.0, center, 0.9 * radius, "body")
+    front = add_hands(rng, clock, 0.9 * radius, "body")
     if rng.random() < 0.55:
         edge = min(front, 0.0015 - rise) - 0.0004
         lid = cylinder((edge, 0, 0), (edge - 0.12 * radius, 0, 0), half, 0.85 * half, 30)

@@ -27,8 +27,8 @@ def outline(kind: str, half: float, tall: float = 1.0) -> Array:
     return points
 
 
-def marks(rng: Rng, x: float, center: Array, radius: float) -> Solid:
-    """Marks of the hours on a face at ``x``: bars, dots, or four large ones."""
+def marks(rng: Rng, radius: float) -> Solid:
+    """Marks of the hours on a face at x = 0: bars, dots, or four large ones."""
     kind = str(rng.choice(["bars", "dots", "four", "mixed"]))
     solid = Solid()
     size = radius * rng.uniform(0.02, 0.04)
@@ -40,7 +40,7 @@ def marks(rng: Rng, x: float, center: Array, radius: float) -> Solid:
             continue
         out = np.array([0.0, -sin(a), cos(a)])
         across = np.array([0.0, cos(a), sin(a)])
-        at = center + 0.86 * radius * out + (x, 0, 0)
+        at = 0.86 * radius * out
         if kind == "dots":
             solid += cylinder(at + (0.001, 0, 0), at - (0.0015, 0, 0), size * (1.5 if main else 1.0), sections=8)
             continue
@@ -52,8 +52,8 @@ def marks(rng: Rng, x: float, center: Array, radius: float) -> Solid:
     return solid
 
 
-def add_hands(rng: Rng, clock: Assembly, x: float, center: Array, radius: float, parent: str) -> float:
-    """Add hour, minute and by chance a second hand before a face at ``x``; returns where they end in front."""
+def add_hands(rng: Rng, clock: Assembly, radius: float, parent: str) -> float:
+    """Add hour, minute and by chance a second hand before a face at x = 0; returns where they end in front."""
     kind = str(rng.choice(["bar", "lance", "spade", "dart"]))
     thick = max(0.012 * radius, 0.0008)
     gap = max(0.006 * radius, 0.0005)
@@ -61,6 +61,7 @@ def add_hands(rng: Rng, clock: Assembly, x: float, center: Array, radius: float,
     hub = radius * rng.uniform(0.05, 0.09)
     names = ["hour_hand", "minute_hand"] + (["second_hand"] if rng.random() < 0.5 else [])
     lengths = [rng.uniform(0.45, 0.6), rng.uniform(0.7, 0.9), rng.uniform(0.72, 0.92)]
+    x = 0.0
     for number, name in enumerate(names):
         thin = number == 2
         long = lengths[number] * radius
@@ -69,8 +70,8 @@ def add_hands(rng: Rng, clock: Assembly, x: float, center: Array, radius: float,
         low, high = x - gap - thick, x - gap
         solid = cylinder((low, 0, 0), (high, 0, 0), hub * (1.0 - 0.2 * number), sections=14)
         solid += _hand("bar" if thin else kind, low, high, w, long, tail)
-        turned = solid.turned(CLOCKWISE, rng.uniform(0.0, 2.0 * np.pi)).moved(center)
-        clock.add(name, turned, continuous(parent, CLOCKWISE, center + (low, 0, 0)), label="hand", density=2000.0)
+        turned = solid.turned(CLOCKWISE, rng.uniform(0.0, 2.0 * np.pi))
+        clock.add(name, turned, continuous(parent, CLOCKWISE, (low, 0, 0)), label="hand", density=2000.0)
         x = low
     return x
 
@@ -97,19 +98,18 @@ def _hand(kind: str, low: float, high: float, wide: float, long: float, tail: fl
     return back + plate([(-wide, 0.0), (wide, 0.0), (0.0, long)])
 
 
-def dial_plate(rng: Rng, x: float, center: Array, radius: float) -> Solid:
-    """A round plate whose front is at ``x``, with the marks of the hours."""
-    solid = cylinder(center + (x, 0, 0), center + (x + 0.004, 0, 0), radius, sections=32)
-    return solid + marks(rng, x, center, radius)
+def dial_plate(rng: Rng, radius: float) -> Solid:
+    """A round plate whose front is the plane x = 0, with the marks of the hours."""
+    return cylinder((0, 0, 0), (0.004, 0, 0), radius, sections=32) + marks(rng, radius)
 
 
-def rim(rng: Rng, x: float, center: Array, radius: float, wide: float, rise: float) -> Solid:
-    """A ring around a face at ``x``, which stands out by ``rise``: bevelled or flat."""
+def rim(rng: Rng, radius: float, wide: float, rise: float) -> Solid:
+    """A ring around a face at x = 0, which stands out by ``rise``: bevelled or flat."""
     inner = rng.uniform(0.3, 1.0) * rise
     section = [(radius, -0.003), (radius + wide, -0.003), (radius + wide, inner), (radius, rise)]
     if rng.random() < 0.5:
         section[2], section[3] = (radius + wide, rise), (radius, inner)
-    return revolved(section, center + (x, 0, 0), FRONT, 28)
+    return revolved(section, (0.003, 0, 0), FRONT, 28)
 
 
 def pendulum(rng: Rng, x: float, top: float, length: float, room: float) -> tuple[Solid, float]:

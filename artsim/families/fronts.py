@@ -164,6 +164,17 @@ def fixed(cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     return _face(low, high, style) + joint, []
 
 
+def boards_across(cell: Cell, style: Style, axis: int, edges: Array) -> Solid:
+    """Boards that divide a cell along ``axis`` (0: Y, 1: Z), their middles at ``edges``."""
+    solid = Solid()
+    for edge in edges:
+        low, high = np.array([style.face, *cell.low]) - 0.001, np.array([style.back, *cell.high]) + 0.001
+        low[0] = style.face
+        low[1 + axis], high[1 + axis] = about(edge, style.board / 2)
+        solid += box(low, high)
+    return solid
+
+
 def _interior(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Behind a door: shelves, or trays that stay inside even when they are pulled out behind a closed door."""
     front = style.face + style.thickness + 0.02

@@ -18,12 +18,11 @@ DENSITY = 500.0
 def wall_clock(rng: Rng) -> Assembly:
     """A plain case, or a face with rays."""
     radius = rng.uniform(0.07, 0.25)
-    center = np.zeros(3)
     deep = radius * rng.uniform(0.1, 0.5)
     kind = str(rng.choice(["round", "round", "square", "octagon", "dodecagon", "hexagon", "rays"]))
     tall = 1.0 if kind != "square" or rng.random() < 0.5 else rng.uniform(1.05, 1.5)
     edge = rng.uniform(1.04, 1.35)
-    body = dial_plate(rng, 0.0, center, radius)
+    body = dial_plate(rng, radius)
     if kind == "rays":
         body += cylinder((0.002, 0, 0), (deep, 0, 0), 1.02 * radius, sections=32)
         count, reach = int(rng.integers(6, 17)), rng.uniform(1.35, 2.0)
@@ -40,10 +39,10 @@ def wall_clock(rng: Rng) -> Assembly:
         body += prism(outline(kind, around * radius, tall), 0.002, deep, 0)
         if rng.random() < 0.4:
             body += prism(outline(kind, 1.06 * around * radius, tall), 0.4 * deep, 0.9 * deep, 0)
-    body += rim(rng, 0.003, center, 1.005 * radius, radius * rng.uniform(0.03, min(0.3, edge - 0.99)),
+    body += rim(rng, 1.005 * radius, radius * rng.uniform(0.03, min(0.3, edge - 0.99)),
                 0.003 + radius * rng.uniform(0.05, 0.2))  # fmt: skip
     clock = Assembly("body", body, DENSITY)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+    add_hands(rng, clock, 0.95 * radius, "body")
     if rng.random() < 0.15 and deep > 0.02:
         knob = cylinder((0.5 * deep, 0, 0), (0.5 * deep, 0, 0.012), 0.3 * deep, sections=14)
         lift = max(outline(kind if kind != "rays" else "round", 1.2 * edge * radius, tall)[:, 1]) + GAP
@@ -55,12 +54,11 @@ def wall_clock(rng: Rng) -> Assembly:
 def pendulum_clock(rng: Rng) -> Assembly:
     """A case on the wall with a box below, in which a pendulum hangs; or the pendulum hangs free."""
     radius = rng.uniform(0.06, 0.14)
-    center = np.zeros(3)
     deep = rng.uniform(0.05, 0.11)
     kind = str(rng.choice(["round", "octagon", "square", "house", "arch"]))
     half = radius * rng.uniform(1.1, 1.35)
-    body = dial_plate(rng, 0.0, center, radius)
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
+    body = dial_plate(rng, radius)
+    body += rim(rng, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
     low = -half
     if kind in ("house", "arch"):
         body += box((0.002, deep), half, half)
@@ -95,7 +93,7 @@ def pendulum_clock(rng: Rng) -> Assembly:
         if rng.random() < 0.6:
             glass_door(rng, clock, 0.006, (-room - 0.008, room + 0.008), (bottom - 0.008, low - 0.002))
     x = 0.4 * deep if free else 0.5 * deep
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+    add_hands(rng, clock, 0.95 * radius, "body")
     clock.add("pendulum", solid, revolute("body", FRONT, (x, 0, low - 0.004), -swing, swing), density=2000.0)
     return clock
 
@@ -104,10 +102,9 @@ def cuckoo_clock(rng: Rng) -> Assembly:
     """A house with a steep roof, a small door for the bird, a leaf as a pendulum, and cones on chains."""
     radius = rng.uniform(0.035, 0.06)
     deep, half = rng.uniform(0.06, 0.1), radius * rng.uniform(1.4, 2.0)
-    center = np.zeros(3)
     low, eaves = -radius * rng.uniform(1.25, 1.6), radius * rng.uniform(1.6, 2.2)
     ridge = eaves + half * rng.uniform(0.7, 1.2)
-    body = dial_plate(rng, 0.0, center, radius) + box((0.002, deep), half, (low, eaves))
+    body = dial_plate(rng, radius) + box((0.002, deep), half, (low, eaves))
     body += prism([(-half, eaves - 0.001), (half, eaves - 0.001), (0, ridge)], 0.002, deep, 0)
     thick, over = 0.08 * half, 1.25
     slope = (ridge - eaves) / half
@@ -115,13 +112,13 @@ def cuckoo_clock(rng: Rng) -> Assembly:
         edge = eaves - (over - 1.0) * half * slope
         slab = [(y, z + t) for y, z in ((0, ridge), (s * over * half, edge)) for t in (0.0, 1.5 * thick)]
         body += prism(slab, -0.35 * deep, deep, 0)
-    body += rim(rng, 0.003, center, 1.005 * radius, 0.1 * radius, 0.006)
+    body += rim(rng, 1.005 * radius, 0.1 * radius, 0.006)
     top, wide = eaves + 0.25 * (ridge - eaves), 0.22 * half
     base = radius * 1.15
     length = radius * rng.uniform(1.5, 3.0)
     body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
     clock = Assembly("body", body, DENSITY)
-    add_hands(rng, clock, 0.0, center, 0.95 * radius, "body")
+    add_hands(rng, clock, 0.95 * radius, "body")
     two = rng.random() < 0.5
     thin = 0.003
     for number in range(1 + two):

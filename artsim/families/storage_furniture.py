@@ -105,14 +105,7 @@ def _divide(rng: Rng, cell: Cell, style: Style, level: int) -> tuple[list[tuple[
         parts, more = _divide(below, cell.between(axis, near, far), style, level + 1 if level < 2 else 2)
         cells += parts
         boards += more
-    for edge in edges[1:-1]:
-        corner, far_corner = np.array([style.face, *cell.low]), np.array([style.back, *cell.high])
-        corner -= 0.001
-        far_corner += 0.001
-        corner[0] = style.face
-        corner[1 + axis], far_corner[1 + axis] = edge - half, edge + half
-        boards += box(corner, far_corner)
-    return cells, boards
+    return cells, boards + fronts.boards_across(cell, style, axis, edges[1:-1])
 
 
 def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -> tuple[Solid, list[Moving]]:

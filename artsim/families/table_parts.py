@@ -73,17 +73,12 @@ def _divided(rng: Rng, cell: Cell, axis: int, count: int, style: Style) -> tuple
     shares = np.maximum(shares / shares.sum(), 0.75 / count)  # the least still holds a drawer
     edges = cell.low[axis] + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * room
     half = style.board / 2
-    cells, boards = [], Solid()
+    cells = []
     for k in range(count):
         first = edges[k] + (half if k else 0.0)
         last = edges[k + 1] - (half if k < count - 1 else 0.0)
         cells.append(cell.between(axis, float(first), float(last)))
-    for edge in edges[1:-1]:
-        low, high = np.array([style.face, *cell.low]) - 0.001, np.array([style.back, *cell.high]) + 0.001
-        low[0] = style.face
-        low[1 + axis], high[1 + axis] = edge - half, edge + half
-        boards += box(low, high)
-    return cells, boards
+    return cells, fronts.boards_across(cell, style, axis, edges[1:-1])
 
 
 def _fill(rng: Rng, cell: Cell, style: Style, doors: float, must_move: bool) -> tuple[Solid, list[Moving]]:
