@@ -11,7 +11,7 @@ PINS = $(shell $(PYTHON) -c 'import sys; print("-c constraints.txt" * (sys.versi
 # Tests start hundreds of programs: each would compile all modules anew where this is set.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test lint bench audit weights gpu assets system clean
+.PHONY: help demo check test lint results audit weights gpu assets system clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*##/\1 /p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-8s %s\n' "$$name" "$$text"; done
@@ -29,25 +29,9 @@ lint: export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 lint: $(VENV)/.ready-dev  ## format, lint, types and import contracts
 	$(TIMED) lint sh -ec 'ruff format --check .; ruff check .; mypy; lint-imports'
 
-bench: $(VENV)/.ready-dev  ## run the benchmarks that docs/measured.md cites
-	$(PY) -m benchmarks.kinematics
-	$(PY) -m benchmarks.agreement
-	$(PY) -m benchmarks.renderers
-	$(PY) -m benchmarks.generation
-	$(PY) -m benchmarks.growth
-	$(PY) -m benchmarks.peers
-	$(PY) -m benchmarks.kills
-	$(PY) -m benchmarks.objects
-	$(PY) -m benchmarks.simulators
-	$(PY) -m benchmarks.efforts
-	$(PY) -m benchmarks.clients
-	$(PY) -m benchmarks.realism
-	$(PY) -m benchmarks.fitting
-	$(PY) -m benchmarks.inference
-	$(PY) -m benchmarks.retrieval
-	$(PY) -m benchmarks.errors
-	$(PY) -m benchmarks.legacy_iou
-	$(PY) -m benchmarks.robot_arm
+# Stop it at any moment: the same command goes on.
+results: $(VENV)/.ready-dev  ## print figures of the docs that are missing or stale into results; ONLY=name runs one
+	$(PY) -m benchmarks.results $(if $(ONLY),--only $(ONLY))
 
 audit: $(VENV)/.ready-dev  ## test 10,000 procedural objects, and those in ARTSIM_PARTNET_DIR, for simulators
 	$(PY) -m benchmarks.audit

@@ -110,7 +110,7 @@ def main(options: Options) -> None:
             print(f"does not load: {outcome.error}")
         for repair in outcome.repairs if options.repairs else ():
             print(f"{outcome.file}: {repair}")
-    result, formats = _summary(outcomes), {}
+    result, formats = _summary(outcomes), dict[str, dict[str, Any]]()
     for reason, count in result["reasons"].items():
         print(f"{count:6d}  {reason}")
     for name in dict.fromkeys(FORMATS.values()):
@@ -118,8 +118,10 @@ def main(options: Options) -> None:
         for reason, count in Counter(outcome.skipped.partition(":")[0] for outcome in own if outcome.skipped).items():
             print(f"{name}: {count} files do not count: {reason}")
         if counted := [outcome for outcome in own if not outcome.skipped]:
-            formats[name] = _summary(counted)
-            print(f"{name}: {formats[name]}")
+            found = formats[name] = _summary(counted)
+            print(f"{name}: {found['loaded']} of {found['files']} files load", end="")
+            moves = "; {parts} parts of {compared} files move as in the other program, to {max_deviation:.2g} at most"
+            print(moves.format(**found) if "parts" in found else "")
     repaired = sum(bool(outcome.repairs) for outcome in outcomes)
     share = 100.0 * result["loaded"] / max(len(outcomes), 1)
     print(f"{result['loaded']} of {len(outcomes)} files load as given ({share:.1f} %), {repaired} of them with repairs")

@@ -91,8 +91,9 @@ def estimate_ms(category: str, options: Options) -> dict[str, float]:
     found = {"all": float(np.median([sum(one.values()) for one in times]))}
     for stage in dict.fromkeys(stage for one in times for stage in one):
         found[stage] = float(np.median([one.get(stage, 0.0) for one in times]))
-    print(f"{category:12} {found['all']:6.1f} ms, {len(times)} instances: {', '.join(found)}", flush=True)
-    return {stage: round(value, 1) for stage, value in found.items()}
+    found = {stage: round(value, 1) for stage, value in found.items()}
+    print(f"{category:12} {len(times)} instances, ms: {', '.join(f'{k} {v}' for k, v in found.items())}", flush=True)
+    return found
 
 
 def per_second(work: Callable[[], int], seconds: float) -> float:

@@ -83,7 +83,7 @@ def test_no_page_rests_on_a_script_that_is_not_in_the_repository() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_files_and_modules_that_a_page_names_exist(page: Path) -> None:
     quoted = re.findall(r"`([^`\s]+)`", page.read_text())
-    folders = r"(?:artsim|artperl|tests|benchmarks|examples|scripts|docs|urdf_assets)/[\w./-]+"
+    folders = r"(?:artsim|artperl|tests|benchmarks|results|examples|scripts|docs|urdf_assets)/[\w./-]+"
     missing = [
         name
         for name in quoted

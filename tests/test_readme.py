@@ -63,7 +63,8 @@ def commands(text: str) -> list[list[str]]:
     return found
 
 
-COMMANDS = [(page.name, words) for page in PAGES for words in commands(page.read_text())]
+RESULTS = sorted((ROOT / "results").glob("*.md"))
+COMMANDS = [(page.name, words) for page in [*PAGES, *RESULTS] for words in commands(page.read_text())]
 
 
 @pytest.mark.slow
@@ -72,8 +73,7 @@ COMMANDS = [(page.name, words) for page in PAGES for words in commands(page.read
 )
 def test_every_command_that_is_shown_exists_with_its_options(page: str, words: list[str]) -> None:
     if words[0] == "-m":
-        package = (ROOT / Path(*words[1].split("."))).is_dir()
-        module = importlib.import_module(f"{words[1]}.__main__" if package else words[1])
+        module = importlib.import_module(words[1])
         known = {"help", *(field.name for field in fields(module.Options))}
         assert {word[2:].replace("-", "_") for word in words[2:] if word.startswith("--")} <= known
         return

@@ -163,5 +163,5 @@ def against_published(category: str, figures: dict[str, Any]) -> str:
     return (
         f"{'':14s}against ArtPERL's published means: {', '.join(texts)}\n"
         f"{'':14s}OMAD's IoU depends on the frame: here z is up, in ArtImage y. With y up, temples and drawers have "
-        "less: python -m benchmarks.legacy_iou"
+        "less: docs/artperl_results.md"
     )

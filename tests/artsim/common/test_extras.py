@@ -27,11 +27,7 @@ from tests.without import beyond_the_core, distributions_of, environment, normal
 
 pytestmark = pytest.mark.slow
 
-BENCHMARKS = sorted(
-    path.stem if path.name != "__main__.py" else path.parent.name
-    for path in [*ROOT.glob("benchmarks/*.py"), *ROOT.glob("benchmarks/*/__main__.py")]
-    if "__main__" in path.read_text()
-)
+BENCHMARKS = sorted(path.stem for path in ROOT.glob("benchmarks/*.py") if "__main__" in path.read_text())
 
 VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
     "artsim": {
@@ -243,7 +239,7 @@ def test_programs_exit_with_2(alone: tuple[Path, dict[str, str]]) -> None:
     """As a shell sees it: the hook of benchmarks decides the exit code, too."""
     folder, variables = alone
     variables = variables | {"PYTHONPATH": os.pathsep.join([variables["PYTHONPATH"], str(ROOT)])}
-    for words in (["-m", "benchmarks.fitting", "--help"], [str(ROOT / "train.py"), "--out", "run"]):
+    for words in (["-m", "benchmarks.speed", "--help"], [str(ROOT / "train.py"), "--out", "run"]):
         done = subprocess.run(
             [sys.executable, *words], capture_output=True, text=True, cwd=folder, env=variables, timeout=60
         )
