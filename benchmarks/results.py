@@ -100,8 +100,8 @@ def index(results: dict[str, Result]) -> str:
         "| result | date | state | command |", "|---|---|---|---|",
     ]  # fmt: skip
     for name, result in results.items():
-        command = result.command.replace("|", "\\|").replace("\n", "; ")
-        lines.append(f"| [{name}]({name}.md) | {result.date} | {result.state} | `{command}` |")
+        command = ", ".join(f"`{line}`" for line in result.command.replace("|", "\\|").splitlines())
+        lines.append(f"| [{name}]({name}.md) | {result.date} | {result.state} | {command} |")
     return "\n".join(lines) + "\n"
 
 
