@@ -30,7 +30,7 @@ PROGRAMS = {
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the packages, with every block of code of every walk in its place."""
+    """A copy of the packages, with every template and registry line in its place."""
     folder = tmp_path_factory.mktemp("clone")
     for name in ("artsim", "artperl", "benchmarks", "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("weights", "golden"))
@@ -39,19 +39,21 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("generate.py", "pyproject.toml"):
         shutil.copy(ROOT / name, folder)
     for section in SECTIONS.values():
-        for _, block in filter(lambda found: found[0] == "python", BLOCK.findall(section)):
-            put(block, folder)
+        for kind, block in BLOCK.findall(section):
+            if kind == "python":
+                register(block, folder)
+            for line in block.splitlines():
+                if line.startswith("cp "):
+                    _, template, module = line.split()
+                    assert not (folder / module).exists(), module
+                    shutil.copy(ROOT / template, folder / module)
     return folder
 
 
-def put(block: str, folder: Path) -> None:
-    """A new file, where the first line is ``# path``; lines of a registry, where it is ``# path, in NAME``."""
+def register(block: str, folder: Path) -> None:
+    """Add the lines of a block to a registry, whose place its first line names: ``# path, in NAME``."""
     first, _, code = block.partition("\n")
     path, _, registry = first.removeprefix("# ").partition(", in ")
-    if not registry:
-        assert not (folder / path).exists(), path
-        (folder / path).write_text(code)
-        return
     text = (folder / path).read_text()
     changed = re.sub(rf"^({registry}\b[^\n]*[({{[]\n)", lambda found: found[1] + code, text, count=1, flags=re.M)
     assert changed != text, f"{path} has no registry {registry}"
@@ -72,7 +74,8 @@ def run(words: list[str], folder: Path) -> str:
 def follow(section: str, folder: Path) -> list[str]:
     """What each command of a section prints."""
     blocks = [block for kind, block in BLOCK.findall(SECTIONS[section]) if kind == "sh"]
-    return [run(shlex.split(line, comments=True), folder) for block in blocks for line in block.splitlines()]
+    lines = [line for block in blocks for line in block.splitlines() if not line.startswith("cp ")]
+    return [run(shlex.split(line, comments=True), folder) for line in lines]
 
 
 def test_a_category_is_generated_and_passes_every_gate(clone: Path) -> None:
