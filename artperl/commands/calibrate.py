@@ -14,7 +14,7 @@ from artsim.model.draws import StateOptions, ViewOptions
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Calibrate the confidence of an estimator anew, on procedural objects that no training and no test shows.
+    """Recalibrate the confidence of an estimator, on procedural objects outside training and test.
 
     Training does so by itself. Do it again for an estimator that shall judge other objects, such as those of some
     categories only.
@@ -54,7 +54,7 @@ class Calibrate:
                 raise ConfigError(f"{getattr(self, name)} is not possible", name, "use 1 or more")
         folder = folder_of(self.estimator)
         if self.out is None and folder.parent == WEIGHTS:
-            raise ConfigError("an estimator that comes with the package stays as it is", self.estimator, "use --out")
+            raise ConfigError("the package's estimators are not overwritten", self.estimator, "use --out")
         estimator = load_estimator(folder)
         categories = self.category or estimator.categories
         unknown = [name for name in categories if name not in FAMILIES]

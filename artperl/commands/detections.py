@@ -33,7 +33,7 @@ class MakeDetections:
     detector: str | None = None
     """tabletop, which comes with the package, or a folder that artperl train-detector wrote."""
     seed: int = 0
-    """Of all chance."""
+    """Seed of all random draws."""
     flaws: Annotated[Flaws, tyro.conf.arg(name="")] = field(default_factory=Flaws)
 
     def run(self) -> None:

@@ -50,8 +50,8 @@ class Estimate(EstimateOptions):
     floats metres: see --unit and --depth-scale. 0, NaN and 65535 are no measurement. Depth is taken along the camera's
     axis: see --depth-kind.
 
-    Masks: .png .bmp .gif .tif .pgm .jpg .webp in any mode, .npy, .npz. The object is what is not black, whatever alpha
-    says; of a JPEG, or a soft mask, what is over half; of artsim's own part_mask.png what is not 255.
+    Masks: .png .bmp .gif .tif .pgm .jpg .webp in any mode, .npy, .npz. The object is what is neither black nor
+    transparent; of a JPEG, or a soft mask, what is over half; of artsim's own part_mask.png what is not 255.
 
     Intrinsics: .json of artsim (fx, fy, cx, cy, or K), BOP (camera.json, scene_camera.json), Open3D, RealSense, ROS
     CameraInfo, NeRF (transforms.json); .yaml of ROS and OpenCV; a 3 x 3 matrix as .txt, .npy or .npz. The centre of the

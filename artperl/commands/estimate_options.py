@@ -26,7 +26,7 @@ class EstimateOptions:
     """An estimator that comes with the package, by its name; or its folder; or the folder of a training run."""
     out: Path | None = None
     """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list. Of
-    several files: .jsonl, a line each; the same command goes on where it stopped."""
+    several files: .jsonl, a line each; rerun the command to resume."""
     view: Path | None = None
     """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
     unit: Literal["m", "mm", "cm"] | None = None
@@ -46,7 +46,7 @@ class EstimateOptions:
     """Number of units (metres, or what --unit says) in one step of the depth image. By default what the intrinsics
     state, for whole numbers; else 0.001 for whole numbers, and 1 for floats."""
     depth_kind: Literal["z", "distance"] = "z"
-    """Depth along the camera's axis, or distance along each ray, as some simulators write it. An image does not tell
+    """Depth along the camera's axis, or distance along each ray, as some simulators write it. An image does not say
     which."""
     pixel_center: Literal["0", "0.5"] | None = None
     """Where the intrinsics have the centre of the first pixel. By default as their format has it."""
@@ -59,17 +59,17 @@ class EstimateOptions:
     detections: Path | None = None
     """Instead of a detector, the objects that another one has found."""
     estimators: tuple[str, ...] = ()
-    """Of an image of several objects: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one
+    """For an image of several objects: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one
     for each category. By default those that come with the package, by their names."""
     picture: Path | None = None
-    """Of an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
+    """For an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
     apart: bool = False
-    """Of an image of several objects: move those whose boxes overlap apart, by 3 cm at most, as a simulator needs them.
-    It makes estimates less exact."""
+    """For an image of several objects: move overlapping boxes apart, by at most 3 cm, as a simulator needs.
+    This reduces accuracy."""
     skip_bad: bool = False
     """Leave out detections that cannot be used, and list them, instead of refusing the file."""
     seen_from: tuple[float, float] | None = None
-    """Azimuths that the camera is known to be within, degrees about the object's vertical, 0 for its front: -75 75 for
+    """Range of the camera's azimuth, degrees about the object's vertical, 0 for its front: -75 75 for
     a robot that stands before a cabinet. It is not below the object then. By default it may be anywhere."""
     method: StoredMethod = "full"
     """Method of the estimator: full, which comes with the package; artperl, the paper's, with weights for laptop,

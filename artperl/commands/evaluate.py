@@ -47,8 +47,8 @@ class Evaluate:
     preset: ViewPreset = "artimage"
     """From where objects are seen."""
     seen_from: tuple[float, float] | None = None
-    """Azimuths that the estimator is told that the camera is within, degrees about the object's vertical, 0 for its
-    front. By default it is not told."""
+    """Range of the camera's azimuth, for the estimator: degrees about the object's vertical, 0 for its front.
+    By default unknown."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] = "none"
     """Depth sensor of the clouds."""
     num_points: int = 8192

@@ -17,7 +17,7 @@ class Report:
     """Compare all methods on a benchmark: train or load each, test each on the same views, and write one report.
 
     The report is OUT/report.html, one page with everything in it; report.md and report.json have its figures. Stop it
-    at any moment with Ctrl-C: the same command goes on where it stopped. Each step says how long it took.
+    at any moment with Ctrl-C: rerun the command to resume. Each step says how long it took.
 
     To see what a report is, in some minutes: artperl report --quick
 
@@ -82,6 +82,6 @@ class Report:
         try:
             run_comparison(options, out, self.workers, True, say)
         except KeyboardInterrupt:
-            print(f"stopped; the same command goes on from {out}", file=sys.stderr)
+            print(f"stopped; rerun the command to resume from {out}", file=sys.stderr)
             sys.exit(130)
         print((out / f"report{options.suffix}.md").read_text(), end="")

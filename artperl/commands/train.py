@@ -24,10 +24,10 @@ _FILE_VIEWS = 40
 
 @dataclass(frozen=True)
 class Train:
-    """Train an estimator on fresh procedural objects, or on objects of your own, and test it as it learns.
+    """Train an estimator on new procedural objects, or on given objects, and test it as it learns.
 
     Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
-    the same command goes on where it stopped, with the same result. Curves: tensorboard --logdir OUT.
+    rerun the command to resume, with the same result. Curves: tensorboard --logdir OUT.
 
     To see it learn: python train.py --category laptop --preset quick
 
@@ -35,13 +35,13 @@ class Train:
 
     To make an estimator that comes with the package: artperl train --recipe laptop
 
-    For a robot of your own, from the estimator for any tree:
+    For your robot, from the estimator for any tree:
     python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000
 
     On several processors or GPUs, with the same result:
     torchrun --nproc-per-node 2 train.py --category laptop --out out/laptop
 
-    What is not given is as the preset or the recipe has it.
+    Defaults are those of the preset or the recipe.
     """
 
     preset: Literal["quick", "full", "joint"] | None = None
@@ -49,7 +49,7 @@ class Train:
     categories, with any parts. By default the recipe's, else quick."""
     recipe: str | None = None
     """A recipe that comes with the package, by the name of its estimator, or a JSON file. With a preset, the run is as
-    long as that preset's. A finished run is left as it is."""
+    long as that preset's. A finished run is unchanged."""
     out: Path | None = None
     """Folder of the run; by default out/train/CATEGORY-PRESET."""
     workers: int = 1
@@ -58,7 +58,7 @@ class Train:
     threads: int | None = None
     """Processor threads of the network; by default torch's choice."""
     device: Literal["cpu", "cuda"] = "cpu"
-    """Where the networks learn. A run may go on elsewhere than where it was begun."""
+    """Where the networks learn. A run may resume on another device."""
 
     wandb: str | None = None
     """Project of Weights & Biases that gets the curves, too. It takes pip install wandb; WANDB_MODE=offline needs no
@@ -89,7 +89,7 @@ class Train:
     stretched: float | None = None
     """Share of perception's training clouds that are stretched, so that rows of drawers are seldom of equal ones."""
     noisy: float | None = None
-    """Share of perception's other training clouds that are as one of four depth sensors sees them."""
+    """Share of perception's other training clouds with the noise of one of four depth sensors."""
     degraded: float | None = None
     """Share of all of perception's training clouds that are cut, dirty or sparse, as detectors' masks are."""
     perception_rate: float | None = None
@@ -107,11 +107,11 @@ class Train:
     dataset: Path | None = None
     """Learn from the train split of a dataset that generate.py wrote, instead of from fresh objects."""
     start_from: Path | None = None
-    """Folder of an estimator whose networks are learnt on; by default they begin at random."""
+    """Folder of an estimator whose networks are trained further; by default they start at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] | None = None
     """Depth sensor of the clouds."""
     states: StateMode | None = None
-    """In which states objects are learnt and tested: anywhere within their limits; at rest; at the ends; or mixed,
+    """Joint states in training and test: anywhere within their limits; at rest; at the ends; or mixed,
     every other object anywhere, the others at rest or at the ends, as things at home mostly are."""
     views: ViewPreset | None = None
     """From where objects are seen: from the front, as in ArtImage, from all round, or half of them each way."""
@@ -140,7 +140,7 @@ class Train:
                 if not training.context.ranks.first:
                     return
             except KeyboardInterrupt:
-                print(f"stopped; the same command goes on from {out}", file=sys.stderr)
+                print(f"stopped; rerun the command to resume from {out}", file=sys.stderr)
                 sys.exit(130)
         print((out / "table.txt").read_text(), end="")
         print(f"estimator: {out / 'best'}")

@@ -18,13 +18,13 @@ from artsim.errors import ConfigError
 class TrainDetector:
     """Train a detector of articulated objects in images with depth, on scenes.
 
-    Without SCENES, the command makes those that the detector of the package has learnt from, into OUT/scenes. Stop it
-    at any moment with Ctrl-C: the same command goes on where it stopped, with the same result. Curves: tensorboard
+    Without SCENES, the command makes those of the package's detector, into OUT/scenes. Stop it
+    at any moment with Ctrl-C: rerun the command to resume, with the same result. Curves: tensorboard
     --logdir OUT.
 
     To see it learn: artperl train-detector --out out/detector --share 0.02 --steps 20
 
-    On scenes of your own: artperl train-detector out/scenes --out out/detector
+    On your scenes: artperl train-detector out/scenes --out out/detector
 
     To use it: artperl estimate image.png depth.png --intrinsics camera.json --detector out/detector
     """
@@ -70,6 +70,6 @@ class TrainDetector:
             options = scene_options(folders, **{name: getattr(self, name) for name in names})
             detector = train_detector(options, self.out, self.workers)
         except KeyboardInterrupt:
-            print(f"stopped; the same command goes on from {self.out}", file=sys.stderr)
+            print(f"stopped; rerun the command to resume from {self.out}", file=sys.stderr)
             sys.exit(130)
         print(f"{detector}: {self.out / 'best'}")

@@ -102,7 +102,7 @@ class Samples:
         raise ConfigError(
             f"{_ATTEMPTS} objects in a row have more than {self.num_rows} parts, or other ones, or cannot be made",
             ", ".join(self.stream.categories),
-            "allow more parts, or mend the family",
+            "allow more parts, or correct the family",
         )
 
     def _keep(self) -> None:

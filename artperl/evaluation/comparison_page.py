@@ -20,7 +20,7 @@ COLUMNS: tuple[tuple[str, str, float, int, str], ...] = (
     ("translation_metres", "translation, m", 1.0, 3, "translation"),
     ("translation_percent_diagonal", "translation, % of the diagonal", 1.0, 2, ""),
     ("iou_exact", "exact IoU, %", 100.0, 1, ""),
-    ("iou_omad_legacy", "IoU as OMAD's, %", 100.0, 1, "iou"),
+    ("iou_omad_legacy", "OMAD's IoU, %", 100.0, 1, "iou"),
 )
 """Metric, title, factor, decimals, and the name among published figures."""
 

@@ -45,7 +45,7 @@ class Flaws:
     twice : float
         Share of objects that are found twice.
     false : float
-        Detections of nothing for each image, on average.
+        False detections an image, on average.
     """
 
     border: float = 2.0

@@ -117,7 +117,7 @@ class Kept:
         try:
             self.records = {key: ImageRecord.from_json(key, own) for key, own in unfinished["images"].items()}
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise ConfigError(f"its records are damaged ({error})", path, "remove it, to begin anew") from error
+            raise ConfigError(f"its records are damaged ({error})", path, "remove it to start again") from error
 
     def add(self, image: str, record: ImageRecord) -> None:
         """Keep the record of an image, and write at intervals."""

@@ -152,7 +152,7 @@ def _cell(part: dict[str, dict[str, float]], name: str) -> str:
 def against_published(category: str, figures: dict[str, Any]) -> str:
     """Where means are better than those published for other images of the category, and where not."""
     published = PUBLISHED[category]
-    names = {"rotation_deg": "rotation", "translation_partnet": "translation", "iou_omad_legacy": "IoU as OMAD's"}
+    names = {"rotation_deg": "rotation", "translation_partnet": "translation", "iou_omad_legacy": "OMAD's IoU"}
     texts = []
     for name, title in names.items():
         own = [part[name]["mean"] for part in figures["parts"]]

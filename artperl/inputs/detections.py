@@ -129,7 +129,7 @@ def read_detections(
         more = f"; and {len(problems) - _NAMED} more" if len(problems) > _NAMED else ""
         raise ConfigError(
             f"{len(problems)} of {len(entries)} detections cannot be used: {'; '.join(problems[:_NAMED])}{more}", path,
-            "mend the file, or add --skip-bad to leave these out and list them",
+            "correct the file, or add --skip-bad to leave these out and list them",
         )  # fmt: skip
     notes = (f"{boxes} detections have no mask: the object is all that is in the box",) if boxes else ()
     return Detections(tuple(found), tuple(problems), notes)

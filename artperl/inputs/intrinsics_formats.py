@@ -221,7 +221,7 @@ def _bop_scene(data: Mapping[str, Any], hints: Hints, path: Path) -> _Found | No
         named = [n for n in digits if n in numbers]
         if len(numbers) > 1 and not (named and len(digits) == 1):
             raise ConfigError(
-                f"it has cameras of {len(numbers)} images, and the depth image's name '{hints.name[:80]}' tells none",
+                f"it has cameras of {len(numbers)} images, and the depth image's name '{hints.name[:80]}' names none",
                 path, f"add --image-id N, one of {choices}",
             )  # fmt: skip
         number = named[0] if named else next(iter(numbers))

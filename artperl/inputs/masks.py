@@ -145,7 +145,7 @@ def _of_numbers(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
     if kind == "auto" and len(found) > 2:
         return Mask(shown, (), (
             f"the mask holds the numbers {_join(found)}: all but 0 are taken for the object. Fix: add --mask-id N to"
-            " choose one, or --mask-kind binary if it is right as it is",
+            " choose one, or --mask-kind binary if this is right",
         ))  # fmt: skip
     warnings: tuple[str, ...] = ()
     if kind == "auto" and _on_border(shown) > 0.5 and not shown.all():

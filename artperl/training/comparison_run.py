@@ -278,7 +278,7 @@ def row_estimator(
         workers, learning = 0, filling(learning, options.minutes, folder.with_name(f"{folder.name}-lengths.json"))
     training = Training(learning, folder, workers, progress)
     if not about_tested(folder):
-        say(f"training {method} on {category} in {folder}: it may be stopped, and goes on by the same command")
+        say(f"training {method} on {category} in {folder}: after a stop, rerun the command to resume")
         training.run()
     return load_estimator(folder / "best", method=known), trained_minutes(training)
 
@@ -310,7 +310,7 @@ def notes(options: ComparisonOptions) -> list[str]:
     length = "" if options.minutes is None else f", stages scaled to {options.minutes:g} minutes of one core each"
     lines = [
         f"Trainings have the preset {options.preset}{train}{length}.",
-        f"{objects} Published figures are of other images, in columns of their own.",
+        f"{objects} Published figures are of other images, in separate columns.",
         "Brackets have the 95 % interval of the mean, by a bootstrap over objects.",
         *(["These trainings are far too short: no figure of them says anything of a method."] if options.train else []),
         "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",

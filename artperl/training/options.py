@@ -64,7 +64,7 @@ class TrainOptions:
     dataset: str | None = None
     """Folder of a dataset to learn from, its train split, instead of fresh objects."""
     start_from: str | None = None
-    """Folder of an estimator whose networks are learnt on; by default they begin at random."""
+    """Folder of an estimator whose networks are trained further; by default they start at random."""
     seed: int = 0
     base_objects: int = 64
     """Reference objects of each category."""
@@ -81,7 +81,7 @@ class TrainOptions:
     stretched: float = 0.0
     """Share of these clouds whose objects are stretched between the edges of their parts."""
     noisy: float = 0.0
-    """Share of the others that are as one of four depth sensors sees them."""
+    """Share of the others with the noise of one of four depth sensors."""
     degraded: float = 0.0
     """Share of all of them that are cut by an occluder or the image's border, have points of the table or a neighbour,
     or are of few points."""

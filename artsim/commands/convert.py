@@ -17,8 +17,8 @@ class Convert:
 
     webdataset: tar shards with plain keys. bop: scenes, models of parts, poses, masks, joints. coco: masks of parts.
     hdf5: one file for each sample, with BlenderProc's keys. ply: one coloured cloud for each sample. All but webdataset
-    and ply need images: generate with --images depth part_mask. Stop it at any moment: the same command goes on where
-    it stopped. The result does not depend on the number of workers.
+    and ply need images: generate with --images depth part_mask. Stop it at any moment: rerun the command to
+    resume. The result does not depend on the number of workers.
 
     Example: artsim convert out/first --to bop --out out/first_bop
     """
@@ -44,7 +44,7 @@ class Convert:
         try:
             result = convert(self.path, self.to, self.out, self.split, self.samples, self.group, self.workers)
         except KeyboardInterrupt:
-            print(f"\nstopped; whole files are kept in {self.out}: the same command goes on from there")
+            print(f"\nstopped; whole files are kept in {self.out}: rerun the command to resume")
             raise
         counted = f"{result.num_samples} samples in {result.files} files"
         if result.made == 0:

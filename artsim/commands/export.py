@@ -34,9 +34,9 @@ class Export(Opened):
     """What collides: convex pieces of each part (extra sim), one convex hull, or the surface as it is. Parts of MJCF
     and USD files keep what their file says."""
     base: Literal["fixed", "free"] = "fixed"
-    """fixed: the root is fixed to the world; free: it falls. Of MJCF and USD: for URDF the simulator is told."""
+    """fixed: the root is fixed to the world; free: it falls. For MJCF and USD; with URDF, set it in the simulator."""
     actuators: Literal["none", "motor", "position"] = "none"
-    """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
+    """For MJCF. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
     control is where the joint shall be."""
 
     def run(self) -> None:

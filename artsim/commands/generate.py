@@ -24,7 +24,7 @@ class Generate(Opened):
 
     Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
     truth as WebDataset tar shards. Objects are made (--categories), loaded (--objects), or both. Stop it at any moment:
-    the same command goes on where it stopped, and makes again what is damaged. With a larger --num-samples it extends
+    rerun the command to resume; damaged files are regenerated. With a larger --num-samples it extends
     the dataset. The result depends on the options and the seed alone, never on the number of workers.
 
     To make objects: python generate.py --categories laptop drawer --objects-per-category 200 --out out/first
@@ -107,7 +107,7 @@ class Generate(Opened):
                 share=share,
             )
         except KeyboardInterrupt:
-            print(f"\nstopped; whole shards are kept in {self.out}: the same command goes on from there")
+            print(f"\nstopped; whole shards are kept in {self.out}: rerun the command to resume")
             raise
         for reason in result.left_out:
             print(f"left out: {printable(reason, 1000)}")
@@ -121,7 +121,7 @@ class Generate(Opened):
             kept = result.num_samples - result.made
             print(f"extended from {result.grown_from} samples, {kept} of which are kept in their shards")
         for file in result.restored:
-            print(f"made again: {file}")
+            print(f"regenerated: {file}")
         if result.made == 0:
             print(f"{result.folder}: already complete, {result.num_samples} samples")
         else:

@@ -15,8 +15,8 @@ from artsim.families.constraints import Constraints
 class GenerateObjects:
     """Write procedural objects as files: simulation-ready URDF folders in PartNet-Mobility's style, MJCF, USD.
 
-    Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: the same
-    command goes on where it stopped. On one kind of processor, bytes depend on category, seed and formats alone.
+    Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: rerun
+    the command to resume. On one kind of processor, bytes depend on category, seed and formats alone.
 
     Example: artsim generate-objects --category drawer --count 1000 --out out/drawers
     """
@@ -33,12 +33,12 @@ class GenerateObjects:
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
     having: Having = ()
     base: Literal["fixed", "free"] = "fixed"
-    """fixed: the root is fixed to the world; free: it falls. Of MJCF and USD: for URDF the simulator is told."""
+    """fixed: the root is fixed to the world; free: it falls. For MJCF and USD; with URDF, set it in the simulator."""
     actuators: Literal["none", "motor", "position"] = "none"
-    """Of MJCF files. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
+    """For MJCF. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
     control is where the joint shall be."""
     materials: bool = False
-    """Write finishes, other for each object: colours, textures, and where they lie."""
+    """Write materials, different for each object: colours, textures, texture coordinates."""
     workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 
@@ -58,7 +58,7 @@ class GenerateObjects:
                 options=ExportOptions(self.base, self.actuators, self.materials),
             )
         except KeyboardInterrupt:
-            print(f"\nstopped; whole objects are kept in {self.out}: the same command goes on from there")
+            print(f"\nstopped; whole objects are kept in {self.out}: rerun the command to resume")
             raise
         if result.made == 0:
             print(f"{result.folder}: already complete, {result.objects} objects")

@@ -13,7 +13,7 @@ from artsim.loading.roots import Opened
 
 @dataclass(frozen=True)
 class Inspect(Opened):
-    """Print an object's tree, joints, limits, boxes, and what was mended while loading it."""
+    """Print an object's tree, joints, limits, boxes, and repairs of the loader."""
 
     path: tyro.conf.Positional[Path]
     """URDF, MJCF or USD file, GLB or joint file (mobility_v2.json, motion_attributes.json), or its folder."""

@@ -25,7 +25,7 @@ class Record:
     out: Path
     """Folder to write to; made if missing."""
     motions: int = 10
-    """Motions, each of an object of its own."""
+    """Motions, each of another object."""
     frames: int = 60
     """Frames of each: one for each control step."""
     seed: int = 0

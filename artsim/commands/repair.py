@@ -18,7 +18,7 @@ _LISTED = 50
 
 @dataclass(frozen=True)
 class Verify:
-    """Check a dataset: every checksum, the descriptions, the objects, and what must hold of every sample's truth.
+    """Check a dataset: every checksum, the descriptions, the objects, and the ground truth of every sample.
 
     Nothing is written. Each problem says what to do.
     """
@@ -26,7 +26,7 @@ class Verify:
     path: tyro.conf.Positional[Path]
     """Dataset folder."""
     workers: int = field(default_factory=cores)
-    """Processes that check samples, of a dataset that is worth them."""
+    """Processes that check samples of a large dataset."""
 
     def run(self) -> None:
         from artsim.datasets.problems import repair_command
@@ -49,7 +49,7 @@ class Verify:
 class Repair:
     """Restore what is damaged or missing of a dataset, to the same bytes, or say why that cannot be.
 
-    Shards are drawn again, objects are made or loaded again, plan.json and dataset.json restore each other. A dataset
+    Shards and objects are regenerated, plan.json and dataset.json restore each other. A dataset
     that was stopped is completed. What cannot be restored is listed, and the exit code is 2.
     """
 
@@ -69,7 +69,7 @@ class Repair:
         try:
             result = repair(self.path, find_sources(self.objects, self.package_root), self.workers)
         except KeyboardInterrupt:
-            print(f"\nstopped; what was restored stays in {self.path}: the same command goes on from there")
+            print(f"\nstopped; what was restored stays in {self.path}: rerun the command to resume")
             raise
         for file in result.restored[:_LISTED]:
             print(f"restored: {file}")

@@ -23,7 +23,7 @@ class Scene:
 
     Every view becomes a folder: rgb.png, depth.npy, instance_ids.png, part_ids.png, scene.json, a cloud with its full
     record for each object, and overview.png, which shows it all. With --shard-size, tar files hold the same.
-    scenes.json lists all views. Stop it at any moment: the same command goes on where it stopped, and a larger --scenes
+    scenes.json lists all views. Stop it at any moment: rerun the command to resume. A larger --scenes
     adds to what is there. The result depends on the options and the seed alone, never on the number of workers.
 
     Example: artsim scene --categories laptop stapler box --seed 3 --scenes 10 --views 2 --out out/scenes
@@ -79,7 +79,7 @@ class Scene:
             )
             converted = [convert_scenes(run, self.out, name, self.workers) for name in self.formats]
         except KeyboardInterrupt:
-            print(f"\nstopped; whole files are kept in {self.out}: the same command goes on from there")
+            print(f"\nstopped; whole files are kept in {self.out}: rerun the command to resume")
             raise
         for entry in open_scenes(self.out).entries[:_LISTED]:
             seen = ", ".join(f"{obj.category} {100 * obj.visible_fraction:.0f}%" for obj in entry.objects)

@@ -20,7 +20,7 @@ class Vary:
     """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
 
     Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
-    a meta.json that says what was done. Stop it at any moment: the same command goes on where it stopped.
+    a meta.json that says what was done. Stop it at any moment: rerun the command to resume.
 
     Example: artsim vary path/to/StorageFurniture/45162 --others path/to/StorageFurniture --count 20 --out out/varied
     """
@@ -49,7 +49,7 @@ class Vary:
                 self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
             )
         except KeyboardInterrupt:
-            print(f"\nstopped; whole variations are kept in {self.out}: the same command goes on from there")
+            print(f"\nstopped; whole variations are kept in {self.out}: rerun the command to resume")
             raise
         for failure in summary.failed[:_LISTED]:
             print(failure)

@@ -90,7 +90,7 @@ def write_error(error: OSError, path: Path) -> ArtsimError:
     """The readable form of an operating-system error on writing ``path``."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return ConfigError("the disk is full", path, "free some space and run the same command again: it resumes")
-    return ConfigError(f"cannot write ({error.strerror})", path, "choose another folder or mend its rights")
+    return ConfigError(f"cannot write ({error.strerror})", path, "choose another folder or correct its permissions")
 
 
 def file_sha256(path: Path) -> str:

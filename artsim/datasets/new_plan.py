@@ -97,4 +97,4 @@ def unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> As
         reasons.append(f"and {len(left_out) - _LISTED} more")
     verb = "do not load, or were repaired (--strict)" if strict else "do not load"
     what = f"{len(left_out)} of {total} objects {verb}: {'; '.join(reasons)}"
-    return AssetError(what, fix="mend them, or leave them out with --skip-broken")
+    return AssetError(what, fix="correct them, or leave them out with --skip-broken")

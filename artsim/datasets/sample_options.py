@@ -152,7 +152,7 @@ def draw_sample(
     raise RenderError(
         f"{attempts} drawn views in a row do not see the object",
         f"{obj.object_id}, sample {index}",
-        "mend the view options",
+        "correct the view options",
     )
 
 
@@ -186,5 +186,5 @@ def check_visible(obj: ArticulatedObject, options: SampleOptions, seed: int, ide
         if seen == _SEEN_OFTEN_ENOUGH:
             return
     raise RenderError(
-        f"{seen} of {_VIEW_ATTEMPTS} drawn views see the object", fix="mend the view options, or the object"
+        f"{seen} of {_VIEW_ATTEMPTS} drawn views see the object", fix="correct the view options, or the object"
     )

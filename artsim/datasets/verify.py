@@ -179,7 +179,7 @@ def _shard_problems(
     wanted, have = [sample_key(index) for index in indices], reader.keys()
     if have != wanted:
         lost, foreign = sorted({*wanted} - {*have}), sorted({*have} - {*wanted})
-        what = f"lacks samples {lost[:5]}, has foreign ones {foreign[:5]}, or holds them out of order"
+        what = f"lacks samples {lost[:5]}, has unexpected ones {foreign[:5]}, or holds them out of order"
         yield Problem(shard.name, what, _FIX)
     there = set(have)
     for index, key in zip(indices, wanted, strict=True):

@@ -205,4 +205,4 @@ def _compile(text: str, robot: Robot, finish: Finish) -> None:
         mujoco.MjSpec.from_string(text, assets=files).compile()
     except ValueError as error:
         where = f"{robot.obj.category} {robot.obj.object_id}"
-        raise AssetError(f"MuJoCo refuses it ({error})", where, "mend the part it names") from error
+        raise AssetError(f"MuJoCo refuses it ({error})", where, "correct the part it names") from error

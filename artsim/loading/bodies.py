@@ -67,7 +67,7 @@ def merge_fixed_links(robot: UrdfRobot, file: Path, repairs: list[Repair]) -> li
                 raise AssetError(
                     f"a floating joint inside the object is not supported: link {joint.child!r} flies free of {link!r}",
                     f"{file}: joint {joint.name!r}",
-                    'write type="fixed" to hold it there, or keep each floating object in a file of its own',
+                    'write type="fixed" to hold it there, or keep each floating object in a separate file',
                 )
             else:
                 body_of[joint.child] = new_body(joint.child, joint, body, T)

@@ -88,7 +88,7 @@ def _read_json(data: bytes, file: Path, reader: MeshReader, helpers: Sequence[st
     if is_shape2motion(document):
         return read_shape2motion(document, file, reader)
     raise AssetError(
-        "it is JSON, but tells of no joints that are read",
+        "it is JSON without joints in a known format",
         file,
         "pass PartNet-Mobility's mobility_v2.json or mobility_v3.json, or Shape2Motion's motion_attributes.json",
     )

@@ -123,7 +123,7 @@ def _compile(
             raise AssetError(
                 f"{without} is not read, and the rest is no model ({reason})", file, f"remove or replace {without}"
             ) from error
-        raise AssetError(f"MuJoCo refuses it ({reason})", file, "mend what it names") from error
+        raise AssetError(f"MuJoCo refuses it ({reason})", file, "correct what it names") from error
     finally:
         mujoco.set_mju_user_warning(own)
 

@@ -79,7 +79,7 @@ def _joints_of(scene: Path) -> Path:
         if (scene.parent / name).is_file():
             return scene.parent / name
     raise AssetError(
-        "a glTF file tells of shapes, not of joints",
+        "a glTF file has shapes, but no joints",
         scene,
         f"put its {JOINT_FILES[1]} beside it, whose parts have the numbers that begin the names of its nodes",
     )

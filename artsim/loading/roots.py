@@ -46,5 +46,5 @@ class Opened:
     """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
     below these folders, too. Repeatable."""
     body: str | None = None
-    """Of an MJCF or USD scene of several objects: the body that is taken, with all that it carries. world: what hangs
-    on the world."""
+    """For an MJCF or USD scene of several objects: the body to load, with its children. world: the children of
+    the world body."""

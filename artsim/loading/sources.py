@@ -179,7 +179,7 @@ def _below(folder: Path) -> list[Path]:
     visited = set()
 
     def refuse(error: OSError) -> None:
-        raise AssetError(f"cannot list ({error.strerror})", error.filename, "mend its rights") from error
+        raise AssetError(f"cannot list ({error.strerror})", error.filename, "correct its permissions") from error
 
     for here, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
         real = os.path.realpath(here)

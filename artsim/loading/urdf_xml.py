@@ -39,7 +39,7 @@ def safe_xml(data: bytes, where: Path) -> etree._Element:
     try:
         root = etree.fromstring(data, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
-        raise AssetError(f"not well-formed XML ({error})", where, "mend the element at that line") from error
+        raise AssetError(f"not well-formed XML ({error})", where, "correct the element at that line") from error
     if root.getroottree().docinfo.doctype:
         raise AssetError("declares a document type, which could hide entities", where, "remove the <!DOCTYPE ...>")
     return root

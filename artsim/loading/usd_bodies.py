@@ -184,7 +184,7 @@ class StageReader:
             body = self.bodies[owner]
             if body.prim is not None and not (body.shown or body.solid):
                 raise self.error(
-                    body.prim, f"none of its shapes can be used: {first}", "mend the shape, or leave out the body"
+                    body.prim, f"none of its shapes can be used: {first}", "correct the shape, or leave out the body"
                 )
         for kind in sorted(skipped):
             self.repairs.append(Repair("prims", f"of type {kind} left out: they are no surface of an object"))

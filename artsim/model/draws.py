@@ -69,7 +69,7 @@ class ViewOptions:
     fov: float = 45.0
     """Vertical field of view in degrees."""
     custom: str | None = None
-    """'module:function' of your own that draws the camera: function(rng, obj, q) -> artsim.Camera."""
+    """Your 'module:function' that draws the camera: function(rng, obj, q) -> artsim.Camera."""
 
     def __post_init__(self) -> None:
         for name, bounds in (("azimuth", self.azimuth), ("elevation", self.elevation), ("fill", self.fill)):

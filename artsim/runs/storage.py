@@ -114,7 +114,7 @@ class FolderStorage:
         try:
             file = path.open("rb")
         except OSError as error:
-            raise DatasetError(f"cannot be read ({error.strerror})", path, "mend its rights") from error
+            raise DatasetError(f"cannot be read ({error.strerror})", path, "correct its permissions") from error
         return file, os.fstat(file.fileno()).st_size
 
     def write(self, name: str, data: bytes) -> None:
@@ -152,7 +152,7 @@ class FolderStorage:
             return {}
         except OSError as error:
             raise DatasetError(
-                f"cannot be listed ({error.strerror})", self.folder / below, "mend its rights"
+                f"cannot be listed ({error.strerror})", self.folder / below, "correct its permissions"
             ) from error
         return found
 
@@ -255,11 +255,11 @@ class UrlStorage:
         raise kind(f"cannot {doing} ({text:.300})", f"{self.place}/{name}", fix) from reason
 
     def _reading(self, name: str, work: Callable[[], T], doing: str = "be read") -> T:
-        return self._try(name, work, DatasetError, doing, "mend the access to the storage, and try again")
+        return self._try(name, work, DatasetError, doing, "restore the access to the storage, and try again")
 
     def _writing(self, name: str, work: Callable[[], T]) -> T:
         return self._try(
-            name, work, ConfigError, "be written", "mend the access to the storage; the same command resumes"
+            name, work, ConfigError, "be written", "restore the access to the storage, and rerun the command to resume"
         )
 
     def read(self, name: str, most: int) -> bytes:

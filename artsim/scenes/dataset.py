@@ -27,7 +27,7 @@ _MAX_FILE = 1 << 28
 _MOST_OPEN = 200
 """Shards whose index is kept, each with a file handle: what shuffled reading of some thousand scenes takes."""
 _KEY, _FILE = re.compile(r"[0-9]{6,12}_[0-9]{1,6}"), re.compile(r"[0-9]{6,12}_[0-9]{1,6}|scenes-[0-9]{6,12}\.tar")
-_AGAIN = "run the same artsim scene command again: it makes again what is damaged"
+_AGAIN = "rerun the artsim scene command: it regenerates damaged files"
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def read_ply(data: bytes, bounds: Bounds) -> Surface:
     if "tristrips" in tables:
         _add_strips(tables["tristrips"], points, bounds, draft)
     if body.left:
-        draft.note(f"goes on for {body.left} {body.unit} after what its header declares")
+        draft.note(f"has {body.left} {body.unit} more than its header declares")
     return draft.surface()
 
 

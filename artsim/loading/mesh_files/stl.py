@@ -48,7 +48,7 @@ def _read_bytes(data: bytes, count: int, bounds: Bounds) -> Surface:
         raise UnusableMeshError(f"declares {count} triangles, but ends after {room}")
     bounds.check(count, "triangles")
     if room > count or over:
-        draft.note(f"goes on for {len(data) - _HEADER - _TRIANGLE.itemsize * count} bytes after its {count} triangles")
+        draft.note(f"has {len(data) - _HEADER - _TRIANGLE.itemsize * count} bytes after its {count} triangles")
     vertices = np.frombuffer(data, _TRIANGLE, count, _HEADER)["vertices"].reshape(-1, 3).astype(np.float64)
     draft.add(vertices, np.arange(3 * count).reshape(-1, 3))
     draft.declared = draft.accounted = count

@@ -141,7 +141,7 @@ def test_ctrl_c_stops_quietly_and_says_how_to_go_on(shards: int, sources: list[S
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the group
     printed, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "the same command goes on" in printed
+    assert "rerun the command to resume" in printed
     assert "Traceback" not in errors
     assert not list(out.glob("**/.*.part"))
     if shards:

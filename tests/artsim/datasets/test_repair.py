@@ -289,7 +289,7 @@ def test_bytes_that_come_out_otherwise_are_never_put_in_place(folder: Path) -> N
     before = (folder / SHARD).read_bytes()
     (problem,) = repair(folder, workers=1, progress=False).failed
     assert problem.where == SHARD
-    assert "made again, it has another checksum (another processor, or another version" in problem.what
+    assert "regenerated, it has another checksum (another processor, or another version" in problem.what
     assert (folder / SHARD).read_bytes() == before
 
 

@@ -82,7 +82,9 @@ def test_an_object_that_no_view_sees_is_left_out_before_a_sample_is_made(tmp_pat
     sources: list[Source] = list(family_sources(["laptop", "drawer"], 1))
     made = generate(sources, tmp_path / "out", sample=options, workers=1, skip_broken=True)
     assert len(made.objects) == 1
-    assert made.left_out == ("drawer:0: 0 of 50 drawn views see the object. Fix: mend the view options, or the object",)
+    assert made.left_out == (
+        "drawer:0: 0 of 50 drawn views see the object. Fix: correct the view options, or the object",
+    )
 
 
 @pytest.fixture

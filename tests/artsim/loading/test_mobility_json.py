@@ -307,13 +307,17 @@ def test_a_slide_without_an_end_and_a_hinge_without_a_direction_are_told(tmp_pat
 
 
 def test_files_that_are_no_annotation_are_refused(tmp_path: Path) -> None:
-    for content, said in (("{", "not JSON"), ("[]", "tells of no joints"), ('{"a": 1}', "tells of no joints")):
+    for content, said in (
+        ("{", "not JSON"),
+        ("[]", "without joints in a known format"),
+        ('{"a": 1}', "without joints in a known format"),
+    ):
         (tmp_path / "mobility_v2.json").write_text(content)
         with pytest.raises(AssetError, match=said):
             artsim.load(tmp_path)
     (tmp_path / "alone").mkdir()
     (tmp_path / "alone" / "m.glb").write_bytes(trimesh.creation.box((1, 1, 1)).export(file_type="glb"))
-    with pytest.raises(AssetError, match="tells of shapes, not of joints"):
+    with pytest.raises(AssetError, match="has shapes, but no joints"):
         artsim.load(tmp_path / "alone" / "m.glb")
     (tmp_path / "alone" / "mobility_v2.json").write_text(json.dumps(annotation(artsim.make("drawer", 0))))
     with pytest.raises(AssetError, match=r"no node of m\.glb belongs to a part"):

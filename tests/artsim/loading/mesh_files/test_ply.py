@@ -87,7 +87,7 @@ def test_ply_that_cannot_be_read_is_refused(text: str, problem: str) -> None:
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        ("0 0 0 1 0 0 0 1 0\n3 0 1 2 7 7\n", "goes on for 2 numbers after what its header declares"),
+        ("0 0 0 1 0 0 0 1 0\n3 0 1 2 7 7\n", "has 2 numbers more than its header declares"),
         ("0 0 0 1 0 0 0 1 0\n3 0 1 7\n", "1 faces left out: not finite, or of vertices that are missing"),
         ("0 0 0 1 0 0 0 1 0\n2 0 1\n", "1 faces left out: fewer than three corners"),
         ("0 0 0 1 0 0 0 1 here\n3 0 1 2\n", "1 faces left out: not finite, or of vertices that are missing"),

@@ -53,10 +53,10 @@ def test_several_solids_are_one_surface() -> None:
 @pytest.mark.parametrize(
     ("content", "count", "said"),
     [
-        (BINARY + b"more", 12, "goes on for 4 bytes after its 12 triangles"),
+        (BINARY + b"more", 12, "has 4 bytes after its 12 triangles"),
         (BINARY[:80] + struct.pack("<I", 0) + BINARY[84:], 12, "does not say how many triangles it holds: all 12"),
         (BINARY[:80] + struct.pack("<I", 2**32 - 1) + BINARY[84:], 12, "all 12 are taken"),
-        (BINARY[:80] + struct.pack("<I", 5) + BINARY[84:], 5, "goes on for 350 bytes after its 5 triangles"),
+        (BINARY[:80] + struct.pack("<I", 5) + BINARY[84:], 5, "has 350 bytes after its 5 triangles"),
         (ASCII[: ASCII.rfind("endloop")], 11, "3 vertices left out: their loop does not end"),
         (ASCII.replace("endsolid", ""), 12, "ends without 'endsolid'"),
         (ASCII.replace("vertex", "vortex", 1), 11, "1 faces left out: fewer than three corners"),
