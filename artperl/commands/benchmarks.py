@@ -55,8 +55,8 @@ class ArtImage(_Tested):
     views: int | None = None
     """The least number of views of each category in each row, by default 500."""
     seen_from: tuple[float, float] | None = None
-    """Azimuths that the estimators are told that the camera is within, degrees about the object's vertical, 0 for its
-    front. By default they are not told."""
+    """Range of the camera's azimuth, for the estimators: degrees about the object's vertical, 0 for its front.
+    By default unknown."""
     num_points: int = 8192
     """Points of a cloud: pixels of the object, drawn at random."""
 

@@ -20,7 +20,7 @@ from artsim.runs.kept import write_kept
 class Evaluate:
     """Test an estimator on unseen objects, procedural ones or those of files, and print the table of its errors.
 
-    The benchmarks are commands of their own: artperl artimage, robustness, reartmix, ablation.
+    The benchmarks are separate commands: artperl artimage, robustness, reartmix, ablation.
     """
 
     estimator: tyro.conf.Positional[Path]

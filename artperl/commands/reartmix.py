@@ -40,8 +40,8 @@ class ReArtMix:
     """CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category, of any method. By default
     those that come with the package, by their names, and any for drawers, whose number varies."""
     seen_from: tuple[float, float] | None = None
-    """Azimuths that the estimators are told that the camera is within, degrees about the object's vertical, 0 for its
-    front. By default they are not told."""
+    """Range of the camera's azimuth, for the estimators: degrees about the object's vertical, 0 for its front.
+    By default unknown."""
     apart: bool = False
     """Move estimates whose boxes overlap apart, as artperl estimate --apart does."""
     picture: Path | None = None
