@@ -7,7 +7,7 @@ import numpy as np
 
 from artsim.families.details import knob
 from artsim.making.assembly import Assembly, revolute
-from artsim.making.solids import box, rounded_box, tray
+from artsim.making.solids import box, tray
 
 GAP = 0.002
 
@@ -17,18 +17,18 @@ def build(rng: np.random.Generator) -> Assembly:
     post = rng.uniform(0.6, 1.2)
     front = -length / 2
     body = tray((front, -width / 2, post), (length / 2, width / 2, post + height), 0.004, axis=0, side=-1)
-    body += box((-0.04, -0.04, 0), (0.04, 0.04, post + 0.002))
-    mailbox = Assembly()
-    mailbox.add("body", body, density=2700.0)
+    body += box(0.04, 0.04, (0, post + 0.002))
+    mailbox = Assembly("body", body, density=2700.0)
 
-    door = rounded_box((front - 0.012, -width / 2, post), (front - GAP, width / 2, post + height), 0.004)
+    door = box((front - 0.012, front - GAP), width / 2, (post, post + height), fillet=0.004)
     door += knob((front - 0.012, 0, post + 0.8 * height), (-1, 0, 0), 0.015, 0.01)
     hinge = revolute("body", (0, -1, 0), (front - 0.012, 0, post), 0.0, rng.uniform(1.2, 1.57))
-    mailbox.add("door", door, hinge, density=2700.0)
+    mailbox.add("door", door, hinge)
 
     if rng.random() < 0.6:
         side = width / 2 + GAP
-        flag = box((-0.02, side, post + 0.5 * height), (0.1, side + 0.004, post + 0.5 * height + 0.03))
-        turn = revolute("body", (0, -1, 0), (-0.01, side, post + 0.5 * height + 0.015), 0.0, 1.57)
-        mailbox.add("flag", flag, turn, density=2700.0)
+        low = post + 0.5 * height
+        flag = box((-0.02, 0.1), (side, side + 0.004), (low, low + 0.03))
+        turn = revolute("body", (0, -1, 0), (-0.01, side, low + 0.015), 0.0, 1.57)
+        mailbox.add("flag", flag, turn)
     return mailbox
