@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from artperl.estimator import WEIGHTS
+from artperl.methods.estimator_files import WEIGHTS
 
 from artsim.families import make
 from tests.conftest import ROOT
