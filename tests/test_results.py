@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from artperl.methods.estimator_files import WEIGHTS
 
+from artperl.methods.estimator_files import WEIGHTS
 from artsim.families import make
 from tests.conftest import ROOT
 from tests.digests import weights_digest
