@@ -26,10 +26,11 @@ import tyro
 
 from artsim import Camera, StateOptions, ViewOptions, generate, load, make_renderer, observe, sample_state, sample_view
 from artsim.common.progress import track
+from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.loading.sources import find_sources
 from artsim.model.kinematics import Array
-from artsim.model.object_file import ObjectCache, save_object
+from artsim.model.object_file import save_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import draw_visible
 from artsim.renderers.raycast import cast, pose

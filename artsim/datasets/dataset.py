@@ -13,6 +13,7 @@ import numpy as np
 
 from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
 from artsim.datasets.description import read_description
+from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.padding import PaddedDataset, PaddedStream
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.problems import repair_command
@@ -21,7 +22,6 @@ from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
-from artsim.model.object_file import ObjectCache
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer

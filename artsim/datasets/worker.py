@@ -9,12 +9,13 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 
 from artsim.datasets.description import read_plan
+from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.sample_options import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
 from artsim.datasets.shards import OtherBytesError, store_shard
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import FamilySource, Source
-from artsim.model.object_file import ObjectCache, object_bytes
+from artsim.model.object_file import object_bytes
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, make_renderer
 from artsim.runs.storage import Storage

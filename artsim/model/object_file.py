@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,7 @@ from artsim.common.names import printable
 from artsim.errors import AssetError, KinematicsError
 from artsim.model.kinematics import LARGEST, Array, KinematicTree
 from artsim.model.objects import MAX_PARTS, ArticulatedObject, Part, Repair
-from artsim.runs.storage import Place, storage_of
 
-_CACHE_BYTES = 250_000_000
 _COMPILED_FORMAT = 1
 _AGAIN = "generate it again"
 
@@ -180,38 +177,3 @@ def _source_joints(joints: object, count: int) -> dict[str, tuple[int, float]]:
             raise ValueError(f"source joint {printable(name)} is {joint!r:.60}")
         found[name] = joint[0], float(_numbers(joint[1:], (1,))[0])
     return found
-
-
-class ObjectCache:
-    """Compiled objects of a folder, the least recently used dropped once they take too much memory.
-
-    Parameters
-    ----------
-    place : path, str or Storage
-        Folder or URL.
-    max_bytes : int
-        Of memory.
-    below : str
-        Where in it the objects lie.
-    """
-
-    def __init__(self, place: Place, max_bytes: int = _CACHE_BYTES, below: str = ""):
-        self.storage, self.below = storage_of(place), f"{below}/" if below else ""
-        self.max_bytes = max_bytes
-        self._objects: OrderedDict[str, ArticulatedObject] = OrderedDict()
-
-    def __getitem__(self, key: str) -> ArticulatedObject:
-        obj = self._objects.get(key)
-        if obj is None:
-            name = f"{self.below}{key}.npz"
-            where = f"{self.storage.place}/{name}"
-            obj = self._objects[key] = parse_object(self.storage.read(name, MAX_ARRAY_BYTES), where)
-            while len(self._objects) > 1 and sum(map(_memory, self._objects.values())) > self.max_bytes:
-                self._objects.popitem(last=False)
-        self._objects.move_to_end(key)
-        return obj
-
-
-def _memory(obj: ArticulatedObject) -> int:
-    """Bytes that an object takes with its acceleration structures (measured: about 180 for each triangle)."""
-    return 40_000 + 180 * obj.num_faces

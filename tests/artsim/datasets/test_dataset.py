@@ -18,13 +18,13 @@ import webdataset
 
 import artsim
 from artsim import StateOptions, observe, sample_state
+from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.padding import pad_sample
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.shards import sample_from_members, sample_members
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import find_sources
 from artsim.model.kinematics import JOINT_TYPES
-from artsim.model.object_file import ObjectCache
 from artsim.observing.sample import Sample
 from tests.conftest import ASSETS, DEMO, in_another_process
 
@@ -205,7 +205,7 @@ def test_what_is_not_a_dataset_is_refused(folder: Path, tmp_path: Path) -> None:
         ("{", "damaged"),
         ('{"format": 99}', "format 99 is not"),
         ("[]", "damaged"),
-        ('{"format": 1}', "damaged"),
+        ('{"format": 2}', "damaged"),
     ):
         (tmp_path / "dataset.json").write_text(content)
         with pytest.raises(DatasetError, match=message):
