@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import islice
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,46 +11,47 @@ from numpy.typing import NDArray
 
 from artperl.inputs.bounds import MAX_TEXT_BYTES, MAX_VERTICES, check_count, guard, read_file
 from artperl.inputs.text import parse_columns
-from artsim.errors import ConfigError
+from artsim.errors import AssetError, ConfigError
+from artsim.loading.mesh_files import Bounds
+from artsim.loading.mesh_files.obj import read_vertices
+from artsim.loading.mesh_files.stl import read_stl as read_triangles
 
 Array = NDArray[np.float64]
 
 _FIX = "save the cloud as .ply or .npy"
 _SAID = ("it is a mesh: its vertices are the cloud",)
 _MOST_HEAD = 10_000
-_TOO_MANY = f"more than {MAX_VERTICES:,} vertices are not read"
-_STL_HEAD, _STL_FACE = 84, 50
 
 
 def read_obj(path: Path) -> tuple[Array, tuple[str, ...]]:
-    """(N, 3) vertices of an OBJ file. Raises ConfigError when a line is no vertex."""
+    """(N, 3) vertices of an OBJ file. Raises ConfigError when a vertex is no three numbers."""
 
-    def read() -> Array:
-        data = read_file(path, "cloud", MAX_TEXT_BYTES).replace(b"\r", b"\n")
-        return _lines_of(rb"^[ \t]*v[ \t]+([^\n]*)", data)
+    def read(data: bytes, bounds: Bounds) -> Array:
+        points = read_vertices(data, bounds)
+        if np.isnan(points).any() and b"nan" not in data.lower():
+            raise ValueError("a vertex is no three numbers")
+        return points
 
-    points = guard(read, path, "cloud", _FIX)
+    points = _read(path, read)
     return points, _SAID if len(points) else ()
 
 
 def read_stl(path: Path) -> tuple[Array, tuple[str, ...]]:
     """(N, 3) corners of the triangles of an STL file, each once. Raises ConfigError when it is cut off."""
+    return _read(path, lambda data, bounds: np.unique(read_triangles(data, bounds).vertices, axis=0)), _SAID
 
-    def read() -> Array:
-        data = read_file(path, "cloud", MAX_TEXT_BYTES)
-        faces = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little") if len(data) >= _STL_HEAD else 0
-        if len(data) == _STL_HEAD + _STL_FACE * faces:
-            if 3 * faces > MAX_VERTICES:
-                raise ValueError(_TOO_MANY)
-            triangles = np.frombuffer(data, np.uint8, offset=_STL_HEAD).reshape(faces, _STL_FACE)[:, 12:48]
-            corners = np.ascontiguousarray(triangles).view("<f4").reshape(-1, 3).astype(np.float64)
-        else:
-            if not data.lstrip().startswith(b"solid"):
-                raise ConfigError("it is no STL, or cut off", path, _FIX)
-            corners = _lines_of(rb"\bvertex[ \t]+([^\r\n]*)", data)
-        return np.unique(corners, axis=0)
 
-    return guard(read, path, "cloud", _FIX), _SAID
+def _read(path: Path, read: Callable[[bytes, Bounds], Array]) -> Array:
+    """What one of artsim's readers of meshes finds."""
+
+    def find() -> Array:
+        try:
+            return read(read_file(path, "cloud", MAX_TEXT_BYTES), Bounds(path, MAX_VERTICES))
+        except AssetError as error:
+            raise ValueError(f"more than {MAX_VERTICES:,} vertices are not read") from error
+
+    points: Array = guard(find, path, "cloud", _FIX)
+    return points
 
 
 def read_off(path: Path) -> tuple[Array, tuple[str, ...]]:
@@ -74,11 +75,3 @@ def read_off(path: Path) -> tuple[Array, tuple[str, ...]]:
         return points
 
     return guard(read, path, "cloud", _FIX), _SAID
-
-
-def _lines_of(pattern: bytes, data: bytes) -> Array:
-    """(N, 3) numbers at the beginning of what a pattern finds."""
-    found = [match[1] for match in islice(re.finditer(pattern, data, re.MULTILINE), MAX_VERTICES + 1)]
-    if len(found) > MAX_VERTICES:
-        raise ValueError(_TOO_MANY)
-    return parse_columns(b"\n".join(found), [0, 1, 2], None)

@@ -78,16 +78,36 @@ def statements(data: bytes, bounds: Bounds) -> Statements:
     AssetError
         When it has more of them than the bounds allow.
     """
+    rows = _rows(data)
+    vertex_rows, face_rows = rows.which(b"v"), rows.which(b"f")
+    bounds.check(int(face_rows.sum()), "triangles")
+    points = _vertices(rows, vertex_rows, bounds)
+    references = _strip_comment(rows.rest(face_rows, b"f"))
+    return Statements(rows, points, vertex_rows, face_rows, numbers_per_row(references), references)
+
+
+def read_vertices(data: bytes, bounds: Bounds) -> Array:
+    """(V, 3) vertices, whether or not a face names them; NaN where no number can be read.
+
+    Raises
+    ------
+    AssetError
+        When there are more than the bounds allow.
+    """
+    rows = _rows(data)
+    return _vertices(rows, rows.which(b"v"), bounds)
+
+
+def _rows(data: bytes) -> Rows:
     text = plain_text(data)
     if b"\\" in text:
         text = text.replace(b"\\ \n", b" ").replace(b"\\\n", b" ")
-    rows = Rows(text)
-    vertex_rows, face_rows = rows.which(b"v"), rows.which(b"f")
-    bounds.check(int(vertex_rows.sum()), "vertices")
-    bounds.check(int(face_rows.sum()), "triangles")
-    points = first_numbers(_strip_comment(rows.rest(vertex_rows, b"v")), 3)  # a row may go on with a weight or a colour
-    references = _strip_comment(rows.rest(face_rows, b"f"))
-    return Statements(rows, points, vertex_rows, face_rows, numbers_per_row(references), references)
+    return Rows(text)
+
+
+def _vertices(rows: Rows, which: np.ndarray, bounds: Bounds) -> Array:
+    bounds.check(int(which.sum()), "vertices")
+    return first_numbers(_strip_comment(rows.rest(which, b"v")), 3)  # a row may go on with a weight or a colour
 
 
 def _strip_comment(text: bytes) -> bytes:

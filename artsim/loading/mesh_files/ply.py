@@ -71,7 +71,7 @@ def read_ply(data: bytes, bounds: Bounds) -> Surface:
     UnusableMeshError
     AssetError
     """
-    order, elements, start = _header(data)
+    order, elements, start = read_header(data)
     body = _Text(data[start:]) if order == "" else _Bytes(data, start, order)
     draft = Draft(declared=sum(e.count for e in elements if e.name == "face"))
     for element in elements:
@@ -95,8 +95,13 @@ def read_ply(data: bytes, bounds: Bounds) -> Surface:
     return draft.surface()
 
 
-def _header(data: bytes) -> tuple[str, list[Element], int]:
-    """Byte order, elements and where they start."""
+def read_header(data: bytes) -> tuple[str, list[Element], int]:
+    """Byte order ("" for text), elements, and where their values begin.
+
+    Raises
+    ------
+    UnusableMeshError
+    """
     found = re.search(rb"(?:^|[\r\n])end_header[ \t]*(\r\n|\r|\n)", data[:_MAX_HEADER])
     if not data.startswith(b"ply") or found is None:
         raise UnusableMeshError("has no PLY header")
