@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from artperl.inputs.detections import ALIASES, Detection, Detections
 from artperl.inputs.images import read_picture
 from artperl.inputs.intrinsics import read_intrinsics
 from artsim.common.files import read_json
-from artsim.datasets import json_values
+from artsim.common.json_records import Pixels, as_type
 from artsim.errors import DatasetError
 
 Array = NDArray[np.float64]
@@ -158,7 +158,7 @@ def _document(path: Path) -> dict[str, Any]:
 
 def _size(document: dict[str, Any], path: Path) -> tuple[int, int]:
     try:
-        width, height = (json_values.whole(document.get(name), name, 1, 8192) for name in ("width", "height"))
+        width, height = (as_type(Pixels, document.get(name), name) for name in ("width", "height"))
     except ValueError as error:
         raise DatasetError(f"is damaged ({error})", path, _FIX) from error
     return width, height
@@ -167,14 +167,12 @@ def _size(document: dict[str, Any], path: Path) -> tuple[int, int]:
 def _instances(document: dict[str, Any], path: Path) -> list[dict[str, Any]]:
     """The objects of an annotation, each with what is needed of it."""
     try:
-        instances = json_values.sequence(document.get("instances"), "instances", 1000)
+        instances = as_type(Annotated[list, range(1001)], document.get("instances"), "instances")
         for own in instances:
-            json_values.whole(own["category_id"], "category_id", 1, len(NAMES))
-            box = json_values.sequence(own["bbox"], "bbox", 4)
-            if len(box) != 4 or not all(isinstance(v, int | float) for v in box):
-                raise ValueError(f"bbox is {box!r:.60}")
-            for link in json_values.sequence(own["links"], "links", 100):
-                json_values.whole(link["link_category_id"], "link_category_id", 0, 100)
+            as_type(Annotated[int, range(1, len(NAMES) + 1)], own["category_id"], "category_id")
+            as_type(tuple[float, float, float, float], own["bbox"], "bbox")
+            for link in as_type(Annotated[list, range(101)], own["links"], "links"):
+                as_type(Annotated[int, range(101)], link["link_category_id"], "link_category_id")
                 if np.shape(link["transformation"]) != (4, 4) or not np.isfinite(link["transformation"]).all():
                     raise ValueError("a transformation is no 4 x 4 matrix")
             if not own["links"]:
@@ -190,7 +188,7 @@ def _boxes(path: Path) -> dict[Any, list[tuple[Array, Array]]]:
     document = read_json(path, _METAS, DatasetError)
     try:
         found = {}
-        for meta in json_values.sequence(document["urdf_metas"], "urdf_metas", _MOST):
+        for meta in as_type(Annotated[list, range(_MOST + 1)], document["urdf_metas"], "urdf_metas"):
             if meta:  # numbers that no object has are empty
                 corners = np.array(meta["corner_pts"], dtype=np.float64)
                 if corners.ndim < 3 or corners[0].size != 6 or not np.isfinite(corners).all():

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from artsim.common.files import MAX_JSON_BYTES, parse_json, read_json, write_atomic
+from artsim.common.json_records import as_type
 from artsim.common.names import printable
-from artsim.datasets import json_values
-from artsim.datasets.plan import FORMAT, MAX_SHARDS, Plan, ShardRecord
+from artsim.datasets.plan import FORMAT, Plan, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.errors import ConfigError, DatasetError
 from artsim.runs.journal import JOURNAL, Journal
@@ -133,7 +133,7 @@ def read_description(place: Place) -> tuple[Plan, list[ShardRecord], dict[str, A
     document = _document(storage, DESCRIPTION)
     plan = _plan(document, storage, DESCRIPTION)
     try:
-        shards = json_values.sequence(document["shards"], "shards", MAX_SHARDS)
+        shards = as_type(list, document["shards"], "shards")
         if len(shards) != plan.num_shards:  # compared before the plan's own are listed: a forged plan has any number
             raise ValueError(f"it lists {len(shards)} shards instead of {plan.num_shards}")
         records = [ShardRecord.from_dict(shard) for shard in shards]
@@ -148,7 +148,7 @@ def _document(storage: Storage, name: str) -> dict[str, Any]:
     """A description whose own digest is right."""
     data = storage.read(name, MAX_JSON_BYTES)
     try:
-        document = dict(json_values.mapping(parse_json(data), "it"))
+        document = as_type(dict, parse_json(data), "it")
         if document["format"] != FORMAT:
             raise DatasetError(
                 f"format {document['format']!r:.20} is not {FORMAT}",
@@ -169,9 +169,9 @@ def _plan(document: Mapping[str, Any], storage: Storage, name: str) -> Plan:
     try:
         plan = Plan.from_dict(document)
         for entries in (document["left_out"], document["repeated"]):
-            for entry in json_values.sequence(entries, "sources", 10_000_000):
+            for entry in as_type(list, entries, "sources"):
                 for name in ("source", "source_sha256"):
-                    json_values.text(json_values.mapping(entry, "source")[name], name)
+                    as_type(str, as_type(dict, entry, "source")[name], name)
     except (ValueError, KeyError, ConfigError) as error:
         raise _damage_error(storage, name, error) from error
     return plan

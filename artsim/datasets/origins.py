@@ -8,10 +8,12 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from artsim.common.files import read_json
-from artsim.datasets import json_values
+from artsim.common.json_records import from_json_values
 from artsim.datasets.description import write_if_other
 from artsim.datasets.plan import PlannedObject
 from artsim.errors import ArtsimError, AssetError, DatasetError
@@ -19,6 +21,19 @@ from artsim.loading.sources import FamilySource, FileSource, Source, find_source
 
 ORIGINS = ".sources.json"
 _MAX_SOURCES = 1_000_000
+
+
+@dataclass(frozen=True)
+class _Origin:
+    path: str
+    sha256: str
+    package_roots: dict[str, str]
+    body: str | None = None
+
+
+@dataclass(frozen=True)
+class _Origins:
+    files: Annotated[tuple[_Origin, ...], range(_MAX_SOURCES + 1)]
 
 
 def write_origins(folder: Path, sources: Sequence[Source]) -> None:
@@ -67,22 +82,15 @@ def _read_origins(folder: Path) -> list[FileSource]:
     """Files that are still where they were, and still as they were."""
     try:
         noted = read_json(folder / ORIGINS, ORIGINS, DatasetError)
-        entries = json_values.sequence(json_values.mapping(noted, "it")["files"], "files", _MAX_SOURCES)
-        files = []
-        for entry in entries:
-            own = json_values.mapping(entry, "file")
-            roots = json_values.mapping(own["package_roots"], "package_roots")
-            path, sha256 = Path(json_values.text(own["path"], "path")), json_values.text(own["sha256"], "sha256")
-            body = None if own.get("body") is None else json_values.text(own["body"], "body")
-            roots = {name: Path(json_values.text(root, name)) for name, root in roots.items()}
-            files.append((path, sha256, roots, body))
-    except (ArtsimError, ValueError, KeyError):
+        files = from_json_values(_Origins, noted).files
+    except (ArtsimError, ValueError):
         return []  # a note that helps, no more
     found = []
-    for path, sha256, roots, body in files:
+    for file in files:
+        path, roots = Path(file.path), {name: Path(root) for name, root in file.package_roots.items()}
         try:
             if path.suffix.lower() in (".urdf", ".xml", ".npz"):
-                found += [source for source in find_sources([path], roots, body) if source.sha256 == sha256]
+                found += [source for source in find_sources([path], roots, file.body) if source.sha256 == file.sha256]
         except (AssetError, OSError, ValueError):
             continue
     return found

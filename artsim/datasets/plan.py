@@ -11,11 +11,11 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
-from artsim.datasets import json_values
+from artsim.common.json_records import SHA256, from_json_values
 from artsim.datasets.layout import at_place
 from artsim.datasets.sample_options import SampleOptions as SampleOptions
 from artsim.datasets.sample_options import draw_sample as draw_sample
@@ -32,7 +32,8 @@ MAX_SHARDS = 1_000_000
 
 _MAX_OBJECTS = 1_000_000
 
-_KEY = re.compile(r"[A-Za-z0-9_-]{1,128}")
+_KEY, _SPLIT = re.compile(r"[A-Za-z0-9_-]{1,128}"), re.compile("|".join(SPLITS))
+_DIGEST = re.compile(f"(?:{SHA256.pattern})?")
 
 
 @dataclass(frozen=True)
@@ -60,15 +61,15 @@ class PlannedObject:
         What was mended, assumed or left out while loading.
     """
 
-    key: str
+    key: Annotated[str, _KEY]
     category: str
     object_id: str
     sha256: str
-    num_parts: int
+    num_parts: Annotated[int, range(1, MAX_PARTS + 1)]
     source: str
     source_sha256: str
-    split: str
-    file_sha256: str = ""
+    split: Annotated[str, _SPLIT]
+    file_sha256: Annotated[str, _DIGEST] = ""
     rigid: bool = False
     repairs: tuple[tuple[str, str], ...] = ()
 
@@ -76,32 +77,6 @@ class PlannedObject:
     def file(self) -> str:
         """Name of its file in the dataset's folder."""
         return f"objects/{self.key}.npz"
-
-    @staticmethod
-    def from_dict(data: object) -> PlannedObject:
-        """Inverse of ``dataclasses.asdict`` after a trip through JSON; ValueError where it is none."""
-        own = json_values.mapping(data, "object")
-        known = {f.name for f in fields(PlannedObject)}
-        if not own.keys() <= known:
-            raise ValueError(f"an object has no {min(own.keys() - known)!r:.40}")
-        repairs = json_values.sequence(own.get("repairs", []), "repairs", 10_000)
-        pairs = [json_values.sequence(repair, "repair", 2) for repair in repairs]
-        digest = own.get("file_sha256", "")
-        return PlannedObject(
-            key=json_values.text(own["key"], "key", _KEY),
-            category=json_values.text(own["category"], "category"),
-            object_id=json_values.text(own["object_id"], "object_id"),
-            sha256=json_values.text(own["sha256"], "sha256"),
-            num_parts=json_values.whole(own["num_parts"], "num_parts", 1, MAX_PARTS),
-            source=json_values.text(own["source"], "source"),
-            source_sha256=json_values.text(own["source_sha256"], "source_sha256"),
-            split=json_values.one_of(own["split"], "split", SPLITS),
-            file_sha256=digest if digest == "" else json_values.text(digest, "file_sha256", json_values.SHA256),
-            rigid=json_values.boolean(own.get("rigid", False), "rigid"),
-            repairs=tuple(
-                (json_values.text(where, "repair"), json_values.text(what, "repair")) for where, what in pairs
-            ),
-        )
 
 
 @dataclass(frozen=True)
@@ -122,12 +97,12 @@ class Plan:
         That makes the samples.
     """
 
-    seed: int
-    num_samples: int
-    shard_size: int
+    seed: Annotated[int, range(2**63)]
+    num_samples: Annotated[int, range(1, MAX_SAMPLES + 1)]
+    shard_size: Annotated[int, range(1, MAX_SAMPLES + 1)]
     fractions: tuple[float, float, float]
     sample: SampleOptions
-    objects: tuple[PlannedObject, ...]
+    objects: Annotated[tuple[PlannedObject, ...], range(1, _MAX_OBJECTS + 1)]
     strict: bool = False
     artsim_version: str = ""
 
@@ -225,27 +200,12 @@ class Plan:
         ValueError, KeyError, ConfigError
             When a value is missing, of another type, or makes no sense.
         """
-        fractions = tuple(
-            json_values.number(v, "fractions") for v in json_values.sequence(data["fractions"], "fractions", 3)
-        )
-        if len(fractions) != 3:
-            raise ValueError("fractions are not three numbers")
-        check_shares(fractions)
-        objects = tuple(map(PlannedObject.from_dict, json_values.sequence(data["objects"], "objects", _MAX_OBJECTS)))
-        if not objects:
+        plan = from_json_values(cls, data, others=True)
+        check_shares(plan.fractions)
+        if not plan.objects:
             raise ValueError("it has no objects")
-        if len({planned.key.lower() for planned in objects}) < len(objects):
+        if len({planned.key.lower() for planned in plan.objects}) < len(plan.objects):
             raise ValueError("two objects have the same key")
-        plan = cls(
-            seed=json_values.whole(data["seed"], "seed", 0, 2**63),
-            num_samples=json_values.whole(data["num_samples"], "num_samples", 1, MAX_SAMPLES),
-            shard_size=json_values.whole(data["shard_size"], "shard_size", 1, MAX_SAMPLES),
-            fractions=fractions,
-            sample=SampleOptions.from_dict(data["sample"]),
-            objects=objects,
-            strict=json_values.boolean(data.get("strict", False), "strict"),
-            artsim_version=json_values.text(data["artsim_version"], "artsim_version", most=64),
-        )
         if plan.num_shards > MAX_SHARDS:
             raise ValueError(f"it has {plan.num_shards} shards, over {MAX_SHARDS}")
         return plan
@@ -256,9 +216,9 @@ class Shard:
     """The samples at places ``first`` to ``end`` (exclusive) of a split, in one tar file."""
 
     name: str
-    split: str
-    first: int
-    end: int
+    split: Annotated[str, _SPLIT]
+    first: Annotated[int, range(MAX_SAMPLES + 1)]
+    end: Annotated[int, range(MAX_SAMPLES + 1)]
 
     def __len__(self) -> int:
         return self.end - self.first
@@ -268,9 +228,9 @@ class Shard:
 class ShardRecord(Shard):
     """A finished shard."""
 
-    bytes: int
-    sha256: str
-    recipe: str = ""
+    bytes: Annotated[int, range(2**63)]
+    sha256: Annotated[str, SHA256]
+    recipe: Annotated[str, _DIGEST] = ""
     """See :meth:`Plan.recipe`."""
 
     @property
@@ -281,20 +241,9 @@ class ShardRecord(Shard):
     @staticmethod
     def from_dict(data: object) -> ShardRecord:
         """Inverse of ``dataclasses.asdict`` after a trip through JSON; ValueError where it is none."""
-        own = json_values.mapping(data, "shard")
-        known = {f.name for f in fields(ShardRecord)}
-        if not known - {"recipe"} <= own.keys() <= known:
-            raise ValueError(f"a shard has {', '.join(sorted(map(str, own)))!s:.80}")
-        split, recipe = json_values.one_of(own["split"], "split", SPLITS), own.get("recipe", "")
-        first, end = (json_values.whole(own[name], name, 0, MAX_SAMPLES) for name in ("first", "end"))
-        if first >= end:
-            raise ValueError(f"a shard goes from {first} to {end}")
-        return ShardRecord(
-            name=json_values.text(own["name"], "name", re.compile(rf"{split}-[0-9]{{6,9}}\.tar")),
-            split=split,
-            first=first,
-            end=end,
-            bytes=json_values.whole(own["bytes"], "bytes", 0, 2**63),
-            sha256=json_values.text(own["sha256"], "sha256", json_values.SHA256),
-            recipe=recipe if recipe == "" else json_values.text(recipe, "recipe", json_values.SHA256),
-        )
+        record = from_json_values(ShardRecord, data)
+        if record.first >= record.end:
+            raise ValueError(f"a shard goes from {record.first} to {record.end}")
+        if not re.fullmatch(rf"{record.split}-[0-9]{{6,9}}\.tar", record.name):
+            raise ValueError(f"name is {record.name!r:.80}")
+        return record

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from artsim.datasets import json_values
+from artsim.common.json_records import from_json_values
 from artsim.errors import ConfigError, RenderError
 from artsim.model.draws import (
     Scale,
-    StateMode,
     StateOptions,
     ViewOptions,
-    ViewPreset,
     sample_scale,
     sample_state,
     sample_view,
@@ -24,7 +21,7 @@ from artsim.model.draws import (
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
-from artsim.renderers import RENDERERS, Renderer, RendererName
+from artsim.renderers import Renderer, RendererName
 
 _VIEW_ATTEMPTS = 50
 _SEEN_OFTEN_ENOUGH = 3
@@ -70,48 +67,7 @@ class SampleOptions:
         ValueError, ConfigError
             When a value is of another type, or makes no sense.
         """
-        own = json_values.mapping(data, "sample")
-        states, views = json_values.mapping(own["states"], "states"), json_values.mapping(own["views"], "views")
-        unknown = own.keys() - {f.name for f in fields(SampleOptions)} | views.keys() - _VIEW_FIELDS.keys()
-        if unknown:
-            raise ValueError(f"sample has no option {min(unknown)!r:.40}")
-        scale, opened = own["scale"], states["fraction_open"]
-        ranges = json_values.mapping(states["joint_range"], "joint_range")
-        return SampleOptions(
-            num_points=json_values.whole(own["num_points"], "num_points", 1, 1_000_000),
-            scale=scale if scale in ("native", "unit") else json_values.pair(scale, "scale"),
-            states=StateOptions(
-                json_values.one_of(states["mode"], "mode", get_args(StateMode)),
-                None if opened is None else json_values.pair(opened, "fraction_open"),
-                {
-                    json_values.text(name, "joint_range"): json_values.pair(value, name)
-                    for name, value in ranges.items()
-                },
-            ),
-            views=ViewOptions(**{name: _VIEW_FIELDS[name](value, name) for name, value in views.items()}),
-            renderer=json_values.one_of(own["renderer"], "renderer", tuple(RENDERERS)),
-            images=tuple(
-                json_values.one_of(v, "image", get_args(ImageName))
-                for v in json_values.sequence(own["images"], "images", 3)
-            ),
-            noise=json_values.one_of(own.get("noise", "none"), "noise", get_args(SensorName)),  # older plans do not say
-        )
-
-
-def _optional(check: Callable[[Any, str], Any]) -> Callable[[Any, str], Any]:
-    return lambda value, name: None if value is None else check(value, name)
-
-
-_VIEW_FIELDS: dict[str, Callable[[Any, str], Any]] = {
-    "preset": lambda value, name: json_values.one_of(value, name, get_args(ViewPreset)),
-    "azimuth": _optional(json_values.pair),
-    "elevation": _optional(json_values.pair),
-    "fill": json_values.pair,
-    "width": lambda value, name: json_values.whole(value, name, 1, 8192),
-    "height": lambda value, name: json_values.whole(value, name, 1, 8192),
-    "fov": json_values.number,
-    "custom": _optional(json_values.text),
-}
+        return from_json_values(SampleOptions, data)
 
 
 def draw_sample(

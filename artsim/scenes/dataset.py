@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import orjson
 from numpy.typing import NDArray
 
 from artsim.common.files import open_image, parse_npy, read_bounded, read_json
-from artsim.datasets import json_values
+from artsim.common.json_records import Pixels, as_type, from_json_values
 from artsim.datasets.shards import MAX_PIXELS, ShardReader, sample_from_members
 from artsim.errors import DatasetError
 from artsim.model.camera import Camera
@@ -27,6 +27,7 @@ _MAX_FILE = 1 << 28
 _MOST_OPEN = 200
 """Shards whose index is kept, each with a file handle: what shuffled reading of some thousand scenes takes."""
 _KEY, _FILE = re.compile(r"[0-9]{6,12}_[0-9]{1,6}"), re.compile(r"[0-9]{6,12}_[0-9]{1,6}|scenes-[0-9]{6,12}\.tar")
+_Corner = Annotated[int, range(8193)]
 _AGAIN = "rerun the artsim scene command: it regenerates damaged files"
 
 
@@ -46,20 +47,20 @@ class ViewObject:
 
     category: str
     object_id: str
-    parts: int
+    parts: Annotated[int, range(1, 256)]
     visible_fraction: float
-    box: tuple[int, int, int, int]
+    box: tuple[_Corner, _Corner, _Corner, _Corner]
 
 
 @dataclass(frozen=True)
 class ViewEntry:
     """A view in the description: its key, its scene's seed, its camera's number, its file or folder, its objects."""
 
-    key: str
-    scene: int
-    view: int
-    file: str
-    objects: tuple[ViewObject, ...]
+    key: Annotated[str, _KEY]
+    scene: Annotated[int, range(2**62 + 1)]
+    view: Annotated[int, range(2**31 + 1)]
+    file: Annotated[str, _FILE]
+    objects: Annotated[tuple[ViewObject, ...], range(256)]
 
 
 class SceneRecord:
@@ -113,8 +114,8 @@ class SceneRecord:
         try:
             own = orjson.loads(self._read("scene.json"))["camera"]
             size = (
-                json_values.whole(own["width"], "width", 1, 8192),
-                json_values.whole(own["height"], "height", 1, 8192),
+                as_type(Pixels, own["width"], "width"),
+                as_type(Pixels, own["height"], "height"),
             )
             return Camera(np.array(own["K"], np.float64), *size, np.array(own["T_world_camera"], np.float64))
         except (ValueError, KeyError, TypeError) as error:
@@ -216,37 +217,9 @@ def open_scenes(folder: str | Path) -> SceneDataset:
 
 
 def _entries(description: Any) -> tuple[ViewEntry, ...]:
-    document = json_values.mapping(description, "it")
+    document = as_type(dict, description, "it")
     if document["format"] != FORMAT:
         raise ValueError(f"format {document['format']!r:.20} is not {FORMAT}")
-    views = [
-        view
-        for piece in json_values.sequence(document["pieces"], "pieces", _MAX_VIEWS)
-        for view in json_values.sequence(piece[2], "views", _MAX_VIEWS)
-    ]
-    return tuple(_entry(json_values.mapping(view, "view")) for view in views)
-
-
-def _entry(view: Any) -> ViewEntry:
-    objects = tuple(_object(own) for own in json_values.sequence(view["objects"], "objects", 255))
-    return ViewEntry(
-        json_values.text(view["key"], "key", _KEY),
-        json_values.whole(view["scene"], "scene", 0, 2**62),
-        json_values.whole(view["view"], "view", 0, 2**31),
-        json_values.text(view["file"], "file", _FILE),
-        objects,
-    )
-
-
-def _object(data: object) -> ViewObject:
-    own = json_values.mapping(data, "object")
-    left, top, right, bottom = (
-        json_values.whole(v, "box", 0, 8192) for v in json_values.sequence(own["box"], "box", 4)
-    )
-    return ViewObject(
-        json_values.text(own["category"], "category"),
-        json_values.text(own["object_id"], "object_id"),
-        json_values.whole(own["parts"], "parts", 1, 255),
-        json_values.number(own["visible_fraction"], "visible_fraction"),
-        (left, top, right, bottom),
-    )
+    pieces = as_type(Annotated[list, range(_MAX_VIEWS + 1)], document["pieces"], "pieces")
+    views = [view for piece in pieces for view in as_type(Annotated[list, range(_MAX_VIEWS + 1)], piece[2], "views")]
+    return tuple(from_json_values(ViewEntry, view) for view in views)
