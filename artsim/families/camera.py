@@ -153,9 +153,8 @@ def _add_controls(rng: Rng, camera: Assembly, shell: Shell, middle: tuple[float,
         at = np.array([0.5 * depth, 0.5 * (left - half), z])
         crank = _dial(rng, at, size)
         if rng.random() < 0.4:
-            bar = box(at + (-0.15 * size, -0.9 * size, 0.8 * size), at + (0.15 * size, 0.9 * size, 1.2 * size),
-                      fillet=0.1 * size)  # fmt: skip
-            crank += bar
+            low, high = at + (-0.15 * size, -0.9 * size, 0.8 * size), at + (0.15 * size, 0.9 * size, 1.2 * size)
+            crank += box(low, high, fillet=0.1 * size)
         add("knob", crank, continuous("body", UP, at), size, "knob")
 
 
