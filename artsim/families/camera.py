@@ -82,9 +82,8 @@ def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float,
         deep = depth * (rng.uniform(0.2, 0.6) if kind == "reflex" else rng.uniform(0.05, 0.2))
         room = max(half - shell.lens_y - shell.lens_radius - 0.004, 0.008)
         wide = min(rng.uniform(0.25, 0.5) * half, room)
-        body += box(
-            (-deep, 0.6 * depth), (half - wide, half), (0.02 * height, 0.97 * height), fillet=0.45 * wide, axis=2
-        )
+        upright = (0.02 * height, 0.97 * height)
+        body += box((-deep, 0.6 * depth), (half - wide, half), upright, fillet=0.45 * wide, axis=2)
     span = (0.0, 0.0, height)
     if kind == "reflex":
         wide = half * rng.uniform(0.28, 0.42)
@@ -209,9 +208,8 @@ def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
                 camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
     if rng.random() < 0.2:  # a door at the right side
         y, t = half + 0.001, 0.0025
-        door = box(
-            (0.2 * shell.depth, 0.8 * shell.depth), (y, y + t), (0.2 * height, 0.75 * height), fillet=0.002, axis=1
-        )
+        deep = (0.2 * shell.depth, 0.8 * shell.depth)
+        door = box(deep, (y, y + t), (0.2 * height, 0.75 * height), fillet=0.002, axis=1)
         camera.add("door", door, revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2)))
 
 

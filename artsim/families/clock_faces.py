@@ -141,9 +141,8 @@ def glass_door(rng: Rng, clock: Assembly, x: float, across: tuple[float, float],
     door = frame(low, high, [bar] * 4)
     if rng.random() < 0.3:
         middle = 0.5 * (upright[0] + upright[1])
-        door += box(
-            (low[0] + 0.002, high[0] - 0.002), (across[0] + 0.5 * bar, across[1] - 0.5 * bar), about(middle, 0.3 * bar)
-        )
+        deep = (low[0] + 0.002, high[0] - 0.002)
+        door += box(deep, (across[0] + 0.5 * bar, across[1] - 0.5 * bar), about(middle, 0.3 * bar))
     left = rng.random() < 0.5
     y = across[0] + 0.5 * bar if left else across[1] - 0.5 * bar
     spot = np.array([low[0], y, 0.5 * (upright[0] + upright[1])])

@@ -265,9 +265,8 @@ def _pod(rng: Rng) -> Assembly:
     lever = box((pivot[0] - length, pivot[0] - length + 0.03), wide, (height + GAP, height + GAP + thick), fillet=0.004)
     for s in (-1.0, 1.0):
         arm = sorted((s * wide, s * (wide - 0.01)))
-        lever += box(
-            (pivot[0] - length, pivot[0] + 0.006), (arm[0], arm[1]), (height + GAP, height + GAP + thick), fillet=0.004
-        )
+        deep = (pivot[0] - length, pivot[0] + 0.006)
+        lever += box(deep, (arm[0], arm[1]), (height + GAP, height + GAP + thick), fillet=0.004)
     lever += cylinder((pivot[0], -wide, height + 0.0075), (pivot[0], wide, height + 0.0075), 0.005, sections=12)
     limit = np.deg2rad(rng.uniform(60.0, 105.0))
     turn = revolute("body", (0, 1, 0), (pivot[0], 0, height + 0.0075), 0.0, limit)

@@ -217,7 +217,6 @@ def _hinges(rng: Rng, shape: _Shape) -> Solid:
     for first, last in spans:
         right, left = first * shape.width, last * shape.width
         solid += cylinder((x, right, z), (x, left, z), radius, sections=16)
-        solid += box(
-            (shape.back - 0.012, x), (right, left), (arm + 0.0004, arm + max(min(0.8 * shape.lid, radius), 0.0015))
-        )
+        upright = (arm + 0.0004, arm + max(min(0.8 * shape.lid, radius), 0.0015))
+        solid += box((shape.back - 0.012, x), (right, left), upright)
     return solid

@@ -90,9 +90,8 @@ def _body(
     solid += posts((0.05, depth - 0.05), (right + 0.05, left - 0.05), (0, low + 0.004), 0.015)
     if rng.random() < 0.4:  # ribs over the vents
         for x in np.linspace(0.4, 0.8, 7) * depth:
-            solid += box(
-                (x, x + 0.006), (left - 0.005, left + 0.0025), (low + 0.55 * (high - low), low + 0.85 * (high - low))
-            )
+            upright = (low + 0.55 * (high - low), low + 0.85 * (high - low))
+            solid += box((x, x + 0.006), (left - 0.005, left + 0.0025), upright)
     return solid
 
 

@@ -136,9 +136,8 @@ def _flip(rng: Rng, phone: Assembly) -> None:
     if rng.random() < 0.6:  # a small display on the outside
         z = bottom + rng.uniform(0.45, 0.7) * (pivot - bottom)
         size = 0.45 * half
-        lid += box(
-            (plane - upper - 0.0008, plane - 0.5 * upper), size, about(z, size), fillet=0.3 * size, axis=0, steps=2
-        )
+        deep = (plane - upper - 0.0008, plane - 0.5 * upper)
+        lid += box(deep, size, about(z, size), fillet=0.3 * size, axis=0, steps=2)
     phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
     _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)

@@ -126,9 +126,8 @@ def _body(
         for z in np.linspace(bottom + wall, top - wall, int(2 + (top - bottom) // 0.25))[1:-1]:
             solid += box((front, inner_back), (shelf_low, shelf_high), (z, z + 0.008))
         if rng.random() < 0.5 and side != 0 and top - bottom > 0.6:  # a crisper
-            solid += box(
-                (front + 0.01, inner_back), (shelf_low, shelf_high), (bottom + wall - 0.002, bottom + wall + 0.12)
-            )
+            upright = (bottom + wall - 0.002, bottom + wall + 0.12)
+            solid += box((front + 0.01, inner_back), (shelf_low, shelf_high), upright)
     if rng.random() < 0.5:
         solid += box((rng.uniform(0.0, 0.05) + GAP, depth - 0.01), half - 0.01, (0.0, low + 0.01))
     else:

@@ -165,9 +165,8 @@ def _door(rng: Rng, s: Shape, combination: bool, opener: str) -> Solid:
         # The plug that fills the opening; its inner edge swings past the wall.
         plug, inner = rng.uniform(0.01, 0.03), s.half - s.wall
         swing = plug * plug / (4.0 * inner) + 0.004
-        solid += box(
-            (high[0] - 0.002, plug), (swing - inner, inner - 0.004), (low[2] + s.wall + 0.004, high[2] - s.wall - 0.004)
-        )
+        upright = (low[2] + s.wall + 0.004, high[2] - s.wall - 0.004)
+        solid += box((high[0] - 0.002, plug), (swing - inner, inner - 0.004), upright)
     if rng.random() < 0.5:  # a raised board; the hinge side stays free for the barrels
         edge = 0.1 * min(wide, tall)
         solid += box(low + (-0.003, edge, edge), (low[0] + 0.004, *(high[1:] - edge)), fillet=0.0015)

@@ -88,9 +88,8 @@ def _trolley(rng: Rng) -> Assembly:
         for s in (-1.0, 1.0):  # feet in front, wheel arches behind
             back += box((seam + 0.004, seam + 0.017), about(s * (y - 0.05), 0.012), (0.0, lift + 0.01), fillet=0.003)
             for cheek in (-0.022, 0.022):
-                back += box(
-                    (wheel_x - 0.02, wheel_x + 0.022), about(s * (y - 0.04) + cheek, 0.004), (0.022, lift + 0.01)
-                )
+                across = about(s * (y - 0.04) + cheek, 0.004)
+                back += box((wheel_x - 0.02, wheel_x + 0.022), across, (0.022, lift + 0.01))
     case = Assembly("body", back, 300.0)
     limit = np.deg2rad(rng.uniform(60.0, 175.0))
     case.add("lid", front, revolute("body", (0, 0, -side), (seam, hinge_y, high / 2), 0.0, limit))

@@ -133,9 +133,8 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
         free = (side < 0 and not on_legs, side > 0 and not on_legs)
         add_case(draw, table, low, high, style, (1, int(draw.integers(1, 5))), doors, free=free)
         if not on_legs and not rolling and low_z > 0:
-            table.body += box(
-                (front + 0.03, front + deep - overhang - 0.02), (a + 0.01, b - 0.01), (0.0, low_z + 0.001)
-            )
+            upright = (0.0, low_z + 0.001)
+            table.body += box((front + 0.03, front + deep - overhang - 0.02), (a + 0.01, b - 0.01), upright)
         if rolling:
             spots = [(u, v) for u in (front + 0.05, front + deep - overhang - 0.05) for v in (a + 0.05, b - 0.05)]
             wheels(table, spots, low_z, 0.05)

@@ -221,14 +221,12 @@ def _high_cistern(rng: Rng, moving: list[Moving], back: float, height: float) ->
     low = height + up
     start = x - 0.5 * deep
     solid = pipe + box((start, start + deep), half, (low, low + tall), fillet=0.02)
-    solid += box(
-        (start - 0.012, start + deep + 0.012), half + 0.012, (low + tall - 0.01, low + tall + 0.02), fillet=0.008
-    )
+    upright = (low + tall - 0.01, low + tall + 0.02)
+    solid += box((start - 0.012, start + deep + 0.012), half + 0.012, upright, fillet=0.008)
     side = rng.choice([-1.0, 1.0])
     y = side * (half + 0.03)
-    solid += box(
-        about(x, 0.012), (side * (half - 0.01), y + side * 0.012), (low + 0.6 * tall, low + 0.6 * tall + 0.015)
-    )
+    upright = (low + 0.6 * tall, low + 0.6 * tall + 0.015)
+    solid += box(about(x, 0.012), (side * (half - 0.01), y + side * 0.012), upright)
     long = rng.uniform(0.3, 0.55) * up + 0.2
     top = low + 0.6 * tall - GAP
     chain = tube([(x, y, top), (x, y, top - long)], 0.0035, 8)
@@ -251,9 +249,8 @@ def _wall(rng: Rng, moving: list[Moving], back: float, width: float, height: flo
     split = 0.0 if count == 1 else inner * rng.uniform(-0.3, 0.3)
     edges = [(-inner, inner)] if count == 1 else [(-inner, split - GAP / 2), (split + GAP / 2, inner)]
     for number, (y0, y1) in enumerate(edges):
-        button = box(
-            (back - 0.016, back - 0.008), (y0, y1), (z - high + 0.012 + GAP, z + high - 0.012 - GAP), fillet=0.002
-        )
+        upright = (z - high + 0.012 + GAP, z + high - 0.012 - GAP)
+        button = box((back - 0.016, back - 0.008), (y0, y1), upright, fillet=0.002)
         joint = prismatic("body", (1, 0, 0), 0.0, 0.006, (back - 0.016, 0.5 * (y0 + y1), z))
         moving.append((f"button_{number}", button, joint))
     return solid
