@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from artperl.detection import SHIPPED
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.showing import PAGE_MODULES
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def load_estimator(name: str | Path, method: str = "full", **changes: Any) -> Me
     DatasetError
         When there is no such estimator, or its files are damaged.
     """
-    with needs("artperl"):
+    with require_extra("artperl"):
         from artperl.methods.estimator_files import load_estimator as load  # torch takes seconds to import
 
     return load(name, method=method, **changes)
@@ -67,7 +67,7 @@ def load_scene_estimator(
     ConfigError
         When torch is not installed.
     """
-    with needs("artperl"):
+    with require_extra("artperl"):
         from artperl.scene.estimator import SceneEstimator  # torch takes seconds to import
 
     return SceneEstimator(estimators, detector, **changes)
@@ -75,7 +75,7 @@ def load_scene_estimator(
 
 def __getattr__(name: str) -> Any:
     if name == "Estimate":
-        with needs("artperl"):
+        with require_extra("artperl"):
             from artperl.core.estimate import Estimate  # torch takes seconds to import
 
         return Estimate

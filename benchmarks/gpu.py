@@ -19,7 +19,7 @@ from typing import Any
 
 import tyro
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.files import write_atomic
 from artsim.errors import ConfigError
 
@@ -125,7 +125,7 @@ def _text(data: bytes | str | None) -> str:
 
 def _device() -> str | None:
     """What torch calls the GPU."""
-    with needs("speed on a GPU"):
+    with require_extra("speed on a GPU"):
         import torch
     return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None
 

@@ -18,9 +18,9 @@ from artperl.agent.actions import BINS, MOVE, SCALE, TURN, compressed, nearest_b
 from artperl.agent.decision_process import Fitting, View
 from artperl.agent.policy import Policy
 from artperl.core.batch import Batch, concatenate
+from artperl.core.distributed import ALONE, Ranks
 from artperl.core.mixed_precision import autocast
 from artperl.core.pose import Theta
-from artperl.core.ranks import ALONE, Ranks
 from artperl.core.trees import KINDS
 from artsim.errors import ConfigError
 

@@ -60,9 +60,9 @@ class Report:
     """Processes that make training clouds; the result does not depend on it."""
 
     def run(self) -> None:
-        from artsim.common.extras import needs
+        from artsim.common.extras import require_extra
 
-        with needs("training"):
+        with require_extra("training"):
             import torch
 
             from artperl.training.comparison_run import ComparisonOptions, run_comparison

@@ -9,7 +9,7 @@ from typing import Literal
 
 import tyro
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.program import cores
 from artsim.errors import ConfigError
 
@@ -56,7 +56,7 @@ class TrainDetector:
     def run(self) -> None:
         if not 0.0 < self.share <= 1.0:
             raise ConfigError(f"{self.share} is no share", "share", "use a number above 0, up to 1")
-        with needs("train-detector", extra="detect"):
+        with require_extra("train-detector", extra="detect"):
             import torch
 
             from artperl.training.detector import scene_options, train_detector

@@ -41,7 +41,7 @@ MoreRows = Callable[[Source, int, Sample], dict[str, Array]]
 
 
 InTurn = Callable[[Iterator[dict[str, Tensor]]], Iterator[dict[str, Tensor]]]
-"""See :meth:`artperl.core.ranks.Ranks.in_turn`."""
+"""See :meth:`artperl.core.distributed.Ranks.in_turn`."""
 
 
 class _Rows(IterableDataset[dict[str, Array]]):

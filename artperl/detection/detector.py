@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 
-with needs("the detector"):
+with require_extra("the detector"):
     import torch
     from torch import Tensor
     from torch.nn import functional

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 
-with needs("the detector"):
+with require_extra("the detector"):
     from torch import Tensor, nn
     from transformers import ResNetConfig, UperNetConfig, UperNetForSemanticSegmentation
 

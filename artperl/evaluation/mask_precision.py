@@ -11,7 +11,7 @@ import numpy as np
 
 from artperl.detection.detector import Detector
 from artperl.evaluation.realistic_detections import LEAST_VISIBLE
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.progress import track
 from artsim.formats.coco import mask_record
 from artsim.scenes import SceneDataset, SceneRecord
@@ -46,7 +46,7 @@ def mask_precision(scenes: SceneDataset, found: Sequence[Mapping[str, Any]]) -> 
     found : sequence of mapping
         COCO's results, with the categories' places in the alphabet as ids.
     """
-    with needs("COCO's average precision"):
+    with require_extra("COCO's average precision"):
         from pycocotools.coco import COCO
         from pycocotools.cocoeval import COCOeval
 

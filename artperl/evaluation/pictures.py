@@ -14,7 +14,7 @@ from artperl.core.estimate import Estimate
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.scoring import compare
 from artperl.methods.protocol import Method
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
 from artsim.errors import ArtsimError
@@ -51,7 +51,7 @@ def curves(events: Path) -> bytes:
     events : Path
         Its folder ``events``.
     """
-    with needs("curves"):
+    with require_extra("curves"):
         from tensorboard.backend.event_processing import event_accumulator  # type: ignore[import-untyped]
 
     log = event_accumulator.EventAccumulator(str(events), size_guidance={"scalars": 0})
@@ -126,7 +126,7 @@ def _box(axes: Axes, camera: Camera, rotation: Array, center: Array, size: Array
 
 
 def _figure(width: float, height: float) -> Figure:
-    with needs("pictures"):
+    with require_extra("pictures"):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     figure = Figure(figsize=(width, height), dpi=110, facecolor="white")

@@ -109,7 +109,7 @@ def find_fit(context: Context, clock: Clock) -> Fit:
                 hypotheses = generate(context, best)
             some += [] if hypotheses is None else [hypotheses]
         if some:
-            fit = settle(Hypotheses.join(some), context, clock)
+            fit = refine_best(Hypotheses.join(some), context, clock)
             fit = _fit_again(fit, context, clock) if context.has_chain else fit
             best = fit if best is None else min(best, fit, key=_score)
     assert best is not None  # perception always proposes some
@@ -126,14 +126,14 @@ def _score(fit: Fit) -> float:
 def _fit_again(fit: Fit, context: Context, clock: Clock) -> Fit:
     """A fit that is fitted anew from where it ends, its points labelled anew, as long as that makes it better."""
     for _ in range(_AGAIN):
-        after = settle(Hypotheses(fit.shapes, fit.theta, [fit.row]), context, clock)
+        after = refine_best(Hypotheses(fit.shapes, fit.theta, [fit.row]), context, clock)
         before, fit = fit, min(fit, replace(after, start=fit.start), key=_score)
         if fit.residual > (1.0 - _GAIN) * before.residual:
             break
     return fit
 
 
-def settle(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
+def refine_best(hypotheses: Hypotheses, context: Context, clock: Clock) -> Fit:
     """The hypothesis with the best score after a few iterations on few points, fitted to all points.
 
     Points are labelled anew before the last fit. There axes lean as the points say.

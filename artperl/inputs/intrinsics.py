@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from artperl.inputs.bounds import guard, read_file, read_npy, read_npz
 from artperl.inputs.intrinsics_formats import Hints, Stated, stated_camera
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.files import parse_json
 from artsim.errors import ArtsimError, ConfigError
 
@@ -212,7 +212,7 @@ def _numbers(data: bytes, path: Path) -> Array:
 
 
 def _yaml(data: bytes, path: Path) -> Any:
-    with needs("intrinsics in YAML"):
+    with require_extra("intrinsics in YAML"):
         import yaml
 
     class Plain(yaml.SafeLoader):  # type: ignore[misc]

@@ -18,8 +18,8 @@ from torch.utils.data import DataLoader, Dataset
 from artperl.boxes.evidence import Evidence
 from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import Batch, concatenate
+from artperl.core.distributed import ALONE, Ranks
 from artperl.core.estimate import points_at_rest
-from artperl.core.ranks import ALONE, Ranks
 from artperl.core.tensor_files import read_tensors, write_tensors
 from artperl.data.batches import ignore_interrupt
 from artperl.evaluation.metrics import true_poses

@@ -11,7 +11,7 @@ from typing import Any, Protocol, cast
 
 import torch
 
-from artperl.core.ranks import Ranks
+from artperl.core.distributed import Ranks
 from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored

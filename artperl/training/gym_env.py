@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 
-with needs("artperl.training.gym_env", extra="train"):
+with require_extra("artperl.training.gym_env", extra="train"):
     import gymnasium as gym
     import torch
     from gymnasium import spaces

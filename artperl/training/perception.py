@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from artperl.core.distributed import Ranks
 from artperl.core.mixed_precision import autocast
-from artperl.core.ranks import Ranks
 from artperl.data.batches import batches
 from artperl.training.context import Context
 from artperl.training.perception_losses import perception_figures, perception_losses

@@ -9,13 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, cast
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 
-with needs("training"):
+with require_extra("training"):
     import torch
     from torch import nn
 
-from artperl.core.ranks import Ranks, several_started
+from artperl.core.distributed import Ranks, several_started
 from artperl.methods import StoredMethod
 from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 
-with needs("artperl.training.stable_baselines", extra="dev"):
+with require_extra("artperl.training.stable_baselines", extra="dev"):
     from stable_baselines3.common.vec_env import VecEnv
 
 from gymnasium.vector import VectorEnv

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from artperl.core.clouds import Clouds
+from artperl.core.distributed import ALONE, Ranks
 from artperl.core.mixed_precision import autocast
-from artperl.core.ranks import ALONE, Ranks
 from artperl.data.batches import batches
 from artperl.data.truth import Truth
 from artperl.training.context import Context

@@ -1,7 +1,7 @@
 """Optional dependencies: which extra brings each of them, and one sentence for whoever lacks one.
 
-Every import of an optional dependency stands in :func:`needs`, or is reached through a program whose last net is
-:func:`import_failure`: nobody has to read a traceback to learn what to install.
+Every import of an optional dependency stands in :func:`require_extra`, or is reached through a program whose last net
+is :func:`import_failure`: nobody has to read a traceback to learn what to install.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _OURS = ("artsim", "artperl", "benchmarks")
 
 
 @contextlib.contextmanager
-def needs(where: str, kind: type[ArtsimError] = ConfigError, extra: str = "") -> Iterator[None]:
+def require_extra(where: str, kind: type[ArtsimError] = ConfigError, extra: str = "") -> Iterator[None]:
     """Import optional dependencies in this block; what is missing, or does not start, becomes one sentence.
 
     Parameters
@@ -85,7 +85,7 @@ def needs(where: str, kind: type[ArtsimError] = ConfigError, extra: str = "") ->
 
 
 def import_mujoco(where: str, extra: str = "") -> ModuleType:
-    """MuJoCo; parameters as of :func:`needs`.
+    """MuJoCo; parameters as of :func:`require_extra`.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def import_mujoco(where: str, extra: str = "") -> ModuleType:
     """
     if platform.machine() in ("x86_64", "AMD64") and not _has_avx():
         raise ConfigError("MuJoCo needs a processor with AVX, which this one lacks", where, "use another machine")
-    with needs(where, extra=extra):
+    with require_extra(where, extra=extra):
         import mujoco
     module: ModuleType = mujoco
     return module
@@ -117,7 +117,7 @@ def is_own_module(error: ImportError) -> bool:
 def import_failure(
     error: ImportError, where: str | None, kind: type[ArtsimError] = ConfigError, extra: str = ""
 ) -> ArtsimError:
-    """The readable form of a failed import; parameters as of :func:`needs`."""
+    """The readable form of a failed import; parameters as of :func:`require_extra`."""
     module = (error.name or "").partition(".")[0]
     name, own = MODULES.get(module, (module, ""))
     fix = install_command(extra or own)
@@ -191,6 +191,6 @@ def import_pybullet() -> ModuleType:
     RenderError
         When it is not installed.
     """
-    with needs("pybullet", RenderError), silence_output():
+    with require_extra("pybullet", RenderError), silence_output():
         import pybullet
     return pybullet

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.names import printable, safe_name
 from artsim.common.outputs import check_output, write_output
 from artsim.common.palette import PALETTE
@@ -118,7 +118,7 @@ def state_text(sample: Sample, most: int = 4) -> str:
 
 def contact_sheet(shown: Sequence[Shown]) -> bytes:
     """PNG with, for each sample: depth; parts with boxes and joint axes; the cloud from another side."""
-    with needs("contact sheets"):
+    with require_extra("contact sheets"):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     rows = -(-len(shown) // _SAMPLES_PER_ROW)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.files import write_error
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
@@ -24,7 +24,7 @@ def write_recording(shown: Sequence[Shown], path: Path) -> None:
     ArtsimError
         When rerun is not installed, or the file cannot be written.
     """
-    with needs("artsim view --rerun"):
+    with require_extra("artsim view --rerun"):
         import rerun as rr
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.envs.maniskill import ENV_ID, EPISODE_LENGTH
 
-with needs("artsim.envs"):
+with require_extra("artsim.envs"):
     import gymnasium
     from gymnasium.envs.registration import WrapperSpec
 
@@ -26,7 +26,7 @@ def make_maniskill(**options: Any) -> Any:
     ConfigError
         When ManiSkill is not installed, or an option makes no sense.
     """
-    with needs(ENV_ID, extra="maniskill"):
+    with require_extra(ENV_ID, extra="maniskill"):
         from artsim.envs.maniskill.task import ArticulatedTask
     return ArticulatedTask(**options)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
 from artsim.model.kinematics import Array
@@ -23,7 +23,7 @@ def usd_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -
     friction: these are attributes of PhysX's schemas. It knows no joints that follow others: such a joint carries
     ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres).
     """
-    with needs("USD files"):
+    with require_extra("USD files"):
         from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.CreateInMemory()

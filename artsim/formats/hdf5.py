@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key, sample_members
@@ -28,7 +28,7 @@ class Hdf5Format(PlainFormat):
     def check(self, options: SampleOptions, folder: Path) -> None:
         """There must be depth and masks, and h5py."""
         require_images(options, folder, "hdf5", ("depth", "part_mask"))
-        with needs("hdf5"):
+        with require_extra("hdf5"):
             import h5py  # noqa: F401
 
     def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
@@ -56,7 +56,7 @@ def hdf5_bytes(sample: Sample, category_id: int) -> bytes:
     ``instance_attribute_maps``, ``camera_pose`` and ``artsim`` are JSON: what each instance is, the camera, and the
     sample's whole record.
     """
-    with needs("hdf5"):
+    with require_extra("hdf5"):
         import h5py
     assert sample.depth is not None
     assert sample.part_mask is not None

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.files import read_npz, write_atomic
 from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
@@ -190,7 +190,7 @@ def _searched(
 
 
 def _run_coacd(vertices: Array, faces: NDArray[np.int32], concavity: float, most: int) -> list[Mesh]:
-    with needs("convex decomposition", extra="sim"):
+    with require_extra("convex decomposition", extra="sim"):
         import coacd
 
     coacd.set_log_level("off")
@@ -218,7 +218,7 @@ def closed_volume(vertices: Array, faces: NDArray[np.int32]) -> float | None:
 
 def union_volume(pieces: Sequence[Mesh]) -> float:
     """What convex pieces hold together."""
-    with needs("convex decomposition", extra="sim"):
+    with require_extra("convex decomposition", extra="sim"):
         from manifold3d import Manifold, OpType
 
     hulls = [Manifold.hull_points(vertices) for vertices, _ in pieces]

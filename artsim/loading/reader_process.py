@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.errors import ArtsimError, AssetError
 
 _POLL_S = 0.005
@@ -96,7 +96,7 @@ _workers: dict[int, _Worker] = {}
 def _running(library: str) -> _Worker:
     worker = _workers.get(os.getpid())
     if worker is None or not worker.lives():
-        with needs(f"{library}, in a process with bounds,"):
+        with require_extra(f"{library}, in a process with bounds,"):
             worker = _workers[os.getpid()] = _Worker()
         atexit.register(worker.end)
     return worker

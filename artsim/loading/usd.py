@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.errors import AssetError
 from artsim.loading import primitives
 from artsim.loading.meshes import LoadLimits
@@ -70,7 +70,7 @@ def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[U
     ConfigError
         When usd-core is not installed.
     """
-    with needs("USD files"):
+    with require_extra("USD files"):
         import pxr  # noqa: F401
     found: tuple[UrdfRobot, list[Repair], list[bytes]] = read_apart(_READER, file, limits, body)
     return found

@@ -12,12 +12,12 @@ from manifold3d import Error, Manifold, Mesh64
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 
-with needs("collision checks"):
+with require_extra("collision checks"):
     import fcl
 
 PENETRATION = 1e-6

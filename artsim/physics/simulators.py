@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from artsim.common.extras import import_mujoco, import_pybullet, needs, silence_output
+from artsim.common.extras import import_mujoco, import_pybullet, require_extra, silence_output
 from artsim.errors import ArtsimError
 from artsim.loading.object_files import find_urdf
 from artsim.loading.urdf import load
@@ -149,7 +149,7 @@ def in_sapien(file: Path) -> LoadedFile:
 def _sapien() -> Any:
     with warnings.catch_warnings():  # about graphics, which are not used
         warnings.simplefilter("ignore")
-        with needs("sapien"):
+        with require_extra("sapien"):
             import sapien
     return sapien
 
@@ -231,7 +231,7 @@ def _compare(
 
 def poses_in_file(file: Path) -> LinkPoses:
     """Where the file itself puts its links, by yourdfpy: in double precision, which simulators do not all keep."""
-    with needs("where a file puts its links"):
+    with require_extra("where a file puts its links"):
         import yourdfpy
 
     robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_scene_graph=True)

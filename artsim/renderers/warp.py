@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.extras import needs, silence_output
+from artsim.common.extras import require_extra, silence_output
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
 from artsim.model.frame import Frame
@@ -274,7 +274,7 @@ def import_warp() -> ModuleType:
     RenderError
         When it is not installed, or cannot write its cache.
     """
-    with needs("warp", RenderError):
+    with require_extra("warp", RenderError):
         import warp
     warp.config.log_level = warp.LOG_WARNING
     try:

@@ -19,7 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.errors import ArtsimError, ConfigError
 from artsim.runs.pool import Progress, Tasks, WorkerLost, ignore
 from artsim.runs.storage import FolderStorage, storage_of
@@ -59,7 +59,7 @@ class RayPool:
     """
 
     def __init__(self, address: str, context: Any = None, packages: Sequence[str] = ("artsim",)):
-        with needs("work on Ray"):
+        with require_extra("work on Ray"):
             import ray
         self._ray = ray
         self._own = not ray.is_initialized()

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol, TypeAlias, TypeVar, cast
 
-from artsim.common.extras import install_command, needs
+from artsim.common.extras import install_command, require_extra
 from artsim.common.files import read_bounded, write_atomic, write_error
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 
@@ -212,7 +212,7 @@ class UrlStorage:
     def _system(self) -> tuple[Any, str]:
         """The file system, and the path in it; anew in each process, for connections do not outlive a fork."""
         if self._opened is None or self._opened[0] != os.getpid():
-            with needs(f"datasets at {self.place}", extra="storage"):
+            with require_extra(f"datasets at {self.place}", extra="storage"):
                 import fsspec
             try:
                 system, path = fsspec.core.url_to_fs(self.place)

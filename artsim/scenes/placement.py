@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from artsim.common.elementary import arccos, arctan2, cos
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.common.products import apply, dot, matmul, unit
 from artsim.making.outlines import rotation_about
 from artsim.model.appearance import Coat
@@ -263,6 +263,6 @@ def _model(obj: ArticulatedObject, k: int) -> Any:
 
 
 def _import_fcl() -> ModuleType:
-    with needs("scene"):
+    with require_extra("scene"):
         import fcl
     return fcl

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.checks.validity import check
-from artsim.common.extras import needs
+from artsim.common.extras import require_extra
 from artsim.model.collision import Sweep, surface_model
 from artsim.model.draws import joint_intervals
 from artsim.model.objects import ArticulatedObject
 
-with needs("collision checks"):
+with require_extra("collision checks"):
     import fcl
 
 _COLLISIONS = "collision free"

@@ -13,7 +13,7 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from artperl.core.ranks import Ranks
+from artperl.core.distributed import Ranks
 from artperl.training.options import ANCSH_PRESETS
 from artperl.training.run import Training
 from artsim.errors import ConfigError

@@ -19,7 +19,7 @@ import pytest
 import artperl.commands.verbs
 import artsim
 import artsim.commands.verbs
-from artsim.common.extras import MODULES, import_failure, import_mujoco, install_command, needs
+from artsim.common.extras import MODULES, import_failure, import_mujoco, install_command, require_extra
 from artsim.errors import ConfigError, RenderError
 from artsim.renderers import RENDERERS
 from tests.conftest import BOX_LAPTOP, ROOT, absent
@@ -276,7 +276,7 @@ def test_the_extra_that_is_named_brings_the_module(module: str) -> None:
 
 
 def load_films() -> None:
-    with needs("films", RenderError):
+    with require_extra("films", RenderError):
         import mujoco  # noqa: F401
 
 
@@ -323,7 +323,7 @@ def test_what_an_optional_module_itself_lacks_is_told_by_its_name() -> None:
 
 
 def test_a_fault_of_our_own_keeps_its_traceback() -> None:
-    with pytest.raises(ImportError, match="nonsense"), needs("films"):
+    with pytest.raises(ImportError, match="nonsense"), require_extra("films"):
         from artsim import nonsense  # type: ignore[attr-defined]  # noqa: F401
 
 
@@ -336,5 +336,5 @@ def test_the_command_fits_where_the_package_runs(tmp_path: Path, monkeypatch: py
     installed = tmp_path / "site-packages" / "artsim" / "common" / "extras.py"
     monkeypatch.setattr("artsim.common.extras.__file__", str(installed))
     assert install_command("train,view").endswith("pip install 'artsim[train,view]'")
-    with pytest.raises(ConfigError, match=r"Fix: .*pip install artsim$"), needs("films"):
+    with pytest.raises(ConfigError, match=r"Fix: .*pip install artsim$"), require_extra("films"):
         raise ModuleNotFoundError("No module named 'no_such_module'", name="no_such_module")
