@@ -141,7 +141,7 @@ class Restoration:
                     if not self.begun.complete:
                         journal.add(asdict(answer))
                 elif answer is not None:
-                    what = f"cannot be restored: made again, it has another checksum ({_OTHER_MAKER})"
+                    what = f"cannot be restored: regenerated, it has another checksum ({_OTHER_MAKER})"
                     self.failed.append(Problem(name, what, "generate the dataset again, into another folder"))
         self.files += [shard.name for shard in missing if shard.name in made]
         self.samples = sum(map(len, made.values()))

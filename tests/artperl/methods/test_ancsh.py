@@ -136,7 +136,11 @@ def test_a_saved_estimator_loads_to_the_same_estimates(tmp_path: Path) -> None:
     method = ANCSH(**networks, base=base)
     save_estimator(method, tmp_path, {})
     loaded = load_estimator(tmp_path, method="ancsh")
-    np.testing.assert_allclose(method(sample.points).T_camera_part, loaded(sample.points).T_camera_part, atol=1e-6)
+    for network, other in ((method.coordinates, loaded.coordinates), (method.joints, loaded.joints)):
+        for name, weights in network.state_dict().items():
+            assert torch.equal(weights, other.state_dict()[name])
+    # Sums over weights that lie elsewhere in memory may be rounded otherwise, and RANSAC may choose another triple.
+    np.testing.assert_allclose(method(sample.points).T_camera_part, loaded(sample.points).T_camera_part, atol=0.05)
     # Images of several objects take it by its folder, whatever its method.
     obj, camera = artsim.make("laptop", 5).with_diagonal(0.4), artsim.Camera.look_at((-0.9, 0.35, 0.6), (0, 0, 0))
     frame = artsim.render(obj, obj.tree.rest, camera)
