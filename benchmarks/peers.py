@@ -27,7 +27,7 @@ from artsim import ArticulatedObject, Camera, make_renderer, observe
 from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from artsim.observing.capture import draw_visible
 from artsim.renderers.raycast import pose
 from tests.agreement import Scene, choose, choose_procedural, draw_scenes

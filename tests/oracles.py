@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from artsim.common.extras import import_pybullet, silence_output
 from artsim.loading.zero_pose import unused_name
-from artsim.model.kinematics import Array, invert_transform
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform
 from artsim.physics.simulators import poses_in_file
 from tests.usd_oracle import ParsedStage
 

@@ -43,7 +43,8 @@ from artperl.evaluation.artimage_records import (
 )
 from artperl.inputs.intrinsics import read_intrinsics
 from artsim.errors import DatasetError
-from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.kinematics import Array
+from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.sample import ARTSIM_VERSION, Sample
 
 Split = Literal["train", "test"]

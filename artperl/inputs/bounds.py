@@ -16,7 +16,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.files import npy_header, read_bounded
+from artsim.common.array_files import npy_header
+from artsim.common.files import read_bounded
 from artsim.errors import ArtsimError, ConfigError
 
 MAX_BYTES = 80_000_000

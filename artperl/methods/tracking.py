@@ -27,7 +27,8 @@ from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.search import Fit
 from artperl.perception.preprocess import Cloud
-from artsim.model.kinematics import Array, invert_transform
+from artsim.model.kinematics import Array
+from artsim.model.transforms import invert_transform
 
 POINTS = 1024
 """Points of a frame that are looked at, and labelled."""

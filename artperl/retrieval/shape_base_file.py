@@ -15,7 +15,8 @@ from torch import Tensor
 from artperl.core.shapes import Shapes
 from artperl.core.trees import Trees
 from artperl.retrieval.shape_base import ShapeBase
-from artsim.common.files import atomic_file, parse_json, read_npz
+from artsim.common.array_files import read_npz
+from artsim.common.files import atomic_file, parse_json
 from artsim.errors import DatasetError, KinematicsError
 from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import MAX_PARTS

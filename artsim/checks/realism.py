@@ -33,8 +33,9 @@ from scipy.spatial import cKDTree
 from artsim.errors import AssetError
 from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, ViewOptions, sample_state, sample_view
-from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.capture import observe
 
 MEASURES = ("surface", "parts", "boxes", "joints", "ranges")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 
-from artsim.common.files import MAX_ARRAY_BYTES
+from artsim.common.array_files import MAX_ARRAY_BYTES
 from artsim.model.object_file import parse_object
 from artsim.model.objects import ArticulatedObject
 from artsim.runs.storage import Place, storage_of

@@ -17,7 +17,8 @@ import orjson
 from numpy.typing import NDArray
 from PIL import Image
 
-from artsim.common.files import atomic_file, open_image, parse_npy
+from artsim.common.array_files import parse_npy
+from artsim.common.files import atomic_file, open_image
 from artsim.datasets.tar_index import read_index
 from artsim.errors import DatasetError
 from artsim.observing.sample import Sample

@@ -12,7 +12,7 @@ from artsim.common.files import write_error
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from artsim.observing.annotation import Shown, axis_segment
 
 

@@ -23,9 +23,10 @@ from artsim.formats.images import depth_png, mask_png, png_bytes
 from artsim.formats.pinhole import integer_centre_K
 from artsim.model.camera import Camera
 from artsim.model.draws import sample_scale
-from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.model.ply import mesh_ply
+from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.sample import Sample
 from artsim.renderers.raycast import pose, render_posed
 from artsim.runs.tasks import Output

@@ -17,7 +17,7 @@ from artsim.datasets.shards import sample_key, sample_members
 from artsim.formats.base import Piece, PlainFormat, require_images
 from artsim.formats.pinhole import integer_centre_K
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import invert_transform
+from artsim.model.transforms import invert_transform
 from artsim.observing.sample import Sample
 from artsim.runs.tasks import Output
 

@@ -15,8 +15,9 @@ from artsim.loading.meshes import LoadLimits, MeshReader
 from artsim.loading.object_files import find_urdf, read_urdf
 from artsim.loading.partnet import read_side_files
 from artsim.loading.urdf_xml import parse_robot, safe_xml
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Body, Mesh, Part, Repair
+from artsim.model.transforms import transform_points
 
 
 def read_bodies(

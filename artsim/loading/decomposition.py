@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.common.array_files import read_npz
 from artsim.common.extras import require_extra
-from artsim.common.files import read_npz, write_atomic
+from artsim.common.files import write_atomic
 from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
 from artsim.model.convex_bodies import DEFAULT_DENSITY, convex_hull

@@ -15,8 +15,9 @@ from artsim.loading.urdf_document import UrdfRobot
 from artsim.loading.zero_pose import combined
 from artsim.model.convex_bodies import DEFAULT_DENSITY, convex_hull
 from artsim.model.inertia import Inertia
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import UNKNOWN_DYNAMICS, Body, JointDynamics, Mesh, Part
+from artsim.model.transforms import transform_points
 
 _THIN = 0.01
 """Share of its length as which a flat part counts as thick."""

@@ -22,8 +22,9 @@ from artsim.loading.mesh_files.gltf import Key, Owner, read_gltf_parts
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
 from artsim.loading.urdf_document import Geometry, MeshFile
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
+from artsim.model.transforms import transform_points
 
 __all__ = [
     "LoadLimits",

@@ -15,8 +15,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from artsim.common.products import norm
-from artsim.model.kinematics import Array, KinematicTree, transform_points
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import Part, Repair
+from artsim.model.transforms import transform_points
 
 _STATES = 61  # of a joint's range that are looked at before refining
 _HINGED_SHUT = np.deg2rad(15.0)  # a lid's limit may lie this far beyond the state in which it is shut

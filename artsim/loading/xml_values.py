@@ -12,8 +12,9 @@ from lxml import etree
 from artsim.common.elementary import cos, sin
 from artsim.common.products import matmul, norm, unit
 from artsim.errors import AssetError
-from artsim.model.kinematics import Array, cross_matrix
+from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
+from artsim.model.transforms import cross_matrix
 
 # What C's strtod reads in decimal; Python's float would also take 1_0 and other scripts' digits.
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan)", re.IGNORECASE | re.ASCII)

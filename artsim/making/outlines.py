@@ -9,7 +9,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
 from artsim.common.products import matmul, unit
-from artsim.model.kinematics import Array, cross_matrix
+from artsim.model.kinematics import Array
+from artsim.model.transforms import cross_matrix
 
 Vector = Sequence[float] | Array
 FRONT = np.array([-1.0, 0.0, 0.0])

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.elementary import tan
 from artsim.common.products import apply, dot, norm
 from artsim.errors import ConfigError
-from artsim.model.kinematics import Array, invert_transform
+from artsim.model.kinematics import Array
+from artsim.model.transforms import invert_transform
 
 
 @dataclass(frozen=True, eq=False)

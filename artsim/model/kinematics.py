@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, matmul, norm
 from artsim.errors import KinematicsError
+from artsim.model.transforms import cross_matrix
 
 Array = NDArray[np.float64]
 
@@ -422,58 +423,3 @@ def _joint(data: object, where: str) -> Joint:
 
 
 _FIELDS = {"name", "type", "parent", "axis", "origin", "lower", "upper", "rest", "pitch", "mimic"}
-
-
-def cross_matrix(vectors: ArrayLike) -> Array:
-    """Skew-symmetric matrices: ``cross_matrix(a) @ b == cross(a, b)``.
-
-    Parameters
-    ----------
-    vectors : (..., 3) float
-
-    Returns
-    -------
-    (..., 3, 3) float
-    """
-    v = np.asarray(vectors, dtype=np.float64)
-    matrix = np.zeros((*v.shape, 3))
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
-    return matrix
-
-
-def transform_points(T_to_from: ArrayLike, points: ArrayLike) -> Array:
-    """Map points by one transform, or by one transform per point.
-
-    Parameters
-    ----------
-    T_to_from : (..., 4, 4) float
-    points : (..., N, 3) float
-
-    Returns
-    -------
-    (..., N, 3) float
-    """
-    T = np.asarray(T_to_from, dtype=np.float64)
-    return apply(T[..., None, :3, :3], np.asarray(points)) + T[..., None, :3, 3]
-
-
-def invert_transform(T_to_from: ArrayLike) -> Array:
-    """Inverse of rigid transforms.
-
-    Parameters
-    ----------
-    T_to_from : (..., 4, 4) float
-
-    Returns
-    -------
-    (..., 4, 4) float
-        ``T_from_to``
-    """
-    T = np.asarray(T_to_from, dtype=np.float64)
-    inverse = np.zeros_like(T)
-    rotation = np.swapaxes(T[..., :3, :3], -1, -2)
-    inverse[..., :3, :3] = rotation
-    inverse[..., :3, 3] = -apply(rotation, T[..., :3, 3])
-    inverse[..., 3, 3] = 1.0
-    return inverse

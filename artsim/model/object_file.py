@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.files import MAX_ARRAY_BYTES, parse_json, parse_npz, read_bounded, write_atomic
+from artsim.common.array_files import MAX_ARRAY_BYTES, parse_npz
+from artsim.common.files import parse_json, read_bounded, write_atomic
 from artsim.common.names import printable
 from artsim.errors import AssetError, KinematicsError
 from artsim.model.kinematics import LARGEST, Array, KinematicTree

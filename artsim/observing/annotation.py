@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from artsim.common.palette import PALETTE
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
+from artsim.model.transforms import transform_points
 from artsim.observing.sample import Sample
 
 _LIGHT = np.array([0.35, -0.55, -0.76])  # towards the light, camera frame

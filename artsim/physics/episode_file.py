@@ -23,9 +23,10 @@ from artsim.common.progress import track
 from artsim.datasets.shards import ShardReader, sample_key, write_shard
 from artsim.errors import DatasetError
 from artsim.model.draws import joint_intervals
-from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.object_file import load_object, save_object
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions
 from artsim.physics.world import engine_of

@@ -31,8 +31,9 @@ from artsim.errors import ArtsimError
 from artsim.loading.object_files import find_urdf
 from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, sample_state
-from artsim.model.kinematics import Array, invert_transform, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform, transform_points
 
 AGREEMENT = 1e-6
 """Metres by which places of parts may differ; for objects larger than 1 m, share of their diagonal."""

@@ -19,8 +19,9 @@ from artsim.errors import RenderError
 from artsim.model.appearance import Coat, Lights, Patch, patches, subpixel
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
+from artsim.model.transforms import transform_points
 from artsim.renderers.base import depth_range
 from artsim.renderers.geometry_cache import GeometryCache
 from artsim.renderers.raycast import pose

@@ -13,8 +13,9 @@ from artsim.common.products import matmul
 from artsim.errors import ConfigError
 from artsim.model.appearance import Coat, Lights
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import Array, Joint, KinematicTree, transform_points
+from artsim.model.kinematics import Array, Joint, KinematicTree
 from artsim.model.objects import ArticulatedObject, Mesh, Part, content_sha256
+from artsim.model.transforms import transform_points
 
 MAX_THINGS = 254
 """Instance ids are stored in a byte; 255 marks places where nothing stands."""

@@ -13,7 +13,8 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from artsim.common.files import open_image, parse_npy, read_bounded, read_json
+from artsim.common.array_files import parse_npy
+from artsim.common.files import open_image, read_bounded, read_json
 from artsim.common.json_records import Pixels, as_type, from_json_values
 from artsim.datasets.shards import MAX_PIXELS, ShardReader, sample_from_members
 from artsim.errors import DatasetError

@@ -20,8 +20,9 @@ from artsim.model.appearance import Colour, Lights, Sun
 from artsim.model.appearance.finishes import draw_coats, repaint_coats
 from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, sample_state
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import transform_points
 from artsim.renderers.scene import Scene, Thing
 from artsim.scenes.placement import Area, Arrangement
 from artsim.scenes.props import TABLE_HEIGHT, distractor, room, table

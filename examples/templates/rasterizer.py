@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import transform_points
 from artsim.renderers.raycast import pose
 
 DEGENERATE = 1e-12

@@ -18,7 +18,7 @@ from artperl.evaluation.reartmix_files import NAMES, ReArtMixFolder
 from artperl.inputs.detections import read_detections
 from artperl.scene.estimator import SceneEstimate, SceneEstimator
 from artsim.errors import ArtsimError, ConfigError, DatasetError
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun, generate_scenes, open_scenes
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
 

@@ -7,7 +7,7 @@ import pytest
 
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.robotarm import arm_samples, seven_part_arm
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from artsim.observing.interference import FOREIGN
 from artsim.observing.sample import Sample
 from artsim.scenes import SceneOptions, make_scene

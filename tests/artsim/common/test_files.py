@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from artsim.common.files import parse_json, parse_npy, parse_npz, read_bounded, read_json
+from artsim.common.array_files import parse_npy, parse_npz
+from artsim.common.files import parse_json, read_bounded, read_json
 from artsim.errors import AssetError
 
 

@@ -15,9 +15,10 @@ import pytest
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.description import document_bytes
+from artsim.datasets.sample_checks import sample_problems
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import ShardReader, write_shard
-from artsim.datasets.verify import sample_problems, verify
+from artsim.datasets.verify import verify
 from artsim.loading.sources import find_sources
 from artsim.observing.sample import Sample
 from tests.conftest import ASSETS

@@ -15,14 +15,14 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
 
 import artsim.envs
-from artsim.datasets.verify import sample_problems
+from artsim.datasets.sample_checks import sample_problems
 from artsim.envs.articulated import EPISODE_LENGTH, ArticulatedEnv
 from artsim.errors import ArtsimError, ConfigError
 from artsim.families import make
 from artsim.model.camera import Camera
 from artsim.model.draws import ViewOptions
-from artsim.model.kinematics import invert_transform
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform
 from artsim.physics.episode import openness
 from tests.conftest import ASSETS
 

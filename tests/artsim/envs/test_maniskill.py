@@ -15,8 +15,8 @@ from artsim.families import make
 from artsim.model.camera import Camera
 from artsim.model.draws import joint_intervals
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.capture import observe
 from artsim.physics.episode import openness
 from artsim.renderers import render

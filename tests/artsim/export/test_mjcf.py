@@ -11,9 +11,10 @@ from artsim.errors import ConfigError
 from artsim.export import FORMATS, export
 from artsim.export.options import Base, ExportOptions
 from artsim.families import make
-from artsim.model.kinematics import Array, transform_points
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, part_inertia
 from artsim.model.robot import as_robot
+from artsim.model.transforms import transform_points
 from tests.conftest import installed, valve
 
 rng = np.random.default_rng(0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from artsim import make
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -17,7 +17,7 @@ from artsim.families.keys import (
 from artsim.making.assembly import Assembly
 from artsim.making.solids import hull, loft
 from artsim.model.collision import Sweep
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 
 DEVICES = ["keyboard", "mouse", "phone", "printer", "remote"]
 

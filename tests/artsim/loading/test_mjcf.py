@@ -20,10 +20,10 @@ from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.draws import ViewOptions, sample_view
-from artsim.model.kinematics import transform_points
 from artsim.model.object_file import load_object, save_object
 from artsim.model.objects import ArticulatedObject, JointDynamics, part_inertia
 from artsim.model.robot import as_robot
+from artsim.model.transforms import transform_points
 from artsim.renderers import render
 from tests.artsim.loading.round_trip import FAMILIES, assert_same_geometry, assert_same_object
 from tests.conftest import installed, valve

@@ -12,8 +12,8 @@ import pytest
 from artsim.errors import AssetError, ConfigError, SceneError
 from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
-from artsim.model.kinematics import transform_points
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import transform_points
 from tests.artsim.loading.test_mjcf import BOX, TETRAHEDRON, asset, repairs_of, written
 from tests.conftest import BOX_LAPTOP, CASES, installed
 

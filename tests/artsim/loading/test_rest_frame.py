@@ -11,8 +11,8 @@ import trimesh
 import artsim
 from artsim.export import export
 from artsim.loading.sources import find_sources
-from artsim.model.kinematics import transform_points
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import transform_points
 
 _OPEN = 0.6
 """Radians that PartNet-Mobility's scissors are open at their files' zero, half of it to either side of Y."""

@@ -16,8 +16,8 @@ import artsim
 from artsim.errors import ArtsimError, AssetError
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.urdf import load
-from artsim.model.kinematics import transform_points
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import transform_points
 from tests.conftest import ASSETS, BOX_LAPTOP
 
 QUIRKS = ASSETS / "quirks"

@@ -8,7 +8,7 @@ import pytest
 import artsim
 from artsim import StateOptions, ViewOptions, sample_state, sample_view
 from artsim.model.draws import ViewPreset, bounding_sphere, joint_intervals, sample_scale
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from tests.conftest import ASSETS
 
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import artsim
-from artsim.model.kinematics import transform_points
 from artsim.model.stretching import SPREAD, coupled_axes, draw_axis_map, stretchable_axes
+from artsim.model.transforms import transform_points
 from artsim.variation.geometry import resized, stretched
 from tests.conftest import valve
 

@@ -12,12 +12,12 @@ from trimesh.proximity import closest_point
 
 import artsim
 from artsim import StateOptions, ViewOptions, observe, sample_state, sample_view
-from artsim.datasets.verify import sample_problems
+from artsim.datasets.sample_checks import sample_problems
 from artsim.loading.sources import find_sources
 from artsim.model.draws import sample_scale
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import invert_transform, transform_points
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.sample import Sample
 from tests.conftest import ASSETS, DEMO
 

@@ -11,7 +11,8 @@ import pytest
 import artsim
 from artsim import Camera, ViewOptions, observe, sample_state, sample_view
 from artsim.datasets.plan import SampleOptions
-from artsim.datasets.verify import sample_problems, verify
+from artsim.datasets.sample_checks import sample_problems
+from artsim.datasets.verify import verify
 from artsim.errors import ConfigError
 from artsim.loading.sources import find_sources
 from artsim.model.draws import StateOptions

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from artsim.datasets.verify import sample_problems
+from artsim.datasets.sample_checks import sample_problems
 from artsim.errors import ArtsimError
 from artsim.model.camera import Camera
 from artsim.model.draws import ViewOptions

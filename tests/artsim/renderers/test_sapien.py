@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import artsim
 from artsim import Camera, make_renderer, observe
-from artsim.datasets.verify import sample_problems
+from artsim.datasets.sample_checks import sample_problems
 from artsim.loading.sources import find_sources
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.objects import ArticulatedObject

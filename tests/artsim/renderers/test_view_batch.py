@@ -12,8 +12,8 @@ from artsim import StateOptions, ViewOptions, make, sample_state, sample_view
 from artsim.errors import ConfigError
 from artsim.model.camera import look_at_transform
 from artsim.model.draws import ViewPreset, bounding_sphere
-from artsim.model.kinematics import invert_transform
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import invert_transform
 from artsim.renderers.view_batch import draw_views
 
 COUNT = 1500

@@ -21,7 +21,7 @@ from artsim.errors import ConfigError
 from artsim.making.solids import box
 from artsim.model.appearance import Lights, Material, Sun
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from artsim.renderers import Renderer
 from artsim.renderers.scene import Scene, Thing
 from artsim.renderers.scene_renderer import render_scene

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from artsim.errors import ConfigError
 from artsim.model.convex_bodies import add_bodies
 from artsim.model.draws import StateOptions
-from artsim.model.kinematics import transform_points
+from artsim.model.transforms import transform_points
 from artsim.renderers.scene import Scene, Thing
 from artsim.scenes import SceneOptions, make_scene
 from artsim.scenes.placement import are_apart
