@@ -21,7 +21,8 @@ from artsim.errors import ArtsimError
 from artsim.loading.object_files import find_urdf, is_urdf
 from artsim.model.collision import Collision, Sweep
 from artsim.model.convex_bodies import is_convex
-from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.objects import ArticulatedObject
+from artsim.model.part_inertia import part_inertia
 
 _SHOWN = 5
 

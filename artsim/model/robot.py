@@ -13,7 +13,8 @@ from artsim.common.names import safe_name
 from artsim.errors import AssetError
 from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.kinematics import Array, Joint
-from artsim.model.objects import ArticulatedObject, Mesh, part_inertia
+from artsim.model.objects import ArticulatedObject, Mesh
+from artsim.model.part_inertia import part_inertia
 
 GRAVITY = 9.81
 DECAY = 0.5

@@ -12,7 +12,8 @@ from artsim.export import FORMATS, export
 from artsim.export.options import Base, ExportOptions
 from artsim.families import make
 from artsim.model.kinematics import Array
-from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.objects import ArticulatedObject
+from artsim.model.part_inertia import part_inertia
 from artsim.model.robot import as_robot
 from artsim.model.transforms import transform_points
 from tests.conftest import installed, valve

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.objects import ArticulatedObject
+from artsim.model.part_inertia import part_inertia
 from artsim.model.robot import as_robot
 
 CLOSE = 1e-6

@@ -21,7 +21,8 @@ from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.draws import ViewOptions, sample_view
 from artsim.model.object_file import load_object, save_object
-from artsim.model.objects import ArticulatedObject, JointDynamics, part_inertia
+from artsim.model.objects import ArticulatedObject, JointDynamics
+from artsim.model.part_inertia import part_inertia
 from artsim.model.robot import as_robot
 from artsim.model.transforms import transform_points
 from artsim.renderers import render

@@ -17,7 +17,7 @@ from artsim.families import make
 from artsim.loading.sources import find_sources
 from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
-from artsim.model.objects import part_inertia
+from artsim.model.part_inertia import part_inertia
 from tests.artsim.loading.round_trip import FAMILIES, assert_same_geometry, assert_same_object
 from tests.artsim.loading.usd_files import AT_LID, BODY, CUBE, HEAD, HINGE, PAIR, body, joint, repairs_of, written
 from tests.conftest import installed, valve

@@ -13,7 +13,8 @@ from artsim.loading.urdf import load
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.solids import Solid, box
 from artsim.model.inertia import combine_inertias
-from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.objects import ArticulatedObject
+from artsim.model.part_inertia import part_inertia
 from tests.conftest import ASSETS, valve
 
 

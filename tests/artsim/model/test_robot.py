@@ -10,7 +10,7 @@ from lxml import etree
 
 from artsim.export import export
 from artsim.families import make
-from artsim.model.objects import part_inertia
+from artsim.model.part_inertia import part_inertia
 from artsim.model.robot import HELPER_SHARE, as_robot
 from tests.conftest import valve
 

@@ -21,7 +21,8 @@ from artsim.families import FAMILIES, make
 from artsim.loading.sources import find_sources
 from artsim.model.inertia import combine_inertias
 from artsim.model.kinematics import Array, KinematicTree
-from artsim.model.objects import ArticulatedObject, part_inertia
+from artsim.model.objects import ArticulatedObject
+from artsim.model.part_inertia import part_inertia
 from artsim.model.robot import as_robot
 from artsim.physics import world
 from artsim.physics.bullet_body import BulletBody
