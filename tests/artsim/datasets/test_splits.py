@@ -70,7 +70,7 @@ def test_splits_and_keys_do_not_depend_on_geometry() -> None:
 
     def compiled(processor: str) -> list[CompiledSource]:
         return [
-            CompiledSource("", s.sha256, s.category, "same", f"{processor}{s.seed}", 2, False, (), f"{processor}")
+            CompiledSource(s.sha256, s.category, "same", f"{processor}{s.seed}", 2, False, (), f"{processor}")
             for s in sources
         ]
 
@@ -83,7 +83,7 @@ def test_splits_and_keys_do_not_depend_on_geometry() -> None:
 @pytest.mark.slow
 def test_objects_of_one_content_share_a_split_whatever_they_are_called() -> None:
     asked = Plan(0, 10, 8, (0.4, 0.3, 0.3), SampleOptions(), ())
-    source = CompiledSource("", "5" * 64, "laptop", "1", "6" * 64, 2, False, (), "")
+    source = CompiledSource("5" * 64, "laptop", "1", "6" * 64, 2, False, (), "")
     compiled = [replace(source, identity=f"{n // 2:064x}", object_id=str(n)) for n in range(40)]
     planned = list(planned_objects(family_sources(["laptop"], 40), compiled, asked))
     assert all(one.split == two.split for one, two in zip(planned[::2], planned[1::2], strict=True))
