@@ -135,9 +135,30 @@ def safe_mjcf(data: bytes, file: Path, paths: AssetPaths, limits: LoadLimits, re
     _check_size(root, file, limits)
     meshes, unread = _take_meshes(root, settings, file)
     _name_height_fields(root)
+    if _take_percent_signs(root):
+        repairs.append(Repair("file", "each % in a name is read as _"))
+        meshes, unread = {_plain(name): of for name, of in meshes.items()}, {_plain(name) for name in unread}
     text = etree.tostring(root, encoding="unicode")
     left_out = tuple(f"<{tag}>" for tag in soft)
     return SafeMjcf(text, meshes, unread, left_out, settings.get("settotalmass"), contents)
+
+
+def _take_percent_signs(root: etree._Element) -> bool:
+    """Replace the percent signs of all values; False where there are none.
+
+    MuJoCo prints what it refuses with names as formats of C: ``%n`` ends the process, ``%s`` reads any memory.
+    """
+    found = False
+    for element in root.iter(etree.Element):
+        for key, value in element.attrib.items():
+            if "%" in value:
+                element.set(key, _plain(str(value)))
+                found = True
+    return found
+
+
+def _plain(name: str) -> str:
+    return name.replace("%", "_")
 
 
 def _compiler_settings(root: etree._Element) -> dict[str, str]:

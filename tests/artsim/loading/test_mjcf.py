@@ -337,3 +337,16 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path) -> None:
     shutil.copy(tmp_path / "secret.obj", tmp_path / "o" / "own.obj")
     path.write_text(path.read_text().replace("inner", "own"))
     assert len(load(path)) == 1
+
+
+def test_percent_signs_are_no_formats_of_c(tmp_path: Path) -> None:
+    """MuJoCo's messages take names for formats: with ``%n`` it ends the process."""
+    installed("mujoco")
+    body = '<body name="50%n"><joint type="hinge" range="0 1"/><geom name="%s%n" type="box" size="1 1 1"{}/></body>'
+    path = tmp_path / "a.xml"
+    path.write_text(f"<mujoco><worldbody>{body.format('')}</worldbody></mujoco>")
+    obj = load(path)
+    assert "each % in a name is read as _" in " ".join(map(str, obj.repairs))
+    path.write_text(f"<mujoco><worldbody>{body.format(' class=' + chr(34) + '%s%n' + chr(34))}</worldbody></mujoco>")
+    with pytest.raises(AssetError, match="MuJoCo refuses it"):
+        load(path)
