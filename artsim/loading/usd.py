@@ -81,9 +81,9 @@ def _read(
 ) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
     from pxr import Tf
 
-    stage, contents = open_stage(file, limits, holds)
-    repairs = [Repair("file", f"is composed without what USD refuses: {e}") for e in stage.GetCompositionErrors()]
     try:
+        stage, contents = open_stage(file, limits, holds)
+        repairs = [Repair("file", f"is composed without what USD refuses: {e}") for e in stage.GetCompositionErrors()]
         reader = StageReader(stage, file, limits, repairs)
         links = read_links(reader, read_joints(reader))
     except (Tf.ErrorException, UnicodeDecodeError) as error:  # values are read when they are asked for

@@ -163,7 +163,9 @@ def of_json(rng: Random, data: bytes) -> bytes:
                 del holder[key]
             case 1 if isinstance(holder, list):
                 copies = 1 if isinstance(holder[key], dict | list) else rng.choice((1, 2, 300))
-                holder[key:key] = [holder[key]] * copies  # copies of copies of containers would have no end
+                holder[key:key] = [
+                    deepcopy(holder[key]) for _ in range(copies)
+                ]  # one that stands twice may hold itself
             case 2:
                 holder[key] = json.loads(json.dumps(other[at]))
             case 3:
