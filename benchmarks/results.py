@@ -14,6 +14,7 @@ import os
 import platform
 import subprocess
 import sys
+import sysconfig
 import time
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timezone
@@ -130,8 +131,19 @@ def run(result: Result) -> tuple[Result, str]:
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     )
     result = replace(result.today(), date=now, machine=machine, figures=figures)
-    text = "\n".join(lines)
+    text = _without_places("\n".join(lines))
     return result, f"\n```\n{text}\n```\n" if "\n|" not in text else f"\n{text}\n"
+
+
+def _without_places(text: str) -> str:
+    """A text in which folders of this machine have the names that they have on any."""
+    places = {
+        sysconfig.get_path("purelib"): "site-packages",
+        os.environ.get("ARTSIM_PARTNET_DIR", ""): "$ARTSIM_PARTNET_DIR",
+    }
+    for place, name in (places | {str(ROOT): "."}).items():
+        text = text.replace(place, name) if place else text
+    return text
 
 
 def page(name: str, result: Result, text: str) -> str:

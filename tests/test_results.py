@@ -121,3 +121,9 @@ def test_the_digest_of_a_family_sees_millimetres_and_no_micrometres() -> None:
     obj = make("laptop", 1)
     assert family_digest([obj.scaled(1 + 1e-9)]) == family_digest([obj])
     assert len({family_digest([other]) for other in (obj, obj.scaled(1.01), make("laptop", 2))}) == 3
+
+
+def test_results_name_no_folder_of_the_machine_that_made_them() -> None:
+    place = re.compile(r"/(?:site-packages|partnet_mobility|home|root|tmp)/")
+    for page in FOLDER.glob("*.*"):
+        assert not place.search(page.read_text()), page.name

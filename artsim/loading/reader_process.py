@@ -9,21 +9,25 @@ from __future__ import annotations
 import atexit
 import contextlib
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import threading
 import traceback
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from artsim.common.extras import require_extra
 from artsim.errors import ArtsimError, AssetError
+from artsim.loading.meshes import LoadLimits
+from artsim.loading.messages import read_message, write_message
 
 _POLL_S = 0.005
 """Between two looks at the process: it can take some 20 MB meanwhile."""
+_ARGUMENTS = (LoadLimits,)
+"""Records that a request may hold besides plain values."""
 _START = "from artsim.loading.reader_process import serve; serve()"
 
 
@@ -44,6 +48,8 @@ class Reader(NamedTuple):
 
     Attributes
     ----------
+    name : str
+        Where it stands, as ``module:name``: the process imports it.
     read : callable
         Of a module. Called as ``read(file, *arguments, holds)``; it calls ``holds`` with the bytes that the content has
         before it lets the library read them.
@@ -51,11 +57,15 @@ class Reader(NamedTuple):
         Called once in each process: what it takes, such as imports, counts for no file.
     library : str
         For messages.
+    records : tuple of type
+        Dataclasses that arguments and results may hold: see :mod:`artsim.loading.messages`.
     """
 
+    name: str
     read: Callable[..., Any]
     prepare: Callable[[], object]
     library: str
+    records: tuple[type, ...] = ()
 
 
 def read_apart(reader: Reader, file: Path, *arguments: Any, bounds: Bounds | None = None) -> Any:
@@ -83,8 +93,10 @@ def read_apart(reader: Reader, file: Path, *arguments: Any, bounds: Bounds | Non
         except BaseException:  # Ctrl-C included: what it would answer later belongs to no one
             worker.end()
             raise
-    if not done:
+    if isinstance(answer, ArtsimError):
         raise answer
+    if not done:
+        raise RuntimeError(f"a reader failed:\n{answer}")
     return answer
 
 
@@ -130,17 +142,18 @@ class _Worker:
 
     def ask(self, reader: Reader, file: Path, arguments: Any, bounds: Bounds) -> tuple[bool, Any]:
         """Whether a file is read, and what is read or the error."""
-        self._send((str(Path.cwd()), reader, (file, *arguments)))
-        self._receive()  # it is ready: what it has taken by now counts for no file
+        self._send((str(Path.cwd()), reader.name, (file, *arguments)))
+        self._receive(reader)  # it is ready: what it has taken by now counts for no file
         watch = _Watch(self._seen, self._gone, bounds)
         try:
             self._send(None)
             while True:
-                kind, value = self._receive()
+                kind, value = self._receive(reader)
                 if kind != "holds":
                     return kind == "done", value
                 watch.content_mb = value / 1e6
-        except (EOFError, OSError, pickle.UnpicklingError) as error:
+        except (EOFError, OSError, ValueError) as error:
+            self._process.kill()  # one that answers in no message is no better than one that has ended
             code = self._process.wait()
             if watch.excess is not None:
                 raise AssetError(
@@ -157,12 +170,11 @@ class _Worker:
 
     def _send(self, what: Any) -> None:
         assert self._process.stdin is not None
-        pickle.dump(what, self._process.stdin)
-        self._process.stdin.flush()
+        write_message(self._process.stdin, what)
 
-    def _receive(self) -> Any:
+    def _receive(self, reader: Reader) -> Any:
         assert self._process.stdout is not None
-        return pickle.load(self._process.stdout)
+        return read_message(self._process.stdout, reader.records)
 
 
 class _Watch(threading.Thread):
@@ -212,24 +224,24 @@ def serve() -> None:
     os.dup2(2, 1)
 
     def answer(kind: str, value: Any) -> None:
-        answers.write(pickle.dumps((kind, value)))
-        answers.flush()
+        write_message(answers, (kind, value))
 
-    prepared = set()
+    readers: dict[str, Reader] = {}
     while True:
         try:
-            folder, reader, arguments = pickle.load(sys.stdin.buffer)
-            if reader not in prepared:
-                reader.prepare()
-                prepared.add(reader)
+            folder, name, arguments = read_message(sys.stdin.buffer, _ARGUMENTS)
+            if name not in readers:
+                module, _, attribute = name.partition(":")
+                readers[name] = getattr(import_module(module), attribute)
+                readers[name].prepare()
             answer("ready", None)
-            pickle.load(sys.stdin.buffer)
+            read_message(sys.stdin.buffer)
         except EOFError:
             return
         try:
             os.chdir(folder)
-            answer("done", reader.read(*arguments, lambda size: answer("holds", size)))
+            answer("done", readers[name].read(*arguments, lambda size: answer("holds", size)))
         except ArtsimError as error:
             answer("failed", error)
-        except Exception:
-            answer("failed", RuntimeError(f"a reader failed:\n{traceback.format_exc()}"))
+        except Exception:  # a bug of a reader, of any kind: whoever asks is to see it, with its traceback
+            answer("broken", traceback.format_exc())

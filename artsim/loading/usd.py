@@ -34,7 +34,7 @@ from artsim.loading import primitives
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.reader_process import Reader, read_apart
 from artsim.loading.scene_objects import WorldLink
-from artsim.loading.urdf_document import Geometry, InlineMesh, Shape, UrdfRobot
+from artsim.loading.urdf_document import Geometry, InlineMesh, MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.usd_bodies import StageReader
 from artsim.loading.usd_joints import read_joints
 from artsim.loading.usd_layers import open_stage, unreadable
@@ -42,7 +42,7 @@ from artsim.loading.usd_tree import read_links
 from artsim.loading.zero_pose import as_document
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
-from artsim.model.objects import Repair
+from artsim.model.objects import JointDynamics, Repair
 
 
 def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
@@ -72,7 +72,7 @@ def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[U
     """
     with require_extra("USD files"):
         import pxr  # noqa: F401
-    found: tuple[UrdfRobot, list[Repair], list[bytes]] = read_apart(_READER, file, limits, body)
+    found: tuple[UrdfRobot, list[Repair], list[bytes]] = read_apart(READER, file, limits, body)
     return found
 
 
@@ -100,7 +100,10 @@ def _prepare() -> None:
     UsdGeom.Cube(UsdPhysics.Scene.Define(stage, "/scene").GetPrim()).GetSizeAttr().Get()
 
 
-_READER = Reader(_read, _prepare, "usd-core")
+READER = Reader(
+    f"{__name__}:READER", _read, _prepare, "usd-core",
+    (UrdfRobot, UrdfLink, UrdfJoint, Shape, Geometry, InlineMesh, MimicRelation, JointDynamics, Inertia, Repair),
+)  # fmt: skip
 
 
 def _show_something(links: list[WorldLink], file: Path, repairs: list[Repair]) -> None:

@@ -43,7 +43,7 @@ def read(file: Path, what: str, amount: float, holds: Holds) -> Any:
     return os.getpid(), file.resolve()
 
 
-READER = Reader(read, os.getpid, "its library")
+READER = Reader(f"{__name__}:READER", read, os.getpid, "its library")
 
 
 def ask(what: str = "", amount: float = 0) -> Any:
@@ -95,7 +95,6 @@ def _ask_in_a_fork(queue: Any) -> None:
     queue.put(ask()[0])
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_a_fork_has_its_own() -> None:
     first, _ = ask()
     context = multiprocessing.get_context("fork")
