@@ -139,8 +139,16 @@ def test_a_saved_estimator_loads_to_the_same_estimates(tmp_path: Path) -> None:
     for network, other in ((method.coordinates, loaded.coordinates), (method.joints, loaded.joints)):
         for name, weights in network.state_dict().items():
             assert torch.equal(weights, other.state_dict()[name])
-    # Sums over weights that lie elsewhere in memory may be rounded otherwise, and RANSAC may choose another triple.
-    np.testing.assert_allclose(method(sample.points).T_camera_part, loaded(sample.points).T_camera_part, atol=0.05)
+    # Sums over weights that lie elsewhere in memory may be rounded otherwise. RANSAC on untrained networks then may
+    # choose other triples, so what the networks say of a cloud is compared and not the poses.
+    points = torch.from_numpy(sample.points[None].astype(np.float32))
+    with torch.inference_mode():
+        before, after = method.coordinates(points), loaded.coordinates(points)
+        for name in ("part_logits", "npcs", "scale", "shift"):
+            torch.testing.assert_close(getattr(after, name), getattr(before, name), rtol=1e-3, atol=1e-4)
+    assert loaded.options == method.options
+    torch.testing.assert_close(loaded.base.shapes.points, method.base.shapes.points, rtol=1e-3, atol=1e-3)  # in halves
+    assert np.isfinite(loaded(sample.points).T_camera_part).all()
     # Images of several objects take it by its folder, whatever its method.
     obj, camera = artsim.make("laptop", 5).with_diagonal(0.4), artsim.Camera.look_at((-0.9, 0.35, 0.6), (0, 0, 0))
     frame = artsim.render(obj, obj.tree.rest, camera)
