@@ -32,7 +32,7 @@ _TRAIN = (
     "start, seen = time.perf_counter(), []\n"
     "def report(group, figures, step):\n"
     "    if group == 'perception': seen.append(time.perf_counter())\n"
-    "options = changed(PRESETS['full'], {'perception_steps': 300, 'dense_steps': 0, 'box_views': 0,\n"
+    "options = changed(PRESETS['long'], {'perception_steps': 300, 'dense_steps': 0, 'box_views': 0,\n"
     "                                    'validate_every': 300, 'test_objects': 4, 'foreign_categories': 1})\n"
     "with TemporaryDirectory() as out:\n"
     "    figures = Training(options, Path(out), WORKERS, progress=False, report=report, device='DEVICE').run()\n"

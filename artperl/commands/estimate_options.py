@@ -59,8 +59,8 @@ class EstimateOptions:
     detections: Path | None = None
     """Instead of a detector, the objects that another one has found."""
     estimators: tuple[str, ...] = ()
-    """For an image of several objects: CATEGORY=NAME, such as drawer=any box=out/train/box-full, or a folder with one
-    for each category. By default those that come with the package, by their names."""
+    """For an image of several objects: CATEGORY=NAME, such as drawer=generic box=out/train/box-long, or a folder with
+    one for each category. By default those that come with the package, by their names."""
     picture: Path | None = None
     """For an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
     apart: bool = False

@@ -50,6 +50,8 @@ def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:
         found |= {folder.name: folder for folder in below} | {run.name: run / "best" for run in runs}
         if not below and not runs:
             raise ConfigError(
-                "it is no folder with an estimator for each category", text, "write CATEGORY=NAME, such as drawer=any"
+                "it is no folder with an estimator for each category",
+                text,
+                "write CATEGORY=NAME, such as drawer=generic",
             )
     return found

@@ -37,7 +37,7 @@ class ReArtMix:
     skip_bad: bool = False
     """Leave out detections that cannot be used, and list them, instead of refusing the file."""
     estimators: tuple[str, ...] = ()
-    """CATEGORY=NAME, such as box=out/train/box-full, or a folder with one for each category, of any method. By default
+    """CATEGORY=NAME, such as box=out/train/box-long, or a folder with one for each category, of any method. By default
     those that come with the package, by their names, and any for drawers, whose number varies."""
     seen_from: tuple[float, float] | None = None
     """Range of the camera's azimuth, for the estimators: degrees about the object's vertical, 0 for its front.
@@ -70,7 +70,7 @@ class ReArtMix:
         for text in () if detections is None else detections.skipped:
             say(f"left out: {text}")
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
-        named: dict[str, str | Path] = {"drawer": "any", **named_estimators(self.estimators)}
+        named: dict[str, str | Path] = {"drawer": "generic", **named_estimators(self.estimators)}
         estimator = SceneEstimator(named, self.detector or SHIPPED, apart=self.apart, **told)
         figures = run_reartmix(images, detections, estimator, True, say, self.picture, self.json)
         write_kept(self.json, figures, indent=1)

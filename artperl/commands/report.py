@@ -43,11 +43,11 @@ class Report:
     """Categories of the benchmark; by default all."""
     methods: tuple[StoredMethod, ...] = ()
     """By default all of the benchmark."""
-    preset: Literal["quick", "full"] = "full"
+    preset: Literal["quick", "long"] = "long"
     """Of the trainings: quick ones take some minutes each, full ones an hour and more."""
     minutes: float | None = None
     """Train every method for so many minutes of one core: the stages of the preset get longer or shorter. By default
-    the preset says how long, and full of ArtImage has the weights that come with the package alone."""
+    the preset says how long, and the method full of ArtImage has the weights that come with the package alone."""
     row: Literal["procedural", "real"] = "procedural"
     """Objects to test on: unseen procedural ones, or the half of PartNet-Mobility's that is for testing."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None

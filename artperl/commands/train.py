@@ -31,12 +31,12 @@ class Train:
 
     To see it learn: python train.py --category laptop --preset quick
 
-    To train well: python train.py --category eyeglasses --preset full --out out/eyeglasses
+    To train well: python train.py --category eyeglasses --preset long --out out/eyeglasses
 
     To make an estimator that comes with the package: artperl train --recipe laptop
 
     For your robot, from the estimator for any tree:
-    python train.py --files robot.urdf --preset joint --start-from any --perception-steps 2000
+    python train.py --files robot.urdf --preset joint --start-from generic --perception-steps 2000
 
     On several processors or GPUs, with the same result:
     torchrun --nproc-per-node 2 train.py --category laptop --out out/laptop
@@ -44,7 +44,7 @@ class Train:
     Defaults are those of the preset or the recipe.
     """
 
-    preset: Literal["quick", "full", "joint"] | None = None
+    preset: Literal["quick", "long", "joint"] | None = None
     """quick: under five minutes on two cores, to see it learn; full: within the hour; joint: one estimator for many
     categories, with any parts. By default the recipe's, else quick."""
     recipe: str | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from typing import Annotated
 
 import tyro
@@ -41,7 +42,12 @@ def main() -> None:
 
 
 def with_new_names(words: list[str]) -> list[str]:
-    """Words of a command line, in which ``evaluate --benchmark NAME`` and ``evaluate --ablation`` are commands."""
+    """Words of a command line, in which ``evaluate --benchmark NAME`` and ``evaluate --ablation`` are commands, and the
+    preset full is long.
+    """
+    if ("--preset", "full") in pairwise(words):
+        say("note: the preset full is now long")
+        words[words.index("--preset") + 1] = "long"
     if words[:1] != ["evaluate"]:
         return words
     rest = words[1:]

@@ -16,7 +16,7 @@ class Symptoms:
 
     Attributes
     ----------
-    residual, disagreement, doubt, foreign : float
+    residual, disagreement, expected_error, outlier_share : float
         As in :class:`artperl.core.estimate.Estimate`; the worse, the higher.
     visibility : float
         Of the part that shows least; the better, the higher.
@@ -25,8 +25,8 @@ class Symptoms:
     residual: float = np.inf
     disagreement: float = np.inf
     visibility: float = 0.0
-    doubt: float = np.inf
-    foreign: float = 0.0
+    expected_error: float = np.inf
+    outlier_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class PartSymptoms:
     disagreement : (K,) float
         Median distance between where perception and the fit place the part's points in the rest frame, in diagonals; of
         the method artperl, between where the two best ends do.
-    doubt : (K,) float
+    expected_error : (K,) float
         Median error that perception expects of these places, in diagonals; of the method artperl, median probability
         that their label is wrong.
     certainty : (K,) float
@@ -50,7 +50,7 @@ class PartSymptoms:
     """
 
     disagreement: Array = field(default_factory=lambda: np.zeros(0))
-    doubt: Array = field(default_factory=lambda: np.zeros(0))
+    expected_error: Array = field(default_factory=lambda: np.zeros(0))
     certainty: Array = field(default_factory=lambda: np.zeros(0))
     visibility: Array = field(default_factory=lambda: np.zeros(0))
     points: Array = field(default_factory=lambda: np.zeros(0))
@@ -79,8 +79,8 @@ class Calibration:
     disagreement: float = -30.0
     visibility: float = 10.0
     """What shows of other parts fits as well where the part that shows least is wrong."""
-    doubt: float = -10.0
-    foreign: float = -3.0
+    expected_error: float = -10.0
+    outlier_share: float = -3.0
 
     def log_odds(self, symptoms: Symptoms) -> float:
         """Log-odds of being right."""
@@ -101,7 +101,7 @@ class PartCalibration:
     whole: float = 0.5
     """Of the log-odds that the whole is right, clipped: one wrong part says little of the others."""
     disagreement: float = -20.0
-    doubt: float = -10.0
+    expected_error: float = -10.0
     certainty: float = 3.0
     visibility: float = 2.0
     points: float = 1.0

@@ -62,10 +62,10 @@ class Estimate(Showable):
     disagreement : float
         Median distance between where perception and the fit place the points in the rest frame, over the diagonal; of
         the method artperl, between where the two best ends of the agent do.
-    doubt : float
+    expected_error : float
         Median error that perception expects of where it places the points in the rest frame, over the diagonal; of the
         method artperl, the mean probability that a point's label is wrong.
-    foreign : float
+    outlier_share : float
         Share of the points that are taken for something else, such as the table.
     visibility : (K,) float
         Share of each part's surface that is seen. A part with 0 is inferred from its joint's limits, not measured.
@@ -103,8 +103,8 @@ class Estimate(Showable):
     reference: str = ""
     residual: float = np.inf
     disagreement: float = np.inf
-    doubt: float = np.inf
-    foreign: float = 0.0
+    expected_error: float = np.inf
+    outlier_share: float = 0.0
     confidence: float = 0.0
     part_confidence: Array = field(default_factory=lambda: np.zeros(0))
     part_symptoms: PartSymptoms = field(default_factory=PartSymptoms)
@@ -117,7 +117,7 @@ class Estimate(Showable):
     def symptoms(self) -> Symptoms:
         """What the estimate says about itself."""
         least = float(self.visibility.min())
-        return Symptoms(self.residual, self.disagreement, least, self.doubt, self.foreign)
+        return Symptoms(self.residual, self.disagreement, least, self.expected_error, self.outlier_share)
 
     def judged(self, calibration: Calibration, part_calibration: PartCalibration, parts: PartSymptoms) -> Estimate:
         """The estimate with its confidence, and that of its parts, which say this about themselves."""
@@ -151,7 +151,7 @@ class Estimate(Showable):
 def summary(estimate: Estimate) -> str:
     """One line: how sure it is, how well it fits, and by which reference."""
     reference = f"reference {estimate.reference}, " if estimate.reference else ""  # some methods have none
-    other = f"{100 * estimate.foreign:.0f} % of the points left out, " if estimate.foreign >= 0.005 else ""
+    other = f"{100 * estimate.outlier_share:.0f} % of the points left out, " if estimate.outlier_share >= 0.005 else ""
     return (
         f"confidence {100 * estimate.confidence:.0f} %, residual {100 * estimate.residual:.2f} % of the diagonal, "
         f"{other}{reference}{sum(estimate.milliseconds.values()):.0f} ms"

@@ -36,8 +36,8 @@ def degrade(sample: Sample, num_points: int, rng: np.random.Generator) -> Sample
     spot = bool(rng.random() < _SPOT)
     # A spot leaves the outline: more than that of the object is seldom behind one thing.
     hidden *= 0.6 if spot else 1.0
-    foreign = rng.uniform(0.0, MOST_FOREIGN) if rng.random() < _DIRTY else 0.0
-    changed = interfere(sample, rng, hidden, foreign, spot)
+    outlier_share = rng.uniform(0.0, MOST_FOREIGN) if rng.random() < _DIRTY else 0.0
+    changed = interfere(sample, rng, hidden, outlier_share, spot)
     available = len(changed.points)
     if rng.random() < _SPARSE:
         available = min(available, int(rng.integers(_FEWEST, max(num_points, _FEWEST) + 1)))

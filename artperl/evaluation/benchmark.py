@@ -31,7 +31,7 @@ def category_folder(folder: Path | None, category: str, method: str = "full") ->
     if folder is None:
         return folder_of(category, method)
     named = category if method == "full" else f"{category}-{method}"
-    runs = (folder / name / "best" for name in (category, f"{named}-full", f"{named}-quick"))
+    runs = (folder / name / "best" for name in (category, f"{named}-long", f"{named}-full", f"{named}-quick"))
     return next((run for run in runs if run.is_dir()), folder / category)
 
 

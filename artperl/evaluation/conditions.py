@@ -32,7 +32,7 @@ class Condition:
         From where objects are seen.
     hidden : float
         Share of the points that are cut away on one side.
-    foreign : float
+    outlier_share : float
         Share of the cloud's points that are of a table, a wall or a neighbour.
     num_points : int
         Points of a cloud before it is cut.
@@ -43,7 +43,7 @@ class Condition:
     states: StateMode = "uniform"
     preset: ViewPreset = "artimage"
     hidden: float = 0.0
-    foreign: float = 0.0
+    outlier_share: float = 0.0
     num_points: int = NUM_POINTS
 
 
@@ -56,8 +56,8 @@ CONDITIONS: dict[str, Condition] = {
     "occluded_40": Condition("40 % cut away on one side", hidden=0.4),
     "occluded_60": Condition("60 % cut away on one side", hidden=0.6),
     "occluded_80": Condition("80 % cut away on one side", hidden=0.8),
-    "leak_7": Condition("7 % of the points are of other things", foreign=0.07),
-    "leak_10": Condition("10 % of the points are of other things", foreign=0.1),
+    "leak_7": Condition("7 % of the points are of other things", outlier_share=0.07),
+    "leak_10": Condition("10 % of the points are of other things", outlier_share=0.1),
     "points_512": Condition("512 points", num_points=512),
     "points_1024": Condition("1,024 points", num_points=1024),
     "points_2048": Condition("2,048 points", num_points=2048),
@@ -98,9 +98,9 @@ def condition_samples(name: str, objects: Sequence[ArticulatedObject], views: in
         views=ViewOptions(preset=condition.preset),
     )  # fmt: skip
     samples = samples_of(objects, -(-views // len(objects)), options)
-    if not (condition.hidden or condition.foreign):
+    if not (condition.hidden or condition.outlier_share):
         return samples
     return [
-        interfere(sample, np.random.default_rng([TEST_SEEDS, number]), condition.hidden, condition.foreign)
+        interfere(sample, np.random.default_rng([TEST_SEEDS, number]), condition.hidden, condition.outlier_share)
         for number, sample in enumerate(samples)
     ]

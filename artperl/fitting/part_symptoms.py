@@ -13,7 +13,7 @@ from artperl.fitting.search import apart
 from artperl.perception.network import Perceived
 
 _ABSENT = 0.5
-"""Disagreement and doubt of a part without points, in diagonals: more than any part with points has."""
+"""Disagreement and expected_error of a part without points, in diagonals: more than any part with points has."""
 
 
 def part_symptoms(
@@ -37,17 +37,17 @@ def symptoms_by_part(
     ----------
     part : (N,) int64
     apart, expected : (N,) float
-        Of which a part's disagreement and doubt are the medians.
+        Of which a part's disagreement and expected error are the medians.
     certainty : (N,) float
         Probability of the label.
     visibility : (K,) float
     """
     label = part.cpu().numpy()
-    off, doubt, own = (values.double().cpu().numpy() for values in (apart, expected, certainty))
+    off, expected_error, own = (values.double().cpu().numpy() for values in (apart, expected, certainty))
     rows = np.zeros((len(visibility), 4))
     rows[:, :2] = _ABSENT
     for k in range(len(rows)):
         mine = label == k
         if mine.any():
-            rows[k] = np.median(off[mine]), np.median(doubt[mine]), own[mine].mean(), np.sqrt(mine.mean())
+            rows[k] = np.median(off[mine]), np.median(expected_error[mine]), own[mine].mean(), np.sqrt(mine.mean())
     return PartSymptoms(rows[:, 0], rows[:, 1], rows[:, 2], visibility, rows[:, 3])

@@ -99,19 +99,19 @@ class ArtPERL(AgentMethod):
         steps = [theta[best[:1]].to("cpu") for theta in paths] + [refined.theta.to("cpu")]
         one, other = (rest_places(reference, observed, ends[[row]])[0] for row in (0, -1))
         apart = torch.linalg.vector_norm(one - other, dim=-1)
-        doubt = 1.0 - certainty[0].cpu()
+        expected_error = 1.0 - certainty[0].cpu()
         estimate = estimate_of_fit(reference, observed, steps, cloud.for_every_point(observed.part[0].numpy(), -1))
         estimate = replace(
             estimate,
             reference=self.base.name(row),
             residual=float(refined.energy.clamp(min=0.0).sqrt()),
             disagreement=float(apart.median()),
-            doubt=float(doubt.mean()),
+            expected_error=float(expected_error.mean()),
             milliseconds=clock.milliseconds,
             part_names=part_names(self.base, row, reference),
             warnings=with_size(warnings, estimate.size, self.categories),
         )
-        own = symptoms_by_part(observed.part[0], apart, doubt, 1.0 - doubt, estimate.visibility)
+        own = symptoms_by_part(observed.part[0], apart, expected_error, 1.0 - expected_error, estimate.visibility)
         return estimate.judged(self.options.calibration, self.options.part_calibration, own)
 
     def starts(self, reference: Shapes, points: Tensor) -> list[Theta]:

@@ -187,7 +187,7 @@ def _load_stored(
         category = str(name) if folder_of(name).parent == WEIGHTS else "laptop"
         raise DatasetError(
             f"there is no estimator of the method {kind.name}", name,
-            f"train it: python train.py --category {category} --method {kind.name} --preset full",
+            f"train it: python train.py --category {category} --method {kind.name} --preset long",
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, kind.name, folder)
@@ -309,8 +309,12 @@ def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor],
 
 def folder_of(name: str | Path, method: str = "full") -> Path:
     """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
-    own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / name
+    own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / _FORMER_ESTIMATORS.get(str(name), name)
     return shipped if shipped.is_dir() and not (own / _SETTINGS).is_file() else own
+
+
+_FORMER_ESTIMATORS = {"any": "generic"}
+"""Names that shipped estimators had."""
 
 
 def read_settings(folder: Path) -> dict[str, Any]:
@@ -332,9 +336,14 @@ def read_settings(folder: Path) -> dict[str, Any]:
         raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
     if settings.get("format") != _FORMAT:
         raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, _AGAIN)
+    for name in ("calibration", "part_calibration"):
+        if isinstance(settings.get(name), dict):
+            settings[name] = {_RENAMED.get(key, key): value for key, value in settings[name].items()}
     return settings
 
 
+_RENAMED = {"doubt": "expected_error", "foreign": "outlier_share"}
+"""Names that files of former versions have for symptoms."""
 _MAX_SETTINGS_BYTES = 16_000_000
 
 

@@ -137,7 +137,7 @@ class Estimator:
         with clock("clean"):
             cloud = Cloud.of(points, options.num_points)
             warnings = cloud_warnings(cloud)
-        cloud, clouds, perceived, foreign = self._perceive_own(cloud, clock)
+        cloud, clouds, perceived, outlier_share = self._perceive_own(cloud, clock)
         seen = cloud.tensor(self.perception.device)
         with clock("retrieval"):
             found = retrieve_references(self.base, perceived, options.references)
@@ -162,8 +162,8 @@ class Estimator:
                 reference=self.base.name(fit.row),
                 residual=fit.residual,
                 disagreement=fit.disagreement,
-                doubt=float(perceived.spread.exp().median()),
-                foreign=foreign,
+                expected_error=float(perceived.spread.exp().median()),
+                outlier_share=outlier_share,
                 milliseconds=clock.milliseconds,
                 part_names=part_names(self.base, fit.row, fit.shapes),
                 warnings=with_size(warnings, estimate.size, self.categories),

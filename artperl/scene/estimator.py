@@ -108,7 +108,7 @@ class SceneEstimator:
         **changes: Any,
     ):  # fmt: skip
         shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
-        shipped.pop("any", None)  # of no category
+        shipped.pop("generic", None)  # of no category
         self.estimators: dict[str, str | Path] = {**shipped, **(estimators or {})}
         self.apart = apart
         self.changes, self._loaded = changes, dict[str, Method]()

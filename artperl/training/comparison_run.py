@@ -38,7 +38,7 @@ from artsim.observing.sample import Sample
 from artsim.runs.kept import read_kept, write_kept
 
 Benchmark = Literal["artimage", "robotarm"]
-Preset = Literal["quick", "full"]
+Preset = Literal["quick", "long"]
 
 METHODS: dict[Benchmark, tuple[StoredMethod, ...]] = {
     "artimage": ("full", "artperl", "ancsh", "omad", "sporeagent"),
@@ -72,7 +72,7 @@ class ComparisonOptions:
     """URDF file of the arm of the benchmark robotarm; by default a procedural one of seven parts."""
     methods: tuple[StoredMethod, ...] = ()
     """By default those of the paper's table, and full."""
-    preset: Preset = "full"
+    preset: Preset = "long"
     """Of the trainings."""
     objects: int = 40
     """Unseen objects of each category; robotarm has one arm in other states."""
@@ -234,7 +234,7 @@ def training_options(options: ComparisonOptions, category: str, method: StoredMe
         preset = PRESETS["joint"] if method == "full" else preset_of(method, options.preset)
         own = replace(preset, categories=(), files=(arm,), parts="any", noisy=_NOISY, degraded=_DEGRADED)
         if method == "full" and options.minutes is None:
-            own = replace(own, start_from="any", perception_steps=_ARM_STEPS)
+            own = replace(own, start_from="generic", perception_steps=_ARM_STEPS)
     # The report tests each estimator itself. Stages that a method does not have stay without steps.
     own = replace(own, validation_views=1, test_views=1)
     changes = {

@@ -225,13 +225,13 @@ PRESETS = {
         base_objects=32, width=32, perception_steps=500, dense_steps=0, batch_size=24, num_points=768,
         box_views=0, validate_every=250, test_objects=20, validation_views=2,
     ),
-    "full": TrainOptions(),
+    "long": TrainOptions(),
     "joint": TrainOptions(
         parts="any", max_parts=10, base_objects=16, reference_points=64, width=40, perception_steps=9000,
         dense_steps=0, denser=1, box_views=0, box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
 }  # fmt: skip
-"""quick: one category in a few minutes on two cores, to see it learn; full: one category within the hour; joint:
+"""quick: one category in a few minutes on two cores, to see it learn; long: one category within the hour; joint:
 one estimator for many categories, with any parts."""
 
 PAPER_PRESETS = {
@@ -240,7 +240,7 @@ PAPER_PRESETS = {
         num_points=768, retrieval_steps=600, agent_rollouts=40, cloning_share=0.7, validate_every=10,
         test_objects=20, validation_views=2, test_views=2,
     ),
-    "full": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500, validate_every=125),
+    "long": TrainOptions(method="artperl", retrieval_steps=2000, agent_rollouts=500, validate_every=125),
 }  # fmt: skip
 """Presets of the method artperl."""
 
@@ -249,7 +249,7 @@ ANCSH_PRESETS = {
         method="ancsh", base_objects=32, reference_points=32, width=32, perception_steps=1200, batch_size=16,
         num_points=768, validate_every=300, test_objects=20, validation_views=2, test_views=2,
     ),
-    "full": TrainOptions(method="ancsh", reference_points=32),
+    "long": TrainOptions(method="ancsh", reference_points=32),
 }  # fmt: skip
 """Presets of the method ancsh."""
 
@@ -258,14 +258,14 @@ OMAD_PRESETS = {
         method="omad", base_objects=32, reference_points=96, width=32, prior_steps=600, perception_steps=2000,
         batch_size=16, num_points=768, validate_every=500, test_objects=20, validation_views=2, test_views=2,
     ),
-    "full": TrainOptions(method="omad", prior_steps=4000),
+    "long": TrainOptions(method="omad", prior_steps=4000),
 }  # fmt: skip
 """Presets of the method omad."""
 
 _REGISTRATION = PPOOptions(lambda_rotation=0.5, lambda_translation=0.5, lambda_scale=0.0, epochs=2)
 SPOREAGENT_PRESETS = {
     "quick": replace(PAPER_PRESETS["quick"], method="sporeagent", agent_rate=1e-3, ppo=_REGISTRATION),
-    "full": replace(PAPER_PRESETS["full"], method="sporeagent", ppo=_REGISTRATION),
+    "long": replace(PAPER_PRESETS["long"], method="sporeagent", ppo=_REGISTRATION),
 }
 """Presets of the method sporeagent: stages as long as those of artperl."""
 
@@ -280,6 +280,10 @@ METHOD_PRESETS: dict[StoredMethod, dict[str, TrainOptions]] = {
 each."""
 
 
+FORMER_PRESETS = {"full": "long"}
+"""Names that presets had in recipes; a method is called full, too."""
+
+
 def preset_of(method: StoredMethod, name: str) -> TrainOptions:
     """A preset of a method.
 
@@ -288,7 +292,7 @@ def preset_of(method: StoredMethod, name: str) -> TrainOptions:
     ConfigError
         When the method has no such preset.
     """
-    presets = METHOD_PRESETS.get(method, {})
+    presets, name = METHOD_PRESETS.get(method, {}), FORMER_PRESETS.get(name, name)
     if name not in presets:
         raise ConfigError(f"the method {method} has no preset {name!r}", "preset", f"use {' or '.join(presets)}")
     return presets[name]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from artperl.methods.estimator_files import WEIGHTS, folder_of, read_settings, weights_sha256
-from artperl.training.options import TrainOptions, changed, preset_of
+from artperl.training.options import FORMER_PRESETS, TrainOptions, changed, preset_of
 from artsim.common.files import parse_json, read_bounded
 from artsim.errors import ConfigError, DatasetError
 
@@ -68,6 +68,7 @@ class Recipe:
             or not all(isinstance(recipe[name], kind) for name, kind in fields.items())
         ):
             raise ConfigError("a recipe has a preset, options and lengths", path, f"write it like {known}")
+        recipe["preset"] = FORMER_PRESETS.get(recipe["preset"], recipe["preset"])
         made = cls(path.stem, sha256=hashlib.sha256(data).hexdigest(), **recipe)
         made.train_options()
         return made

@@ -36,7 +36,7 @@ _TRIES = 6
 
 
 def interfere(
-    sample: Sample, rng: np.random.Generator, hidden: float = 0.0, foreign: float = 0.0, spot: bool = False
+    sample: Sample, rng: np.random.Generator, hidden: float = 0.0, outlier_share: float = 0.0, spot: bool = False
 ) -> Sample:
     """The sample with points hidden, and with points of other things in its mask.
 
@@ -49,7 +49,7 @@ def interfere(
     rng : numpy.random.Generator
     hidden : float
         Share of the points that are hidden, 0 to 1. Three stay at least.
-    foreign : float
+    outlier_share : float
         Share of the cloud's points, afterwards, that are of the table under the object, a wall behind it, or a
         neighbour beside it, 0 to less than 1.
     spot : bool
@@ -58,7 +58,7 @@ def interfere(
     Returns
     -------
     Sample
-        Of ``(1 - hidden) N / (1 - foreign)`` points. Foreign ones have part :data:`FOREIGN` and ``npcs`` NaN.
+        Of ``(1 - hidden) N / (1 - outlier_share)`` points. Foreign ones have part :data:`FOREIGN` and ``npcs`` NaN.
 
     Raises
     ------
@@ -67,12 +67,12 @@ def interfere(
     """
     if not 0.0 <= hidden <= 1.0:
         raise ConfigError(f"{hidden} is no share", "hidden", "use 0 to 1")
-    if not 0.0 <= foreign < 1.0:
-        raise ConfigError(f"{foreign} is no share", "foreign", "use 0 to less than 1")
+    if not 0.0 <= outlier_share < 1.0:
+        raise ConfigError(f"{outlier_share} is no share", "outlier_share", "use 0 to less than 1")
     image = _in_image(sample.points)
     kept = _visible(image, hidden, spot, rng)
     points, part, npcs = sample.points[kept], sample.part[kept], sample.npcs[kept]
-    count = round(len(points) * foreign / (1.0 - foreign))
+    count = round(len(points) * outlier_share / (1.0 - outlier_share))
     if count:
         other = _foreign_points(sample, image, image[kept], count, rng)
         points = np.concatenate([points, other])

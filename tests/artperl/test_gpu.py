@@ -42,7 +42,7 @@ def test_a_run_learns_there_and_goes_on_on_the_processor(tmp_path: Path) -> None
         "batch_size": 4, "num_points": 96, "box_views": 0, "validate_every": 3, "test_objects": 2,
         "foreign_categories": 1, "validation_views": 1, "test_views": 1,
     }  # fmt: skip
-    options = changed(PRESETS["full"], tiny)
+    options = changed(PRESETS["long"], tiny)
 
     def stop(group: str, figures: dict[str, float], step: int) -> None:
         begun.context.stop.asked = step == 1

@@ -111,4 +111,4 @@ def test_what_does_not_fit_is_refused_with_its_mend(
 def test_estimators_are_named_by_category(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="CATEGORY=NAME"):
         named_estimators((str(tmp_path),))
-    assert named_estimators(("drawer=any",))["drawer"].name == "any"  # type: ignore[union-attr]
+    assert named_estimators(("drawer=generic",))["drawer"].name == "generic"  # type: ignore[union-attr]

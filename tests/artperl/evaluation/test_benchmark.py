@@ -21,9 +21,9 @@ def test_rows_are_run_with_the_estimators_of_a_folder(tmp_path: Path) -> None:
 
 
 def test_runs_are_found_by_the_names_that_training_gives_them(tmp_path: Path) -> None:
-    for name in ("laptop-full", "laptop-quick", "scissors-ancsh-quick", "scissors-quick"):
+    for name in ("laptop-long", "laptop-quick", "scissors-ancsh-quick", "scissors-quick"):
         (tmp_path / name / "best").mkdir(parents=True)
-    assert category_folder(tmp_path, "laptop") == tmp_path / "laptop-full" / "best"
+    assert category_folder(tmp_path, "laptop") == tmp_path / "laptop-long" / "best"
     assert category_folder(tmp_path, "scissors") == tmp_path / "scissors-quick" / "best"
     assert category_folder(tmp_path, "scissors", "ancsh") == tmp_path / "scissors-ancsh-quick" / "best"
     assert category_folder(tmp_path, "drawer") == tmp_path / "drawer"

@@ -68,7 +68,7 @@ def test_estimates_with_other_parts_are_wrong_whatever_they_fit(estimator: Estim
     assert calibrate(20 * right)(other.symptoms) > 0.9
 
 
-@pytest.mark.parametrize("name", ["doubt", "foreign"])
+@pytest.mark.parametrize("name", ["expected_error", "outlier_share"])
 def test_confidence_takes_notice_of_doubt_and_of_other_things(estimator: Estimator, sample: Sample, name: str) -> None:
     """Where estimates with more of it are wrong more often, it says by how much."""
     one: Scored = evaluate(estimator, [sample])[0]

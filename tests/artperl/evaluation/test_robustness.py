@@ -25,7 +25,7 @@ def test_conditions_do_what_they_say(name: str) -> None:
         np.testing.assert_array_equal(sample.points, same.points)
         assert sample.noise == condition.noise
         other = sample.part == FOREIGN
-        assert other.mean() == pytest.approx(condition.foreign, abs=1e-3)
+        assert other.mean() == pytest.approx(condition.outlier_share, abs=1e-3)
         assert (~other).sum() == pytest.approx(condition.num_points * (1.0 - condition.hidden), abs=1)
         if condition.states == "rest":
             np.testing.assert_array_equal(sample.joint_state, sample.joint_rest)

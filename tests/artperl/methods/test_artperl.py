@@ -150,7 +150,7 @@ def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path
 
 def test_the_method_without_shipped_weights_says_how_to_train_it() -> None:
     with pytest.raises(
-        DatasetError, match=r"train it: python train.py --category stapler --method artperl --preset full"
+        DatasetError, match=r"train it: python train.py --category stapler --method artperl --preset long"
     ):
         load_estimator("stapler", method="artperl")
 

@@ -52,7 +52,7 @@ def test_labels_are_in_doubt_as_far_as_they_are_unsure(method: ArtPERL) -> None:
             with torch.no_grad():
                 last.weight.copy_(factor * weight)
                 last.bias.copy_(factor * bias)
-            assert least <= method(points).doubt <= most
+            assert least <= method(points).expected_error <= most
     finally:
         with torch.no_grad():
             last.weight.copy_(weight)

@@ -27,15 +27,15 @@ def view() -> Sample:
 
 @settings(max_examples=40, deadline=None)
 @given(st.floats(0.0, 1.0), st.floats(0.0, 0.9), st.booleans(), st.integers(0, 1000))
-def test_shares_are_what_is_asked_for(view: Sample, hidden: float, foreign: float, spot: bool, seed: int) -> None:
-    changed = interfere(view, np.random.default_rng(seed), hidden, foreign, spot)
+def test_shares_are_what_is_asked_for(view: Sample, hidden: float, outlier_share: float, spot: bool, seed: int) -> None:
+    changed = interfere(view, np.random.default_rng(seed), hidden, outlier_share, spot)
     other = changed.part == FOREIGN
     own = max(3, 3000 - round(3000 * hidden))
     assert abs((~other).sum() - own) <= 1
-    assert other.sum() == round(own * foreign / (1.0 - foreign)) or abs(other.mean() - foreign) < 1e-3
+    assert other.sum() == round(own * outlier_share / (1.0 - outlier_share)) or abs(other.mean() - outlier_share) < 1e-3
     assert np.isfinite(changed.points).all()
     assert np.isnan(changed.npcs[other]).all()
-    again = interfere(view, np.random.default_rng(seed), hidden, foreign, spot)
+    again = interfere(view, np.random.default_rng(seed), hidden, outlier_share, spot)
     np.testing.assert_array_equal(changed.points, again.points)
 
 
@@ -80,7 +80,9 @@ def test_other_things_lie_on_rays_that_miss_the_object(category: str) -> None:
     assert (np.linalg.norm(points - view.points.mean(axis=0), axis=1) < 3.0 * view.diagonal).all()
 
 
-@pytest.mark.parametrize(("hidden", "foreign"), [(-0.1, 0.0), (1.1, 0.0), (0.0, 1.0), (0.0, -1.0), (float("nan"), 0.0)])
-def test_impossible_shares_are_refused(view: Sample, hidden: float, foreign: float) -> None:
+@pytest.mark.parametrize(
+    ("hidden", "outlier_share"), [(-0.1, 0.0), (1.1, 0.0), (0.0, 1.0), (0.0, -1.0), (float("nan"), 0.0)]
+)
+def test_impossible_shares_are_refused(view: Sample, hidden: float, outlier_share: float) -> None:
     with pytest.raises(ConfigError, match="share"):
-        interfere(view, np.random.default_rng(0), hidden, foreign)
+        interfere(view, np.random.default_rng(0), hidden, outlier_share)
