@@ -28,8 +28,9 @@ class Export(Opened):
     """URDF, MJCF or USD file, GLB or joint file, or its folder."""
     out: Path
     """Folder to write; it must not exist."""
-    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf", "mjcf", "usd")
-    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    formats: tuple[Literal["urdf", "mjcf", "usd", "usdz", "simready"], ...] = ("urdf", "mjcf", "usd")
+    """File formats: mobility.urdf, mobility.xml, mobility.usda, mobility.usdz, and in the folder simready a package for
+    NVIDIA's profile Robotics-Prop."""
     collision: Literal["pieces", "hull", "surface"] = "pieces"
     """What collides: convex pieces of each part (extra sim), one convex hull, or the surface as it is. Parts of MJCF
     and USD files keep what their file says."""

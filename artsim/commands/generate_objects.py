@@ -27,8 +27,9 @@ class GenerateObjects:
     """Folder to write to; made if missing."""
     count: int = 1000
     """Objects of each category."""
-    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
-    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    formats: tuple[Literal["urdf", "mjcf", "usd", "usdz", "simready"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda, mobility.usdz, and in the folder simready a package for
+    NVIDIA's profile Robotics-Prop."""
     seed: int = 0
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
     having: Having = ()

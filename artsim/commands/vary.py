@@ -35,8 +35,9 @@ class Vary:
     """Seed of the first variation; the others count up from it."""
     others: tuple[Path, ...] = ()
     """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
-    formats: tuple[Literal["urdf", "mjcf", "usd"], ...] = ("urdf",)
-    """File formats: mobility.urdf, mobility.xml, mobility.usda."""
+    formats: tuple[Literal["urdf", "mjcf", "usd", "usdz", "simready"], ...] = ("urdf",)
+    """File formats: mobility.urdf, mobility.xml, mobility.usda, mobility.usdz, and in the folder simready a package for
+    NVIDIA's profile Robotics-Prop."""
     package_root: PackageRoots = field(default_factory=dict)
     """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
     below these folders, too. Repeatable."""

@@ -20,7 +20,16 @@ from artsim.errors import ConfigError
 _MARKS = ("dataset.json", "plan.json", "scenes.json", "motions.json", "estimator.json")
 """Files by which a folder is known for a dataset, a set of scenes, of motions, or an estimator."""
 _OWN = (*_MARKS, "progress.jsonl", "weights.safetensors", "base.npz")
-_OBJECT = {"meta.json", "semantics.txt", "mobility.urdf", "mobility.xml", "mobility.usda", "meshes"}
+_OBJECT = {
+    "meta.json",
+    "semantics.txt",
+    "mobility.urdf",
+    "mobility.xml",
+    "mobility.usda",
+    "mobility.usdz",
+    "simready",
+    "meshes",
+}
 """Everything in the folder of an object that artsim wrote."""
 _DEEPEST = 4
 """Folders below one of those that are its own."""

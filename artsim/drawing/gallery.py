@@ -6,15 +6,13 @@ import io
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.common.names import printable
-from artsim.model.draws import ViewOptions, joint_intervals, sample_view
+from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.annotation import shade_parts
-from artsim.renderers import render
+from artsim.observing.portrait import portrait
 
 _TILE = 260  # pixels
 _HEADER = 22
@@ -41,7 +39,7 @@ def draw_gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_
         title = printable(f"{obj.category} {obj.object_id}: {len(obj)} parts")
         draw.text((x + 6, y + 2), title, "black", font)
         for i, q in enumerate(opening_states(obj, states)):
-            sheet.paste(Image.fromarray(portrait(obj, q)), (x + i * _TILE, y + _HEADER))
+            sheet.paste(Image.fromarray(portrait(obj, q, _TILE)), (x + i * _TILE, y + _HEADER))
     buffer = io.BytesIO()
     sheet.quantize(256).save(buffer, "PNG", optimize=True)  # a third of the size
     return buffer.getvalue()
@@ -56,13 +54,3 @@ def opening_states(obj: ArticulatedObject, count: int) -> list[Array]:
     share = rng.uniform(0.4, 0.9, len(rest))
     steps = np.linspace(0.0, 1.0, count)
     return [obj.tree.complete_state(rest + step * share * (far - rest)) for step in steps]
-
-
-def portrait(obj: ArticulatedObject, q: Array, size: int = _TILE) -> NDArray[np.uint8]:
-    """(size, size, 3) picture of one state from the front left, above."""
-    options = ViewOptions(
-        azimuth=(35.0, 35.0), elevation=(25.0, 25.0), fill=(0.95, 0.95), width=2 * size, height=2 * size
-    )
-    camera = sample_view(obj, q, options, np.random.default_rng(0))
-    image = Image.fromarray(shade_parts(render(obj, q, camera), camera))
-    return np.asarray(image.resize((size, size), Image.Resampling.LANCZOS))

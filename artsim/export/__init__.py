@@ -1,4 +1,4 @@
-"""Objects as files: PartNet-style URDF folders, MJCF and USD.
+"""Objects as files: PartNet-style URDF folders, MJCF, USD and SimReady packages.
 
 All lengths are metres, Z is up and the front towards -X: meshes are written in the object's rest frame, and each link's
 frame stands at its joint's origin with the axes of the rest frame. The root link is the robot's base; MJCF and USD fix
@@ -26,8 +26,9 @@ from artsim.model.objects import ArticulatedObject
 from artsim.model.robot import Robot, as_robot
 
 DEFAULTS = ExportOptions()
-FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda"}
-"""File written in each format."""
+FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda", "usdz": "mobility.usdz",
+           "simready": "simready"}  # fmt: skip
+"""File written in each format; of SimReady, the folder that holds its package."""
 
 
 def export(
@@ -74,7 +75,7 @@ def export(
     finish = draw_finish(robot) if options.materials else NO_FINISH
     if "urdf" in formats or "mjcf" in formats:
         _write_meshes(robot, folder / "meshes", finish, apart="mjcf" in formats)
-    elif finish.pictures:
+    elif finish.pictures and "usd" in formats:
         _write_pictures(folder / "meshes", finish)
     if "urdf" in formats:
         from artsim.export.urdf import semantics_text, urdf_text
@@ -86,9 +87,18 @@ def export(
 
         (folder / FORMATS["mjcf"]).write_text(mjcf_text(robot, options, finish))
     if "usd" in formats:
-        from artsim.export.usd import usd_text
+        from artsim.export.usd import usd_stage
 
-        (folder / FORMATS["usd"]).write_text(usd_text(robot, options, finish))
+        stage = usd_stage(robot, options, finish)  # its layer lives as long as the stage
+        (folder / FORMATS["usd"]).write_text(stage.GetRootLayer().ExportToString())
+    if "usdz" in formats:
+        from artsim.export.simready import write_usdz
+
+        write_usdz(robot, folder / FORMATS["usdz"], options, finish)
+    if "simready" in formats:
+        from artsim.export.simready import write_simready
+
+        write_simready(robot, folder, options, finish if options.materials else draw_finish(robot))
     meta = {**describe(robot, formats), **(notes or {})}
     meta["artsim"] |= asdict(options)
     (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n")

@@ -61,4 +61,4 @@ def whole_meta(
             return None
     except (AssetError, ValueError, KeyError, TypeError):
         return None
-    return meta if all((folder / FORMATS[name]).is_file() for name in formats) else None
+    return meta if all((folder / FORMATS[name]).exists() for name in formats) else None

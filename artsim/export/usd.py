@@ -6,22 +6,38 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from artsim.common.extras import require_extra
 from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
+from artsim.export.semantic_labels import add_labels
+from artsim.model.appearance import Material
 from artsim.model.kinematics import Array
 from artsim.model.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 
 
-def usd_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -> str:
-    """The object as a USD layer in text form.
+def usd_stage(
+    robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH, pictures: str = "./meshes", labelled: bool = False
+) -> Any:
+    """The object as a USD stage in memory.
 
     One prim for each link, in metres, kilograms and degrees as UsdPhysics has it, Z up. A fixed base hangs on a fixed
     joint to the world, and the articulation root is the object's prim; the articulation root of a free one is its root
     link, to which Isaac Lab can add a fixed joint (``fix_root_link``). UsdPhysics has no velocity limits and no
-    friction: these are attributes of PhysX's schemas. It knows no joints that follow others: such a joint carries
-    ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres).
+    friction: these are attributes of the schemas of PhysX and Newton. It knows no joints that follow others: such a
+    joint carries ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres) and, where it follows one of
+    its own kind, Newton's and PhysX's mimic.
+
+    Parameters
+    ----------
+    robot : Robot
+    options : ExportOptions
+    finish : Finish
+    pictures : str
+        Folder of the textures, as the layer names it.
+    labelled : bool
+        Write semantic labels: category, parts and materials.
     """
     with require_extra("USD files"):
         from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdPhysics
@@ -37,7 +53,7 @@ def usd_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -
     paths = [root.GetPath().AppendChild(link.name) for link in robot.links]
     for link, path in zip(robot.links, paths, strict=True):
         _add_link(stage, path, link)
-    _add_finish(stage, root.GetPath(), robot, finish)
+    materials = _add_finish(stage, root.GetPath(), robot, finish, pictures)
     free = options.base == "free"
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[0]) if free else root.GetPrim())
     if not free:
@@ -59,8 +75,12 @@ def usd_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) -
             prim.CreateRelationship("artsim:mimic:joint").SetTargets([scope.AppendChild(source)])
             prim.CreateAttribute("artsim:mimic:multiplier", Sdf.ValueTypeNames.Double).Set(multiplier)
             prim.CreateAttribute("artsim:mimic:offset", Sdf.ValueTypeNames.Double).Set(offset)
-    text: str = stage.GetRootLayer().ExportToString()
-    return text
+            kinds = {named.name: named.type == "prismatic" for named in robot.joints}
+            if kinds[source] == kinds[joint.name]:
+                _add_mimic(prim, scope.AppendChild(source), kinds[source], multiplier, offset)
+    if labelled:
+        add_labels(stage, robot, paths, materials)
+    return stage
 
 
 def _add_link(stage: Any, path: Any, link: Link) -> None:
@@ -75,30 +95,43 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
     mass.CreateCenterOfMassAttr(Gf.Vec3f(*(link.inertia.center - link.origin).tolist()))
     mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
     mass.CreatePrincipalAxesAttr(_quaternion(axes))
-    if link.visual is not None:
-        _add_mesh(stage, path.AppendChild("visual"), link, link.visual)
+    seen = None if link.visual is None else _add_mesh(stage, path.AppendChild("visual"), link, link.visual)
     for i, shape in enumerate(link.collision):
         here = path.AppendChild(f"collision_{i}")
+        if any(_is_same(shape, other) for other in link.collision[:i]):
+            continue
         if isinstance(shape, BoxShape):
-            cube = UsdGeom.Cube.Define(stage, here)
-            cube.CreateSizeAttr(1.0)
-            cube.CreateExtentAttr([(-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)])
-            cube.AddTranslateOp().Set(Gf.Vec3d(*(shape.center - link.origin).tolist()))
-            cube.AddScaleOp().Set(Gf.Vec3f(*shape.size.tolist()))
-            collider = cube
+            collider: Any = UsdGeom.Cube.Define(stage, here)
+            collider.CreateSizeAttr(1.0)
+            collider.CreateExtentAttr([(-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)])
+            collider.AddTranslateOp().Set(Gf.Vec3d(*(shape.center - link.origin).tolist()))
+            collider.AddScaleOp().Set(Gf.Vec3f(*shape.size.tolist()))
         else:
-            collider = _add_mesh(stage, here, link, shape)
+            shown = link.visual is not None and _is_same(shape, link.visual)  # one mesh is seen and collides
+            collider = seen if shown else _add_mesh(stage, here, link, shape)
             UsdPhysics.MeshCollisionAPI.Apply(collider.GetPrim()).CreateApproximationAttr("convexHull")
+            collider.GetPrim().AddAppliedSchema("NewtonMeshCollisionAPI")
         UsdPhysics.CollisionAPI.Apply(collider.GetPrim())
-        collider.CreatePurposeAttr(UsdGeom.Tokens.guide)
+        for schema in ("NewtonCollisionAPI", "MjcCollisionAPI"):
+            collider.GetPrim().AddAppliedSchema(schema)
+        if collider is not seen:
+            collider.CreatePurposeAttr(UsdGeom.Tokens.guide)
 
 
-def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish) -> None:
-    """Materials, and meshes with places on textures, each face in the subset of its material."""
+def _is_same(shape: BoxShape | MeshShape, other: BoxShape | MeshShape) -> bool:
+    """Whether two meshes have the same corners and as many faces, in any order."""
+    if not (isinstance(shape, MeshShape) and isinstance(other, MeshShape) and len(shape.faces) == len(other.faces)):
+        return False
+    first, second = (np.unique(np.round(mesh.vertices, 7), axis=0) for mesh in (shape, other))
+    return np.array_equal(first, second)
+
+
+def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish, pictures: str) -> dict[Any, Material]:
+    """Materials, and meshes with places on textures, each face in the subset of its material; materials by path."""
     from pxr import Sdf, UsdGeom, UsdShade, Vt
 
     if not finish.materials:
-        return
+        return {}
     taken = {link.name for link in robot.links}
     scope = root.AppendChild(next(name for name in ("Looks", "Looks_", "Looks__") if name not in taken))
     UsdGeom.Scope.Define(stage, scope)
@@ -120,7 +153,7 @@ def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish) -> None:
             out = place.CreateOutput("result", Sdf.ValueTypeNames.Float2)
             texture = UsdShade.Shader.Define(stage, made.GetPath().AppendChild("texture"))
             texture.CreateIdAttr("UsdUVTexture")
-            texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./meshes/{name}.png")
+            texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"{pictures}/{name}.png")
             texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(out)
             for side in ("wrapS", "wrapT"):
                 texture.CreateInput(side, Sdf.ValueTypeNames.Token).Set("repeat")
@@ -147,6 +180,7 @@ def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish) -> None:
             subset = binding.CreateMaterialBindSubset(look.material, faces)
             material = UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(look.material)))
             UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+    return {scope.AppendChild(name): material for name, material in finish.materials.items()}
 
 
 def _joined(link: Link, looks: Sequence[Look]) -> MeshShape:
@@ -172,7 +206,19 @@ def _add_mesh(stage: Any, path: Any, link: Link, shape: MeshShape) -> Any:
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(shape.faces.ravel().astype(np.int32)))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateExtentAttr([tuple(points.min(axis=0).tolist()), tuple(points.max(axis=0).tolist())])
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(face_normals(points, shape.faces)))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform)
     return mesh
+
+
+def face_normals(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Unit normals (F, 3) of triangles; up for those without area."""
+    a, b, c = vertices.astype(np.float64)[faces].swapaxes(0, 1)
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    up = np.array([0.0, 0.0, 1.0])
+    unit: NDArray[np.float32] = np.where(length > 0, normals / np.where(length > 0, length, 1.0), up).astype(np.float32)
+    return unit
 
 
 def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: list[Any]) -> None:
@@ -198,15 +244,35 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
     drive.CreateStiffnessAttr(0.0)
     drive.CreateTypeAttr("force")
     drive.CreateMaxForceAttr(joint.effort)
-    # Schemas of PhysX are not part of usd-core: they are named, and their attributes written, as PhysX reads them.
+    # Schemas of PhysX and Newton are not part of usd-core: they are named, and their attributes written, as these read
+    # them. Damping is that of the drive in both.
     prim, axis = added.GetPrim(), "linear" if slides else "angular"
     for schema_name, name, value in (
         ("PhysxJointAPI", "physxJoint:maxJointVelocity", joint.velocity * unit),
         (f"PhysxJointAxisAPI:{axis}", f"physxJointAxis:{axis}:staticFrictionEffort", joint.friction),
         (f"PhysxJointAxisAPI:{axis}", f"physxJointAxis:{axis}:dynamicFrictionEffort", joint.friction),
+        ("NewtonJointAPI", "newton:velocityLimit", joint.velocity * unit),
+        ("NewtonJointAPI", "newton:friction", joint.friction),
     ):
         prim.AddAppliedSchema(schema_name)
         prim.CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(value)
+
+
+def _add_mimic(prim: Any, source: Any, slides: bool, multiplier: float, offset: float) -> None:
+    """``q = offset + multiplier q_source`` as Newton and PhysX have it: the latter's terms add up to zero."""
+    from pxr import Sdf
+
+    offset *= 1.0 if slides else 180.0 / np.pi
+    prim.AddAppliedSchema("NewtonMimicAPI")
+    prim.CreateRelationship("newton:mimicJoint").SetTargets([source])
+    prim.CreateAttribute("newton:mimicCoef0", Sdf.ValueTypeNames.Float).Set(offset)
+    prim.CreateAttribute("newton:mimicCoef1", Sdf.ValueTypeNames.Float).Set(multiplier)
+    axis = "transX" if slides else "rotX"
+    prim.AddAppliedSchema(f"PhysxMimicJointAPI:{axis}")
+    prim.CreateRelationship(f"physxMimicJoint:{axis}:referenceJoint").SetTargets([source])
+    prim.CreateAttribute(f"physxMimicJoint:{axis}:referenceJointAxis", Sdf.ValueTypeNames.Token).Set(axis)
+    prim.CreateAttribute(f"physxMimicJoint:{axis}:gearing", Sdf.ValueTypeNames.Float).Set(-multiplier)
+    prim.CreateAttribute(f"physxMimicJoint:{axis}:offset", Sdf.ValueTypeNames.Float).Set(-offset)
 
 
 def principal_axes(tensor: Array) -> tuple[Array, Array]:

@@ -37,6 +37,8 @@ class Material:
         Share of the colour that it sends out by itself.
     transmission : float
         Share of the light that passes through. Depth sensors see less of such a surface; renderers draw it opaque.
+    substance : str
+        What it is made of, such as wood or metal; empty where that is not known.
     """
 
     colour: Colour
@@ -47,6 +49,7 @@ class Material:
     tile: float = 0.5
     emission: float = 0.0
     transmission: float = 0.0
+    substance: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,12 @@ FINISHES: dict[str, Finish] = {
 }
 """Every finish by name."""
 
+_SUBSTANCES = {
+    "parquet": "wood", "tiles": "ceramic", "fabric": "textile", "card": "cardboard", "smoke": "glass",
+    "steel": "metal", "enamel": "metal", "chrome": "metal", "gloss": "plastic", "shell": "plastic",
+}  # fmt: skip
+"""What finishes cover that are not called so themselves."""
+
 _TONES: dict[str, tuple[Colour, ...]] = {
     "wood": ((0.66, 0.47, 0.29), (0.50, 0.32, 0.19), (0.76, 0.60, 0.42), (0.36, 0.23, 0.15), (0.83, 0.70, 0.53)),
     "parquet": ((0.66, 0.48, 0.31), (0.56, 0.40, 0.26), (0.74, 0.60, 0.44)),
@@ -174,7 +180,7 @@ def draw_material(finish: str, rng: np.random.Generator) -> Material:
     tones = _TONES.get(finish, _VIVID)
     tone = np.asarray(tones[int(rng.integers(len(tones)))]) * rng.uniform(0.92, 1.08) + rng.uniform(-0.02, 0.02, 3)
     red, green, blue = tone.clip(0.02, 0.97).tolist()
-    return FINISHES[finish](rng, (red, green, blue))
+    return replace(FINISHES[finish](rng, (red, green, blue)), substance=_SUBSTANCES.get(finish, finish))
 
 
 def _detail_faces(part: Part) -> NDArray[np.bool_]:

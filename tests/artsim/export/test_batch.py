@@ -25,7 +25,10 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-def test_bytes_depend_on_the_seed_alone_and_whole_objects_are_kept(tmp_path: Path) -> None:
+def test_bytes_depend_on_the_seed_alone_and_whole_objects_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")  # the date in SimReady packages
     formats = [name for name in FORMATS if name != "usd"]
     one = generate_objects(["laptop", "drawer"], tmp_path / "one", 2, 5, formats, workers=1, progress=False)
     two = generate_objects(["laptop", "drawer"], tmp_path / "two", 2, 5, formats, workers=2, progress=False)

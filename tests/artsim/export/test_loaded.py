@@ -30,7 +30,8 @@ def test_a_loaded_object_comes_back_from_every_format(collision: Any, tmp_path: 
         export(obj, tmp_path / "raw", ["urdf"])
     export(prepare(obj, collision), tmp_path / "out", list(FORMATS))
     for name in FORMATS.values():
-        again = artsim.load(tmp_path / "out" / name)
+        file = tmp_path / "out" / name
+        again = artsim.load(next(file.rglob("*.usdc")) if file.is_dir() else file)
         assert again.tree.types == obj.tree.types
         np.testing.assert_allclose(again.tree.axes, obj.tree.axes, atol=1e-6)
         np.testing.assert_allclose(again.tree.limits, obj.tree.limits - obj.tree.rest[:, None], atol=1e-6)

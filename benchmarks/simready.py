@@ -1,0 +1,151 @@
+"""Are exported objects ready for simulators? ``python -m benchmarks.simready``.
+
+Objects of every category go through NVIDIA's ``simready-validate`` with the profile Robotics-Prop, as packages of
+``artsim export --formats simready``; a failed requirement of a feature that the profile needs is a failure. Then the
+same objects are read by MuJoCo (MJCF), Newton (USD) and SAPIEN (URDF), and what each says of limits, friction, effort,
+speed and masses is compared with the object. A dash: the format has no such value, or the simulator does not read it.
+SAPIEN's friction is a coefficient of its own and no effort; of a screw's turning joint, which URDF has as continuous,
+it reads no limits.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from artsim import make
+from artsim.common.progress import say, track
+from artsim.export import FORMATS, export
+from artsim.families import FAMILIES
+from artsim.model.robot import Robot, as_robot
+
+Values = dict[str, dict[str, float]]
+"""By quantity, then by joint or link."""
+QUANTITIES = ("lower", "upper", "friction", "effort", "velocity", "mass")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Validate exported objects, and read them by three simulators."""
+
+    objects: int = 5
+    """Of each category."""
+    first_seed: int = 0
+
+
+def in_mujoco(folder: Path) -> Values:
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(folder / FORMATS["mjcf"]))
+    joints = [model.joint(j) for j in range(model.njnt)]
+    limited = [joint for joint in joints if joint.limited[0]]
+    return {
+        "lower": {joint.name: joint.range[0] for joint in limited},
+        "upper": {joint.name: joint.range[1] for joint in limited},
+        "friction": {joint.name: model.dof_frictionloss[joint.dofadr[0]] for joint in joints},
+        "effort": {joint.name: model.jnt_actfrcrange[joint.id][1] for joint in joints},
+        "mass": {model.body(b).name: model.body(b).mass[0] for b in range(1, model.nbody)},
+    }
+
+
+def in_newton(folder: Path) -> Values:
+    import newton
+
+    read = newton.ModelBuilder()
+    read.add_usd(str(folder / FORMATS["usd"]))
+    moving = [(name, place) for name, place in zip(read.joint_label, read.joint_qd_start, strict=True)
+              if "/fixed_base" not in name]  # fmt: skip
+    names = [(name.rsplit("/", 1)[-1], place) for name, place in moving]
+    arrays = {"lower": read.joint_limit_lower, "upper": read.joint_limit_upper, "friction": read.joint_friction,
+              "effort": read.joint_effort_limit, "velocity": read.joint_velocity_limit}  # fmt: skip
+    values = {quantity: {name: array[place] for name, place in names} for quantity, array in arrays.items()}
+    bodies = (name.rsplit("/", 1)[-1] for name in read.body_label)
+    return {**values, "mass": dict(zip(bodies, read.body_mass, strict=True))}
+
+
+def in_sapien(folder: Path) -> Values:
+    import sapien
+
+    scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
+    loader = scene.create_urdf_loader()
+    loader.fix_root_link = True
+    builders, _, _ = loader.parse(str(folder / FORMATS["urdf"]))
+    for link in builders[0].link_builders:
+        link.visual_records.clear()
+    built = builders[0].build()
+    joints = built.get_active_joints()
+    return {
+        "lower": {joint.name: joint.limits[0][0] for joint in joints if np.isfinite(joint.limits).all()},
+        "upper": {joint.name: joint.limits[0][1] for joint in joints if np.isfinite(joint.limits).all()},
+        "mass": {link.name: link.mass for link in built.links},
+    }
+
+
+READERS = {"mujoco": in_mujoco, "newton": in_newton, "sapien": in_sapien}
+
+
+def wanted(robot: Robot) -> Values:
+    """What the object itself says."""
+    own = {name: {joint.name: getattr(joint, name) for joint in robot.joints} for name in QUANTITIES[:-1]}
+    return {**own, "mass": {link.name: link.inertia.mass for link in robot.links}}
+
+
+def differences(found: Values, own: Values) -> dict[str, float]:
+    """Largest relative difference in each quantity that was read, over joints or links of which both have a number."""
+    worst = {}
+    for quantity, values in found.items():
+        apart = [
+            abs(value - own[quantity][name]) / max(abs(own[quantity][name]), 1e-6)
+            for name, value in values.items()
+            if name in own[quantity] and np.isfinite(own[quantity][name])
+        ]
+        worst[quantity] = float(max(apart, default=0.0))
+    return worst
+
+
+def main() -> None:
+    """Entry point of ``python -m benchmarks.simready``."""
+    import simready.validate as validator
+
+    options = tyro.cli(Options)
+    validator.initialize(rules_and_requirements_paths=[], features_paths=[], profiles_paths=[])
+    keys = [(category, options.first_seed + n) for category in sorted(FAMILIES) for n in range(options.objects)]
+    failed: Counter[str] = Counter()
+    passed, worst = 0, defaultdict[str, dict[str, float]](dict)
+    for category, seed in track("objects", keys, unit="object"):
+        with tempfile.TemporaryDirectory() as place:
+            folder, obj = Path(place), make(category, seed)
+            export(obj, folder, ("urdf", "mjcf", "usd", "simready"))
+            (file,) = (folder / FORMATS["simready"]).rglob("*.usdc")
+            found = validator.validate_asset(
+                validator.AssetValidationConfig(asset_path=str(file), profile_id="Robotics-Prop")
+            )
+            reasons = {
+                reason for said in found.features_summary.values() if said["blocking_failure"]
+                for reason in [str(said.get("failing requirements"))]
+            }  # fmt: skip
+            passed += not reasons
+            failed.update(f"{category} {seed}: {reason}" for reason in reasons)
+            own = wanted(as_robot(obj))
+            for name, read in READERS.items():
+                seen = read(folder)
+                for quantity, value in differences(seen, own).items():
+                    worst[name][quantity] = max(worst[name].get(quantity, 0.0), value)
+    for line in failed:
+        say(line)
+    print(f"Robotics-Prop: {passed} of {len(keys)} pass")
+    print("| largest relative difference | " + " | ".join(QUANTITIES) + " |\n|---" + "|---" * len(QUANTITIES) + "|")
+    for name, values in worst.items():
+        cells = [f"{values[quantity]:.1e}" if quantity in values else "-" for quantity in QUANTITIES]
+        print(f"| {name} | " + " | ".join(cells) + " |")
+    print(json.dumps({"passed": passed, "objects": len(keys), "failed": list(failed), "differences": worst}))
+
+
+if __name__ == "__main__":
+    main()
