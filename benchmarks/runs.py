@@ -66,7 +66,7 @@ def main(options: Options) -> None:
             out = Path(name) / "made"
             looks = watch(command(out, options, way), out)
             digests.add(tuple(file_sha256(path) for path in sorted(out.glob("*.tar"))))
-            left = sorted(path.name for pattern in (".*.part", "objects/.*.part", "objects/_*", "progress.jsonl")
+            left = sorted(path.name for pattern in (".*.part", "objects/.*.part", ".parts/*")
                           for path in out.glob(pattern))  # fmt: skip
         rows[way].append(figures(looks, options.shard_size) | {"left_over": len(left)})
         print(f"{way:<12} {rows[way][-1]} {' '.join(left)}", flush=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import tyro
 
+from artsim.commands.printing import print_made, resumable
 from artsim.common.program import cores
 from artsim.formats.base import FormatName
 
@@ -41,14 +42,7 @@ class Convert:
     def run(self) -> None:
         from artsim.formats.conversion import convert
 
-        try:
+        with resumable("whole files are kept", self.out):
             result = convert(self.path, self.to, self.out, self.split, self.samples, self.group, self.workers)
-        except KeyboardInterrupt:
-            print(f"\nstopped; whole files are kept in {self.out}: rerun the command to resume")
-            raise
-        counted = f"{result.num_samples} samples in {result.files} files"
-        if result.made == 0:
-            print(f"{result.folder}: already complete, {counted}")
-            return
-        rate = result.made / result.seconds
-        print(f"{result.folder}: {counted}, {result.made} samples converted now, {rate:.0f} samples/s")
+        whole = f"{result.num_samples} samples in {result.files} files"
+        print_made(result.folder, whole, result.made, "samples", result.seconds)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
 from artsim.errors import ConfigError
+from artsim.export.options import ExportOptions
 from artsim.loading.roots import Opened
 
 
@@ -34,27 +35,21 @@ class Export(Opened):
     collision: Literal["pieces", "hull", "surface"] = "pieces"
     """What collides: convex pieces of each part (extra sim), one convex hull, or the surface as it is. Parts of MJCF
     and USD files keep what their file says."""
-    base: Literal["fixed", "free"] = "fixed"
-    """fixed: the root is fixed to the world; free: it falls. For MJCF and USD; with URDF, set it in the simulator."""
-    actuators: Literal["none", "motor", "position"] = "none"
-    """For MJCF. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
-    control is where the joint shall be."""
+    options: Annotated[ExportOptions, tyro.conf.arg(name="")] = field(default_factory=ExportOptions)
 
     def run(self) -> None:
         from artsim.export import check_formats, export
         from artsim.export.loaded import prepare
-        from artsim.export.options import ExportOptions
         from artsim.loading.urdf import load
 
         check_formats(self.formats)
-        options = ExportOptions(self.base, self.actuators)
         if self.out.exists():
             raise ConfigError("it exists already", self.out, "name a folder that does not, or remove it")
         obj = prepare(load(self.path, package_roots=self.package_root, body=self.body), self.collision)
         self.out.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f".{self.out.name}.", dir=self.out.parent) as place:
             made = Path(place) / "made"
-            export(obj, made, self.formats, {"source": {"collision": self.collision}}, options)
+            export(obj, made, self.formats, {"source": {"collision": self.collision}}, self.options)
             shutil.move(made, self.out)
         pieces = sum(len(part.body.pieces) for part in obj.parts if part.body is not None)
         print(f"{self.out}: {', '.join(self.formats)}; {len(obj)} parts, {pieces} shapes that collide")

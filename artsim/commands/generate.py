@@ -10,6 +10,7 @@ import tyro
 
 from artsim.commands.convert import Convert
 from artsim.commands.having import Having, categories_named
+from artsim.commands.printing import print_made, resumable
 from artsim.common.program import cores
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
@@ -84,31 +85,13 @@ class Generate(Opened):
                 raise ConfigError("a whole dataset in a folder is converted", "format", "leave --format out")
             FORMATS[self.format].check(self.sample, Path(self.out))
         sources: list[Source] = [*find_sources(self.objects, self.package_root, self.body)]
-        sources += family_sources(
-            categories_named(self.categories),
-            self.objects_per_category,
-            self.first_object,
-            Constraints.parse(self.having),
-        )
-        try:
+        categories, constraints = categories_named(self.categories), Constraints.parse(self.having)
+        sources += family_sources(categories, self.objects_per_category, self.first_object, constraints)
+        with resumable("whole shards are kept", self.out):
             result = generate(
-                sources,
-                self.out,
-                num_samples=self.num_samples,
-                seed=self.seed,
-                sample=self.sample,
-                workers=self.workers,
-                shard_size=self.shard_size,
-                splits=self.splits,
-                skip_broken=self.skip_broken,
-                strict=self.strict,
-                load_limit=self.load_limit,
-                ray=self.ray,
-                share=share,
-            )
-        except KeyboardInterrupt:
-            print(f"\nstopped; whole shards are kept in {self.out}: rerun the command to resume")
-            raise
+                sources, self.out, self.num_samples, self.seed, self.sample, self.workers, self.shard_size, self.splits,
+                self.skip_broken, strict=self.strict, load_limit=self.load_limit, ray=self.ray, share=share,
+            )  # fmt: skip
         for reason in result.left_out:
             print(f"left out: {printable(reason, 1000)}")
         if share is not None:
@@ -122,11 +105,8 @@ class Generate(Opened):
             print(f"extended from {result.grown_from} samples, {kept} of which are kept in their shards")
         for file in result.restored:
             print(f"regenerated: {file}")
-        if result.made == 0:
-            print(f"{result.folder}: already complete, {result.num_samples} samples")
-        else:
-            made, rate = result.made, result.made / result.seconds
-            print(f"{result.folder}: {result.num_samples} samples, {made} of them made now, {rate:.0f} samples/s")
+        print_made(result.folder, f"{result.num_samples} samples", result.made, "samples", result.seconds)
+        if result.made:
             print(f"look at them: artsim view {result.folder}")
         if self.format is not None:
             Convert(Path(self.out), self.format, Path(f"{self.out}_{self.format}"), workers=self.workers).run()

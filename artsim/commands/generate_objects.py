@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+import tyro
 
 from artsim.commands.having import Having, categories_named
+from artsim.commands.printing import print_made, resumable
 from artsim.common.program import cores
+from artsim.export.options import ExportOptions
 from artsim.families.constraints import Constraints
 
 
@@ -33,36 +37,16 @@ class GenerateObjects:
     seed: int = 0
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
     having: Having = ()
-    base: Literal["fixed", "free"] = "fixed"
-    """fixed: the root is fixed to the world; free: it falls. For MJCF and USD; with URDF, set it in the simulator."""
-    actuators: Literal["none", "motor", "position"] = "none"
-    """For MJCF. motor: a control of 1 is the effort limit at rest, and nothing at the velocity limit; position: a
-    control is where the joint shall be."""
-    materials: bool = False
-    """Write materials, different for each object: colours, textures, texture coordinates."""
+    options: Annotated[ExportOptions, tyro.conf.arg(name="")] = field(default_factory=ExportOptions)
     workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 
     def run(self) -> None:
         from artsim.export.batch import generate_objects
-        from artsim.export.options import ExportOptions
 
-        try:
+        with resumable("whole objects are kept", self.out):
             result = generate_objects(
-                categories_named(self.category),
-                self.out,
-                self.count,
-                self.seed,
-                self.formats,
-                self.workers,
-                constraints=Constraints.parse(self.having),
-                options=ExportOptions(self.base, self.actuators, self.materials),
-            )
-        except KeyboardInterrupt:
-            print(f"\nstopped; whole objects are kept in {self.out}: rerun the command to resume")
-            raise
-        if result.made == 0:
-            print(f"{result.folder}: already complete, {result.objects} objects")
-            return
-        rate = result.made / result.seconds
-        print(f"{result.folder}: {result.objects} objects, {result.made} of them made now, {rate:.0f} objects/s")
+                categories_named(self.category), self.out, self.count, self.seed, self.formats, self.workers,
+                constraints=Constraints.parse(self.having), options=self.options,
+            )  # fmt: skip
+        print_made(result.folder, f"{result.objects} objects", result.made, "objects", result.seconds)

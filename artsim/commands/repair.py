@@ -8,12 +8,12 @@ from typing import Annotated
 
 import tyro
 
+from artsim.commands.printing import print_some, resumable
 from artsim.common.program import cores
-from artsim.errors import ConfigError, DatasetError
+from artsim.common.tables import plural
+from artsim.errors import DatasetError
 from artsim.loading.roots import PackageRoots
-
-_LISTED = 50
-"""Lines of a list before the rest is only counted."""
+from artsim.runs.recipe import check_counts
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,11 @@ class Verify:
         from artsim.datasets.problems import repair_command
         from artsim.datasets.verify import verify
 
-        if self.workers < 1:
-            raise ConfigError(f"{self.workers} processes check nothing", "workers", "use 1 or more")
+        check_counts(workers=self.workers)
         problems = verify(self.path, workers=self.workers)
-        for problem in problems[:_LISTED]:
-            print(problem)
-        if len(problems) > _LISTED:
-            print(f"... and {len(problems) - _LISTED} more")
+        print_some(problems)
         if problems:
-            plural = "problem" if len(problems) == 1 else "problems"
-            raise DatasetError(f"{len(problems)} {plural} found", self.path, repair_command(self.path))
+            raise DatasetError(f"{plural(len(problems), 'problem')} found", self.path, repair_command(self.path))
         print(f"{self.path}: sound")
 
 
@@ -66,17 +61,10 @@ class Repair:
         from artsim.datasets.repair import repair
         from artsim.loading.sources import find_sources
 
-        try:
+        with resumable("what was restored stays", self.path):
             result = repair(self.path, find_sources(self.objects, self.package_root), self.workers)
-        except KeyboardInterrupt:
-            print(f"\nstopped; what was restored stays in {self.path}: rerun the command to resume")
-            raise
-        for file in result.restored[:_LISTED]:
-            print(f"restored: {file}")
-        if len(result.restored) > _LISTED:
-            print(f"... and {len(result.restored) - _LISTED} more")
-        for problem in result.failed[:_LISTED]:
-            print(problem)
+        print_some([f"restored: {file}" for file in result.restored])
+        print_some(result.failed)
         if result.failed:
             raise DatasetError(f"{len(result.failed)} problems are left", self.path)
         print(f"{self.path}: " + (f"{len(result.restored)} files restored" if result.restored else "nothing to repair"))

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from artsim.commands.printing import print_made, resumable
 from artsim.common.program import cores
 from artsim.datasets.sample_options import SensorName
 from artsim.renderers import RendererName
@@ -73,21 +74,14 @@ class Scene:
             self.scene, self.camera, self.views, self.renderer, self.rgb_samples, self.num_points, self.noise,
             self.misses,
         )  # fmt: skip
-        try:
+        with resumable("whole files are kept", self.out):
             result = generate_scenes(
                 run, self.out, self.scenes, self.seed, self.shard_size, self.workers, overview_files, self.overviews
             )
             converted = [convert_scenes(run, self.out, name, self.workers) for name in self.formats]
-        except KeyboardInterrupt:
-            print(f"\nstopped; whole files are kept in {self.out}: rerun the command to resume")
-            raise
         for entry in open_scenes(self.out).entries[:_LISTED]:
             seen = ", ".join(f"{obj.category} {100 * obj.visible_fraction:.0f}%" for obj in entry.objects)
             print(f"{entry.key}: {seen} visible")
-        if result.made == 0:
-            print(f"{result.folder}: already complete, {result.scenes} scenes")
-        else:
-            rate = 60.0 * result.made / result.seconds
-            print(f"{result.folder}: {result.scenes} scenes, {result.made} of them made now, {rate:.0f} a minute")
+        print_made(result.folder, f"{result.scenes} scenes", result.made, "scenes", result.seconds)
         for folder in converted:
             print(f"wrote {folder}")

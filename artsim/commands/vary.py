@@ -8,11 +8,9 @@ from typing import Literal
 
 import tyro
 
+from artsim.commands.printing import print_some, resumable
 from artsim.errors import AssetError
 from artsim.loading.roots import PackageRoots
-
-_LISTED = 50
-"""Failures that are printed before the rest is only counted."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +43,11 @@ class Vary:
     def run(self) -> None:
         from artsim.variation.folder import write_variations
 
-        try:
+        with resumable("whole variations are kept", self.out):
             summary = write_variations(
                 self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
             )
-        except KeyboardInterrupt:
-            print(f"\nstopped; whole variations are kept in {self.out}: rerun the command to resume")
-            raise
-        for failure in summary.failed[:_LISTED]:
-            print(failure)
-        if len(summary.failed) > _LISTED:
-            print(f"... and {len(summary.failed) - _LISTED} more")
+        print_some(summary.failed)
         print(f"{summary.folder}: {summary.whole} variations of {self.path}\n{summary}")
         if not summary.whole:
             raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
+from artsim.common.sharding import Shared, process_rank
 from artsim.datasets.description import read_description
 from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.padding import PaddedDataset, PaddedStream
@@ -158,7 +158,7 @@ class Dataset:
         float32 : bool
             Poses, boxes and joints in single precision, too.
         """
-        return PaddedDataset(self, max_parts or max(o.num_parts for o in self.plan.objects), float32)
+        return PaddedDataset(self, max_parts or self.plan.max_parts, float32)
 
     def stream(self, split: str = "train", seed: int | None = None, start: int = 0, step: int = 1) -> SampleStream:
         """Fresh samples of a split's objects for ever, drawn like this dataset's but with another seed.
@@ -180,7 +180,7 @@ class Dataset:
         return EpochStream(self, seed)
 
 
-class SampleStream:
+class SampleStream(Shared):
     """Endless on-line source: sample ``i`` is made when asked for, and is always the same.
 
     Iterating yields samples ``start``, ``start + step``, ... Workers of a torch ``DataLoader``, and processes of its
@@ -205,15 +205,10 @@ class SampleStream:
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
         self.objects = ObjectCache(place, below="objects")
         self._renderer: Renderer | None = None
-        self._rank: tuple[int, int] | None = None
-        register_with_torch(SampleStream)
 
     def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape; see :meth:`Dataset.padded`."""
-        return PaddedStream(self, max_parts or max(o.num_parts for o in self.plan.objects), float32)
-
-    def __len__(self) -> int:
-        raise TypeError(NO_LENGTH)
+        return PaddedStream(self, max_parts or self.plan.max_parts, float32)
 
     def __getitem__(self, i: int) -> Sample:
         if i < 0:
@@ -223,21 +218,8 @@ class SampleStream:
         planned = self.plan.object_in_split(self.split, i)
         return draw_sample(self.objects[planned.key], self.plan.sample, self.seed, i, self._renderer)
 
-    def __getstate__(self) -> dict[str, Any]:
-        rank = self._rank or process_rank()  # of the process that hands it to workers, which have no group
-        return {
-            **self.__dict__,
-            "objects": ObjectCache(self.objects.storage, below="objects"),
-            "_renderer": None,
-            "_rank": rank,
-        }
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        register_with_torch(SampleStream)
-
     def __iter__(self) -> Iterator[Sample]:
-        share, shares = share_of(self._rank or process_rank())
+        share, shares = self._share()
         i = self.start + share * self.step
         while True:
             yield self[i]
@@ -249,7 +231,7 @@ def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:
     return Dataset(folder, split)
 
 
-class EpochStream:
+class EpochStream(Shared):
     """Every sample of a dataset once in each epoch, in a random order that depends on (seed, epoch) and on the shares.
 
     The shards of a split are put into a new order for each epoch. Nodes and workers take equal stretches of it: at
@@ -271,8 +253,6 @@ class EpochStream:
         if seed < 0 or shards_at_once < 1:
             raise ConfigError(f"there is no seed {seed}, or {shards_at_once} shards", fix="use 0 or more, 1 or more")
         self.dataset, self.seed, self.shards_at_once, self.epoch = dataset, seed, shards_at_once, 0
-        self._rank: tuple[int, int] | None = None
-        register_with_torch(EpochStream)
 
     def set_epoch(self, epoch: int) -> None:
         """Which epoch the next iteration goes through: another one has another order."""
@@ -280,7 +260,7 @@ class EpochStream:
 
     def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape; see :meth:`artsim.datasets.dataset.Dataset.padded`."""
-        return PaddedStream(self, max_parts or max(o.num_parts for o in self.dataset.plan.objects), float32)
+        return PaddedStream(self, max_parts or self.dataset.plan.max_parts, float32)
 
     def __len__(self) -> int:
         """Samples of this process in an epoch, those of all its workers together."""
@@ -291,7 +271,7 @@ class EpochStream:
         return self.dataset[i]
 
     def __iter__(self) -> Iterator[Sample]:
-        share, shares = share_of(self._rank or process_rank())
+        share, shares = self._share()
         rng = np.random.default_rng([self.seed, self.epoch, share, shares])
         pieces = list(self._pieces(share, shares))
         for first in range(0, len(pieces), self.shards_at_once):
@@ -322,13 +302,6 @@ class EpochStream:
         if isinstance(storage, FolderStorage):
             return ShardReader(storage.folder / shard.name, fix)
         return ShardReader.of_bytes(storage, shard.name, shard.bytes, shard.sha256, fix)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_rank": self._rank or process_rank()}  # workers have no group
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        register_with_torch(EpochStream)
 
 
 def _bound(total: int, share: int, shares: int) -> int:

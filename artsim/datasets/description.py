@@ -9,19 +9,18 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
-from artsim.common.files import MAX_JSON_BYTES, parse_json, read_json, write_atomic
+from artsim.common.files import MAX_JSON_BYTES, parse_json
 from artsim.common.json_records import as_type
 from artsim.common.names import printable
-from artsim.datasets.plan import FORMAT, Plan, ShardRecord
+from artsim.datasets.plan import FORMAT, Plan, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.errors import ConfigError, DatasetError
-from artsim.runs.journal import JOURNAL, Journal
-from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
+from artsim.runs.storage import Place, Storage, storage_of
 
 PLAN, DESCRIPTION = "plan.json", "dataset.json"
 
@@ -37,6 +36,9 @@ _PLAN_KEYS = (
 )  # fmt: skip
 _MORE_KEYS = ("conventions", "splits", "shards")
 _SEAL = "sha256"
+_MAX_RECORD = 10_000_000
+READERS = 32
+"""Requests at once: one to object storage takes some ten milliseconds, of which the machine waits nearly all."""
 
 
 def plan_part(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,11 +79,11 @@ def full_description(begun: Mapping[str, Any], plan: Plan, records: Sequence[Sha
     }
 
 
-def write_if_other(path: Path, data: bytes) -> bool:
+def write_if_other(storage: Storage, name: str, data: bytes) -> bool:
     """Write a file unless it holds just that; whether it was written."""
-    if path.is_file() and not path.is_symlink() and path.stat().st_size == len(data) and path.read_bytes() == data:
+    if storage.sizes().get(name) == len(data) and storage.read(name, len(data)) == data:
         return False
-    write_atomic(path, data)
+    storage.write(name, data)
     return True
 
 
@@ -89,21 +91,6 @@ def read_plan(place: Place) -> Plan:
     """The plan that a generation run wrote into its folder."""
     storage = storage_of(place)
     return _plan(_document(storage, PLAN), storage, PLAN)
-
-
-def read_plan_document(storage: Storage) -> dict[str, Any] | None:
-    """Content of ``plan.json``; None where there is none.
-
-    Raises
-    ------
-    DatasetError
-        When it is damaged.
-    """
-    if PLAN not in storage.sizes():
-        return None
-    document = _document(storage, PLAN)
-    _plan(document, storage, PLAN)
-    return document
 
 
 def read_description(place: Place) -> tuple[Plan, list[ShardRecord], dict[str, Any]]:
@@ -184,7 +171,7 @@ def _damage_error(storage: Storage, name: str, error: Exception) -> DatasetError
 
 @dataclass(frozen=True)
 class StartedDataset:
-    """What the descriptions in a folder say.
+    """What the descriptions of a dataset say.
 
     Attributes
     ----------
@@ -192,7 +179,7 @@ class StartedDataset:
         What ``plan.json`` has to hold.
     plan : Plan
     records : tuple of ShardRecord
-        Shards that are said to be finished. Of another plan, perhaps: their recipes tell.
+        Those of ``dataset.json``, if it is sound.
     complete : bool
         Whether ``dataset.json`` is sound: then it says what every shard has to be.
     problems : tuple of Problem
@@ -201,64 +188,64 @@ class StartedDataset:
 
     document: dict[str, Any]
     plan: Plan
-    records: tuple[ShardRecord, ...]
-    complete: bool
-    problems: tuple[Problem, ...]
+    records: tuple[ShardRecord, ...] = ()
+    complete: bool = False
+    problems: tuple[Problem, ...] = ()
 
 
-def read_started(folder: Path) -> StartedDataset | None:
-    """What is known of the dataset in a folder; None when nothing is.
+def read_started(place: Place) -> StartedDataset | None:
+    """What is known of the dataset at a place; None when nothing is.
 
     Raises
     ------
     DatasetError
         When every description that there is is damaged.
     """
-    fix, problems = repair_command(folder), []
+    storage = storage_of(place)
+    fix, files, errors = repair_command(storage.place), storage.sizes(), dict[str, DatasetError]()
     described = begun = None
-    for name in (DESCRIPTION, PLAN):
-        if not (folder / name).exists() and not (folder / name).is_symlink():
-            continue
-        try:
-            if name == DESCRIPTION:
-                described = read_description(folder)
-            else:
-                begun = plan_part(_document(FolderStorage(folder), PLAN))
-                _plan(begun, FolderStorage(folder), PLAN)
-        except DatasetError as error:
-            problems.append((name, error))
-            if name == PLAN:
-                begun = None
+    try:
+        described = read_description(storage) if DESCRIPTION in files else None
+    except DatasetError as error:
+        errors[DESCRIPTION] = error
+    try:
+        begun = plan_part(_document(storage, PLAN)) if PLAN in files else None
+        plan = None if begun is None else _plan(begun, storage, PLAN)
+    except DatasetError as error:
+        errors[PLAN], begun = error, None
+    problems = [Problem(name, error.what.removeprefix(f"{name} "), fix) for name, error in errors.items()]
     if described is not None:
         plan, records, document = described
-        wanted, found = (
-            plan_part(document),
-            [Problem(name, error.what.removeprefix(f"{name} "), fix) for name, error in problems],
-        )
-        if begun is None and not found:
-            found.append(Problem(PLAN, "is missing", fix))
-        elif begun is not None and begun != wanted:
-            found.append(Problem(PLAN, f"is not the plan of {DESCRIPTION}", fix))
-        return StartedDataset(wanted, plan, tuple(records), True, tuple(found))
-    if begun is not None:
-        records = _shards_of_journal(folder)
-        found = [Problem(name, error.what.removeprefix(f"{name} "), fix) for name, error in problems]
-        return StartedDataset(begun, _plan(begun, FolderStorage(folder), PLAN), tuple(records), False, tuple(found))
-    if problems:
-        raise problems[0][1]
+        wanted = plan_part(document)
+        if not problems and begun != wanted:
+            what = "is missing" if begun is None else f"is not the plan of {DESCRIPTION}"
+            problems.append(Problem(PLAN, what, fix))
+        return StartedDataset(wanted, plan, tuple(records), True, tuple(problems))
+    if begun is not None and plan is not None:
+        return StartedDataset(begun, plan, problems=tuple(problems))
+    if errors:
+        raise next(iter(errors.values()))
     return None
 
 
-def _shards_of_journal(folder: Path) -> list[ShardRecord]:
-    """Shards that a damaged ``dataset.json`` and the journal of a stopped run speak of."""
-    entries: list[Any] = []
-    with contextlib.suppress(DatasetError, KeyError, TypeError, IndexError):  # there may be none, or nothing left of it
-        shards = read_json(folder / DESCRIPTION, DESCRIPTION, DatasetError)["shards"]
-        entries += shards if isinstance(shards, list) else []
-    with contextlib.suppress(DatasetError):
-        entries += Journal(folder / JOURNAL).lines()
-    records = []
+def finished_shards(storage: Storage, shards: Iterable[Shard], parts: str) -> Iterator[ShardRecord]:
+    """Shards of a dataset that is not complete which are said to be finished, the latest word last.
+
+    Records say so, and a description that is damaged or that of a smaller dataset. Their recipes tell whether they are
+    those of the plan.
+    """
+    entries, recorded = list[Any](), storage.sizes(f"{parts}/shards")
+    for name in (DESCRIPTION, f"{parts}/{DESCRIPTION}"):
+        with contextlib.suppress(DatasetError, ValueError, KeyError, TypeError, IndexError):  # or nothing is left of it
+            listed = parse_json(storage.read(name, MAX_JSON_BYTES))["shards"]
+            entries += listed if isinstance(listed, list) else []
+
+    def read(shard: Shard) -> Any:
+        with contextlib.suppress(ValueError):
+            return parse_json(storage.read(f"{parts}/shards/{shard.name}.json", _MAX_RECORD))
+
+    with ThreadPoolExecutor(READERS) as pool:
+        entries += pool.map(read, [shard for shard in shards if f"{shard.name}.json" in recorded])
     for entry in entries:
         with contextlib.suppress(ValueError, KeyError):
-            records.append(ShardRecord.from_dict(entry))
-    return records
+            yield ShardRecord.from_dict(entry)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from artsim.common.sequences import listed
-from artsim.common.sharding import NO_LENGTH, process_rank, register_with_torch, share_of
+from artsim.common.sharding import Shared
 from artsim.datasets.padding import PaddedStream
 from artsim.datasets.plan import SampleOptions, draw_sample
 from artsim.errors import ConfigError
@@ -26,7 +25,7 @@ STREAM_SEEDS = (1 << 31, 1 << 32)
 """Seeds of a stream's objects: none that a person would choose for a test set."""
 
 
-class FamilyStream:
+class FamilyStream(Shared):
     """Endless source of samples of objects that have never been seen before.
 
     Object ``n`` is drawn from (seed, n) and is of category ``n`` modulo the number of categories; sample ``i`` shows
@@ -71,9 +70,6 @@ class FamilyStream:
         self.options, self.seed = options or SampleOptions(), seed
         self.views_per_object, self.start, self.step = views_per_object, start, step
         self._renderer: Renderer | None = None
-        self._rank: tuple[int, int] | None = None
-        self._object = lru_cache(maxsize=8)(self._make)
-        register_with_torch(FamilyStream)
 
     def padded(self, max_parts: int, float32: bool = False) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape, which default collation stacks.
@@ -87,9 +83,6 @@ class FamilyStream:
         """
         return PaddedStream(self, max_parts, float32)
 
-    def __len__(self) -> int:
-        raise TypeError(NO_LENGTH)
-
     def __getitem__(self, i: int) -> Sample:
         if i < 0:
             raise IndexError(f"sample {i} of an endless stream")
@@ -99,7 +92,7 @@ class FamilyStream:
 
     def object(self, n: int) -> ArticulatedObject:
         """Object number ``n``, which samples ``n * views_per_object`` and on show."""
-        return self._object(n)
+        return _loaded(*self._named(n))
 
     def assembly(self, n: int) -> Assembly:
         """Parts and joints of object number ``n``, in less than half of the time that the object takes.
@@ -112,27 +105,19 @@ class FamilyStream:
         return assembly_of(*self._named(n))
 
     def __iter__(self) -> Iterator[Sample]:
-        share, shares = share_of(self._rank or process_rank())
+        share, shares = self._share()
         n = self.start + share * self.step
         while True:
             for view in range(self.views_per_object):
                 yield self[n * self.views_per_object + view]
             n += shares * self.step
 
-    def _make(self, n: int) -> ArticulatedObject:
-        category, seed = self._named(n)
-        (source,) = family_sources([category], 1, seed)
-        return source.load()
-
     def _named(self, n: int) -> tuple[str, int]:
         seed = int(np.random.default_rng([self.seed, n]).integers(*STREAM_SEEDS))
         return self.categories[n % len(self.categories)], seed
 
-    def __getstate__(self) -> dict[str, Any]:
-        rank = self._rank or process_rank()  # of the process that hands it to workers, which have no group
-        return {**{k: v for k, v in self.__dict__.items() if k != "_object"}, "_renderer": None, "_rank": rank}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        register_with_torch(FamilyStream)
-        self._object = lru_cache(maxsize=8)(self._make)
+@lru_cache(maxsize=16)
+def _loaded(category: str, seed: int) -> ArticulatedObject:
+    """The last objects used, of all streams of a process."""
+    return family_sources([category], 1, seed)[0].load()

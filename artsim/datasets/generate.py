@@ -1,40 +1,57 @@
-"""plan -> workers -> shards: generate a dataset on local processes, resumably.
+"""plan -> workers -> shards: generate a dataset by one machine or by several, resumably.
 
 A folder under construction holds ``plan.json``, ``objects/*.npz`` (every object, so that the dataset stands on
-its own), whole shards, and ``progress.jsonl``, one line for each of them. ``dataset.json`` is written last: its
-presence means that the dataset is complete.
+its own), and whole shards. Its folder ``.parts`` holds what is done: see below, with ``parts`` in its place.
+``dataset.json`` is written last: its presence means that the dataset is complete.
+
+Several machines have nothing in common but the storage of the dataset: a shared folder, or a URL. Machine ``i`` of
+``n`` prepares every n-th block of objects and makes every n-th shard. No machine leads: the plan is a function of the
+prepared objects, so that each finds the same one. Nothing is locked, appended or renamed, for object storage can do
+none of it. Until the dataset is merged, its folder ``parts`` holds::
+
+    objects/<block>.json     what became of some sources
+    objects/<sha256>.npz     their objects, before the plan names them
+    shards/<shard>.json      the record of each finished shard
+    <i>-of-<n>.json          that a machine has done its share
 """
 
 from __future__ import annotations
 
+import json
+import re
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
-from artsim.datasets.description import DESCRIPTION, StartedDataset, read_started
-from artsim.datasets.inventory import Inventory, examine, leftover_problems
-from artsim.datasets.merge import merge, place_objects
-from artsim.datasets.origins import Origins, write_origins
+from artsim.datasets.description import DESCRIPTION, PLAN, StartedDataset, document_bytes, read_started
+from artsim.datasets.inventory import (
+    UNFINISHED,
+    Inventory,
+    examine,
+    examine_sizes,
+    leftover_problems,
+    remove_leftovers,
+)
+from artsim.datasets.merge import place_objects
+from artsim.datasets.new_plan import VERSIONS_OF
+from artsim.datasets.origins import write_origins
 from artsim.datasets.plan import MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
 from artsim.datasets.preparing import Preparation, Share
-from artsim.datasets.restore import Restoration, remove_leftovers
-from artsim.datasets.same_plan import check_same_plan
+from artsim.datasets.restore import Restoration
 from artsim.datasets.sample_options import SampleOptions
-from artsim.datasets.shares import ShareRun
 from artsim.datasets.splits import check_shares
-from artsim.datasets.versions import VERSIONS_OF
-from artsim.datasets.worker import PARTS, PREPARED_BY_ONE
+from artsim.datasets.worker import PARTS, PARTS_OF_ONE
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
-from artsim.runs.journal import JOURNAL, Journal
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool
 from artsim.runs.ray_pool import RayPool
-from artsim.runs.recipe import check_counts, check_seed
-from artsim.runs.storage import FolderStorage, Place, is_url, storage_of
+from artsim.runs.recipe import check_counts, check_seed, differences
+from artsim.runs.storage import FolderStorage, Place, Storage, is_url, storage_of
 
 LOAD_LIMIT = 300.0
 """Seconds that an object may take to load: a hundred times what the largest real ones take."""
@@ -141,52 +158,49 @@ def generate(
     KeyboardInterrupt
         On Ctrl-C, after the workers have stopped; the same call resumes.
     """
-    start = time.perf_counter()
-    folder = Path(out)
+    start, alone = time.perf_counter(), share is None and not is_url(out)
+    storage, folder, machine = storage_of(out), Path(out), share or Share()
     asked = Plan(seed, num_samples, shard_size, splits, sample or SampleOptions(), (), strict, version("artsim"))
     _check_options(asked, workers, load_limit, sources)
-    if is_url(out) or share is not None:
-        storage = storage_of(out)
-        with _team(storage, workers, ray) as team:
-            objects = Preparation(storage, asked, sources, share or Share(), team, skip_broken, load_limit, progress)
-            plan, document, made = ShareRun(objects).run()
-        if isinstance(storage, FolderStorage):
-            write_origins(storage.folder, sources)
-        if share is None:
-            merge(storage, progress=progress)
-        return _result(storage.place, StartedDataset(document, plan, (), share is None, ()), made, start)
-    if (folder / DESCRIPTION).exists():  # else it is not complete, and perhaps another run is at it
-        begun = _start(folder, asked, sources)
+    if alone and DESCRIPTION in storage.sizes():  # else it is not complete, and perhaps another run is at it
+        begun = _start(storage, asked, sources, alone)
         if begun is not None and _is_sound(folder, begun, num_samples, workers, progress):
             return _result(folder, begun, 0, start)
-    with folder_lock(folder):
-        remove_leftovers(folder)
+    with folder_lock(folder) if alone else nullcontext(), _team(folder if alone else storage, workers, ray) as team:
         try:
-            begun = _start(folder, asked, sources)
-            grown_from = None
-            with _team(folder, workers, ray) as team:
-                if begun is None:
-                    storage = FolderStorage(folder)
-                    objects = Preparation(storage, asked, sources, None, team, skip_broken, load_limit, progress)
-                    document = objects.by_one()
-                    begun = StartedDataset(document, Plan.from_dict(document), (), False, ())
-                    place_objects(storage, begun.plan, PREPARED_BY_ONE)
-                elif num_samples > begun.plan.num_samples:
-                    grown_from = begun.plan.num_samples
-                    begun = _extend(folder, begun, num_samples)
-                write_origins(folder, sources)
+            begun, grown_from = _start(storage, asked, sources, alone), None
+            if begun is None:
+                begun = _begin(
+                    Preparation(storage, asked, sources, None if alone else machine, team, skip_broken, load_limit,
+                                progress)
+                )  # fmt: skip
+            elif num_samples > begun.plan.num_samples:
+                grown_from, plan = begun.plan.num_samples, replace(begun.plan, num_samples=num_samples)
+                begun = StartedDataset({**begun.document, "num_samples": num_samples}, plan)
+            if isinstance(storage, FolderStorage):
+                write_origins(storage, sources)
+            if alone:
                 inventory = examine(folder, begun, workers, progress)
-                damaged = _damaged_files(folder, begun, inventory) if grown_from is None else set()
-                restored = Restoration(folder, begun, inventory, Origins(folder, sources), team, progress)
-                restored.run()
+            else:
+                shards = begun.plan.shards()
+                own = shards if begun.complete else shards[machine.number :: machine.count]
+                inventory = examine_sizes(storage, begun, own, PARTS)
+            parts = PARTS_OF_ONE if alone else PARTS
+            restored = Restoration(storage, begun, inventory, sources, team, progress, parts, share is None)
+            restored.run()
         finally:
-            remove_leftovers(folder)
+            if alone:
+                remove_leftovers(folder)
     if restored.failed:
         raise DatasetError(
-            f"{len(restored.failed)} files of the dataset: " + "; ".join(map(str, restored.failed[:5])), folder
+            f"{len(restored.failed)} files of the dataset: " + "; ".join(map(str, restored.failed[:5])), storage.place
         )
+    if share is not None and not begun.complete:
+        storage.write(share.marker, json.dumps({"shards": len(own)}).encode())
+    damaged = _damaged_files(begun, inventory) if grown_from is None else set()
     files = tuple(name for name in restored.files if name in damaged)
-    return replace(_result(folder, begun, restored.samples, start), restored=files, grown_from=grown_from)
+    result = _result(folder if alone else storage.place, begun, restored.samples, start)
+    return replace(result, restored=files, grown_from=grown_from)
 
 
 def _team(place: Place, workers: int, ray: str | None) -> WorkerPool | RayPool:
@@ -198,7 +212,7 @@ def _is_sound(folder: Path, begun: StartedDataset, num_samples: int, workers: in
     """Whether the dataset asked for is there, complete and undamaged: then nothing is written, not even a lock."""
     if not begun.complete or begun.problems or num_samples != begun.plan.num_samples:
         return False
-    return not leftover_problems(folder, begun) and not examine(folder, begun, workers, progress)
+    return not leftover_problems(folder) and not examine(folder, begun, workers, progress)
 
 
 def _result(folder: Path | str, begun: StartedDataset, made: int, start: float) -> GenerateResult:
@@ -207,12 +221,10 @@ def _result(folder: Path | str, begun: StartedDataset, made: int, start: float) 
     return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
 
 
-def _damaged_files(folder: Path, begun: StartedDataset, inventory: Inventory) -> set[str]:
+def _damaged_files(begun: StartedDataset, inventory: Inventory) -> set[str]:
     """Files that were there before, or were said to be, and have to be made again."""
-    finished = {record.name for record in begun.records}
-    shards = {shard.name for shard in inventory.shards if shard.name in finished}
-    descriptions = {problem.where for problem in begun.problems}
-    return shards | {planned.file for planned in inventory.objects} | descriptions
+    shards = {shard.name for shard, why in inventory.shards.items() if why != UNFINISHED}
+    return shards | {planned.file for planned in inventory.objects} | {problem.where for problem in begun.problems}
 
 
 def _check_options(asked: Plan, workers: int, load_limit: float, sources: Sequence[Source]) -> None:
@@ -233,41 +245,64 @@ def _check_options(asked: Plan, workers: int, load_limit: float, sources: Sequen
         view_sampler(asked.sample.views.custom)
 
 
-def _start(folder: Path, asked: Plan, sources: Sequence[Source]) -> StartedDataset | None:
-    """What the folder says of its dataset, which is the one asked for, or a smaller one; None when there is none.
+def _start(storage: Storage, asked: Plan, sources: Sequence[Source], alone: bool) -> StartedDataset | None:
+    """What is there of the dataset, which is the one asked for, or a smaller one; None when there is none.
 
     Raises
     ------
     DatasetError
-        When the folder belongs to another plan, or to something else.
+        When another dataset is there, naming the options that differ, or something else.
     """
-    if not folder.exists():
-        return None
-    if not folder.is_dir():
-        raise ConfigError("cannot write (it is a file)", folder, "choose another folder")
-    if (folder / PARTS).exists():
-        raise DatasetError("several machines are making it in shares", folder, "artsim merge completes it, then go on")
-    begun = read_started(folder)
+    if alone and (Path(storage.place) / PARTS).exists():
+        what = "several machines are making it in shares"
+        raise DatasetError(what, storage.place, "artsim merge completes it, then go on")
+    begun = read_started(storage)
     if begun is None:
-        _refuse_strangers(folder)
+        _refuse_strangers(storage)
         return None
-    check_same_plan(str(folder), begun.document, asked, sources)
+    document, wanted = begun.document, asked.to_dict()
+    del wanted["objects"]
+    if alone and asked.num_samples > document["num_samples"]:
+        del wanted["num_samples"]
+    differing = [name for name, _, _ in differences(document, wanted)]
+    have = {(o["source"], o["source_sha256"]) for name in ("objects", "left_out", "repeated") for o in document[name]}
+    if have != {(s.name, s.sha256) for s in sources}:
+        differing.append("objects")
+    if differing:
+        fix = "choose another --out folder, or the options it was begun with (see its plan.json)"
+        if differing == ["num_samples"]:
+            does = "grows, but does not shrink" if alone else "made by several machines does not grow"
+            fix = f"a dataset {does}: choose another --out folder, or {document['num_samples']}"
+        what = f"the folder holds a dataset of another plan (different: {', '.join(differing)})"
+        raise DatasetError(what, storage.place, fix)
     return begun
 
 
-def _refuse_strangers(folder: Path) -> None:
-    """Refuse a folder without a dataset that holds something else."""
-    ours = {folder / "objects", *folder.glob(".*"), *folder.glob("objects/.*"), *folder.glob("objects/*.npz")}
-    found = sorted({*folder.iterdir(), *folder.glob("objects/*")} - ours)
+def _refuse_strangers(storage: Storage) -> None:
+    """Refuse a place without a dataset that holds something else."""
+    found = list(storage.sizes())
+    if isinstance(storage, FolderStorage):
+        paths = [*storage.folder.glob("*"), *storage.folder.glob("objects/*")]
+        found = [path.relative_to(storage.folder).as_posix() for path in paths]
+    ours = re.compile(rf"(.*/)?\..*|objects|{PARTS}|objects/.*\.npz")
+    found = sorted(name for name in found if not ours.fullmatch(name))
     if found:
-        name = found[0].relative_to(folder).as_posix()
-        raise DatasetError(f"the folder already holds {name!r}", folder, "choose an empty or new folder")
+        raise DatasetError(f"the folder already holds {found[0]!r}", storage.place, "choose an empty or new folder")
 
 
-def _extend(folder: Path, begun: StartedDataset, num_samples: int) -> StartedDataset:
-    """The plan with more samples. What is finished of the smaller one is noted, before nothing else says so."""
-    document = {**begun.document, "num_samples": num_samples}
-    plan = replace(begun.plan, num_samples=num_samples)
-    Journal(folder / JOURNAL).start(map(asdict, begun.records))
-    (folder / DESCRIPTION).unlink(missing_ok=True)
-    return StartedDataset(document, plan, begun.records, False, ())
+def _begin(objects: Preparation) -> StartedDataset:
+    """Write the plan that all prepared objects make, or read the one that another machine has written."""
+    storage, alone, document = objects.storage, objects.share is None, objects.document()
+    if document is not None:
+        if alone:
+            place_objects(storage, Plan.from_dict(document), PARTS_OF_ONE)
+        storage.write_new(PLAN, document_bytes(document))
+    begun = _start(storage, objects.asked, objects.sources, alone)
+    assert begun is not None
+    if document not in (None, begun.document):
+        raise DatasetError(
+            "another machine makes another plan of the same objects",
+            storage.place,
+            "use one kind of processor, and one version of artsim and its libraries, for all shares",
+        )
+    return begun

@@ -1,10 +1,9 @@
-"""The end of a dataset that several machines made: objects get their names, and ``dataset.json`` is written."""
+"""The end of a dataset: its objects have their names, and ``dataset.json`` is written."""
 
 from __future__ import annotations
 
-import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -12,20 +11,20 @@ from artsim.common.progress import track
 from artsim.datasets.description import (
     DESCRIPTION,
     PLAN,
+    READERS,
+    StartedDataset,
     document_bytes,
     full_description,
     read_description,
-    read_plan_document,
+    read_started,
 )
+from artsim.datasets.inventory import examine_sizes, remove_leftovers
 from artsim.datasets.plan import Plan, ShardRecord
-from artsim.datasets.preparing import READERS
-from artsim.datasets.restore import remove_leftovers
-from artsim.datasets.shares import read_records
-from artsim.datasets.worker import PARTS, PREPARED, RECORDS
+from artsim.datasets.worker import PARTS, PARTS_OF_ONE
 from artsim.errors import DatasetError
+from artsim.runs.checksums import check_files
 from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
 
-_BLOCK_BYTES = 1 << 22
 _AGAIN = "delete it, and run its share again"
 
 
@@ -57,28 +56,15 @@ def merge(place: Place, check: bool = False, progress: bool = True) -> MergeResu
         When shards are missing, with the shares that have not finished, or a file is not as it was written.
     """
     storage = storage_of(place)
-    files = storage.sizes()
-    if DESCRIPTION in files:
-        plan, records, _ = read_description(storage)
+    if DESCRIPTION in storage.sizes():
+        plan = read_description(storage)[0]
         _clean(storage)
-        return MergeResult(storage.place, plan.num_samples, len(records), True)
-    document = read_plan_document(storage)
-    if document is None:
+        return MergeResult(storage.place, plan.num_samples, plan.num_shards, True)
+    begun = read_started(storage)
+    if begun is None:
         raise DatasetError("no dataset was begun here", storage.place, f"name a folder or URL with {PLAN} in it")
-    plan = Plan.from_dict(document)
-    records = _records(storage, plan, files)
-    if check:
-        _compare(storage, [(r.name, r.sha256) for r in records], progress)
-    place_objects(storage, plan, PREPARED, check, progress)
-    storage.write(DESCRIPTION, document_bytes(full_description(document, plan, records)))
-    _clean(storage)
-    return MergeResult(storage.place, plan.num_samples, len(records), False)
-
-
-def _records(storage: Storage, plan: Plan, files: dict[str, int]) -> list[ShardRecord]:
-    """The records of all shards."""
-    shards = plan.shards()
-    records = read_records(storage, plan, shards, files)
+    plan, shards = begun.plan, begun.plan.shards()
+    records = examine_sizes(storage, begun, shards, PARTS).kept
     lacking = [shard.name for shard in shards if shard.name not in records]
     if lacking:
         raise DatasetError(
@@ -86,7 +72,10 @@ def _records(storage: Storage, plan: Plan, files: dict[str, int]) -> list[ShardR
             storage.place,
             _unfinished_shares(storage),
         )
-    return [records[shard.name] for shard in shards]
+    if check:
+        _compare(storage, [(record.name, record.sha256) for record in records.values()], progress)
+    complete(storage, begun, records, PARTS, check, progress)
+    return MergeResult(storage.place, plan.num_samples, len(records), False)
 
 
 def _unfinished_shares(storage: Storage) -> str:
@@ -101,24 +90,32 @@ def _unfinished_shares(storage: Storage) -> str:
     return f"run again: {named}" + (f" and {len(left) - 6} more" if len(left) > 6 else "")
 
 
-def place_objects(
-    storage: Storage, plan: Plan, folder: str = PREPARED, check: bool = False, progress: bool = False
+def complete(
+    storage: Storage, begun: StartedDataset, records: Mapping[str, ShardRecord], parts: str, check: bool, progress: bool
 ) -> None:
-    """Let every object of a folder of prepared ones be there under its name, too."""
-    prepared, there = storage.sizes(folder), storage.sizes("objects")
+    """Write ``dataset.json``, and remove what is of no use beside it."""
+    place_objects(storage, begun.plan, parts, check, progress)
+    shards = [records[shard.name] for shard in begun.plan.shards()]
+    storage.write(DESCRIPTION, document_bytes(full_description(begun.document, begun.plan, shards)))
+    _clean(storage)
+
+
+def place_objects(storage: Storage, plan: Plan, parts: str, check: bool = False, progress: bool = False) -> None:
+    """Let every object that was prepared be there under its name, too."""
+    prepared, there = storage.sizes(f"{parts}/objects"), storage.sizes("objects")
     for planned in plan.objects:
         if f"{planned.file_sha256}.npz" not in prepared and f"{planned.key}.npz" not in there:
             raise DatasetError("is missing", f"{storage.place}/{planned.file}", "run every share again")
-    if check:
-        names = [(f"{folder}/{p.file_sha256}.npz", p.file_sha256) for p in plan.objects]
-        _compare(storage, [pair for pair in names if pair[0].rpartition("/")[2] in prepared], progress)
-    left = [
-        (f"{folder}/{p.file_sha256}.npz", p.file) for p in plan.objects
-        if (size := prepared.get(f"{p.file_sha256}.npz")) is not None and there.get(f"{p.key}.npz") != size
+    found = [
+        (planned, f"{parts}/objects/{planned.file_sha256}.npz", prepared[f"{planned.file_sha256}.npz"])
+        for planned in plan.objects if f"{planned.file_sha256}.npz" in prepared
     ]  # fmt: skip
+    if check:
+        _compare(storage, [(name, planned.file_sha256) for planned, name, _ in found], progress)
+    left = [(name, planned.file) for planned, name, size in found if there.get(f"{planned.key}.npz") != size]
     with (
         ThreadPoolExecutor(READERS) as pool,
-        track("objects", total=len(left), unit="object", shown=progress) as bar,
+        track("objects", total=len(left), unit="object", shown=progress and bool(left)) as bar,
     ):
         for _ in pool.map(lambda names: storage.copy(*names), left):
             bar.update()
@@ -126,29 +123,16 @@ def place_objects(
 
 def _compare(storage: Storage, digests: Sequence[tuple[str, str]], progress: bool) -> None:
     """Read files, and compare their checksums."""
-
-    def digest(name: str) -> str:
-        total, (file, _) = hashlib.sha256(), storage.open(name)
-        with file:
-            while block := file.read(_BLOCK_BYTES):
-                total.update(block)
-        return total.hexdigest()
-
-    with (
-        ThreadPoolExecutor(4) as pool,
-        track("check", total=len(digests), unit="file", shown=progress) as bar,
-    ):
-        for (name, wanted), found in zip(digests, pool.map(lambda pair: digest(pair[0]), digests), strict=True):
-            if found != wanted:
-                raise DatasetError("has another checksum than its record", f"{storage.place}/{name}", _AGAIN)
-            bar.update()
+    found = check_files(storage, {name: [sha256] for name, sha256 in digests}, 4, progress)
+    for name, (problem, _) in found.items():
+        if problem is not None:
+            raise DatasetError(problem, f"{storage.place}/{name}", _AGAIN)
 
 
 def _clean(storage: Storage) -> None:
     """Remove what a complete dataset does not need."""
-    for folder in (PREPARED, RECORDS, PARTS):
-        names = [f"{folder}/{name}" for name in storage.sizes(folder)]
-        if names:
-            storage.remove(names)
+    for parts in (PARTS, PARTS_OF_ONE):
+        for folder in (f"{parts}/objects", f"{parts}/shards", parts):
+            storage.remove([f"{folder}/{name}" for name in storage.sizes(folder)])
     if isinstance(storage, FolderStorage):
         remove_leftovers(storage.folder)

@@ -9,11 +9,13 @@ from typing import Any
 
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
-from artsim.datasets.versions import VERSIONS_OF
 from artsim.datasets.worker import CompiledSource, RefusedSource
 from artsim.errors import AssetError
 from artsim.loading.sources import Source
+from artsim.renderers.ray_scenes import RAY_LIBRARY
 
+VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", RAY_LIBRARY)
+"""Packages that the bytes of a dataset follow from, besides its plan."""
 _LISTED = 6
 """Reasons that an error gives; the others are counted."""
 
@@ -42,20 +44,6 @@ def plan_document(
     AssetError
         Naming the sources that cannot be used.
     """
-    used, repeated, left_out = _sort_out(sources, answers)
-    if (left_out and not skip_broken) or not used:
-        raise unusable(left_out, len(sources), asked.strict)
-    objects = list(planned_objects([source for source, _ in used], [compiled for _, compiled in used], asked))
-    order = showing_order([(planned.category, planned.split) for planned in objects])
-    plan = replace(asked, objects=tuple(objects[n] for n in order)).to_dict()
-    versions = {name: version(name) for name in VERSIONS_OF}
-    return {**plan, "versions": versions, "left_out": left_out, "repeated": repeated}
-
-
-def _sort_out(
-    sources: Sequence[Source], answers: Sequence[CompiledSource | RefusedSource]
-) -> tuple[list[tuple[Source, CompiledSource]], list[dict[str, str]], list[dict[str, str]]]:
-    """Sources that are used, those that name an object again, and those that are of no use."""
     used: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
     repeated: list[dict[str, str]] = []
     left_out: list[dict[str, str]] = []
@@ -65,7 +53,13 @@ def _sort_out(
             left_out.append({**entry, "why": answer.why})
         elif used.setdefault((answer.category, answer.object_id, answer.identity), (source, answer))[0] is not source:
             repeated.append(entry)  # the same object named twice counts once
-    return list(used.values()), repeated, left_out
+    if (left_out and not skip_broken) or not used:
+        raise unusable(left_out, len(sources), asked.strict)
+    objects = list(planned_objects([source for source, _ in used.values()], [made for _, made in used.values()], asked))
+    order = showing_order([(planned.category, planned.split) for planned in objects])
+    plan = replace(asked, objects=tuple(objects[n] for n in order)).to_dict()
+    versions = {name: version(name) for name in VERSIONS_OF}
+    return {**plan, "versions": versions, "left_out": left_out, "repeated": repeated}
 
 
 def planned_objects(
@@ -75,19 +69,8 @@ def planned_objects(
     keys = unique_keys([(c.category, c.object_id, c.identity) for c in compiled])
     splits = assign_splits([(c.category, c.identity) for c in compiled], asked.fractions, asked.seed)
     for key, split, source, c in zip(keys, splits, sources, compiled, strict=True):
-        yield PlannedObject(
-            key=key,
-            category=c.category,
-            object_id=c.object_id,
-            sha256=c.sha256,
-            num_parts=c.num_parts,
-            source=source.name,
-            source_sha256=source.sha256,
-            split=split,
-            file_sha256=c.file_sha256,
-            rigid=c.rigid,
-            repairs=c.repairs,
-        )
+        known = {name: value for name, value in vars(c).items() if name != "identity"}
+        yield PlannedObject(key=key, split=split, source=source.name, source_sha256=source.sha256, **known)
 
 
 def unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> AssetError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from typing import Any
 
 from artsim.common.array_files import MAX_ARRAY_BYTES
 from artsim.model.object_file import parse_object
@@ -29,6 +30,9 @@ class ObjectCache:
         self.storage, self.below = storage_of(place), f"{below}/" if below else ""
         self.max_bytes = max_bytes
         self._objects: OrderedDict[str, ArticulatedObject] = OrderedDict()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ObjectCache, (self.storage, self.max_bytes, self.below.rstrip("/"))
 
     def __getitem__(self, key: str) -> ArticulatedObject:
         obj = self._objects.get(key)

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from artsim.common.files import read_json
+from artsim.common.files import MAX_JSON_BYTES, parse_json
 from artsim.common.json_records import from_json_values
 from artsim.datasets.description import write_if_other
 from artsim.datasets.plan import PlannedObject
-from artsim.errors import ArtsimError, AssetError, DatasetError
+from artsim.errors import ArtsimError, AssetError
 from artsim.loading.sources import FamilySource, FileSource, Source, find_sources
+from artsim.runs.storage import Storage
 
 ORIGINS = ".sources.json"
 _MAX_SOURCES = 1_000_000
@@ -36,7 +37,7 @@ class _Origins:
     files: Annotated[tuple[_Origin, ...], range(_MAX_SOURCES + 1)]
 
 
-def write_origins(folder: Path, sources: Sequence[Source]) -> None:
+def write_origins(storage: Storage, sources: Sequence[Source]) -> None:
     """Note the paths of sources that are files."""
     files = {
         (str(source.path), source.sha256): {
@@ -50,7 +51,7 @@ def write_origins(folder: Path, sources: Sequence[Source]) -> None:
     }
     if files:
         entries = [files[key] for key in sorted(files)]
-        write_if_other(folder / ORIGINS, json.dumps({"files": entries}, indent=1).encode())
+        write_if_other(storage, ORIGINS, json.dumps({"files": entries}, indent=1).encode())
 
 
 class Origins:
@@ -58,15 +59,15 @@ class Origins:
 
     Parameters
     ----------
-    folder : Path
+    storage : Storage
         Of the dataset.
     sources : sequence of Source
         Those that are named now; they come first.
     """
 
-    def __init__(self, folder: Path, sources: Sequence[Source] = ()):
+    def __init__(self, storage: Storage, sources: Sequence[Source] = ()):
         self._files: dict[str, list[FileSource]] = defaultdict(list)
-        for source in [*sources, *_read_origins(folder)]:
+        for source in [*sources, *_read_origins(storage)]:
             if isinstance(source, FileSource):
                 self._files[source.sha256].append(source)
 
@@ -78,11 +79,10 @@ class Origins:
         return list(self._files[planned.source_sha256])
 
 
-def _read_origins(folder: Path) -> list[FileSource]:
+def _read_origins(storage: Storage) -> list[FileSource]:
     """Files that are still where they were, and still as they were."""
     try:
-        noted = read_json(folder / ORIGINS, ORIGINS, DatasetError)
-        files = from_json_values(_Origins, noted).files
+        files = from_json_values(_Origins, parse_json(storage.read(ORIGINS, MAX_JSON_BYTES))).files
     except (ArtsimError, ValueError):
         return []  # a note that helps, no more
     found = []

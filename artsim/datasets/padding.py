@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.sharding import NO_LENGTH, register_with_torch
+from artsim.common.sharding import Shared
 from artsim.errors import ConfigError
 from artsim.model.kinematics import JOINT_TYPES
 from artsim.observing.sample import Sample
@@ -62,51 +62,31 @@ def _writable(array: NDArray[Any], float32: bool) -> NDArray[Any]:
     return array if array.flags.writeable else array.copy()
 
 
-class Stream(Protocol):
-    """An endless source of samples by number."""
+class Samples(Protocol):
+    """Samples by number."""
 
     def __getitem__(self, i: int) -> Sample: ...
 
     def __iter__(self) -> Iterator[Sample]: ...
 
-
-class Source(Protocol):
-    """A finite source of samples by number."""
-
-    def __getitem__(self, i: int) -> Sample: ...
-
     def __len__(self) -> int: ...
 
 
 class PaddedDataset:
-    """Samples of a dataset by number, as :func:`pad_sample` makes them."""
+    """Samples by number, as :func:`pad_sample` makes them."""
 
-    def __init__(self, dataset: Source, max_parts: int, float32: bool = False):
-        self.dataset, self.max_parts, self.float32 = dataset, max_parts, float32
+    def __init__(self, samples: Samples, max_parts: int, float32: bool = False):
+        self.samples, self.max_parts, self.float32 = samples, max_parts, float32
 
     def __len__(self) -> int:
-        return len(self.dataset)
+        return len(self.samples)
 
     def __getitem__(self, i: int) -> dict[str, NDArray[Any]]:
-        return pad_sample(self.dataset[i], self.max_parts, self.float32)
+        return pad_sample(self.samples[i], self.max_parts, self.float32)
 
 
-class PaddedStream:
+class PaddedStream(Shared, PaddedDataset):
     """Samples of a stream, as :func:`pad_sample` makes them; for loaders of torch an ``IterableDataset``."""
 
-    def __init__(self, stream: Stream, max_parts: int, float32: bool = False):
-        self.stream, self.max_parts, self.float32 = stream, max_parts, float32
-        register_with_torch(PaddedStream)
-
-    def __getitem__(self, i: int) -> dict[str, NDArray[Any]]:
-        return pad_sample(self.stream[i], self.max_parts, self.float32)
-
     def __iter__(self) -> Iterator[dict[str, NDArray[Any]]]:
-        return (pad_sample(sample, self.max_parts, self.float32) for sample in self.stream)
-
-    def __len__(self) -> int:
-        raise TypeError(NO_LENGTH)
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        register_with_torch(PaddedStream)
+        return (pad_sample(sample, self.max_parts, self.float32) for sample in self.samples)

@@ -125,9 +125,10 @@ class Plan:
         rounds, left = divmod(self.num_samples, max(1, len(self.objects)))
         return {split: rounds * len(own) + bisect.bisect_left(own, left) for split, own in self._numbers.items()}
 
-    def split_of(self, index: int) -> str:
-        """Split that a sample belongs to."""
-        return self.object_of(index).split
+    @property
+    def max_parts(self) -> int:
+        """Most parts of any object."""
+        return max(planned.num_parts for planned in self.objects)
 
     def object_of(self, index: int) -> PlannedObject:
         """Object that a sample shows: each gets the same number of samples, give or take one."""

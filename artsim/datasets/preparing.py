@@ -11,23 +11,21 @@ import re
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from artsim.common.files import parse_json
 from artsim.common.json_records import from_json_values
 from artsim.common.progress import track
-from artsim.datasets.description import PLAN
+from artsim.datasets.description import PLAN, READERS
 from artsim.datasets.new_plan import plan_document, unusable
 from artsim.datasets.plan import Plan
-from artsim.datasets.worker import PARTS, PREPARED, PREPARED_BY_ONE, CompiledSource, RefusedSource, compile_source
+from artsim.datasets.worker import PARTS, PARTS_OF_ONE, CompiledSource, RefusedSource, compile_source
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.runs.pool import Team, WorkerLost
 from artsim.runs.storage import Storage
 
-READERS = 32
-"""Requests at once: one to object storage takes some ten milliseconds, of which the machine waits nearly all."""
 _BLOCK = 16
 """Sources of one record of several machines: of 100,000 objects there are 6,000, which every machine reads."""
 _MAX_RECORD = 10_000_000
@@ -104,43 +102,34 @@ class Preparation:
     skip_broken: bool
     load_limit: float
     progress: bool
-    _known: dict[int, list[Answer]] = field(default_factory=dict)
 
     @property
     def folder(self) -> str:
         """Where prepared objects lie."""
-        return PREPARED_BY_ONE if self.share is None else PREPARED
+        return f"{PARTS_OF_ONE if self.share is None else PARTS}/objects"
 
-    def by_one(self) -> dict[str, Any]:
-        """Content of ``plan.json``, where no other machine prepares objects; each source has a record of its own.
-
-        Raises
-        ------
-        AssetError
-            Naming the sources that cannot be used.
-        """
-        blocks = [range(i, i + 1) for i in range(len(self.sources))]
-        files = self.storage.sizes(self.folder)
-        for number in self._recorded() & set(range(len(blocks))):
-            answers = self._read(number, blocks[number]) or []
-            if any(isinstance(own, CompiledSource) and f"{own.file_sha256}.npz" in files for own in answers):
-                self._known[number] = answers
-        self._prepare(blocks, [number for number in range(len(blocks)) if number not in self._known])
-        return self._document(blocks)
-
-    def by_several(self) -> dict[str, Any] | None:
-        """The same, where others have shares, too; None when another machine wrote ``plan.json`` meanwhile.
+    def document(self) -> dict[str, Any] | None:
+        """Content of ``plan.json``; None when another machine wrote it meanwhile.
 
         Raises
         ------
         AssetError
-            Naming a source that cannot be used.
+            Naming the sources that cannot be used; of several machines, each names the first.
         DatasetError
             When objects were prepared with other options.
         """
-        share, total = self.share or Share(), len(self.sources)
-        blocks = [range(first, min(first + _BLOCK, total)) for first in range(0, total, _BLOCK)]
+        share, total, size = self.share or Share(), len(self.sources), _BLOCK if self.share else 1
+        blocks = [range(first, min(first + size, total)) for first in range(0, total, size)]
         start, recorded = time.monotonic(), self._recorded()
+        if (
+            self.share is None
+        ):  # no other machine reads them: what is damaged, refused or of other options is done again
+            files = self.storage.sizes(self.folder)
+            recorded = {
+                number for number in recorded & set(range(len(blocks)))
+                if all(isinstance(own, CompiledSource) and f"{own.file_sha256}.npz" in files
+                       for own in self._read(number, blocks[number]) or [RefusedSource("")])
+            }  # fmt: skip
         self._prepare(blocks, [own for own in range(len(blocks))[share.number :: share.count] if own not in recorded])
         patience = _PATIENCE + time.monotonic() - start
         most, since = -1, time.monotonic()
@@ -159,7 +148,7 @@ class Preparation:
 
     def _document(self, blocks: Sequence[range]) -> dict[str, Any]:
         def known(number: int) -> list[Answer]:
-            answers = self._known.get(number) or self._read(number, blocks[number])
+            answers = self._read(number, blocks[number])
             if answers is None:
                 raise DatasetError(
                     "its objects were prepared with other options, or a record is damaged",
@@ -200,12 +189,8 @@ class Preparation:
 
     def _record(self, number: int, block: range, answers: list[Answer]) -> None:
         content = {"recipe": self._recipe(block), "answers": [asdict(answer) for answer in answers]}
-        name, data = f"{self.folder}/{number:06d}.json", json.dumps(content).encode()
-        if self.share is None:
-            self.storage.write(name, data)
-            self._known[number] = answers
-        else:  # of several machines, the first one is right
-            self.storage.write_new(name, data)
+        write = self.storage.write_new if self.share else self.storage.write  # of several machines, the first is right
+        write(f"{self.folder}/{number:06d}.json", json.dumps(content).encode())
 
     def _recipe(self, block: range) -> str:
         """Digest of all that the loading of some sources follows from."""
@@ -225,7 +210,4 @@ class Preparation:
 
 
 def _answer(entry: dict[str, Any]) -> Answer:
-    if "why" in entry:
-        return from_json_values(RefusedSource, entry)
-    entry.pop("staged", None)  # versions before December 2026 wrote it
-    return from_json_values(CompiledSource, entry)
+    return from_json_values(RefusedSource, entry) if "why" in entry else from_json_values(CompiledSource, entry)

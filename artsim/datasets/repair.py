@@ -8,10 +8,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from artsim.datasets.description import read_started
-from artsim.datasets.inventory import examine, leftover_problems, strangers
-from artsim.datasets.origins import Origins
+from artsim.datasets.inventory import examine, leftover_problems, remove_leftovers, strangers
+from artsim.datasets.plan import Plan
 from artsim.datasets.problems import Problem
-from artsim.datasets.restore import Restoration, remove_leftovers
+from artsim.datasets.restore import Restoration
 from artsim.errors import DatasetError
 from artsim.loading.sources import Source
 from artsim.runs.lock import folder_lock
@@ -54,10 +54,6 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     progress : bool
         Show progress bars.
 
-    Returns
-    -------
-    RepairResult
-
     Raises
     ------
     DatasetError
@@ -68,34 +64,34 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
         On Ctrl-C, after the workers have stopped; the same call resumes.
     """
     folder = Path(folder)
-    begun = read_started(folder)
+    storage, begun = FolderStorage(folder), read_started(folder)
     if begun is None:
         raise DatasetError("no dataset here", folder, "name a folder that generate.py wrote")
     inventory = examine(folder, begun, workers, progress)
     foreign = strangers(folder, begun)
-    if not inventory and begun.complete and not begun.problems and not leftover_problems(folder, begun):
+    if not inventory and begun.complete and not begun.problems and not leftover_problems(folder):
         return RepairResult(folder, (), tuple(foreign))
     if inventory.shards:
-        _check_makeable(folder, begun.plan.artsim_version, begun.plan.sample.views.custom, begun.complete)
-    with folder_lock(folder):
+        _check_makeable(folder, begun.plan, begun.complete)
+    with folder_lock(folder), WorkerPool(workers, storage) as team:
+        restored = Restoration(storage, begun, inventory, sources, team, progress)
         try:
-            with WorkerPool(workers, FolderStorage(folder)) as team:
-                restored = Restoration(folder, begun, inventory, Origins(folder, sources), team, progress)
-                restored.run()
+            restored.run()
         finally:
             remove_leftovers(folder)
     return RepairResult(folder, tuple(restored.files), (*restored.failed, *foreign))
 
 
-def _check_makeable(folder: Path, made_by: str, custom_views: str | None, complete: bool) -> None:
+def _check_makeable(folder: Path, plan: Plan, complete: bool) -> None:
     """Refuse to make samples that could not be those of the dataset."""
-    if custom_views is not None:  # repairing a dataset of other people must not run what it names
+    if plan.sample.views.custom is not None:  # repairing a dataset of other people must not run what it names
         raise DatasetError(
-            f"its views come from code ({custom_views!r}), which is not run because a dataset names it",
+            f"its views come from code ({plan.sample.views.custom!r}), which is not run because a dataset names it",
             folder,
             "run the same generate command again: it repairs, too",
         )
-    if not complete and made_by != version("artsim"):  # no checksum would tell
+    if not complete and plan.artsim_version != version("artsim"):  # no checksum would tell
+        made_by = plan.artsim_version
         raise DatasetError(
             f"artsim {made_by} began it, and this is {version('artsim')}", folder, f"use artsim {made_by}"
         )

@@ -52,9 +52,7 @@ def sample_members(sample: Sample) -> dict[str, bytes]:
     for name in _PNG:
         image = getattr(sample, name)
         if image is not None:
-            buffer = io.BytesIO()
-            Image.fromarray(image).save(buffer, "PNG")
-            members[f"{name}.png"] = buffer.getvalue()
+            members[f"{name}.png"] = png_bytes(image)
     return members
 
 
@@ -116,6 +114,13 @@ def _check(values: Mapping[str, Any]) -> None:
     wrong = [name for name in _ARRAYS if name not in ("K", "T_world_camera") and len(values[name]) != K]
     if wrong:
         raise ValueError(f"{wrong[0]} is not of {K} parts")
+
+
+def png_bytes(image: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """(H, W) or (H, W, 3) image as PNG."""
+    buffer = io.BytesIO()
+    Image.fromarray(image).save(buffer, "PNG")
+    return buffer.getvalue()
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:

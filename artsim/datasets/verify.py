@@ -62,7 +62,7 @@ def verify(folder: str | Path, progress: bool = True, workers: int = 1) -> list[
         *_share_problems(begun.plan),
         *inventory.problems(folder),
         *strangers(folder, begun),
-        *leftover_problems(folder, begun),
+        *leftover_problems(folder),
     ]
     if not begun.complete:
         return problems

@@ -24,12 +24,12 @@ from artsim.runs.worker import StoppedError, report, stop_if_asked, this_worker
 _STEP = 16  # samples between two reports
 
 
-PARTS = "parts"
-"""Folder of what several machines have done of a dataset that is not complete."""
-PREPARED, RECORDS = f"{PARTS}/objects", f"{PARTS}/shards"
-"""Objects before they have a name in the plan: each is called by the digest of its file. Records of finished shards."""
-PREPARED_BY_ONE = "objects/.prepared"
-"""The same objects where one machine makes the dataset."""
+PARTS, PARTS_OF_ONE = "parts", ".parts"
+"""Folder of what is done of a dataset that is not complete, by several machines and by one.
+
+Its folder ``objects`` holds objects before they have a name in the plan, each called by the digest of its file, and
+``shards`` the record of each finished shard.
+"""
 
 
 class DatasetFiles:
@@ -53,30 +53,30 @@ class DatasetFiles:
 
     @cached_property
     def prepared(self) -> ObjectCache:
-        return ObjectCache(self.storage, below=PREPARED)
+        return ObjectCache(self.storage, below=f"{PARTS}/objects")
 
     @cached_property
     def renderer(self) -> Renderer:
         return make_renderer(self.plan.sample.renderer)
 
 
-def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> ShardRecord | str | None:
+def make_shard(shard: Shard, sha256: str | None, parts: str) -> ShardRecord | str | None:
     """Make and write one shard.
 
     Parameters
     ----------
     shard : Shard
     sha256 : str or None
-        What its digest has to be, if that is known: any other bytes are not written.
-    prepared : bool
-        Several machines make the dataset: the objects are where they prepared them, and the shard gets a record.
+        What its digest has to be, if the dataset is complete: any other bytes are not written. Else it gets a record.
+    parts : str
+        Folder of records. Until a dataset of several machines is complete, its objects are there, too.
 
     Returns
     -------
     ShardRecord or str or None
         The other digest, where it is not as wanted; None when asked to stop before the shard is whole.
     """
-    dataset = this_worker().kept(DatasetFiles)
+    dataset, prepared = this_worker().kept(DatasetFiles), parts == PARTS and sha256 is None
     try:
         size, digest = store_shard(dataset.storage, shard.name, _samples(dataset, shard, prepared), sha256)
     except OtherBytesError as other:
@@ -85,8 +85,8 @@ def make_shard(shard: Shard, sha256: str | None, prepared: bool = False) -> Shar
         return None
     recipe = dataset.plan.recipe(shard)
     record = ShardRecord(shard.name, shard.split, shard.first, shard.end, size, digest, recipe)
-    if prepared:
-        dataset.storage.write(f"{RECORDS}/{shard.name}.json", json.dumps(asdict(record)).encode())
+    if sha256 is None:
+        dataset.storage.write(f"{parts}/shards/{shard.name}.json", json.dumps(asdict(record)).encode())
     return record
 
 

@@ -11,11 +11,12 @@ from PIL import Image, ImageDraw
 from artsim.common.files import write_atomic
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
+from artsim.datasets.shards import png_bytes
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND
 from artsim.observing.annotation import BOX_EDGES, axis_segment, box_corners
 from artsim.observing.sample import Sample
-from artsim.scenes.ground_truth import SceneView, png_bytes, write_view
+from artsim.scenes.ground_truth import SceneView, write_view
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
 _TINT = 0.62  # of a part's or instance's colour over the picture

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.sample_options import SampleOptions
@@ -40,10 +40,10 @@ class Piece:
         return f"{self.split or 'objects'}-{self.number:06d}"
 
 
-class Format(Protocol):
+class Format:
     """A format that a dataset can be converted to. All methods but ``check`` run after it."""
 
-    converts_objects: bool
+    converts_objects = False
     """Whether the objects become files of their own."""
 
     def check(self, options: SampleOptions, folder: Path) -> None:
@@ -56,28 +56,14 @@ class Format(Protocol):
 
     def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
         """Write the files of a piece. What it returns is JSON, and goes to :meth:`finish`."""
+        raise NotImplementedError
 
     def write_objects(self, dataset: Dataset, piece: Piece, output: Output) -> Any:
         """Write the files of some objects of the plan; as :meth:`write_samples`."""
-
-    def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
-        """Write the files that need to know of all pieces, given in order with what was returned for each."""
-
-
-class PlainFormat:
-    """A format whose files each depend on one piece of samples."""
-
-    converts_objects = False
-
-    def check(self, options: SampleOptions, folder: Path) -> None:
-        """Every dataset will do."""
-
-    def write_objects(self, dataset: Dataset, piece: Piece, output: Output) -> Any:
-        """There are no files of objects."""
         raise NotImplementedError
 
     def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
-        """Nothing is left to write."""
+        """Write the files that need to know of all pieces, given in order with what was returned for each."""
 
 
 def require_images(options: SampleOptions, folder: Path, name: str, images: Sequence[str]) -> None:

@@ -7,6 +7,8 @@ object, so that poses of parts are comparable, and joint axes hold in every pose
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,8 @@ from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.sample_options import SampleOptions
 from artsim.errors import ConfigError
-from artsim.formats.base import Piece, require_images
-from artsim.formats.images import depth_png, mask_png, png_bytes
-from artsim.formats.pinhole import integer_centre_K
+from artsim.formats.base import Format, Piece, require_images
+from artsim.formats.images import depth_png, integer_centre_K, mask_box, mask_png, png_bytes
 from artsim.model.camera import Camera
 from artsim.model.draws import sample_scale
 from artsim.model.kinematics import Array
@@ -36,7 +37,7 @@ _TARGET_VISIBLE = 0.1
 """BOP asks for estimates of objects of which at least a tenth is visible."""
 
 
-class BopFormat:
+class BopFormat(Format):
     """``models/``, ``<split>/<scene>/`` and ``camera.json``."""
 
     converts_objects = True
@@ -66,38 +67,13 @@ class BopFormat:
 
     def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
         """Write one scene; the answer is its first camera, and the targets in it."""
-        folder, first = f"{piece.split}/{piece.number:06d}", _first_ids(dataset)
-        cameras, truths, infos, articulations = {}, {}, {}, {}
-        answer: dict[str, Any] = {"camera": None, "targets": []}
+        scene, first = BopScene(output, piece.split, piece.number), _first_ids(dataset)
         for image, sample in enumerate(samples):
-            obj = dataset.object_of(sample)
             assert sample.depth is not None
-            assert sample.part_mask is not None
-            depth, unit = depth_png(sample.depth)
-            output.write(f"{folder}/depth/{image:06d}.png", depth)
-            if sample.rgb is not None:
-                output.write(f"{folder}/rgb/{image:06d}.png", png_bytes(sample.rgb))
-            parts = np.flatnonzero(obj.has_surface).tolist()
-            whole = whole_masks(obj, sample)
-            for number, k in enumerate(parts):
-                name = f"{image:06d}_{number:06d}.png"
-                output.write(f"{folder}/mask/{name}", mask_png(whole[k]))
-                output.write(f"{folder}/mask_visib/{name}", mask_png(sample.part_mask == k))
-            key, first_id = str(image), first[dataset.planned(sample.index).key]
-            cameras[key] = camera_record(sample, unit)
-            truths[key] = [{**model_pose(sample.T_camera_part[k]), "obj_id": first_id + k} for k in parts]
-            infos[key] = [truth_info(obj, sample, k, whole[k]) for k in parts]
-            articulations[key] = articulation(obj, sample, first_id)
-            answer["camera"] = answer["camera"] or shared_camera(sample, unit)
-            for k, info in zip(parts, infos[key], strict=True):
-                if info["visib_fract"] >= _TARGET_VISIBLE:
-                    target = {"im_id": image, "inst_count": 1, "obj_id": first_id + k, "scene_id": piece.number}
-                    answer["targets"].append(target)
-        for name, content in (
-            ("camera", cameras), ("gt", truths), ("gt_info", infos), ("articulation", articulations)
-        ):  # fmt: skip
-            output.write(f"{folder}/scene_{name}.json", json_bytes(content))
-        return answer
+            obj, first_id = dataset.object_of(sample), first[dataset.planned(sample.index).key]
+            (told,) = scene.write_image(image, sample.depth, sample.rgb, [(obj, sample, first_id, None)])
+            scene.articulations[str(image)] = told
+        return scene.finish()
 
     def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
         """Write ``models_info.json``, ``camera.json``, and the targets of the test split."""
@@ -114,13 +90,78 @@ class BopFormat:
             output.write("test_targets_bop19.json", json_bytes(targets))
 
 
+class BopScene:
+    """A scene, written image by image.
+
+    Parameters
+    ----------
+    output : Output
+    split : str
+    number : int
+
+    Attributes
+    ----------
+    articulations : dict
+        Of the objects in each image, by its number.
+    """
+
+    def __init__(self, output: Output, split: str, number: int):
+        self.output, self.number, self.folder = output, number, f"{split}/{number:06d}"
+        self.articulations, self._targets = dict[str, Any](), list[dict[str, int]]()
+        self._cameras, self._truths, self._infos = dict[str, Any](), dict[str, Any](), dict[str, Any]()
+        self._camera: dict[str, Any] | None = None
+
+    def write_image(
+        self, image: int, depth: NDArray[np.float32], rgb: NDArray[np.uint8] | None,
+        seen: Iterable[tuple[ArticulatedObject, Sample, int, Array | None]],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Write an image and the masks in it; the articulation of each object that is seen.
+
+        Parameters
+        ----------
+        image : int
+        depth : (H, W) float32
+        rgb : (H, W, 3) uint8, optional
+        seen : iterable of (object, sample, model number of its first part, T_world_object)
+        """
+        data, unit = depth_png(depth)
+        self.output.write(f"{self.folder}/depth/{image:06d}.png", data)
+        if rgb is not None:
+            self.output.write(f"{self.folder}/rgb/{image:06d}.png", png_bytes(rgb))
+        truths, infos, told = list[Any](), list[Any](), list[dict[str, Any]]()
+        for obj, sample, first, T_world_object in seen:
+            sample = replace(sample, depth=depth)
+            whole = whole_masks(obj, sample, T_world_object)
+            assert sample.part_mask is not None
+            for k in np.flatnonzero(obj.has_surface).tolist():
+                name = f"{image:06d}_{len(truths):06d}.png"
+                self.output.write(f"{self.folder}/mask/{name}", mask_png(whole[k]))
+                self.output.write(f"{self.folder}/mask_visib/{name}", mask_png(sample.part_mask == k))
+                truths.append({**model_pose(sample.T_camera_part[k]), "obj_id": first + k})
+                infos.append(truth_info(obj, sample, k, whole[k]))
+                if infos[-1]["visib_fract"] >= _TARGET_VISIBLE:
+                    target = {"im_id": image, "inst_count": 1, "obj_id": first + k, "scene_id": self.number}
+                    self._targets.append(target)
+            told.append(articulation(obj, sample, first))
+            self._cameras[str(image)] = camera_record(sample, unit)
+            self._camera = self._camera or shared_camera(sample, unit)
+        self._truths[str(image)], self._infos[str(image)] = truths, infos
+        return told
+
+    def finish(self) -> dict[str, Any]:
+        """Write what is said of the images; the first camera, and the targets."""
+        for name, content in (
+            ("camera", self._cameras), ("gt", self._truths), ("gt_info", self._infos),
+            ("articulation", self.articulations),
+        ):  # fmt: skip
+            self.output.write(f"{self.folder}/scene_{name}.json", json_bytes(content))
+        return {"camera": self._camera, "targets": self._targets}
+
+
 def _first_ids(dataset: Dataset) -> dict[str, int]:
     """Model number of the first part of each object, by the object's key; the first of all is 1."""
-    ids, following = {}, 1
-    for planned in dataset.plan.objects:
-        ids[planned.key] = following
-        following += planned.num_parts
-    return ids
+    following = accumulate((planned.num_parts for planned in dataset.plan.objects), initial=1)
+    return {planned.key: first for planned, first in zip(dataset.plan.objects, following, strict=False)}
 
 
 def model_file(obj: ArticulatedObject, k: int, model: int) -> tuple[str, bytes]:
@@ -203,7 +244,7 @@ def truth_info(obj: ArticulatedObject, sample: Sample, k: int, whole: NDArray[np
     count_all, count_seen = int(whole.sum()), int(seen.sum())
     return {
         "bbox_obj": _outline_box(obj, sample, k),
-        "bbox_visib": _mask_box(seen),
+        "bbox_visib": _sides(*(mask_box(seen) or (0, 0, 0, 0))),
         "px_count_all": count_all,
         "px_count_valid": int((whole & (sample.depth > 0)).sum()),
         "px_count_visib": count_seen,
@@ -211,13 +252,9 @@ def truth_info(obj: ArticulatedObject, sample: Sample, k: int, whole: NDArray[np
     }
 
 
-def _mask_box(mask: NDArray[np.bool_]) -> list[int]:
-    """Left, top, width and height; -1 for an empty mask, as BOP has it."""
-    if not mask.any():
-        return [-1, -1, -1, -1]
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    left, top = int(columns[0]), int(rows[0])
-    return [left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top]
+def _sides(left: int, top: int, right: int, bottom: int) -> list[int]:
+    """Left, top, width and height; -1 for an empty box, as BOP has it."""
+    return [left, top, right - left, bottom - top] if right > left and bottom > top else [-1, -1, -1, -1]
 
 
 def _outline_box(obj: ArticulatedObject, sample: Sample, k: int) -> list[int]:
@@ -230,9 +267,7 @@ def _outline_box(obj: ArticulatedObject, sample: Sample, k: int) -> list[int]:
     image = camera.project(corners) - 0.5  # pixel centres, which rays pass through, at whole numbers
     left, top = np.ceil(image.min(axis=0)).astype(int).tolist()
     right, bottom = np.floor(image.max(axis=0)).astype(int).tolist()
-    if right < left or bottom < top:  # it passes between the centres
-        return [-1, -1, -1, -1]
-    return [left, top, right + 1 - left, bottom + 1 - top]
+    return _sides(left, top, right + 1, bottom + 1)  # empty where it passes between the centres
 
 
 def articulation(obj: ArticulatedObject, sample: Sample, first_id: int) -> dict[str, Any]:

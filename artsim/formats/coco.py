@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key
-from artsim.formats.base import Piece, PlainFormat, require_images
-from artsim.formats.images import grey_depth, png_bytes
+from artsim.formats.base import Format, Piece, require_images
+from artsim.formats.images import grey_depth, mask_box, png_bytes
 from artsim.observing.sample import Sample
 from artsim.runs.tasks import Output
 
 
-class CocoFormat(PlainFormat):
+class CocoFormat(Format):
     """``annotations/instances_<split>.json`` and ``images/<split>/<index>.png``."""
 
     def check(self, options: SampleOptions, folder: Path) -> None:
@@ -34,32 +34,45 @@ class CocoFormat(PlainFormat):
             name = f"{sample_key(sample.index)}.png"
             output.write(f"images/{piece.split}/{name}", png_bytes(_picture(sample)))
             image = {"id": sample.index, "file_name": name, "width": sample.width, "height": sample.height}
-            entries.append({"image": image, "category": sample.category, "parts": _parts(sample)})
+            entries.append({"image": image, "objects": _parts(sample)})
         return entries
 
     def finish(self, dataset: Dataset, answers: Sequence[tuple[Piece, Any]], output: Output) -> None:
         """Number categories and annotations, and write the JSON of each split."""
         entries = [(piece.split, entry) for piece, answer in answers for entry in answer]
-        named = sorted({(entry["category"], part["name"]) for _, entry in entries for part in entry["parts"]})
-        number = {category: i for i, category in enumerate(named, start=1)}
-        categories = [
-            {"id": i, "name": f"{category}/{part}", "supercategory": category} for (category, part), i in number.items()
-        ]
+        named: list[tuple[str, ...]] = sorted(
+            {tuple(part["name"]) for _, entry in entries for part in entry["objects"]}
+        )
+        categories = {name: {"name": "/".join(name), "supercategory": name[0]} for name in named}
         for split, group in groupby(entries, key=lambda pair: pair[0]):
-            images: list[Any] = []
-            annotations: list[Any] = []
-            for _, entry in group:
-                images.append(entry["image"])
-                for part in entry["parts"]:
-                    own = {key: value for key, value in part.items() if key != "name"}
-                    category_id = number[entry["category"], part["name"]]
-                    identity = {"id": len(annotations) + 1, "image_id": entry["image"]["id"]}
-                    annotations.append({**identity, "category_id": category_id, **own})
             info = {"description": f"artsim, split {split}", "version": dataset.description["artsim_version"]}
-            document = {
-                "info": info, "licenses": [], "images": images, "annotations": annotations, "categories": categories,
-            }  # fmt: skip
+            document = coco_document(info, categories, [entry for _, entry in group])
             output.write(f"annotations/instances_{split}.json", orjson.dumps(document))
+
+
+def coco_document(
+    info: dict[str, Any], categories: Mapping[tuple[str, ...], dict[str, Any]], entries: Iterable[dict[str, Any]]
+) -> dict[str, Any]:
+    """Images and what is in them, with numbers for categories and annotations.
+
+    Parameters
+    ----------
+    info : dict
+    categories : mapping
+        What is said of each category, by its name.
+    entries : iterable of dict
+        ``image``, and ``objects``, each with the ``name`` of its category.
+    """
+    number = {name: i for i, name in enumerate(categories, start=1)}
+    images, annotations = list[Any](), list[Any]()
+    for entry in entries:
+        images.append(entry["image"])
+        for obj in entry["objects"]:
+            own = {key: value for key, value in obj.items() if key != "name"}
+            identity = {"id": len(annotations) + 1, "image_id": entry["image"]["id"]}
+            annotations.append({**identity, "category_id": number[tuple(obj["name"])], **own})
+    listed = [{"id": number[name], **about} for name, about in categories.items()]
+    return {"info": info, "licenses": [], "images": images, "annotations": annotations, "categories": listed}
 
 
 def _picture(sample: Sample) -> NDArray[np.uint8]:
@@ -77,17 +90,15 @@ def _parts(sample: Sample) -> list[dict[str, Any]]:
     for k, name in enumerate(sample.part_names):
         mask = sample.part_mask == k
         if mask.any():
-            found.append({**mask_record(mask), "iscrowd": 0, "name": name, "part": k})
+            found.append({**mask_record(mask), "iscrowd": 0, "name": (sample.category, name), "part": k})
     return found
 
 
 def mask_record(mask: NDArray[np.bool_]) -> dict[str, Any]:
     """What COCO says of a mask (H, W) that is not empty: ``segmentation`` as run lengths, ``area``, ``bbox``."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    left, top = int(columns[0]), int(rows[0])
-    box = [left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top]
+    left, top, right, bottom = mask_box(mask) or (0, 0, 0, 0)
     segmentation = {"size": list(mask.shape), "counts": run_lengths(mask)}
-    return {"segmentation": segmentation, "area": int(mask.sum()), "bbox": box}
+    return {"segmentation": segmentation, "area": int(mask.sum()), "bbox": [left, top, right - left, bottom - top]}
 
 
 def run_lengths(mask: NDArray[np.bool_]) -> str:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,18 +15,29 @@ from typing import Any, get_args
 from artsim.common.files import file_sha256
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.description import DESCRIPTION
+from artsim.datasets.shards import sample_key
 from artsim.datasets.splits import SPLITS
 from artsim.errors import ConfigError
 from artsim.formats.base import Format, FormatName, Piece
 from artsim.formats.bop import BopFormat
 from artsim.formats.coco import CocoFormat
 from artsim.formats.hdf5 import Hdf5Format
-from artsim.formats.ply import PlyFormat
 from artsim.formats.webdataset import WebDatasetFormat
+from artsim.model.ply import cloud_ply
 from artsim.observing.sample import Sample
 from artsim.runs.recipe import check_counts
 from artsim.runs.tasks import Output, Run, Task, run_tasks
 from artsim.runs.worker import report, stop_if_asked
+
+
+class PlyFormat(Format):
+    """``<split>/<index>.ply``: one cloud for each sample, coloured by part, camera frame, metres."""
+
+    def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:
+        """Write one file for each sample."""
+        for sample in samples:
+            output.write(f"{piece.split}/{sample_key(sample.index)}.ply", cloud_ply(sample.points, sample.part))
+
 
 FORMATS: dict[FormatName, Format] = {
     "webdataset": WebDatasetFormat(),

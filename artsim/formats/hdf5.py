@@ -14,15 +14,15 @@ from artsim.common.extras import require_extra
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.shards import sample_key, sample_members
-from artsim.formats.base import Piece, PlainFormat, require_images
-from artsim.formats.pinhole import integer_centre_K
+from artsim.formats.base import Format, Piece, require_images
+from artsim.formats.images import integer_centre_K
 from artsim.model.frame import BACKGROUND
 from artsim.model.transforms import invert_transform
 from artsim.observing.sample import Sample
 from artsim.runs.tasks import Output
 
 
-class Hdf5Format(PlainFormat):
+class Hdf5Format(Format):
     """``<split>/<index>.hdf5``."""
 
     def check(self, options: SampleOptions, folder: Path) -> None:

@@ -1,23 +1,16 @@
-"""Images as the bytes of PNG files."""
+"""Images as the bytes of PNG files, boxes of masks, and intrinsics for programs that count pixel centres from 0."""
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+
+from artsim.datasets.shards import png_bytes as png_bytes
+from artsim.model.kinematics import Array
 
 _LARGEST = 65535
 _FINEST = 1e-6
 """Metres: what single precision resolves at some metres."""
-
-
-def png_bytes(image: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    """(H, W) or (H, W, 3) image as PNG."""
-    buffer = io.BytesIO()
-    Image.fromarray(image).save(buffer, "PNG")
-    return buffer.getvalue()
 
 
 def mask_png(mask: NDArray[np.bool_]) -> bytes:
@@ -59,3 +52,18 @@ def grey_depth(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
         share = (far - depth[seen]) / max(far - near, 1e-9)
         grey[seen] = np.rint(55.0 + 200.0 * share).astype(np.uint8)
     return grey
+
+
+def mask_box(mask: NDArray[np.bool_]) -> tuple[int, int, int, int] | None:
+    """First column and row, end column and row of a mask; None where it is empty."""
+    rows, columns = mask.any(axis=1).nonzero()[0], mask.any(axis=0).nonzero()[0]
+    return (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1) if len(rows) else None
+
+
+def integer_centre_K(K: Array) -> Array:
+    """(3, 3) intrinsics under which pixel (u, v) has its centre at (u, v), as in OpenCV.
+
+    In artsim the centre lies at (u + 0.5, v + 0.5), so that the principal point moves by half a pixel.
+    """
+    moved: Array = np.array([[1.0, 0.0, -0.5], [0.0, 1.0, -0.5], [0.0, 0.0, 1.0]]) @ K
+    return moved

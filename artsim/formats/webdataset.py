@@ -21,13 +21,13 @@ from artsim.common.files import open_image
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.shards import MAX_PIXELS, sample_key, sample_members, write_tar
 from artsim.errors import DatasetError
-from artsim.formats.base import Piece, PlainFormat
+from artsim.formats.base import Format, Piece
 from artsim.formats.images import depth_png
 from artsim.observing.sample import Sample
 from artsim.runs.tasks import Output
 
 
-class WebDatasetFormat(PlainFormat):
+class WebDatasetFormat(Format):
     """``<split>-<number>.tar`` of ``<index>.points.npy``, ``.part.npy``, ``.npcs.npy``, ``.json`` and images."""
 
     def write_samples(self, dataset: Dataset, piece: Piece, samples: Iterable[Sample], output: Output) -> Any:

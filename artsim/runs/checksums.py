@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
-from artsim.common.files import file_sha256
 from artsim.common.progress import track
+from artsim.errors import DatasetError
+from artsim.runs.storage import FolderStorage, Place, Storage, storage_of
+
+_BLOCK_BYTES = 1 << 20
 
 
 def check_files(
-    folder: Path, digests: Mapping[str, Sequence[str]], threads: int = 2, progress: bool = True
+    place: Place, digests: Mapping[str, Sequence[str]], threads: int = 2, progress: bool = True
 ) -> dict[str, tuple[str | None, str]]:
     """Compare files with their checksums.
 
     Parameters
     ----------
-    folder : Path
+    place : path, str or Storage
     digests : mapping
-        SHA-256 that each file may have, by its path within the folder; any, when there are none.
+        SHA-256 that each file may have, by its name at the place; any, when there are none.
     threads : int
     progress : bool
         Show a progress bar.
@@ -28,13 +31,14 @@ def check_files(
     Returns
     -------
     dict
-        By path: what is wrong (None for a sound file), and the digest ("" where there is none).
+        By name: what is wrong (None for a sound file), and the digest ("" where there is none).
     """
+    storage = storage_of(place)
     with (
         _readers(threads) as pool,
         track("check", total=len(digests), unit="file", shown=progress and bool(digests), leave=False) as bar,
     ):
-        states = pool.map(lambda own: _check(folder / own[0], own[1]), digests.items())
+        states = pool.map(lambda own: _check(storage, *own), digests.items())
         found = {}
         for name, state in zip(digests, states, strict=True):
             found[name] = state
@@ -52,19 +56,26 @@ def _readers(threads: int) -> Iterator[ThreadPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _check(path: Path, digests: Sequence[str]) -> tuple[str | None, str]:
-    if path.is_symlink():
-        return "is a link to somewhere else", ""
-    if path.is_dir():
-        return "is a folder", ""
-    if not path.exists():
-        return "is missing", ""
-    if not path.is_file():
-        return "is no regular file", ""
+def _check(storage: Storage, name: str, digests: Sequence[str]) -> tuple[str | None, str]:
+    if isinstance(storage, FolderStorage):
+        path = storage.folder / name
+        if path.is_symlink():
+            return "is a link to somewhere else", ""
+        if path.is_dir():
+            return "is a folder", ""
+        if not path.exists():
+            return "is missing", ""
+        if not path.is_file():
+            return "is no regular file", ""
+    digest = hashlib.sha256()
     try:
-        digest = file_sha256(path)
+        with storage.open(name)[0] as file:
+            while block := file.read(_BLOCK_BYTES):
+                digest.update(block)
+    except DatasetError as error:
+        return error.what, ""
     except OSError as error:
         return f"cannot be read ({error.strerror})", ""
-    if digests and digest not in digests:
-        return "has another checksum than when it was written", digest
-    return None, digest
+    if digests and digest.hexdigest() not in digests:
+        return "has another checksum than when it was written", digest.hexdigest()
+    return None, digest.hexdigest()

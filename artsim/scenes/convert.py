@@ -5,7 +5,6 @@ Each scene is a piece of work; see :mod:`artsim.runs.tasks`.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -14,19 +13,9 @@ import numpy as np
 
 from artsim.common.files import file_sha256
 from artsim.errors import DatasetError
-from artsim.formats.bop import (
-    articulation,
-    camera_record,
-    json_bytes,
-    model_file,
-    model_info,
-    model_pose,
-    shared_camera,
-    truth_info,
-    whole_masks,
-)
-from artsim.formats.coco import mask_record
-from artsim.formats.images import depth_png, grey_depth, mask_png, png_bytes
+from artsim.formats.bop import BopScene, json_bytes, model_file, model_info
+from artsim.formats.coco import coco_document, mask_record
+from artsim.formats.images import grey_depth, png_bytes
 from artsim.runs.tasks import Output, Run, Task, run_tasks
 from artsim.runs.worker import report, stop_if_asked
 from artsim.scenes.dataset import DESCRIPTION, SceneDataset, SceneRecord
@@ -36,8 +25,6 @@ from artsim.scenes.random_scene import make_scene
 SceneFormat = Literal["coco", "bop"]
 _DONE = "conversion.json"
 _VERSION = 1
-_TARGET_VISIBLE = 0.1
-"""BOP asks for estimates of objects of which at least a tenth is visible."""
 
 
 def convert_scenes(
@@ -103,32 +90,24 @@ def write_coco(output: Output, folder: Path, run: SceneRun, scene: int, start: i
         output.write(f"depth/{key}.png", depth)
         output.write(f"intrinsics/{key}.json", json_bytes(K))
         image = {"id": number, "file_name": f"{key}.png", "width": camera.width, "height": camera.height}
-        objects = []
-        for i, obj in enumerate(record.entry.objects):
-            mask = record.instance_ids == i
-            if mask.any():
-                told = {"instance": i, "visible_fraction": obj.visible_fraction, "category": obj.category}
-                objects.append({**mask_record(mask), "iscrowd": 0, **told})
+        masks = [(i, obj, record.instance_ids == i) for i, obj in enumerate(record.entry.objects)]
+        objects = [
+            {**mask_record(mask), "iscrowd": 0, "instance": i, "visible_fraction": obj.visible_fraction,
+             "name": (obj.category,)}
+            for i, obj, mask in masks if mask.any()
+        ]  # fmt: skip
         entries.append({"image": image, "objects": objects})
     report(1)
     return entries
 
 
 def _finish_coco(source: SceneDataset, values: dict[str, Any], output: Output) -> None:
-    """Number categories and annotations, and write the list of all."""
-    number = {name: i for i, name in enumerate(source.categories, start=1)}
-    images, annotations = list[Any](), list[Any]()
-    for entry in (entry for entries in values.values() for entry in entries):
-        images.append(entry["image"])
-        for obj in entry["objects"]:
-            own = {name: value for name, value in obj.items() if name != "category"}
-            identity = {"id": len(annotations) + 1, "image_id": entry["image"]["id"]}
-            annotations.append({**identity, "category_id": number[obj["category"]], **own})
-    document = {
-        "info": {"description": "scenes of artsim", "version": source.description["artsim_version"]},
-        "licenses": [], "images": images, "annotations": annotations,
-        "categories": [{"id": i, "name": name, "supercategory": "object"} for name, i in number.items()],
-    }  # fmt: skip
+    """Write the list of all images."""
+    info = {"description": "scenes of artsim", "version": source.description["artsim_version"]}
+    categories: dict[tuple[str, ...], Any] = {
+        (name,): {"name": name, "supercategory": "object"} for name in source.categories
+    }
+    document = coco_document(info, categories, [entry for entries in values.values() for entry in entries])
     output.write("annotations/instances.json", json_bytes(document))
 
 
@@ -137,54 +116,26 @@ def write_bop(output: Output, folder: Path, run: SceneRun, scene: int, start: in
     source = _opened(folder)
     things = make_scene(run.scene, scene).instances
     first = np.cumsum([start, *(len(thing.obj) for thing in things)]).tolist()
-    cameras: dict[str, Any] = {}
-    truths: dict[str, list[Any]] = {}
-    infos: dict[str, list[Any]] = {}
-    articulations: dict[str, list[Any]] = {}
-    answer: dict[str, Any] = {"camera": None, "targets": [], "models": {}}
-    where = f"test/{scene:06d}"
+    written, models = BopScene(output, "test", scene), dict[str, Any]()
     for i, thing in enumerate(things):
         for k in np.flatnonzero(thing.obj.has_surface).tolist():
             output.write(*model_file(thing.obj, k, first[i] + k))
-            answer["models"][str(first[i] + k)] = model_info(thing.obj, k)
+            models[str(first[i] + k)] = model_info(thing.obj, k)
     for _, record in _views(source, scene):
         stop_if_asked()
-        image = record.entry.view
-        depth, unit = depth_png(record.depth)
-        output.write(f"{where}/depth/{image:06d}.png", depth)
-        if record.rgb is not None:
-            output.write(f"{where}/rgb/{image:06d}.png", png_bytes(record.rgb))
-        truths[str(image)], infos[str(image)], articulations[str(image)] = [], [], []
+        seen = []
         for i, (thing, sample) in enumerate(zip(things, record.samples, strict=True)):
-            if sample is None:
-                continue
-            if sample.object_sha256 != thing.obj.sha256:
+            if sample is not None and sample.object_sha256 != thing.obj.sha256:
                 raise DatasetError(
                     f"object {i} of scene {scene} is not what its options make", folder,
                     "use the options and the version of artsim that the scenes were made with",
                 )  # fmt: skip
-            sample = replace(sample, depth=record.depth)
-            whole = whole_masks(thing.obj, sample, thing.T_world_object)
-            assert sample.part_mask is not None
-            for k in np.flatnonzero(thing.obj.has_surface).tolist():
-                name = f"{image:06d}_{len(truths[str(image)]):06d}.png"
-                output.write(f"{where}/mask/{name}", mask_png(whole[k]))
-                output.write(f"{where}/mask_visib/{name}", mask_png(sample.part_mask == k))
-                truths[str(image)].append({**model_pose(sample.T_camera_part[k]), "obj_id": first[i] + k})
-                info = truth_info(thing.obj, sample, k, whole[k])
-                infos[str(image)].append(info)
-                if info["visib_fract"] >= _TARGET_VISIBLE:
-                    target = {"im_id": image, "inst_count": 1, "obj_id": first[i] + k, "scene_id": scene}
-                    answer["targets"].append(target)
-            articulations[str(image)].append(articulation(thing.obj, sample, first[i]))
-            cameras[str(image)] = camera_record(sample, unit)
-            answer["camera"] = answer["camera"] or shared_camera(sample, unit)
+            if sample is not None:
+                seen.append((thing.obj, sample, first[i], thing.T_world_object))
+        image = record.entry.view
+        written.articulations[str(image)] = written.write_image(image, record.depth, record.rgb, seen)
     report(1)
-    for name, content in (
-        ("camera", cameras), ("gt", truths), ("gt_info", infos), ("articulation", articulations)
-    ):  # fmt: skip
-        output.write(f"{where}/scene_{name}.json", json_bytes(content))
-    return answer
+    return {**written.finish(), "models": models}
 
 
 def _finish_bop(source: SceneDataset, values: dict[str, Any], output: Output) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,11 +10,11 @@ from typing import Any
 import numpy as np
 import orjson
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image
 
 from artsim.common.files import write_atomic
-from artsim.datasets.shards import npy_bytes, sample_members
+from artsim.datasets.shards import npy_bytes, png_bytes, sample_members
 from artsim.errors import ConfigError
+from artsim.formats.images import mask_box
 from artsim.model.camera import Camera
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
@@ -119,7 +118,7 @@ def observe_scene(
             alone = render_posed(pose(thing.obj, thing.q, camera, thing.T_world_object))
             covered = int(np.count_nonzero(alone.part_ids != BACKGROUND))
             fractions.append(min(int(np.count_nonzero(shown)) / max(covered, 1), 1.0))
-            boxes.append(_box(shown))
+            boxes.append(mask_box(shown) or (0, 0, 0, 0))
             sample = None
             if (shown & (depth > 0)).any():
                 part_ids = np.where(shown, frame.part_ids, np.uint8(BACKGROUND))
@@ -152,13 +151,6 @@ class _Window:
         pass
 
 
-def _box(shown: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    rows, columns = shown.any(axis=1).nonzero()[0], shown.any(axis=0).nonzero()[0]
-    if len(rows) == 0:
-        return 0, 0, 0, 0
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-
-
 def write_view(view: SceneView, folder: Path) -> None:
     """Write a view as files; see :func:`view_files`.
 
@@ -187,13 +179,6 @@ def view_files(view: SceneView) -> dict[str, bytes]:
             files |= {f"instance_{i}.{member}": content for member, content in sample_members(sample).items()}
     files["scene.json"] = orjson.dumps(_description(view), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
     return files
-
-
-def png_bytes(image: NDArray[np.uint8]) -> bytes:
-    """A picture as a PNG file."""
-    buffer = io.BytesIO()
-    Image.fromarray(image).save(buffer, "PNG")
-    return buffer.getvalue()
 
 
 def _description(view: SceneView) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 def wait_for_shards(out: Path, count: int) -> None:
-    wait_until(lambda: (out / "objects").exists() and len(list(out.glob("*.tar"))) >= count)
+    wait_until(lambda: (out / ".parts").exists() and len(list(out.glob("*.tar"))) >= count)
 
 
 def test_shards_are_byte_identical_whatever_the_number_of_workers(sources: list[Source], tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_unwritable_places_are_clear_errors(sources: list[Source], tmp_path: Pat
 def test_an_object_that_cannot_be_written_is_not_a_broken_one(sources: list[Source], tmp_path: Path) -> None:
     """A full disk while objects are compiled must never end in a dataset without them."""
     digest = make(sources, tmp_path / "straight").objects[1].file_sha256
-    in_the_way = tmp_path / "out" / "objects" / ".prepared" / f"{digest}.npz"
+    in_the_way = tmp_path / "out" / ".parts" / "objects" / f"{digest}.npz"
     in_the_way.mkdir(parents=True)
     with pytest.raises(ConfigError, match=r"npz: it is a folder"):
         make(sources, tmp_path / "out", skip_broken=True)
@@ -376,7 +376,7 @@ def test_objects_that_a_killed_run_has_prepared_are_not_loaded_again(sources: li
     straight, out = tmp_path / "straight", tmp_path / "out"
     files = {planned.source: planned.file_sha256 for planned in make(sources, straight).objects}
     first, second, last = (f"{files[source.name]}.npz" for source in sources)
-    prepared = out / "objects" / ".prepared"
+    prepared = out / ".parts" / "objects"
     (prepared / last).mkdir(parents=True)  # the last object cannot be written
     with pytest.raises(ConfigError, match=rf"{last}: it is a folder"):
         make(sources, out, workers=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from hypothesis import given
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 import artsim
 from artsim.datasets import generate as generating
+from artsim.datasets import restore
 from artsim.datasets.generate import GenerateResult
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.verify import verify
@@ -51,20 +53,20 @@ def test_an_extended_dataset_has_the_bytes_of_a_large_one(large: Path, tmp_path:
         make(out, 50)
 
 
-@pytest.mark.parametrize("where", ["Restoration", "examine", "_extend"])
+@pytest.mark.parametrize(
+    ("module", "where"), [(generating, "Restoration"), (generating, "examine"), (restore, "write_if_other")]
+)
 def test_an_extension_that_is_killed_goes_on(
-    where: str, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    module: ModuleType, where: str, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = make(tmp_path / "out", 50).folder
-    original = getattr(generating, where)
 
     def killed(*arguments: object, **more: object) -> None:
-        if where == "_extend":
-            original(*arguments, **more)
+        assert (out / "dataset.json").exists() == (module is generating)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(generating, where, killed)
+        patched.setattr(module, where, killed)
         with pytest.raises(KeyboardInterrupt):
             make(out, 120)
     assert make(out, 120).made < 120

@@ -37,7 +37,7 @@ def test_shards_hold_every_index_once_and_one_split_each(objects: int, samples: 
     assert len(p.shards()) == p.num_shards
     for shard in p.shards():
         assert 0 < len(shard) <= size
-        assert {p.split_of(i) for i in p.indices(shard)} == {shard.split}
+        assert {p.object_of(i).split for i in p.indices(shard)} == {shard.split}
         assert {p.object_of(i).split for i in p.indices(shard)} == {shard.split}
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import artsim
+from artsim.common.files import write_atomic
 from artsim.datasets.description import document_bytes
 from artsim.datasets.repair import repair
 from artsim.datasets.sample_options import SampleOptions
@@ -197,8 +198,8 @@ DAMAGES = {
         lambda f: (f / "progress.jsonl").write_bytes(b'{"name": 3}\n\xff[[[' * 9), "progress.jsonl: is left over"
     ),
     "files of a killed run": Damage(
-        lambda f: [(f / name).write_text("x") for name in (f".{SHARD}.12.part", "objects/_staged_3.npz")],
-        "objects/_staged_3.npz: is left over",
+        lambda f: [write_atomic(f / name, b"x") for name in (f".{SHARD}.12.part", "objects/.prepared/3.npz")],
+        "objects/.prepared/3.npz: is left over",
     ),
 }
 
@@ -303,7 +304,8 @@ def test_repair_runs_no_code_that_a_dataset_names(folder: Path) -> None:
 
 def test_a_stopped_run_is_completed(folder: Path, sound: Path) -> None:
     shards = json.loads((folder / "dataset.json").read_text())["shards"]
-    (folder / "progress.jsonl").write_text("".join(json.dumps(shard) + "\n" for shard in shards[:-1]))
+    for shard in shards[:-1]:
+        write_atomic(folder / ".parts" / "shards" / f"{shard['name']}.json", json.dumps(shard).encode())
     (folder / "dataset.json").unlink()
     kept = (folder / SHARD).stat().st_mtime_ns
     assert repair(folder, workers=1, progress=False).restored == (shards[-1]["name"], "dataset.json")

@@ -17,7 +17,7 @@ import pytest
 
 import artsim
 from artsim.datasets import preparing
-from artsim.datasets.description import document_bytes, read_plan_document
+from artsim.datasets.description import document_bytes, read_started
 from artsim.datasets.merge import merge
 from artsim.datasets.preparing import Share
 from artsim.datasets.sample_options import SampleOptions
@@ -94,8 +94,9 @@ def test_a_plan_whose_objects_have_other_bytes_is_not_gone_on_with(tmp_path: Pat
     """As another kind of processor may make them."""
     storage = FolderStorage(tmp_path / "out")
     make(tmp_path / "out", share=Share(0, 1))
-    document = read_plan_document(storage)
-    assert document is not None
+    begun = read_started(storage)
+    assert begun is not None
+    document = begun.document
     document["objects"][0]["file_sha256"] = "0" * 64
     storage.write("plan.json", document_bytes(document))
     with pytest.raises(DatasetError, match=r"sample \d+ of laptop:\d+ cannot be made"):

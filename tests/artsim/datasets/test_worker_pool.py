@@ -63,7 +63,7 @@ def test_an_object_that_stalls_or_ends_its_process_is_named(tmp_path: Path) -> N
         AssetError, match=r"1 of 2 objects do not load: stalls: it took over 2 s\. Fix: .*--skip-broken"
     ):
         generate(sources, tmp_path / "out", workers=1, load_limit=2.0)
-    assert len(list((tmp_path / "out").glob("objects/.prepared/*.npz"))) == 1  # the next run has it
+    assert len(list((tmp_path / "out").glob(".parts/objects/*.npz"))) == 1  # the next run has it
 
 
 def one_sided(rng: np.random.Generator, obj: artsim.ArticulatedObject, q: Array) -> artsim.Camera:
