@@ -12,8 +12,8 @@ from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.worker import PARTS_OF_ONE
 from artsim.runs.checksums import check_files
-from artsim.runs.journal import JOURNAL
 from artsim.runs.storage import FolderStorage, Storage
+from artsim.runs.tasks import JOURNAL
 
 _MOVE = "move it out of the folder, or delete it"
 UNFINISHED = "is not finished"

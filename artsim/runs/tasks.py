@@ -6,6 +6,7 @@ A last file, written at the end, holds the checksum of every file: its presence 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Mapping
@@ -15,15 +16,19 @@ from typing import Any
 
 import orjson
 
-from artsim.common.files import read_json, write_atomic
+from artsim.common.files import append, read_bounded, read_json, write_atomic
 from artsim.common.progress import track
 from artsim.errors import DatasetError
 from artsim.runs.checksums import check_files
-from artsim.runs.journal import JOURNAL, Journal
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool, results
 from artsim.runs.recipe import differences
 from artsim.runs.worker import StoppedError
+
+JOURNAL = "progress.jsonl"
+_MAX_JOURNAL = 4_000_000_000
+_DAMAGED = (ValueError, KeyError, TypeError, AttributeError)
+"""What reading values of a damaged file ends in."""
 
 Files = dict[str, tuple[int, str]]
 """Size and SHA-256 of files, by their paths within a folder."""
@@ -112,7 +117,7 @@ def run_tasks(
     """Do the tasks that are not done yet, then write what needs all of them, and the last file.
 
     The same bytes come out whatever the number of workers and however often the run was stopped. A complete run is
-    checked and left alone; one with damaged or missing files is made again.
+    checked and left alone; damaged or missing files are made again, or all of them where nothing says whose they are.
 
     Parameters
     ----------
@@ -137,11 +142,16 @@ def run_tasks(
     """
     with folder_lock(run.folder):
         _remove_unfinished(run.folder)
-        files = _complete_files(run)
-        if files is not None:
+        found, records, files = _found(run)
+        is_smaller = found is not None and _is_smaller(run, found)
+        whole = _whole(run, files or {file: entry for own in records.values() for file, entry in own.files.items()})
+        if files is not None and not is_smaller and all(whole.values()):
             return files, 0
+        records = {
+            name: own for name, own in records.items() if name in tasks and all(whole.get(file) for file in own.files)
+        }
         try:
-            records, made = _work(run, tasks, workers)
+            made = _work(run, tasks, records, workers)
         finally:
             _remove_unfinished(run.folder)
         last = Output(run.folder)
@@ -153,14 +163,14 @@ def run_tasks(
         document = {**run.recipe, **pieces, "files": files}
         data = orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
         write_atomic(run.folder / run.done, data)
-        Journal(run.folder / JOURNAL).remove()
+        (run.folder / JOURNAL).unlink(missing_ok=True)
         return files, made
 
 
-def _work(run: Run, tasks: Mapping[str, Task], workers: int) -> tuple[dict[str, _Record], int]:
-    """Do what is not done yet; records of all tasks by name, and how much was done now."""
-    records, journal = _finished(run, tasks), Journal(run.folder / JOURNAL)
-    journal.start([run.recipe, *([name, own.files, own.value] for name, own in records.items())])
+def _work(run: Run, tasks: Mapping[str, Task], records: dict[str, _Record], workers: int) -> int:
+    """Do what is not done yet, and add its records; how much was done now."""
+    journal = run.folder / JOURNAL
+    write_atomic(journal, _lines(run.recipe, *([name, own.files, own.value] for name, own in records.items())))
     (run.folder / run.done).unlink(missing_ok=True)
     missing = {name: task for name, task in tasks.items() if name not in records}
     total, left = (sum(task.size for task in some.values()) for some in (tasks, missing))
@@ -172,8 +182,8 @@ def _work(run: Run, tasks: Mapping[str, Task], workers: int) -> tuple[dict[str, 
         for name, record in results(team.run(_do, jobs, progress=bar.update), run.folder):
             if record is not None:
                 records[name] = record
-                journal.add([name, record.files, record.value])
-    return records, left
+                append(journal, _lines([name, record.files, record.value]))
+    return left
 
 
 def _do(folder: Path, task: Task) -> _Record | None:
@@ -185,93 +195,72 @@ def _do(folder: Path, task: Task) -> _Record | None:
         return None
 
 
-def _complete_files(run: Run) -> Files | None:
-    """Files of a run that is complete and whole; None when there is something to do.
+def _found(run: Run) -> tuple[Any, dict[str, _Record], Files | None]:
+    """What the folder says of its run: its recipe, finished tasks and, if it is complete, all files.
 
     Raises
     ------
     DatasetError
         When the folder holds something else.
     """
-    folder = run.folder
-    if (folder / run.done).exists():
-        document = read_json(folder / run.done, run.done, DatasetError)
-        if _is_smaller(run, document):
-            _take_up(run, document)
-            return None
-        _refuse_other(run, document)
-        try:
-            files = {name: (size, sha256) for name, (size, sha256) in document["files"].items()}
-        except (KeyError, TypeError, ValueError, AttributeError):
-            return None
-        return files if all(_whole(run, files).values()) else None
-    if not (folder / JOURNAL).exists():
-        found = sorted(path.name for path in folder.iterdir() if path.name != ".lock")
-        if found:
-            raise DatasetError(f"the folder already holds {found[0]!r}", folder, "choose an empty or new folder")
-    return None
+    files: Files | None = None
+    lines: list[Any] = []
+    if (run.folder / run.done).exists():
+        found = read_json(run.folder / run.done, run.done, DatasetError)
+        with contextlib.suppress(*_DAMAGED):
+            files = {name: (size, sha256) for name, (size, sha256) in found["files"].items()}
+            lines = [[name, {file: files[file] for file in own}, value] for name, own, value in found.get("pieces", ())]
+    else:
+        found, *lines = read_journal(run.folder) or [None]
+        strange = sorted(path.name for path in run.folder.iterdir() if path.name not in (".lock", JOURNAL))
+        if strange and not (run.folder / JOURNAL).exists():
+            raise DatasetError(f"the folder already holds {strange[0]!r}", run.folder, "choose an empty or new folder")
+    records: dict[str, _Record] = {}
+    for line in lines:
+        with contextlib.suppress(*_DAMAGED):
+            name, own, value = line
+            records[name] = _Record({file: (size, sha256) for file, (size, sha256) in own.items()}, value)
+    return found, records, files
+
+
+def read_journal(folder: Path) -> list[Any]:
+    """Lines of a journal. The last line of a killed run may be cut short: it is left out, as other damaged ones."""
+    values, path = [], folder / JOURNAL
+    data = read_bounded(path, _MAX_JOURNAL, JOURNAL, DatasetError, fix="remove it") if path.exists() else b""
+    for line in data.splitlines():
+        with contextlib.suppress(ValueError):
+            values.append(orjson.loads(line))
+    return values
+
+
+def _lines(*values: Any) -> bytes:
+    try:
+        return b"".join(orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY) + b"\n" for value in values)
+    except TypeError:  # a file's name that is no text
+        return b"".join(json.dumps(value).encode() + b"\n" for value in values)
 
 
 def _is_smaller(run: Run, found: object) -> bool:
-    """Whether what was made is less of the same."""
-    if not run.grows or not isinstance(found, dict) or not isinstance(found.get(run.grows), int):
-        return False
-    return bool(found[run.grows] < run.recipe[run.grows]) and _differing(run, found) == [run.grows]
-
-
-def _take_up(run: Run, document: Mapping[str, Any]) -> None:
-    """Note the finished tasks of a smaller run, before nothing else says so."""
-    try:
-        files = document["files"]
-        lines = [[name, {file: files[file] for file in own}, value] for name, own, value in document["pieces"]]
-    except (KeyError, TypeError, ValueError) as error:
-        raise DatasetError(f"{run.done} is damaged", run.folder, "choose another --out folder") from error
-    Journal(run.folder / JOURNAL).start([run.recipe, *lines])
-    (run.folder / run.done).unlink()
-
-
-def _differing(run: Run, found: Mapping[str, Any]) -> list[str]:
-    """Names of what differs, such as 'scene.count'."""
-    return [name for name, _, _ in differences(found, json.loads(orjson.dumps(run.recipe)))]
-
-
-def _refuse_other(run: Run, found: object) -> None:
-    """Refuse to resume another run."""
-    if not isinstance(found, dict):
-        raise DatasetError(f"the folder holds no {run.what} of this kind", run.folder, "choose another --out folder")
-    differing = _differing(run, found)
-    if differing:
-        raise DatasetError(
-            f"the folder holds another {run.what} (different: {', '.join(differing)})",
-            run.folder,
-            "choose another --out folder, or the same options",
-        )
-
-
-def _finished(run: Run, tasks: Mapping[str, Task]) -> dict[str, _Record]:
-    """What a run that was stopped has finished.
+    """Whether what was made is less of the same.
 
     Raises
     ------
     DatasetError
         When it was another run.
     """
-    lines = Journal(run.folder / JOURNAL).lines()
-    if not lines:
-        return {}
-    begun = lines[0]
-    if not _is_smaller(run, begun):
-        _refuse_other(run, begun)
-    records: dict[str, _Record] = {}
-    for line in lines[1:]:
-        try:
-            name, files, value = line
-            records[name] = _Record({file: (size, sha256) for file, (size, sha256) in files.items()}, value)
-        except (ValueError, TypeError, AttributeError):
-            continue
-    records = {name: record for name, record in records.items() if name in tasks}
-    whole = _whole(run, {file: entry for record in records.values() for file, entry in record.files.items()})
-    return {name: record for name, record in records.items() if all(whole[file] for file in record.files)}
+    if not isinstance(found, dict):
+        raise DatasetError(f"the folder holds no {run.what} of this kind", run.folder, "choose another --out folder")
+    differing = [name for name, _, _ in differences(found, json.loads(orjson.dumps(run.recipe)))]
+    before = found.get(run.grows)
+    if differing == [run.grows] and isinstance(before, int) and before < run.recipe[run.grows]:
+        return True
+    if differing:
+        raise DatasetError(
+            f"the folder holds another {run.what} (different: {', '.join(differing)})",
+            run.folder,
+            "choose another --out folder, or the same options",
+        )
+    return False
 
 
 def _whole(run: Run, files: Mapping[str, tuple[int, str]]) -> dict[str, bool]:

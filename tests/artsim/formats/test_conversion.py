@@ -20,7 +20,7 @@ from artsim.errors import ConfigError, DatasetError
 from artsim.formats.base import FormatName
 from artsim.formats.conversion import DONE, FORMATS, convert
 from artsim.loading.sources import family_sources
-from artsim.runs.journal import JOURNAL
+from artsim.runs.tasks import JOURNAL
 from tests.artsim.formats.conftest import contents
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_workers")]
