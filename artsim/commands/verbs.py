@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import tyro
-
 from artsim.commands.convert import Convert
 from artsim.commands.doctor import Doctor
 from artsim.commands.export import Export
@@ -20,22 +16,9 @@ from artsim.commands.view import Gallery, View
 from artsim.common.program import run_program
 
 Verb = (
-    Annotated[Generate, tyro.conf.subcommand("generate")]
-    | Annotated[Gallery, tyro.conf.subcommand("gallery")]
-    | Annotated[Families, tyro.conf.subcommand("families")]
-    | Annotated[GenerateObjects, tyro.conf.subcommand("generate-objects")]
-    | Annotated[Export, tyro.conf.subcommand("export")]
-    | Annotated[Vary, tyro.conf.subcommand("vary")]
-    | Annotated[Record, tyro.conf.subcommand("record")]
-    | Annotated[Scene, tyro.conf.subcommand("scene")]
-    | Annotated[View, tyro.conf.subcommand("view")]
-    | Annotated[Inspect, tyro.conf.subcommand("inspect")]
-    | Annotated[Verify, tyro.conf.subcommand("verify")]
-    | Annotated[Repair, tyro.conf.subcommand("repair")]
-    | Annotated[Merge, tyro.conf.subcommand("merge")]
-    | Annotated[Convert, tyro.conf.subcommand("convert")]
-    | Annotated[Doctor, tyro.conf.subcommand("doctor")]
-)
+    Generate | Gallery | Families | GenerateObjects | Export | Vary | Record | Scene | View | Inspect | Verify | Repair
+    | Merge | Convert | Doctor
+)  # fmt: skip
 
 
 def main() -> None:

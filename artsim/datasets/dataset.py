@@ -121,11 +121,8 @@ class Dataset:
             self._open.popitem(last=False)[1].close()
         return reader
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"storage": self.storage, "split": self.split}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["storage"], state["split"])  # type: ignore[misc]
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Dataset, (self.storage, self.split)
 
     def object_key(self, i: int) -> str:
         """Name, unique in the dataset, of the object that sample ``i`` shows, without reading it."""
@@ -276,11 +273,15 @@ class EpochStream(Shared):
         pieces = list(self._pieces(share, shares))
         for first in range(0, len(pieces), self.shards_at_once):
             mixed = pieces[first : first + self.shards_at_once]
-            readers = [(self._reader(shard), shard, places) for shard, places in mixed]
+            dataset = self.dataset
+            readers = [
+                (ShardReader.at(dataset.storage, s.name, s.bytes, s.sha256, dataset.fix, in_memory=True), s, places)
+                for s, places in mixed
+            ]
             samples = [(reader, shard, place) for reader, shard, places in readers for place in places]
             for number in rng.permutation(len(samples)):
                 reader, shard, place = samples[number]
-                yield reader.read(sample_key(self.dataset.plan.index_at(shard.split, place)))
+                yield reader.read(sample_key(dataset.plan.index_at(shard.split, place)))
             for reader, _, _ in readers:
                 reader.close()
 
@@ -295,13 +296,6 @@ class EpochStream(Shared):
             if first < last:
                 yield shard, range(shard.first + first, shard.first + last)
             at += len(shard)
-
-    def _reader(self, shard: ShardRecord) -> ShardReader:
-        """A shard: of a folder as a file, of a URL as a whole, whose checksum is compared."""
-        storage, fix = self.dataset.storage, self.dataset.fix
-        if isinstance(storage, FolderStorage):
-            return ShardReader(storage.folder / shard.name, fix)
-        return ShardReader.of_bytes(storage, shard.name, shard.bytes, shard.sha256, fix)
 
 
 def _bound(total: int, share: int, shares: int) -> int:

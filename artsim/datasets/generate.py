@@ -36,10 +36,9 @@ from artsim.datasets.inventory import (
     remove_leftovers,
 )
 from artsim.datasets.merge import place_objects
-from artsim.datasets.new_plan import VERSIONS_OF
 from artsim.datasets.origins import write_origins
 from artsim.datasets.plan import MAX_SAMPLES, MAX_SHARDS, Plan, PlannedObject
-from artsim.datasets.preparing import Preparation, Share
+from artsim.datasets.preparing import VERSIONS_OF, Preparation, Share
 from artsim.datasets.restore import Restoration
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -40,18 +40,16 @@ class _Origins:
 def write_origins(storage: Storage, sources: Sequence[Source]) -> None:
     """Note the paths of sources that are files."""
     files = {
-        (str(source.path), source.sha256): {
-            "path": str(source.path),
-            "sha256": source.sha256,
-            "package_roots": {name: str(Path(root).absolute()) for name, root in source.package_roots.items()},
-            "body": source.body,
-        }
+        (str(source.path), source.sha256): _Origin(
+            str(source.path), source.sha256,
+            {name: str(Path(root).absolute()) for name, root in source.package_roots.items()}, source.body,
+        )
         for source in sources
         if isinstance(source, FileSource)
-    }
+    }  # fmt: skip
     if files:
-        entries = [files[key] for key in sorted(files)]
-        write_if_other(storage, ORIGINS, json.dumps({"files": entries}, indent=1).encode())
+        text = json.dumps({"files": [asdict(files[key]) for key in sorted(files)]}, indent=1)
+        write_if_other(storage, ORIGINS, text.encode())
 
 
 class Origins:

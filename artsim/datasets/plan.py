@@ -178,18 +178,7 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready description, inverse of :meth:`from_dict`."""
-        plan = {
-            "format": FORMAT,
-            "artsim_version": self.artsim_version,
-            "seed": self.seed,
-            "num_samples": self.num_samples,
-            "shard_size": self.shard_size,
-            "fractions": self.fractions,
-            "strict": self.strict,
-            "sample": asdict(self.sample),
-            "objects": [asdict(o) for o in self.objects],
-        }
-        plain: dict[str, Any] = json.loads(json.dumps(plan))
+        plain: dict[str, Any] = json.loads(json.dumps({"format": FORMAT, **asdict(self)}))
         return plain
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The objects of a new dataset: every source is loaded once, and kept compiled until the plan gives it a name.
+"""The objects of a new dataset and the plan that they make: every source is loaded once, and kept compiled.
 
 ``<digest>.npz`` is an object, ``<block>.json`` the record of some sources: a stopped run loads what has no record.
 """
@@ -9,20 +9,22 @@ import hashlib
 import json
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
 from typing import Any
 
 from artsim.common.files import parse_json
 from artsim.common.json_records import from_json_values
 from artsim.common.progress import track
 from artsim.datasets.description import PLAN, READERS
-from artsim.datasets.new_plan import plan_document, unusable
-from artsim.datasets.plan import Plan
+from artsim.datasets.plan import Plan, PlannedObject
+from artsim.datasets.splits import assign_splits, showing_order, unique_keys
 from artsim.datasets.worker import PARTS, PARTS_OF_ONE, CompiledSource, RefusedSource, compile_source
-from artsim.errors import ConfigError, DatasetError
+from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
+from artsim.renderers.ray_scenes import RAY_LIBRARY
 from artsim.runs.pool import Team, WorkerLost
 from artsim.runs.storage import Storage
 
@@ -33,6 +35,11 @@ _PATIENCE = 10.0
 """Seconds, beside those that its own blocks took, that a machine waits for the others' before it prepares them, too."""
 _LOOK = 1.0
 """Seconds between two looks at what others have prepared."""
+
+VERSIONS_OF = ("artsim", "numpy", "scipy", "trimesh", RAY_LIBRARY)
+"""Packages that the bytes of a dataset follow from, besides its plan."""
+_LISTED = 6
+"""Reasons that an error gives; the others are counted."""
 
 Answer = CompiledSource | RefusedSource
 
@@ -211,3 +218,66 @@ class Preparation:
 
 def _answer(entry: dict[str, Any]) -> Answer:
     return from_json_values(RefusedSource, entry) if "why" in entry else from_json_values(CompiledSource, entry)
+
+
+def plan_document(
+    asked: Plan, sources: Sequence[Source], answers: Sequence[Answer], skip_broken: bool
+) -> dict[str, Any]:
+    """What loaded sources make of a plan: a function of its arguments alone, so that every machine finds the same.
+
+    Parameters
+    ----------
+    asked : Plan
+        Without objects.
+    sources : sequence of Source
+    answers : sequence
+        What became of each source.
+    skip_broken : bool
+
+    Returns
+    -------
+    dict
+        Content of ``plan.json``.
+
+    Raises
+    ------
+    AssetError
+        Naming the sources that cannot be used.
+    """
+    used: dict[tuple[str, str, str], tuple[Source, CompiledSource]] = {}
+    repeated: list[dict[str, str]] = []
+    left_out: list[dict[str, str]] = []
+    for source, answer in zip(sources, answers, strict=True):
+        entry = {"source": source.name, "source_sha256": source.sha256}
+        if isinstance(answer, RefusedSource):
+            left_out.append({**entry, "why": answer.why})
+        elif used.setdefault((answer.category, answer.object_id, answer.identity), (source, answer))[0] is not source:
+            repeated.append(entry)  # the same object named twice counts once
+    if (left_out and not skip_broken) or not used:
+        raise unusable(left_out, len(sources), asked.strict)
+    objects = list(planned_objects([source for source, _ in used.values()], [made for _, made in used.values()], asked))
+    order = showing_order([(planned.category, planned.split) for planned in objects])
+    plan = replace(asked, objects=tuple(objects[n] for n in order)).to_dict()
+    versions = {name: version(name) for name in VERSIONS_OF}
+    return {**plan, "versions": versions, "left_out": left_out, "repeated": repeated}
+
+
+def planned_objects(
+    sources: Sequence[Source], compiled: Sequence[CompiledSource], asked: Plan
+) -> Iterator[PlannedObject]:
+    """The objects, each with its key and split."""
+    keys = unique_keys([(c.category, c.object_id, c.identity) for c in compiled])
+    splits = assign_splits([(c.category, c.identity) for c in compiled], asked.fractions, asked.seed)
+    for key, split, source, c in zip(keys, splits, sources, compiled, strict=True):
+        known = {name: value for name, value in vars(c).items() if name != "identity"}
+        yield PlannedObject(key=key, split=split, source=source.name, source_sha256=source.sha256, **known)
+
+
+def unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> AssetError:
+    """The error that names what cannot be used."""
+    reasons = [entry["why"] for entry in left_out[:_LISTED]]
+    if len(left_out) > _LISTED:
+        reasons.append(f"and {len(left_out) - _LISTED} more")
+    verb = "do not load, or were repaired (--strict)" if strict else "do not load"
+    what = f"{len(left_out)} of {total} objects {verb}: {'; '.join(reasons)}"
+    return AssetError(what, fix="correct them, or leave them out with --skip-broken")

@@ -10,14 +10,7 @@ import numpy as np
 
 from artsim.common.json_records import from_json_values
 from artsim.errors import ConfigError, RenderError
-from artsim.model.draws import (
-    Scale,
-    StateOptions,
-    ViewOptions,
-    sample_scale,
-    sample_state,
-    sample_view,
-)
+from artsim.model.draws import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
@@ -92,17 +85,9 @@ def draw_sample(
         camera = sample_view(sized, q, options.views, rng)
         try:
             return observe(
-                sized,
-                q,
-                camera,
-                num_points=options.num_points,
-                renderer=renderer,
-                images=options.images,
-                noise=options.noise,
-                rng=rng,
-                seed=seed,
-                index=index,
-            )
+                sized, q, camera, num_points=options.num_points, renderer=renderer, images=options.images,
+                noise=options.noise, rng=rng, seed=seed, index=index,
+            )  # fmt: skip
         except RenderError:
             continue  # out of sight: draw another view
     raise RenderError(

@@ -6,7 +6,7 @@ import hashlib
 import io
 import os
 import tarfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
@@ -143,25 +143,18 @@ def sample_key(index: int) -> str:
 
 
 class OtherBytesError(Exception):
-    """A shard came out with another digest than it was to have.
-
-    Attributes
-    ----------
-    sha256 : str
-        Its digest.
-    """
-
-    def __init__(self, sha256: str):
-        super().__init__(sha256)
-        self.sha256 = sha256
+    """A shard came out with another digest than it was to have."""
 
 
-def write_shard(path: Path, samples: Iterable[Sample], wanted: str | None = None) -> tuple[int, str]:
+def write_shard(storage: Storage, name: str, samples: Iterable[Sample], wanted: str | None = None) -> tuple[int, str]:
     """Write a whole shard, each sample as it comes: plain tar, no times, no owners.
+
+    A storage that is no folder gets the shard at once, so it is in memory before.
 
     Parameters
     ----------
-    path : Path
+    storage : Storage
+    name : str
     samples : iterable of Sample
     wanted : str, optional
         Digest that the shard has to have to take the place of what is there.
@@ -177,21 +170,13 @@ def write_shard(path: Path, samples: Iterable[Sample], wanted: str | None = None
     OtherBytesError
         When its digest is not ``wanted``: the file is as before.
     """
-    return write_tar(path, _entries(samples), wanted)
-
-
-def store_shard(storage: Storage, name: str, samples: Iterable[Sample], wanted: str | None = None) -> tuple[int, str]:
-    """:func:`write_shard` to any storage. One that is no folder gets the shard at once, so it is in memory before."""
+    entries = ((sample_key(sample.index), sample_members(sample)) for sample in samples)
     if isinstance(storage, FolderStorage):
-        return write_shard(storage.folder / name, samples, wanted)
+        return write_tar(storage.folder / name, entries, wanted)
     file = io.BytesIO()  # a request that fails is made again with the same bytes
-    written = _write_entries(file, _entries(samples), wanted)
+    written = _write_entries(file, entries, wanted)
     storage.write(name, file.getvalue())
     return written
-
-
-def _entries(samples: Iterable[Sample]) -> Iterator[tuple[str, dict[str, bytes]]]:
-    return ((sample_key(sample.index), sample_members(sample)) for sample in samples)
 
 
 def write_tar(
@@ -216,7 +201,7 @@ def _write_entries(
     file.write(end)
     digest.update(end)
     if wanted not in (None, digest.hexdigest()):
-        raise OtherBytesError(digest.hexdigest())
+        raise OtherBytesError
     return size + len(end), digest.hexdigest()
 
 
@@ -284,28 +269,23 @@ class ShardReader:
         # Members of a sample stand side by side, each behind its header: one read takes them all.
         start = min(offset for _, offset, _ in members)
         end = max(offset + size for _, offset, size in members)
-        try:
-            if end - start <= sum(size + 2 * tarfile.BLOCKSIZE for _, _, size in members):
-                block = self._bytes(start, end - start)
-                contents = {suffix: block[offset - start : offset - start + size] for suffix, offset, size in members}
-            else:
-                contents = {suffix: self._bytes(offset, size) for suffix, offset, size in members}
-        except OSError as error:
-            raise DatasetError(f"cannot read the shard ({error})", self.path, self.fix) from error
+        if end - start <= sum(size + 2 * tarfile.BLOCKSIZE for _, _, size in members):
+            block = self._bytes(start, end - start)
+            contents = {suffix: block[offset - start : offset - start + size] for suffix, offset, size in members}
+        else:
+            contents = {suffix: self._bytes(offset, size) for suffix, offset, size in members}
         return sample_from_members(contents, f"{self.path}: sample {key}", self.fix)
 
     def _bytes(self, offset: int, size: int) -> bytes:
-        file = self._opened()
-        file.seek(offset)
-        content = file.read(size)
+        try:
+            self._file = self._file or self._opener()[0]
+            self._file.seek(offset)
+            content = self._file.read(size)
+        except OSError as error:
+            raise DatasetError(f"cannot read the shard ({error})", self.path, self.fix) from error
         if len(content) != size:
             raise DatasetError("the shard is cut short", self.path, self.fix)
         return content
-
-    def _opened(self) -> BinaryIO:
-        if self._file is None:
-            self._file = self._opener()[0]
-        return self._file
 
     def suffixes(self, key: str) -> list[str]:
         """Members that a key has."""
@@ -322,14 +302,13 @@ class ShardReader:
         place = next((place for name, *place in self._index.members(key) if name == suffix), None)
         if place is None:
             raise DatasetError(f"holds no {key}.{suffix}", self.path, self.fix)
-        try:
-            return self._bytes(*place)
-        except OSError as error:
-            raise DatasetError(f"cannot read the shard ({error})", self.path, self.fix) from error
+        return self._bytes(*place)
 
     @staticmethod
-    def of_bytes(storage: Storage, name: str, size: int, sha256: str, fix: str = _AGAIN) -> ShardReader:
-        """A shard that is read as a whole, at once, into memory, and whose checksum is compared.
+    def at(
+        storage: Storage, name: str, size: int, sha256: str, fix: str = _AGAIN, in_memory: bool = False
+    ) -> ShardReader:
+        """A shard in a storage. One that is no folder is read as a whole once, and its checksum is compared.
 
         Parameters
         ----------
@@ -340,20 +319,18 @@ class ShardReader:
         sha256 : str
             That it has to have.
         fix : str
+        in_memory : bool
+            Keep it there until it is closed; else each sample is a request of just its bytes.
         """
+        if isinstance(storage, FolderStorage):
+            return ShardReader(storage.folder / name, fix)
         where, data = f"{storage.place}/{name}", storage.read(name, size)
         if len(data) != size or hashlib.sha256(data).hexdigest() != sha256:
             raise DatasetError("has another checksum than when it was written", where, fix)
-        return ShardReader(where, fix, lambda: (io.BytesIO(data), size))
-
-    @staticmethod
-    def at(storage: Storage, name: str, size: int, sha256: str, fix: str = _AGAIN) -> ShardReader:
-        """A shard that is read as a whole once, for its index; then each sample is a request of just its bytes."""
-        if isinstance(storage, FolderStorage):
-            return ShardReader(storage.folder / name, fix)
-        reader = ShardReader.of_bytes(storage, name, size, sha256, fix)
-        reader.close()
-        reader._opener = partial(storage.open, name)
+        reader = ShardReader(where, fix, lambda: (io.BytesIO(data), size))
+        if not in_memory:
+            reader.close()
+            reader._opener = partial(storage.open, name)
         return reader
 
     def close(self) -> None:

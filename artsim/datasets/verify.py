@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +22,7 @@ from artsim.model.draws import Scale
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
-from artsim.runs.pool import WorkerLost, WorkerPool
-from artsim.runs.worker import report
+from artsim.runs.each import each
 
 _FIX = "generate the dataset again, into another folder: its checksums are right, its content is not"
 _WORTH_A_PROCESS = 500
@@ -76,36 +75,16 @@ def verify(folder: str | Path, progress: bool = True, workers: int = 1) -> list[
         shards = [shard for shard in dataset.shards if shard.name in inventory.kept]
         bar.update(len(dataset) - sum(map(len, shards)))
         workers = min(workers, len(shards), 1 + sum(map(len, shards)) // _WORTH_A_PROCESS)
-        if workers > 1:
-            return problems + _by_several(folder, shards, unusable, workers, bar.update)
-        for shard in shards:
-            problems += _shard_problems(dataset, shard, unusable, bar.update)
+        for shard, own in each(partial(_shard_checker, folder, unusable), shards, max(1, workers)):
+            problems += own
+            bar.update(len(shard))
     return problems
 
 
-def _by_several(
-    folder: Path, shards: Sequence[ShardRecord], unusable: set[str], workers: int, progress: Callable[[int], object]
-) -> list[Problem]:
-    """What is wrong with shards, in their order, found by several processes."""
-    found: dict[str, list[Problem] | WorkerLost] = {}
-    with WorkerPool(workers) as team:
-        found.update(team.run(_check_shard, ((s.name, (folder, s, unusable)) for s in shards), progress=progress))
-    problems = []
-    for shard in shards:
-        answer = found[shard.name]
-        problems += [Problem(shard.name, answer.why, _FIX)] if isinstance(answer, WorkerLost) else answer
-    return problems
-
-
-def _check_shard(folder: Path, shard: ShardRecord, unusable: set[str]) -> list[Problem]:
-    """The task of a worker process."""
-    return list(_shard_problems(_worker_dataset(folder), shard, unusable, report))
-
-
-@lru_cache(maxsize=1)
-def _worker_dataset(folder: Path) -> Dataset:
-    """Read once for all tasks of a process."""
-    return Dataset(folder)
+def _shard_checker(folder: Path, unusable: set[str]) -> Callable[[ShardRecord], tuple[ShardRecord, list[Problem]]]:
+    """What checks a shard, once in each process."""
+    dataset = Dataset(folder)
+    return lambda shard: (shard, list(_shard_problems(dataset, shard, unusable)))
 
 
 def _share_problems(plan: Plan) -> Iterator[Problem]:
@@ -157,15 +136,12 @@ def _object_flaws(obj: ArticulatedObject) -> Iterator[str]:
         yield "its parts are not at rest in its rest state"
 
 
-def _shard_problems(
-    dataset: Dataset, shard: ShardRecord, unusable: set[str], progress: Callable[[int], object]
-) -> Iterator[Problem]:
+def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) -> Iterator[Problem]:
     path, plan = dataset.folder / shard.name, dataset.plan
     try:
         reader = ShardReader(path)
     except DatasetError as error:
         yield Problem(shard.name, error.what, _FIX)
-        progress(len(shard))
         return
     indices = plan.indices(shard)
     wanted, have = [sample_key(index) for index in indices], reader.keys()
@@ -175,7 +151,6 @@ def _shard_problems(
         yield Problem(shard.name, what, _FIX)
     there = set(have)
     for index, key in zip(indices, wanted, strict=True):
-        progress(1)
         planned = plan.object_of(index)
         if key not in there or planned.file in unusable:
             continue

@@ -12,7 +12,7 @@ from artsim.datasets.description import read_plan
 from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.plan import Plan, Shard, ShardRecord
 from artsim.datasets.sample_options import PLANNED_ATTEMPTS, SampleOptions, check_visible, draw_sample
-from artsim.datasets.shards import OtherBytesError, store_shard
+from artsim.datasets.shards import OtherBytesError, write_shard
 from artsim.errors import ArtsimError, DatasetError
 from artsim.loading.sources import FamilySource, Source
 from artsim.model.object_file import object_bytes
@@ -60,7 +60,7 @@ class DatasetFiles:
         return make_renderer(self.plan.sample.renderer)
 
 
-def make_shard(shard: Shard, sha256: str | None, parts: str) -> ShardRecord | str | None:
+def make_shard(shard: Shard, sha256: str | None, parts: str) -> ShardRecord | bool | None:
     """Make and write one shard.
 
     Parameters
@@ -73,14 +73,14 @@ def make_shard(shard: Shard, sha256: str | None, parts: str) -> ShardRecord | st
 
     Returns
     -------
-    ShardRecord or str or None
-        The other digest, where it is not as wanted; None when asked to stop before the shard is whole.
+    ShardRecord or False or None
+        False where its digest is not as wanted; None when asked to stop before the shard is whole.
     """
     dataset, prepared = this_worker().kept(DatasetFiles), parts == PARTS and sha256 is None
     try:
-        size, digest = store_shard(dataset.storage, shard.name, _samples(dataset, shard, prepared), sha256)
-    except OtherBytesError as other:
-        return other.sha256
+        size, digest = write_shard(dataset.storage, shard.name, _samples(dataset, shard, prepared), sha256)
+    except OtherBytesError:
+        return False
     except StoppedError:
         return None
     recipe = dataset.plan.recipe(shard)

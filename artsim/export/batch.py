@@ -21,8 +21,8 @@ from artsim.errors import AssetError, ConfigError
 from artsim.export import DEFAULTS, check_formats, export
 from artsim.export.folders import new_folder, remove_unfinished, whole_meta
 from artsim.export.options import ExportOptions
-from artsim.families import FAMILIES, make_constrained
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
+from artsim.loading.sources import FamilySource, family_sources
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool, results
 from artsim.runs.recipe import check_counts, check_seed
@@ -87,85 +87,66 @@ def generate_objects(
         On Ctrl-C, after the workers have stopped; the same call resumes.
     """
     start = time.perf_counter()
-    _check_options(categories, count, seed, workers)
+    wanted = family_sources(categories, count, seed, constraints)
+    if not wanted:
+        raise ConfigError("there is no category to make", "category", "name one, such as drawer")
+    check_counts(workers=workers)
+    check_seed(seed)
     check_formats(formats)
     folder = Path(out)
-    wanted = [(category, number) for category in dict.fromkeys(categories) for number in range(seed, seed + count)]
     with folder_lock(folder):
         remove_unfinished(folder)
-        found = {key: meta for key in wanted if (meta := _whole(folder, key, formats, constraints, options))}
-        missing = [key for key in wanted if key not in found]
+        found = {source: meta for source in wanted if (meta := _whole(folder, source, formats, options))}
+        missing = [source for source in wanted if source not in found]
         with (
             track("objects", total=len(wanted), initial=len(found), unit="object", shown=progress) as bar,
             WorkerPool(workers) as team,
         ):
-            tasks = ((key, (folder, *key, tuple(formats), constraints, options)) for key in missing)
-            for key, meta in results(team.run(write_object, tasks), folder):
-                found[key] = meta
+            tasks = ((source, (folder, source, tuple(formats), options)) for source in missing)
+            for source, meta in results(team.run(write_object, tasks), folder):
+                found[source] = meta
                 bar.update()
-        write_atomic(folder / INDEX, _index_text([(key, found[key]) for key in wanted]).encode())
+        file = io.StringIO()
+        rows = [_COLUMNS, *(_row(source, found[source]) for source in wanted)]
+        csv.writer(file, lineterminator="\n").writerows(rows)
+        write_atomic(folder / INDEX, file.getvalue().encode())
     return ObjectsResult(folder, len(wanted), len(missing), time.perf_counter() - start)
 
 
-def _check_options(categories: Sequence[str], count: int, seed: int, workers: int) -> None:
-    unknown = [category for category in categories if category not in FAMILIES]
-    if unknown or not categories:
-        known = ", ".join(sorted(FAMILIES))
-        raise ConfigError(f"there is no category {', '.join(map(repr, unknown))}", "category", f"use some of {known}")
-    check_counts(count=count, workers=workers)
-    check_seed(seed)
-
-
-def _whole(
-    out: Path, key: tuple[str, int], formats: Sequence[str], constraints: Constraints, options: ExportOptions
-) -> dict[str, Any] | None:
+def _whole(out: Path, source: FamilySource, formats: Sequence[str], options: ExportOptions) -> dict[str, Any] | None:
     """Content of an object's ``meta.json`` if this version of artsim wrote it so in these formats."""
 
     def is_same(meta: dict[str, Any]) -> bool:
-        _row(key, meta)  # what index.csv takes from it
-        same = meta["artsim"]["version"] == version("artsim") and meta.get("constraints", "") == str(constraints)
-        return same and asdict(options).items() <= meta["artsim"].items()
+        _row(source, meta)  # what index.csv takes from it
+        same = meta["artsim"]["version"] == version("artsim")
+        return (
+            same
+            and meta.get("constraints", "") == str(source.constraints)
+            and asdict(options).items() <= meta["artsim"].items()
+        )
 
-    return whole_meta(out / key[0] / str(key[1]), formats, is_same)
+    return whole_meta(out / source.category / str(source.seed), formats, is_same)
 
 
-def write_object(
-    out: Path, category: str, seed: int, formats: tuple[str, ...], constraints: Constraints, options: ExportOptions
-) -> dict[str, Any]:
+def write_object(out: Path, source: FamilySource, formats: tuple[str, ...], options: ExportOptions) -> dict[str, Any]:
     """Make an object and write its folder; returns the content of its ``meta.json``."""
     try:
-        obj = make_constrained(category, seed, constraints)
+        obj = source.load()
     except ConfigError:
         raise
     except Exception as error:  # whatever a family stumbles on, the seed is what one needs to know
-        raise AssetError(f"cannot be made ({type(error).__name__}: {error})", f"{category} {seed}") from error
-    notes = {"constraints": str(constraints)} if constraints else {}
-    with new_folder(out / category / str(seed)) as folder:
+        where = f"{source.category} {source.seed}"
+        raise AssetError(f"cannot be made ({type(error).__name__}: {error})", where) from error
+    notes = {"constraints": str(source.constraints)} if source.constraints else {}
+    with new_folder(out / source.category / str(source.seed)) as folder:
         return export(obj, folder, formats, notes, options)
 
 
-def _index_text(objects: Sequence[tuple[tuple[str, int], dict[str, Any]]]) -> str:
-    """One row for each object."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(_COLUMNS)
-    for key, meta in objects:
-        writer.writerow(_row(key, meta))
-    return file.getvalue()
-
-
-def _row(key: tuple[str, int], meta: dict[str, Any]) -> list[Any]:
+def _row(source: FamilySource, meta: dict[str, Any]) -> list[Any]:
     """What stands in the index of one object; KeyError, ValueError or TypeError where its ``meta.json`` is damaged."""
-    category, seed = key
     own = meta["artsim"]
+    size = " ".join(f"{side:.6g}" for side in own["size_m"])
     return [
-        f"{category}/{seed}",
-        meta["model_cat"],
-        meta["anno_id"],
-        " ".join(own["parts"]),
-        " ".join(own["joints"]),
-        own["free_joints"],
-        f"{own['mass_kg']:.6g}",
-        " ".join(f"{side:.6g}" for side in own["size_m"]),
-        own["sha256"],
-    ]
+        f"{source.category}/{source.seed}", meta["model_cat"], meta["anno_id"], " ".join(own["parts"]),
+        " ".join(own["joints"]), own["free_joints"], f"{own['mass_kg']:.6g}", size, own["sha256"],
+    ]  # fmt: skip

@@ -31,6 +31,7 @@ from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions
 from artsim.physics.world import engine_of
 from artsim.runs.recipe import check_counts, check_seed
+from artsim.runs.storage import FolderStorage
 
 FORMAT = 1
 _GOAL_SECONDS = 2.0  # a joint heads for a goal for so long, then for another
@@ -173,7 +174,7 @@ def _record_one(folder: Path, episode: Episode, frames: int, seed: int, number: 
             yield episode.look(rng, seed)
             episode.step((goal - episode.simulation.state[free]) / _REACH_SECONDS, "velocity")
 
-    size, digest = write_shard(folder / f"{name}.tar", samples())
+    size, digest = write_shard(FolderStorage(folder), f"{name}.tar", samples())
     save_object(obj, folder / "objects" / f"{name}.npz")
     return {
         "name": name,

@@ -29,9 +29,9 @@ from artsim.loading.urdf import load
 from artsim.model.convex_bodies import add_surface_bodies
 from artsim.model.objects import ArticulatedObject
 from artsim.runs.lock import folder_lock
-from artsim.runs.recipe import check_counts, check_seed
+from artsim.runs.recipe import check_counts
 from artsim.variation.operations import OPERATIONS
-from artsim.variation.search import Variation, draw_variation
+from artsim.variation.search import Variation, check_variable, draw_variation
 from artsim.variation.standard import Standard
 
 _FILE_GATES: dict[str, Callable[[Path, Mapping[str, Path] | None], list[str]]] = {
@@ -144,11 +144,9 @@ def write_variations(
         On Ctrl-C; the same call resumes.
     """
     check_counts(count=count)
-    check_seed(seed)
     check_formats(formats)
     obj, file_gates = load_with_bodies(path, package_roots)
-    if obj.is_rigid:
-        raise AssetError("no joint can move: there is no articulated object to vary", path, "give it a moving joint")
+    check_variable(obj, seed)
     donors = _load_others(obj, others, package_roots)
     standard = Standard.of(obj)
     folder = Path(out)

@@ -12,6 +12,7 @@ import numpy as np
 
 from artsim.errors import ArtsimError, AssetError, ConfigError
 from artsim.model.objects import ArticulatedObject, content_sha256
+from artsim.runs.recipe import check_seed
 from artsim.variation.geometry import centered
 from artsim.variation.operations import OPERATIONS
 from artsim.variation.standard import Standard
@@ -56,7 +57,7 @@ def draw_variation(
     standard : Standard, optional
         That of the object, where it is known.
     """
-    _check(obj, seed, others)
+    check_variable(obj, seed, others)
     standard = standard or Standard.of(obj)
     rejected: list[str] = []
     for draw in range(DRAWS):
@@ -77,12 +78,12 @@ def draw_variation(
     )
 
 
-def _check(obj: ArticulatedObject, seed: int, others: Sequence[ArticulatedObject]) -> None:
-    where = f"{obj.category} {obj.object_id}"
-    if seed < 0:
-        raise ConfigError(f"seed {seed} is negative", fix="use 0 or more")
+def check_variable(obj: ArticulatedObject, seed: int, others: Sequence[ArticulatedObject] = ()) -> None:
+    """Refuse what has no variation: a rigid object, or parts of other categories."""
+    check_seed(seed)
     if obj.is_rigid:
-        raise AssetError("no joint can move: there is no articulated object to vary", where, "give it a moving joint")
+        what, where = "no joint can move: there is no articulated object to vary", f"{obj.category} {obj.object_id}"
+        raise AssetError(what, where, "give it a moving joint")
     strange = sorted({other.category for other in others} - {obj.category})
     if strange:
         raise ConfigError(

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from artsim.datasets.new_plan import planned_objects
 from artsim.datasets.plan import Plan
+from artsim.datasets.preparing import planned_objects
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import SPLITS, assign_splits, unique_keys
 from artsim.datasets.worker import CompiledSource

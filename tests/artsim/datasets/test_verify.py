@@ -21,6 +21,7 @@ from artsim.datasets.shards import ShardReader, write_shard
 from artsim.datasets.verify import verify
 from artsim.loading.sources import find_sources
 from artsim.observing.sample import Sample
+from artsim.runs.storage import FolderStorage
 from tests.conftest import ASSETS
 
 
@@ -138,7 +139,7 @@ def rewrite(folder: Path, change: Callable[[list[Sample]], list[Sample]]) -> lis
     path, description = folder / "train-000000.tar", json.loads((folder / "dataset.json").read_text())
     reader = ShardReader(path)
     samples = list(map(reader.read, reader.keys()))
-    size, sha256 = write_shard(path, change(samples))
+    size, sha256 = write_shard(FolderStorage(path.parent), path.name, change(samples))
     description["shards"][0] |= {"bytes": size, "sha256": sha256}
     (folder / "dataset.json").write_bytes(document_bytes(description))
     return [str(problem) for problem in verify(folder, progress=False)]
@@ -214,7 +215,7 @@ def test_several_processes_find_what_one_finds_in_the_same_order(
     for path in (shards[0], shards[-1]):  # sealed again, so that only the samples themselves tell
         reader = ShardReader(path)
         samples = [replace(read, diagonal=2 * read.diagonal) for read in map(reader.read, reader.keys())]
-        size, sha256 = write_shard(path, samples)
+        size, sha256 = write_shard(FolderStorage(path.parent), path.name, samples)
         (record,) = (record for record in description["shards"] if record["name"] == path.name)
         record["size"], record["sha256"] = size, sha256
     (tmp_path / "dataset.json").write_bytes(document_bytes(description))
