@@ -213,7 +213,7 @@ def _watch_memory(folder: Path, keys: list[str], samples: int) -> tuple[float, f
 def _compile_all(paths: list[Path], folder: Path) -> list[str]:
     for i, path in enumerate(paths):
         save_object(load(path), folder / f"{i}.npz")
-    return [str(i) for i in range(len(paths))]
+    return [f"{i}.npz" for i in range(len(paths))]
 
 
 def resident_mb() -> float:

@@ -199,18 +199,12 @@ def _ray() -> tuple[str, float | None]:
     return f"Ray {ray.__version__}, for generate.py --ray", None
 
 
-def _torch_device() -> str:
-    import torch
-
-    return "cuda" if torch.cuda.is_available() else "cpu"
-
-
 def _torch() -> tuple[str, float | None]:
     import torch
 
-    device = torch.cuda.get_device_name() if _torch_device() == "cuda" else processor()
-    torch.ones(2, device=_torch_device()).sum().item()
-    return device, None
+    kind = "cuda" if torch.cuda.is_available() else "cpu"
+    torch.ones(2, device=kind).sum().item()
+    return torch.cuda.get_device_name() if kind == "cuda" else processor(), None
 
 
 BACKENDS: dict[str, Callable[[], tuple[str, float | None]]] = {

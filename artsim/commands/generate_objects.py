@@ -49,4 +49,4 @@ class GenerateObjects:
                 categories_named(self.category), self.out, self.count, self.seed, self.formats, self.workers,
                 constraints=Constraints.parse(self.having), options=self.options,
             )  # fmt: skip
-        print_made(result.folder, f"{result.objects} objects", result.made, "objects", result.seconds)
+        print_made(result.folder, f"{result.total} objects", result.made, "objects", result.seconds)

@@ -12,7 +12,7 @@ from artsim.commands.printing import print_some, resumable
 from artsim.common.program import cores
 from artsim.common.tables import plural
 from artsim.errors import DatasetError
-from artsim.loading.roots import PackageRoots
+from artsim.loading.roots import Packages
 from artsim.runs.recipe import check_counts
 
 
@@ -41,7 +41,7 @@ class Verify:
 
 
 @dataclass(frozen=True)
-class Repair:
+class Repair(Packages):
     """Restore what is damaged or missing of a dataset, to the same bytes, or say why that cannot be.
 
     Shards and objects are regenerated, plan.json and dataset.json restore each other. A dataset
@@ -52,8 +52,6 @@ class Repair:
     """Dataset folder."""
     objects: tuple[Path, ...] = ()
     """Where objects lie that were loaded from files, if they are not where they were."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folder of a package:// name: NAME=FOLDER ..."""
     workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
 

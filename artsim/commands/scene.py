@@ -10,9 +10,8 @@ import tyro
 
 from artsim.commands.printing import print_made, resumable
 from artsim.common.program import cores
-from artsim.datasets.sample_options import SensorName
-from artsim.renderers import RendererName
-from artsim.scenes.random_scene import SceneCameraOptions, SceneOptions
+from artsim.scenes.dataset import open_scenes
+from artsim.scenes.generate import SceneRun, generate_scenes
 
 _LISTED = 12
 """Views that are printed one by one; the others are counted."""
@@ -38,26 +37,13 @@ class Scene:
     """Folder to write to; made if missing."""
     scenes: int = 1
     """Scenes, seeds counting up."""
-    views: int = 1
-    """Cameras that look at each."""
     seed: int = 0
     """Seed of the first scene: the same seed and options make the same files."""
     workers: int = field(default_factory=cores)
     """Worker processes; by default one for each core."""
     shard_size: int = 0
     """Scenes of each tar file; 0 writes a folder for each view."""
-    scene: Annotated[SceneOptions, tyro.conf.arg(name="")] = field(default_factory=SceneOptions)
-    camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
-    renderer: RendererName = "sapien"
-    """Only sapien, pybullet and pybullet-egl make colour images."""
-    rgb_samples: int = 8
-    """Pictures that each colour image is the mean of: more give softer shadows and smoother edges."""
-    num_points: int = 2048
-    """Points of each object's cloud."""
-    noise: SensorName = "none"
-    """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
-    misses: bool = False
-    """The sensor gets nothing back from patches of shiny and transparent surfaces."""
+    options: Annotated[SceneRun, tyro.conf.arg(name="")] = field(default_factory=SceneRun)
     overviews: int = 12
     """Write overview.png for the views of so many scenes, the first ones."""
     formats: tuple[Literal["coco", "bop"], ...] = ()
@@ -67,21 +53,22 @@ class Scene:
     def run(self) -> None:
         from artsim.drawing.scene_overview import overview_files
         from artsim.scenes.convert import convert_scenes
-        from artsim.scenes.dataset import open_scenes
-        from artsim.scenes.generate import SceneRun, generate_scenes
 
-        run = SceneRun(
-            self.scene, self.camera, self.views, self.renderer, self.rgb_samples, self.num_points, self.noise,
-            self.misses,
-        )  # fmt: skip
         with resumable("whole files are kept", self.out):
             result = generate_scenes(
-                run, self.out, self.scenes, self.seed, self.shard_size, self.workers, overview_files, self.overviews
+                self.options,
+                self.out,
+                self.scenes,
+                self.seed,
+                self.shard_size,
+                self.workers,
+                overview_files,
+                self.overviews,
             )
-            converted = [convert_scenes(run, self.out, name, self.workers) for name in self.formats]
+            converted = [convert_scenes(self.options, self.out, name, self.workers) for name in self.formats]
         for entry in open_scenes(self.out).entries[:_LISTED]:
             seen = ", ".join(f"{obj.category} {100 * obj.visible_fraction:.0f}%" for obj in entry.objects)
             print(f"{entry.key}: {seen} visible")
-        print_made(result.folder, f"{result.scenes} scenes", result.made, "scenes", result.seconds)
+        print_made(result.folder, f"{result.total} scenes", result.made, "scenes", result.seconds)
         for folder in converted:
             print(f"wrote {folder}")

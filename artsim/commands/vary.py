@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -10,11 +10,11 @@ import tyro
 
 from artsim.commands.printing import print_some, resumable
 from artsim.errors import AssetError
-from artsim.loading.roots import PackageRoots
+from artsim.loading.roots import Packages
 
 
 @dataclass(frozen=True)
-class Vary:
+class Vary(Packages):
     """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
 
     Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
@@ -36,9 +36,6 @@ class Vary:
     formats: tuple[Literal["urdf", "mjcf", "usd", "usdz", "simready"], ...] = ("urdf",)
     """File formats: mobility.urdf, mobility.xml, mobility.usda, mobility.usdz, and in the folder simready a package for
     NVIDIA's profile Robotics-Prop."""
-    package_root: PackageRoots = field(default_factory=dict)
-    """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
-    below these folders, too. Repeatable."""
 
     def run(self) -> None:
         from artsim.variation.folder import write_variations
@@ -48,6 +45,6 @@ class Vary:
                 self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
             )
         print_some(summary.failed)
-        print(f"{summary.folder}: {summary.whole} variations of {self.path}\n{summary}")
-        if not summary.whole:
+        print(f"{summary.folder}: {len(summary.notes)} variations of {self.path}\n{summary}")
+        if not summary.notes:
             raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")

@@ -65,7 +65,7 @@ class Dataset:
         self._readers: dict[str, ShardReader] = {}
         self._open: OrderedDict[str, ShardReader] = OrderedDict()
         self._owner, self.fix = os.getpid(), repair_command(self.storage.place)
-        self.objects = ObjectCache(self.storage, below="objects")
+        self.objects = ObjectCache(self.storage)
 
     @property
     def folder(self) -> Path:
@@ -143,7 +143,7 @@ class Dataset:
 
     def object_of(self, sample: Sample) -> ArticulatedObject:
         """The object that a sample shows, at the sample's scale."""
-        return self.objects[self.planned(sample.index).key].scaled(sample.scale)
+        return self.objects[self.planned(sample.index).file].scaled(sample.scale)
 
     def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedDataset:
         """View as dictionaries of arrays of one shape, which default collation stacks.
@@ -200,7 +200,7 @@ class SampleStream(Shared):
         if seed < 0 or start < 0 or step < 1:
             raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", fix="count from 0 upwards")
         self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
-        self.objects = ObjectCache(place, below="objects")
+        self.objects = ObjectCache(place)
         self._renderer: Renderer | None = None
 
     def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
@@ -213,7 +213,7 @@ class SampleStream(Shared):
         if self._renderer is None:
             self._renderer = make_renderer(self.plan.sample.renderer)
         planned = self.plan.object_in_split(self.split, i)
-        return draw_sample(self.objects[planned.key], self.plan.sample, self.seed, i, self._renderer)
+        return draw_sample(self.objects[planned.file], self.plan.sample, self.seed, i, self._renderer)
 
     def __iter__(self) -> Iterator[Sample]:
         share, shares = self._share()

@@ -48,7 +48,7 @@ from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool
-from artsim.runs.ray_pool import RayPool
+from artsim.runs.ray_pool import RayPool, Team
 from artsim.runs.recipe import check_counts, check_seed, differences
 from artsim.runs.storage import FolderStorage, Place, Storage, is_url, storage_of
 
@@ -202,7 +202,7 @@ def generate(
     return replace(result, restored=files, grown_from=grown_from)
 
 
-def _team(place: Place, workers: int, ray: str | None) -> WorkerPool | RayPool:
+def _team(place: Place, workers: int, ray: str | None) -> Team:
     """What does the tasks of a run."""
     return WorkerPool(workers, storage_of(place)) if ray is None else RayPool(ray, place, VERSIONS_OF)
 

@@ -14,7 +14,7 @@ _CACHE_BYTES = 250_000_000
 
 
 class ObjectCache:
-    """Compiled objects of a folder, the least recently used dropped once they take too much memory.
+    """Compiled objects by the names of their files, the least recently used dropped once they take too much memory.
 
     Parameters
     ----------
@@ -22,27 +22,23 @@ class ObjectCache:
         Folder or URL.
     max_bytes : int
         Of memory.
-    below : str
-        Where in it the objects lie.
     """
 
-    def __init__(self, place: Place, max_bytes: int = _CACHE_BYTES, below: str = ""):
-        self.storage, self.below = storage_of(place), f"{below}/" if below else ""
-        self.max_bytes = max_bytes
+    def __init__(self, place: Place, max_bytes: int = _CACHE_BYTES):
+        self.storage, self.max_bytes = storage_of(place), max_bytes
         self._objects: OrderedDict[str, ArticulatedObject] = OrderedDict()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return ObjectCache, (self.storage, self.max_bytes, self.below.rstrip("/"))
+        return ObjectCache, (self.storage, self.max_bytes)
 
-    def __getitem__(self, key: str) -> ArticulatedObject:
-        obj = self._objects.get(key)
+    def __getitem__(self, name: str) -> ArticulatedObject:
+        obj = self._objects.get(name)
         if obj is None:
-            name = f"{self.below}{key}.npz"
             where = f"{self.storage.place}/{name}"
-            obj = self._objects[key] = parse_object(self.storage.read(name, MAX_ARRAY_BYTES), where)
+            obj = self._objects[name] = parse_object(self.storage.read(name, MAX_ARRAY_BYTES), where)
             while len(self._objects) > 1 and sum(map(_memory, self._objects.values())) > self.max_bytes:
                 self._objects.popitem(last=False)
-        self._objects.move_to_end(key)
+        self._objects.move_to_end(name)
         return obj
 
 

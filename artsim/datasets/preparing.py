@@ -25,7 +25,8 @@ from artsim.datasets.worker import PARTS, PARTS_OF_ONE, CompiledSource, RefusedS
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
 from artsim.renderers.ray_scenes import RAY_LIBRARY
-from artsim.runs.pool import Team, WorkerLost
+from artsim.runs.pool import WorkerLost
+from artsim.runs.ray_pool import Team
 from artsim.runs.storage import Storage
 
 _BLOCK = 16

@@ -15,7 +15,8 @@ from artsim.datasets.plan import PlannedObject, Shard, ShardRecord
 from artsim.datasets.problems import Problem
 from artsim.datasets.worker import PARTS_OF_ONE, CompiledSource, RefusedSource, compile_source, make_shard
 from artsim.loading.sources import Source
-from artsim.runs.pool import Team, WorkerLost, results
+from artsim.runs.pool import WorkerLost, results
+from artsim.runs.ray_pool import Team
 from artsim.runs.storage import FolderStorage, Storage
 
 _OTHER_MAKER = "another processor, or another version of artsim or of a library, made it"

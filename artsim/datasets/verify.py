@@ -157,7 +157,7 @@ def _shard_problems(dataset: Dataset, shard: ShardRecord, unusable: set[str]) ->
         where = f"{shard.name}: sample {index}"
         try:
             sample = reader.read(key)
-            obj = dataset.objects[planned.key].scaled(sample.scale)
+            obj = dataset.objects[planned.file].scaled(sample.scale)
             yield from (Problem(where, what, _FIX) for what in _plan_problems(sample, plan, index))
             yield from (Problem(where, what, _FIX) for what in sample_problems(sample, obj))
         except ArtsimError as error:

@@ -49,11 +49,7 @@ class DatasetFiles:
 
     @cached_property
     def objects(self) -> ObjectCache:
-        return ObjectCache(self.storage, below="objects")
-
-    @cached_property
-    def prepared(self) -> ObjectCache:
-        return ObjectCache(self.storage, below=f"{PARTS}/objects")
+        return ObjectCache(self.storage)
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -96,8 +92,8 @@ def _samples(dataset: DatasetFiles, shard: Shard, prepared: bool) -> Iterator[Sa
         stop_if_asked()
         planned = plan.object_of(index)
         try:
-            obj = dataset.prepared[planned.file_sha256] if prepared else dataset.objects[planned.key]
-            yield draw_sample(obj, plan.sample, plan.seed, index, renderer, PLANNED_ATTEMPTS)
+            file = f"{PARTS}/objects/{planned.file_sha256}.npz" if prepared else planned.file
+            yield draw_sample(dataset.objects[file], plan.sample, plan.seed, index, renderer, PLANNED_ATTEMPTS)
         except ImportError:  # which says what to install
             raise
         except Exception as error:  # whatever a renderer or a view function stumbles on: what matters is where

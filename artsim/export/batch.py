@@ -10,7 +10,7 @@ import csv
 import io
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,19 +26,10 @@ from artsim.loading.sources import FamilySource, family_sources
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool, results
 from artsim.runs.recipe import check_counts, check_seed
+from artsim.runs.tasks import RunResult
 
 INDEX = "index.csv"
 _COLUMNS = ("folder", "category", "object_id", "parts", "joints", "free_joints", "mass_kg", "size_m", "sha256")
-
-
-@dataclass(frozen=True)
-class ObjectsResult:
-    """What a call of :func:`generate_objects` did."""
-
-    folder: Path
-    objects: int
-    made: int
-    seconds: float
 
 
 def generate_objects(
@@ -51,7 +42,7 @@ def generate_objects(
     progress: bool = True,
     constraints: Constraints = NO_CONSTRAINTS,
     options: ExportOptions = DEFAULTS,
-) -> ObjectsResult:
+) -> RunResult:
     """Write procedural objects as files, or resume a run that was stopped.
 
     Parameters
@@ -110,7 +101,7 @@ def generate_objects(
         rows = [_COLUMNS, *(_row(source, found[source]) for source in wanted)]
         csv.writer(file, lineterminator="\n").writerows(rows)
         write_atomic(folder / INDEX, file.getvalue().encode())
-    return ObjectsResult(folder, len(wanted), len(missing), time.perf_counter() - start)
+    return RunResult(folder, len(wanted), len(missing), time.perf_counter() - start)
 
 
 def _whole(out: Path, source: FamilySource, formats: Sequence[str], options: ExportOptions) -> dict[str, Any] | None:

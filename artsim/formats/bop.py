@@ -58,7 +58,7 @@ class BopFormat(Format):
         for number in piece.members:
             planned = dataset.plan.objects[number]
             size = dataset.plan.sample.scale
-            obj = sample_scale(dataset.objects[planned.key], size, np.random.default_rng(0))
+            obj = sample_scale(dataset.objects[planned.file], size, np.random.default_rng(0))
             for k in np.flatnonzero(obj.has_surface).tolist():
                 model = first[planned.key] + k
                 output.write(*model_file(obj, k, model))

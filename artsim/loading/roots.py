@@ -39,12 +39,18 @@ PackageRoots = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Opened:
-    """Options of commands that open objects of files."""
+class Packages:
+    """Where files lie that objects name by their package."""
 
     package_root: PackageRoots = field(default_factory=dict)
     """Folder of each package name, as in package://NAME/. Meshes and included files outside the object's folder open
     below these folders, too. Repeatable."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opened(Packages):
+    """Options of commands that open objects of files."""
+
     body: str | None = None
     """For an MJCF or USD scene of several objects: the body to load, with its children. world: the children of
     the world body."""

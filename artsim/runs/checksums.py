@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from artsim.common.progress import track
@@ -33,27 +32,16 @@ def check_files(
     dict
         By name: what is wrong (None for a sound file), and the digest ("" where there is none).
     """
-    storage = storage_of(place)
-    with (
-        _readers(threads) as pool,
-        track("check", total=len(digests), unit="file", shown=progress and bool(digests), leave=False) as bar,
-    ):
-        states = pool.map(lambda own: _check(storage, *own), digests.items())
-        found = {}
-        for name, state in zip(digests, states, strict=True):
-            found[name] = state
-            bar.update()
-    return found
-
-
-@contextlib.contextmanager
-def _readers(threads: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that a Ctrl-C stops after the files that they are at, not after all."""
-    pool = ThreadPoolExecutor(threads)
+    storage, found, pool = storage_of(place), dict[str, tuple[str | None, str]](), ThreadPoolExecutor(threads)
     try:
-        yield pool
-    finally:
+        with track("check", total=len(digests), unit="file", shown=progress and bool(digests), leave=False) as bar:
+            states = pool.map(lambda own: _check(storage, *own), digests.items())
+            for name, state in zip(digests, states, strict=True):
+                found[name] = state
+                bar.update()
+    finally:  # a Ctrl-C stops the threads after the files that they are at, not after all
         pool.shutdown(cancel_futures=True)
+    return found
 
 
 def _check(storage: Storage, name: str, digests: Sequence[str]) -> tuple[str | None, str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any, TypeVar
 
 from artsim.errors import ArtsimError, ConfigError
-from artsim.runs.pool import Team, WorkerLost, WorkerPool
+from artsim.runs.pool import WorkerLost, WorkerPool
 from artsim.runs.ray_pool import RayPool
 from artsim.runs.worker import this_worker
 
@@ -60,7 +60,6 @@ def _in_processes(
 ) -> Generator[Result, None, None]:
     early: dict[int, Result] = {}
     following, ahead = 0, _AHEAD * workers if ray is None else _AHEAD_ON_RAY
-    team: Team
 
     def numbered() -> Iterator[tuple[int, tuple[Task]] | None]:
         for number, task in enumerate(tasks):

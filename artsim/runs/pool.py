@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from artsim.errors import DatasetError
 from artsim.runs.worker import serve
@@ -53,15 +53,6 @@ class _Member:
     greeted: bool = False
     task: tuple[Any, tuple[Any, ...]] | None = None
     since: float = 0.0
-
-
-class Team(Protocol):
-    """What does the tasks of a run: processes of this machine, or of a cluster."""
-
-    def run(
-        self, work: Callable[..., T], tasks: Tasks[K], limit: float | None = None, progress: Progress = ignore
-    ) -> Iterator[tuple[K, T | WorkerLost]]:
-        """See :meth:`WorkerPool.run`."""
 
 
 class WorkerPool:

@@ -17,11 +17,11 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO, TypeAlias, TypeVar
 
 from artsim.common.extras import require_extra
 from artsim.errors import ArtsimError, ConfigError
-from artsim.runs.pool import Progress, Tasks, WorkerLost, ignore
+from artsim.runs.pool import Progress, Tasks, WorkerLost, WorkerPool, ignore
 from artsim.runs.storage import FolderStorage, storage_of
 from artsim.runs.worker import Worker, outcome, set_worker
 
@@ -141,6 +141,10 @@ class RayPool:
             self._ray.kill(self._hub)
         if self._own:
             self._ray.shutdown()
+
+
+Team: TypeAlias = WorkerPool | RayPool
+"""What does the tasks of a run: processes of this machine, or of a cluster."""
 
 
 def connect(ray: Any, address: str) -> None:

@@ -30,6 +30,7 @@ _FIRST_PAUSE, _LONGEST_PAUSE = 0.1, 10.0
 _OF_BUCKETS = ("s3", "s3a", "gs", "gcs", "az", "abfs", "oss")
 """Protocols whose first name is that of a bucket, or container."""
 _MISSING = "restore it, or make the dataset again"
+_WRITE = "be written", ConfigError
 
 
 class Storage(Protocol):
@@ -227,7 +228,9 @@ class UrlStorage:
         path = self._system()[1]
         return f"{path}/{name}" if name else path
 
-    def _try(self, name: str, work: Callable[[], T], kind: type[ArtsimError], doing: str, fix: str) -> T:
+    def _try(
+        self, name: str, work: Callable[[], T], doing: str = "be read", kind: type[ArtsimError] = DatasetError
+    ) -> T:
         """Do something with a file, again after a while where it fails."""
         for attempt in range(_ATTEMPTS):
             try:
@@ -252,15 +255,9 @@ class UrlStorage:
                 pause = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0**attempt)
                 time.sleep(pause * random.uniform(0.5, 1.0))
         text = f"{type(reason).__name__}: {reason}"
+        again = "try again" if kind is DatasetError else "rerun the command to resume"
+        fix = f"restore the access to the storage, and {again}"
         raise kind(f"cannot {doing} ({text:.300})", f"{self.place}/{name}", fix) from reason
-
-    def _reading(self, name: str, work: Callable[[], T], doing: str = "be read") -> T:
-        return self._try(name, work, DatasetError, doing, "restore the access to the storage, and try again")
-
-    def _writing(self, name: str, work: Callable[[], T]) -> T:
-        return self._try(
-            name, work, ConfigError, "be written", "restore the access to the storage, and rerun the command to resume"
-        )
 
     def read(self, name: str, most: int) -> bytes:
         """See :meth:`Storage.read`."""
@@ -269,22 +266,19 @@ class UrlStorage:
             raise DatasetError(f"is over the limit of {most / 1e6:.0f} MB", f"{self.place}/{name}", _MISSING)
         return data
 
-    def _size(self, name: str) -> int:
-        return int(self._reading(name, lambda: self._system()[0].info(self._path(name))["size"]))
-
     def open(self, name: str) -> tuple[BinaryIO, int]:
         """See :meth:`Storage.open`: each read is a request of just these bytes."""
-        size = self._size(name)
+        size = int(self._try(name, lambda: self._system()[0].info(self._path(name))["size"]))
         return cast(BinaryIO, _Ranges(self, name, size)), size
 
     def range(self, name: str, start: int, end: int) -> bytes:
         """Bytes ``start`` to ``end`` (exclusive) of a file."""
-        data: bytes = self._reading(name, lambda: self._system()[0].cat_file(self._path(name), start=start, end=end))
+        data: bytes = self._try(name, lambda: self._system()[0].cat_file(self._path(name), start=start, end=end))
         return data
 
     def write(self, name: str, data: bytes) -> None:
         """See :meth:`Storage.write`."""
-        self._writing(name, lambda: self._system()[0].pipe_file(self._path(name), data))
+        self._try(name, lambda: self._system()[0].pipe_file(self._path(name), data), *_WRITE)
 
     def write_new(self, name: str, data: bytes) -> None:
         """See :meth:`Storage.write_new`."""
@@ -297,7 +291,7 @@ class UrlStorage:
             except (TypeError, NotImplementedError):  # a file system that cannot tell
                 self._system()[0].pipe_file(self._path(name), data)
 
-        self._writing(name, work)
+        self._try(name, work, *_WRITE)
 
     def sizes(self, below: str = "") -> dict[str, int]:
         """See :meth:`Storage.sizes`."""
@@ -311,7 +305,7 @@ class UrlStorage:
                 return {}
             return {e["name"].rstrip("/").rpartition("/")[2]: int(e["size"]) for e in entries if e["type"] == "file"}
 
-        return self._reading(below, work, "be listed")
+        return self._try(below, work, "be listed")
 
     def _refuse_missing_bucket(self) -> None:
         """Say so before anything is made for a bucket that is not there: no write makes one."""
@@ -322,7 +316,7 @@ class UrlStorage:
 
     def copy(self, source: str, target: str) -> None:
         """See :meth:`Storage.copy`."""
-        self._writing(target, lambda: self._system()[0].copy(self._path(source), self._path(target)))
+        self._try(target, lambda: self._system()[0].copy(self._path(source), self._path(target)), *_WRITE)
 
     def remove(self, names: Iterable[str]) -> None:
         """See :meth:`Storage.remove`."""
@@ -338,7 +332,7 @@ class UrlStorage:
                         if system.exists(path):
                             system.rm_file(path)
 
-            self._writing("", work)
+            self._try("", work, *_WRITE)
 
 
 class _Ranges(io.RawIOBase):

@@ -104,6 +104,16 @@ class Run:
 
 
 @dataclass(frozen=True)
+class RunResult:
+    """What a call has come to: where it is, how much that is, and how much of it was made now."""
+
+    folder: Path
+    total: int
+    made: int
+    seconds: float
+
+
+@dataclass(frozen=True)
 class _Record:
     """What a task has written and returned."""
 

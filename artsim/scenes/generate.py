@@ -7,14 +7,16 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import tyro
 
 from artsim.datasets.sample_options import SensorName
 from artsim.datasets.shards import write_tar
 from artsim.loading.sources import find_sources
 from artsim.renderers import RendererName
 from artsim.runs.recipe import check_counts
-from artsim.runs.tasks import Output, Run, Task, run_tasks
+from artsim.runs.tasks import Output, Run, RunResult, Task, run_tasks
 from artsim.runs.worker import report, stop_if_asked
 from artsim.scenes.dataset import DESCRIPTION, FORMAT
 from artsim.scenes.ground_truth import SceneView, observe_scene, view_files
@@ -26,27 +28,22 @@ Extra = Callable[[SceneView], Mapping[str, bytes]]
 
 @dataclass(frozen=True)
 class SceneRun:
-    """How scenes are drawn and seen.
+    """How scenes are drawn and seen."""
 
-    Attributes
-    ----------
-    scene : SceneOptions
-    camera : SceneCameraOptions
-    views : int
-        Cameras that look at each scene.
-    renderer : str
-    rgb_samples, num_points, noise, misses
-        As in :func:`artsim.scenes.observe_scene`.
-    """
-
-    scene: SceneOptions = field(default_factory=SceneOptions)
+    scene: Annotated[SceneOptions, tyro.conf.arg(name="")] = field(default_factory=SceneOptions)
     camera: SceneCameraOptions = field(default_factory=SceneCameraOptions)
     views: int = 1
+    """Cameras that look at each scene."""
     renderer: RendererName = "sapien"
+    """Only sapien, pybullet and pybullet-egl make colour images."""
     rgb_samples: int = 8
+    """Pictures that each colour image is the mean of: more give softer shadows and smoother edges."""
     num_points: int = 2048
+    """Points of each object's cloud."""
     noise: SensorName = "none"
+    """Depth sensor whose noise depth and clouds carry; the ground truth never does."""
     misses: bool = False
+    """The sensor gets nothing back from patches of shiny and transparent surfaces."""
 
     def observe(self, seed: int) -> list[SceneView]:
         """All views of the scene of a seed."""
@@ -68,26 +65,6 @@ class SceneRun:
         return {**own, "scene": scene, "camera": asdict(self.camera)}
 
 
-@dataclass(frozen=True)
-class ScenesResult:
-    """What a call of :func:`generate_scenes` did.
-
-    Attributes
-    ----------
-    folder : Path
-    scenes : int
-        Of the whole dataset.
-    made : int
-        Scenes made by this call.
-    seconds : float
-    """
-
-    folder: Path
-    scenes: int
-    made: int
-    seconds: float
-
-
 def generate_scenes(
     run: SceneRun,
     out: str | Path,
@@ -98,7 +75,7 @@ def generate_scenes(
     extra: Extra | None = None,
     extra_scenes: int = 0,
     progress: bool = True,
-) -> ScenesResult:
+) -> RunResult:
     """Write scenes, or resume a run that was stopped, or add to one that is complete.
 
     The same bytes come out whatever the number of workers and however often the run was stopped. A complete dataset is
@@ -139,18 +116,13 @@ def generate_scenes(
         "format": FORMAT, "artsim_version": version("artsim"), "scenes": scenes, "seed": seed,
         "shard_size": shard_size, "overviews": extra_scenes if extra else 0, **run.recipe(),
     }  # fmt: skip
-    step = shard_size or 1
-    tasks = {
-        f"{first:06d}-{min(first + step, seed + scenes):06d}": Task(
-            write_scenes,
-            (run, first, min(first + step, seed + scenes), (first - seed) // step, shard_size > 0,
-             extra, seed + extra_scenes),
-            min(first + step, seed + scenes) - first,
-        )
-        for first in range(seed, seed + scenes, step)
-    }  # fmt: skip
+    tasks, step = dict[str, Task](), shard_size or 1
+    for number, first in enumerate(range(seed, seed + scenes, step)):
+        end = min(first + step, seed + scenes)
+        arguments = run, first, end, number, shard_size > 0, extra, seed + extra_scenes
+        tasks[f"{first:06d}-{end:06d}"] = Task(write_scenes, arguments, end - first)
     _, made = run_tasks(Run(folder, recipe, DESCRIPTION, "set of scenes", "scene", "scenes", progress), tasks, workers)
-    return ScenesResult(folder, scenes, made, time.perf_counter() - start)
+    return RunResult(folder, scenes, made, time.perf_counter() - start)
 
 
 def write_scenes(

@@ -48,18 +48,13 @@ class VariationSummary:
 
     Attributes
     ----------
+    folder : Path
+    gates : tuple of str
+        That variations pass.
     made : int
         Variations that were made now.
-    first : int
-        Those that passed at the first draw.
-    draws : int
-        Draws over all variations.
-    rejected : Counter of str
-        Gates that draws failed.
-    operations : Counter of str
-        Variations that each operation was part of.
-    trees, topologies : set of str
-        Different trees with all their numbers, and as parents and types of joints alone.
+    notes : list of dict
+        What ``meta.json`` says of each variation.
     failed : list of str
         Variations that no draw of passes, and why.
     """
@@ -67,35 +62,28 @@ class VariationSummary:
     folder: Path
     gates: tuple[str, ...]
     made: int = 0
-    whole: int = 0
-    first: int = 0
-    draws: int = 0
-    rejected: Counter[str] = field(default_factory=Counter)
-    operations: Counter[str] = field(default_factory=Counter)
-    trees: set[str] = field(default_factory=set)
-    topologies: set[str] = field(default_factory=set)
+    notes: list[dict[str, Any]] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
 
-    def count(self, notes: dict[str, Any]) -> None:
-        """Take in a variation by what its ``meta.json`` says of it."""
-        self.whole += 1
-        self.draws += 1 + len(notes["rejected"])
-        self.first += not notes["rejected"]
-        self.rejected.update(notes["rejected"])
-        self.operations.update({step["operation"] for step in notes["operations"]})
-        self.trees.add(notes["tree"])
-        self.topologies.add(notes["topology"])
+    @property
+    def trees(self) -> set[str]:
+        """Digests of different trees with all their numbers."""
+        return {own["tree"] for own in self.notes}
 
     def __str__(self) -> str:
+        draws = [1 + len(own["rejected"]) for own in self.notes]
+        rejected = Counter(gate for own in self.notes for gate in own["rejected"])
+        used = Counter(name for own in self.notes for name in {step["operation"] for step in own["operations"]})
+        first = draws.count(1)
         rows = [
-            ("variations", str(self.whole)),
+            ("variations", str(len(draws))),
             ("made now", str(self.made)),
-            ("passed at the first draw", f"{self.first} ({100 * self.first / max(1, self.whole):.0f} %)"),
-            ("draws", str(self.draws)),
-            *((f"rejected: {gate}", str(number)) for gate, number in sorted(self.rejected.items())),
-            *((f"operation: {name}", str(self.operations[name])) for name in OPERATIONS if self.operations[name]),
+            ("passed at the first draw", f"{first} ({100 * first / max(1, len(draws)):.0f} %)"),
+            ("draws", str(sum(draws))),
+            *((f"rejected: {gate}", str(number)) for gate, number in sorted(rejected.items())),
+            *((f"operation: {name}", str(used[name])) for name in OPERATIONS if used[name]),
             ("different trees", str(len(self.trees))),
-            ("different topologies", str(len(self.topologies))),
+            ("different topologies", str(len({own["topology"] for own in self.notes}))),
             ("without a variation", str(len(self.failed))),
         ]
         return "\n".join([f"gates: {', '.join(self.gates)}", *table([("", "number"), *rows])])
@@ -168,7 +156,7 @@ def write_variations(
                 except AssetError as error:
                     summary.failed.append(str(error))
             if notes is not None:
-                summary.count(notes)
+                summary.notes.append(notes)
             bar.update()
     return summary
 
@@ -234,7 +222,7 @@ def _whole(folder: Path, origin: dict[str, Any], seed: int, formats: Sequence[st
 
     def is_same(meta: dict[str, Any]) -> bool:
         notes = meta["variation"]
-        VariationSummary(folder, ()).count(notes)  # what the summary takes from it
+        str(VariationSummary(folder, (), 0, [notes]))  # what the summary takes from it
         return (notes["of"], notes["seed"], notes["version"]) == (origin, seed, version("artsim"))
 
     meta = whole_meta(folder, formats, is_same)

@@ -162,12 +162,12 @@ def test_neighbouring_seeds_do_not_bring_back_a_stream(folder: Path) -> None:
 
 
 def test_the_object_cache_forgets_what_was_not_used_lately(folder: Path) -> None:
-    keys = [o.key for o in artsim.open_dataset(folder).plan.objects]
-    cache = ObjectCache(folder / "objects", max_bytes=1)
-    first = cache[keys[0]]
-    assert cache[keys[0]] is first
-    _ = cache[keys[1]]
-    assert cache[keys[0]] is not first
+    files = [o.file for o in artsim.open_dataset(folder).plan.objects]
+    cache = ObjectCache(folder, max_bytes=1)
+    first = cache[files[0]]
+    assert cache[files[0]] is first
+    _ = cache[files[1]]
+    assert cache[files[0]] is not first
     assert len(cache._objects) == 1
 
 
