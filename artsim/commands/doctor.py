@@ -46,26 +46,17 @@ _FIXES = {
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found out about one backend.
-
-    Attributes
-    ----------
-    backend : str
-    works : bool
-    device : str
-        What it runs on; empty if it does not.
-    fps : float or None
-        Pictures of a laptop (depth and part ids) per second; None where the backend makes none.
-    problem, fix : str
-        What is wrong and what to do about it; empty if nothing is.
-    """
+    """What was found out about one backend."""
 
     backend: str
     works: bool
     device: str = ""
+    """What it runs on; empty if it does not."""
     fps: float | None = None
+    """Pictures of a laptop (depth and part ids) per second; None where the backend makes none."""
     problem: str = ""
     fix: str = ""
+    """What is wrong and what to do about it; empty if nothing is."""
 
 
 def examine(backend: str) -> Finding:

@@ -171,26 +171,17 @@ def _damage_error(storage: Storage, name: str, error: Exception) -> DatasetError
 
 @dataclass(frozen=True)
 class StartedDataset:
-    """What the descriptions of a dataset say.
-
-    Attributes
-    ----------
-    document : dict
-        What ``plan.json`` has to hold.
-    plan : Plan
-    records : tuple of ShardRecord
-        Those of ``dataset.json``, if it is sound.
-    complete : bool
-        Whether ``dataset.json`` is sound: then it says what every shard has to be.
-    problems : tuple of Problem
-        Of the descriptions themselves.
-    """
+    """What the descriptions of a dataset say."""
 
     document: dict[str, Any]
+    """What ``plan.json`` has to hold."""
     plan: Plan
     records: tuple[ShardRecord, ...] = ()
+    """Those of ``dataset.json``, if it is sound."""
     complete: bool = False
+    """Whether ``dataset.json`` is sound: then it says what every shard has to be."""
     problems: tuple[Problem, ...] = ()
+    """Of the descriptions themselves."""
 
 
 def read_started(place: Place) -> StartedDataset | None:

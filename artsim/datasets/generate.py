@@ -58,35 +58,23 @@ LOAD_LIMIT = 300.0
 
 @dataclass(frozen=True)
 class GenerateResult:
-    """What a call of :func:`generate` did.
-
-    Attributes
-    ----------
-    folder : Path or str
-        A str is the URL, or the place of a share.
-    num_samples : int
-        Of the whole dataset.
-    made : int
-        Samples made by this call.
-    seconds : float
-    left_out : tuple of str
-        Sources left out because they are of no use, with the reason.
-    objects : tuple of PlannedObject
-        Of the dataset.
-    restored : tuple of str
-        Files that were there before, and had to be made again.
-    grown_from : int or None
-        Samples that the dataset had before it was extended.
-    """
+    """What a call of :func:`generate` did."""
 
     folder: Path | str
+    """A str is the URL, or the place of a share."""
     num_samples: int
+    """Of the whole dataset."""
     made: int
+    """Samples made by this call."""
     seconds: float
     left_out: tuple[str, ...]
+    """Sources left out because they are of no use, with the reason."""
     objects: tuple[PlannedObject, ...] = ()
+    """Of the dataset."""
     restored: tuple[str, ...] = ()
+    """Files that were there before, and had to be made again."""
     grown_from: int | None = None
+    """Samples that the dataset had before it was extended."""
 
 
 def generate(

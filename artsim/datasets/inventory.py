@@ -21,21 +21,14 @@ UNFINISHED = "is not finished"
 
 @dataclass(frozen=True)
 class Inventory:
-    """What is there, and what is not.
-
-    Attributes
-    ----------
-    objects : dict
-        Planned objects whose files are not as they were written -> why.
-    shards : dict
-        Planned shards that are missing or not as they were written -> why.
-    kept : dict
-        Name -> record of every shard that is sound.
-    """
+    """What is there, and what is not."""
 
     objects: dict[PlannedObject, str]
+    """Planned objects whose files are not as they were written -> why."""
     shards: dict[Shard, str]
+    """Planned shards that are missing or not as they were written -> why."""
     kept: dict[str, ShardRecord]
+    """Name -> record of every shard that is sound."""
 
     def __bool__(self) -> bool:
         return bool(self.objects or self.shards)

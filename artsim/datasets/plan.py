@@ -38,40 +38,27 @@ _DIGEST = re.compile(f"(?:{SHA256.pattern})?")
 
 @dataclass(frozen=True)
 class PlannedObject:
-    """One object of a dataset.
-
-    Attributes
-    ----------
-    key : str
-        Unique name in the dataset; its file is ``objects/<key>.npz``.
-    category, object_id, sha256 : str
-        As in :class:`ArticulatedObject`.
-    num_parts : int
-    source : str
-        Where it came from, relative to the folder given.
-    source_sha256 : str
-        Digest of the source's main file, to tell a changed source at a restart.
-    split : str
-        One of ``SPLITS``.
-    file_sha256 : str
-        Digest of its file.
-    rigid : bool
-        Whether no joint can move.
-    repairs : tuple of (where, what)
-        What was mended, assumed or left out while loading.
-    """
+    """One object of a dataset."""
 
     key: Annotated[str, _KEY]
+    """Unique name in the dataset; its file is ``objects/<key>.npz``."""
     category: str
     object_id: str
     sha256: str
+    """As in :class:`ArticulatedObject`."""
     num_parts: Annotated[int, range(1, MAX_PARTS + 1)]
     source: str
+    """Where it came from, relative to the folder given."""
     source_sha256: str
+    """Digest of the source's main file, to tell a changed source at a restart."""
     split: Annotated[str, _SPLIT]
+    """One of ``SPLITS``."""
     file_sha256: Annotated[str, _DIGEST] = ""
+    """Digest of its file."""
     rigid: bool = False
+    """Whether no joint can move."""
     repairs: tuple[tuple[str, str], ...] = ()
+    """What was mended, assumed or left out while loading."""
 
     @property
     def file(self) -> str:
@@ -81,30 +68,20 @@ class PlannedObject:
 
 @dataclass(frozen=True)
 class Plan:
-    """A deterministic list of samples.
-
-    Attributes
-    ----------
-    seed, num_samples, shard_size : int
-    fractions : tuple of 3 float
-        Share of the objects of each category in train, val and test.
-    sample : SampleOptions
-    objects : tuple of PlannedObject
-        In the order in which they are shown: sample ``i`` shows number ``i % len(objects)``.
-    strict : bool
-        Whether objects that were repaired while loading are refused.
-    artsim_version : str
-        That makes the samples.
-    """
+    """A deterministic list of samples."""
 
     seed: Annotated[int, range(2**63)]
     num_samples: Annotated[int, range(1, MAX_SAMPLES + 1)]
     shard_size: Annotated[int, range(1, MAX_SAMPLES + 1)]
     fractions: tuple[float, float, float]
+    """Share of the objects of each category in train, val and test."""
     sample: SampleOptions
     objects: Annotated[tuple[PlannedObject, ...], range(1, _MAX_OBJECTS + 1)]
+    """In the order in which they are shown: sample ``i`` shows number ``i % len(objects)``."""
     strict: bool = False
+    """Whether objects that were repaired while loading are refused."""
     artsim_version: str = ""
+    """That makes the samples."""
 
     @cached_property
     def objects_of(self) -> dict[str, list[PlannedObject]]:

@@ -47,18 +47,12 @@ Answer = CompiledSource | RefusedSource
 
 @dataclass(frozen=True)
 class Share:
-    """The share of one machine.
-
-    Attributes
-    ----------
-    number : int
-        From 0 on.
-    count : int
-        Of machines.
-    """
+    """The share of one machine."""
 
     number: int = 0
+    """From 0 on."""
     count: int = 1
+    """Of machines."""
 
     @staticmethod
     def parse(text: str) -> Share:
@@ -84,31 +78,19 @@ class Share:
 
 @dataclass(frozen=True)
 class Preparation:
-    """Loads the sources of a dataset.
-
-    Attributes
-    ----------
-    storage : Storage
-    asked : Plan
-        Without objects.
-    sources : sequence of Source
-    share : Share or None
-        None: no other machine has a share.
-    team : WorkerPool or RayPool
-    skip_broken : bool
-        Leave out what is of no use, instead of stopping.
-    load_limit : float
-        Seconds that an object may take to load.
-    progress : bool
-    """
+    """Loads the sources of a dataset."""
 
     storage: Storage
     asked: Plan
+    """Without objects."""
     sources: Sequence[Source]
     share: Share | None
+    """None: no other machine has a share."""
     team: Team
     skip_broken: bool
+    """Leave out what is of no use, instead of stopping."""
     load_limit: float
+    """Seconds that an object may take to load."""
     progress: bool
 
     @property

@@ -11,17 +11,10 @@ from artsim.runs.storage import is_url
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong.
-
-    Attributes
-    ----------
-    where : str
-        File of the dataset, or sample in one.
-    what : str
-    fix : str, optional
-    """
+    """One thing that is wrong."""
 
     where: str
+    """File of the dataset, or sample in one."""
     what: str
     fix: str | None = None
 

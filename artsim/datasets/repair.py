@@ -21,20 +21,13 @@ from artsim.runs.storage import FolderStorage
 
 @dataclass(frozen=True)
 class RepairResult:
-    """What a call of :func:`repair` did.
-
-    Attributes
-    ----------
-    folder : Path
-    restored : tuple of str
-        Files that are as they were again.
-    failed : tuple of Problem
-        What is still wrong, and why.
-    """
+    """What a call of :func:`repair` did."""
 
     folder: Path
     restored: tuple[str, ...]
+    """Files that are as they were again."""
     failed: tuple[Problem, ...]
+    """What is still wrong, and why."""
 
 
 def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2, progress: bool = True) -> RepairResult:

@@ -27,43 +27,29 @@ class Restoration:
     """Makes all that is missing or damaged of a dataset, and completes it once no other machine has to.
 
     A file whose checksum is known is put in place only with that very content.
-
-    Attributes
-    ----------
-    storage : Storage
-        Where one machine makes it, a folder that this process has locked.
-    begun : StartedDataset
-        What the dataset has to be.
-    inventory : Inventory
-        What of it is there, and what this machine has to make.
-    sources : sequence of Source
-        Where its objects may come from.
-    team : WorkerPool or RayPool
-    progress : bool
-        Show progress bars.
-    parts : str
-        Folder of what is done of a dataset that is not complete.
-    completes : bool
-        Whether nothing is left to do for other machines.
-    files : list of str
-        Files of the dataset that were made or made again.
-    samples : int
-        In the shards among them.
-    failed : list of Problem
-        What could not be made.
     """
 
     storage: Storage
+    """Where one machine makes it, a folder that this process has locked."""
     begun: StartedDataset
+    """What the dataset has to be."""
     inventory: Inventory
+    """What of it is there, and what this machine has to make."""
     sources: Sequence[Source]
+    """Where its objects may come from."""
     team: Team
     progress: bool
+    """Show progress bars."""
     parts: str = PARTS_OF_ONE
+    """Folder of what is done of a dataset that is not complete."""
     completes: bool = True
+    """Whether nothing is left to do for other machines."""
     files: list[str] = field(default_factory=list)
+    """Files of the dataset that were made or made again."""
     samples: int = 0
+    """In the shards among them."""
     failed: list[Problem] = field(default_factory=list)
+    """What could not be made."""
 
     def run(self) -> None:
         """Make what can be made."""

@@ -25,26 +25,18 @@ Member = tuple[str, int, int]
 
 @dataclass(frozen=True, eq=False)
 class TarIndex:
-    """The members of a tar file by sample.
-
-    Attributes
-    ----------
-    keys : (S,) bytes
-        What the names of a sample's members begin with, up to the first dot; in ascending order.
-    starts : (S + 1,) int32
-        First member of each sample, and the number of members.
-    offsets : (M,) int64
-    sizes : (M,) int32
-    kinds : (M,) int32
-        Which of ``suffixes`` a name ends with.
-    suffixes : tuple of str
-    """
+    """The members of a tar file by sample."""
 
     keys: NDArray[np.bytes_]
+    """(S,) bytes. What the names of a sample's members begin with, up to the first dot; in ascending order."""
     starts: NDArray[np.int32]
+    """(S + 1,) int32. First member of each sample, and the number of members."""
     offsets: NDArray[np.int64]
+    """(M,) int64."""
     sizes: NDArray[np.int32]
+    """(M,) int32."""
     kinds: NDArray[np.int32]
+    """(M,) int32. Which of ``suffixes`` a name ends with."""
     suffixes: tuple[str, ...]
 
     @staticmethod

@@ -109,18 +109,11 @@ def _samples(dataset: DatasetFiles, shard: Shard, prepared: bool) -> Iterator[Sa
 
 @dataclass(frozen=True)
 class CompiledSource:
-    """What the plan needs to know of a source that is loaded.
-
-    Attributes
-    ----------
-    identity : str
-        Digest of what it is named by: category and seed of a procedural object, the bytes of the files of a loaded one.
-        Splits follow from it.
-    category, object_id, sha256, num_parts, rigid, repairs, file_sha256
-        As in :class:`artsim.datasets.plan.PlannedObject`.
-    """
+    """What the plan needs to know of a source that is loaded."""
 
     identity: str
+    """Digest of what it is named by: category and seed of a procedural object, the bytes of the files of a loaded one.
+    Splits follow from it."""
     category: str
     object_id: str
     sha256: str
@@ -128,6 +121,7 @@ class CompiledSource:
     rigid: bool
     repairs: tuple[tuple[str, str], ...]
     file_sha256: str
+    """As in :class:`artsim.datasets.plan.PlannedObject`."""
 
 
 @dataclass(frozen=True)

@@ -18,21 +18,14 @@ FormatName = Literal["webdataset", "bop", "coco", "hdf5", "ply"]
 
 @dataclass(frozen=True)
 class Piece:
-    """What is converted at once, and is either finished or done again.
-
-    Attributes
-    ----------
-    split : str
-        Of its samples; empty for objects.
-    number : int
-        Within its split, from 0.
-    members : tuple of int
-        Positions of its samples in the whole dataset, or of its objects in the plan.
-    """
+    """What is converted at once, and is either finished or done again."""
 
     split: str
+    """Of its samples; empty for objects."""
     number: int
+    """Within its split, from 0."""
     members: tuple[int, ...]
+    """Positions of its samples in the whole dataset, or of its objects in the plan."""
 
     @property
     def name(self) -> str:

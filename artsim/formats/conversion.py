@@ -56,24 +56,15 @@ _OBJECTS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class ConvertResult:
-    """What a call of :func:`convert` did.
-
-    Attributes
-    ----------
-    folder : Path
-    num_samples : int
-        Of the whole conversion.
-    made : int
-        Samples converted by this call.
-    files : int
-        Of the whole conversion, without ``conversion.json``.
-    seconds : float
-    """
+    """What a call of :func:`convert` did."""
 
     folder: Path
     num_samples: int
+    """Of the whole conversion."""
     made: int
+    """Samples converted by this call."""
     files: int
+    """Of the whole conversion, without ``conversion.json``."""
     seconds: float
 
 

@@ -36,17 +36,11 @@ Files = dict[str, tuple[int, str]]
 
 @dataclass
 class Output:
-    """The folder that a task writes to, and which files it has written.
-
-    Attributes
-    ----------
-    folder : Path
-    files : dict
-        Size and SHA-256 of each file that was written, by its path within the folder.
-    """
+    """The folder that a task writes to, and which files it has written."""
 
     folder: Path
     files: Files = field(default_factory=dict)
+    """Size and SHA-256 of each file that was written, by its path within the folder."""
 
     def write(self, name: str, data: bytes) -> None:
         """Write a whole file and note it."""
@@ -56,51 +50,33 @@ class Output:
 
 @dataclass(frozen=True)
 class Task:
-    """A piece of work.
-
-    Attributes
-    ----------
-    work : callable
-        A function of a module. It gets an :class:`Output` and the arguments, and returns, in JSON's terms, what the end
-        of the run wants to know. It may call :func:`artsim.runs.worker.stop_if_asked`.
-    arguments : tuple
-    size : int
-        What it counts for on the progress bar: as much as ``work`` reports.
-    """
+    """A piece of work."""
 
     work: Callable[..., Any]
+    """A function of a module. It gets an :class:`Output` and the arguments, and returns, in JSON's terms, what the end
+    of the run wants to know. It may call :func:`artsim.runs.worker.stop_if_asked`."""
     arguments: tuple[Any, ...]
     size: int = 1
+    """What it counts for on the progress bar: as much as ``work`` reports."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What is made, and where.
-
-    Attributes
-    ----------
-    folder : Path
-    recipe : mapping
-        All that the files follow from, in JSON's terms.
-    done : str
-        Name of the last file.
-    what : str
-        What the folder holds, for messages.
-    unit : str
-        What is counted.
-    grows : str
-        Name of a number of the recipe that may become larger later: finished tasks are kept. Empty for none.
-    progress : bool
-        Show progress bars.
-    """
+    """What is made, and where."""
 
     folder: Path
     recipe: Mapping[str, Any]
+    """All that the files follow from, in JSON's terms."""
     done: str
+    """Name of the last file."""
     what: str
+    """What the folder holds, for messages."""
     unit: str
+    """What is counted."""
     grows: str = ""
+    """Name of a number of the recipe that may become larger later: finished tasks are kept. Empty for none."""
     progress: bool = True
+    """Show progress bars."""
 
 
 @dataclass(frozen=True)

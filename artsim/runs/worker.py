@@ -20,21 +20,14 @@ T = TypeVar("T")
 
 @dataclass
 class Worker:
-    """A process of a run.
-
-    Attributes
-    ----------
-    context : object
-        What the run gave to each of its processes, such as the storage of a dataset.
-    tell : callable
-        Hears how much more is done.
-    is_stopped : callable
-        Whether the run wishes that work in hand is left as it is.
-    """
+    """A process of a run."""
 
     context: Any
+    """What the run gave to each of its processes, such as the storage of a dataset."""
     tell: Callable[[int], object]
+    """Hears how much more is done."""
     is_stopped: Callable[[], bool]
+    """Whether the run wishes that work in hand is left as it is."""
     _kept: dict[Callable[[Any], Any], Any] = field(default_factory=dict)
 
     def kept(self, make: Callable[[Any], T]) -> T:

@@ -34,23 +34,15 @@ _AGAIN = "rerun the artsim scene command: it regenerates damaged files"
 
 @dataclass(frozen=True)
 class ViewObject:
-    """What the description says of an articulated object in a view.
-
-    Attributes
-    ----------
-    category, object_id : str
-    parts : int
-    visible_fraction : float
-        Of its pixels, 0 where all of it is hidden.
-    box : 4 int
-        First column and row, end column and row of its visible pixels.
-    """
+    """What the description says of an articulated object in a view."""
 
     category: str
     object_id: str
     parts: Annotated[int, range(1, 256)]
     visible_fraction: float
+    """Of its pixels, 0 where all of it is hidden."""
     box: tuple[_Corner, _Corner, _Corner, _Corner]
+    """First column and row, end column and row of its visible pixels."""
 
 
 @dataclass(frozen=True)

@@ -33,19 +33,13 @@ _UPRIGHT = cos(np.deg2rad(30.0))  # what leans less is turned like what stands u
 
 @dataclass(frozen=True)
 class Area:
-    """A level rectangle to put things on.
-
-    Attributes
-    ----------
-    low, high : 2 float
-        Corners in world x and y, metres.
-    height : float
-        World z, metres.
-    """
+    """A level rectangle to put things on."""
 
     low: tuple[float, float]
     high: tuple[float, float]
+    """Corners in world x and y, metres."""
     height: float = 0.0
+    """World z, metres."""
 
 
 @dataclass
@@ -53,18 +47,12 @@ class Arrangement:
     """Things put down one after another.
 
     Tall things tend to stand at the back (+X), none before another where that can be, and everything close together.
-
-    Attributes
-    ----------
-    area : Area
-    things : list of Thing
-    crowded : bool
-        Things may hide one another, and the tall need not stand at the back.
     """
 
     area: Area
     things: list[Thing] = field(default_factory=list)
     crowded: bool = False
+    """Things may hide one another, and the tall need not stand at the back."""
 
     def put(
         self,

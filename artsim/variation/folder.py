@@ -44,26 +44,17 @@ _FILE_GATES: dict[str, Callable[[Path, Mapping[str, Path] | None], list[str]]] =
 
 @dataclass
 class VariationSummary:
-    """What a run has come to.
-
-    Attributes
-    ----------
-    folder : Path
-    gates : tuple of str
-        That variations pass.
-    made : int
-        Variations that were made now.
-    notes : list of dict
-        What ``meta.json`` says of each variation.
-    failed : list of str
-        Variations that no draw of passes, and why.
-    """
+    """What a run has come to."""
 
     folder: Path
     gates: tuple[str, ...]
+    """That variations pass."""
     made: int = 0
+    """Variations that were made now."""
     notes: list[dict[str, Any]] = field(default_factory=list)
+    """What ``meta.json`` says of each variation."""
     failed: list[str] = field(default_factory=list)
+    """Variations that no draw of passes, and why."""
 
     @property
     def trees(self) -> set[str]:

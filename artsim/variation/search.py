@@ -25,23 +25,15 @@ _GENTLER = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """A variation and how it came about.
-
-    Attributes
-    ----------
-    obj : ArticulatedObject
-    operations : tuple of dict
-        What was done, in order: the operation's name, and its numbers in the units of the original.
-    rejected : tuple of str
-        Gates that earlier draws failed, one entry for each draw.
-    gates : tuple of str
-        Those that the original passes, and the variation with it.
-    """
+    """A variation and how it came about."""
 
     obj: ArticulatedObject
     operations: tuple[dict[str, Any], ...]
+    """What was done, in order: the operation's name, and its numbers in the units of the original."""
     rejected: tuple[str, ...]
+    """Gates that earlier draws failed, one entry for each draw."""
     gates: tuple[str, ...]
+    """Those that the original passes, and the variation with it."""
 
 
 def draw_variation(

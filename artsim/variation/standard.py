@@ -23,23 +23,16 @@ _GAP, _GROWTH = 0.003, 1.7
 
 @dataclass(frozen=True)
 class Standard:
-    """What an object passes, and its variations have to.
-
-    Attributes
-    ----------
-    gates : tuple of str
-        Gates of :func:`artsim.checks.check` that it passes.
-    colliding : frozenset of (str, str)
-        Parts, by name, that run into each other although no joint connects them: surfaces of real objects often do. No
-        other two parts of a variation may.
-    gaps : dict of str to float
-        How far each part, by name, is from its parent at rest and at both ends of its joint, at most, in diagonals. No
-        part of a variation may float farther from it.
-    """
+    """What an object passes, and its variations have to."""
 
     gates: tuple[str, ...]
+    """Gates of :func:`artsim.checks.check` that it passes."""
     colliding: frozenset[tuple[str, str]]
+    """Parts, by name, that run into each other although no joint connects them: surfaces of real objects often do. No
+    other two parts of a variation may."""
     gaps: dict[str, float]
+    """How far each part, by name, is from its parent at rest and at both ends of its joint, at most, in diagonals. No
+    part of a variation may float farther from it."""
 
     @staticmethod
     def of(obj: ArticulatedObject) -> Standard:
