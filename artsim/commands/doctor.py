@@ -62,10 +62,6 @@ class Finding:
 def examine(backend: str) -> Finding:
     """Try one of ``BACKENDS`` in a process of its own.
 
-    Parameters
-    ----------
-    backend : str
-
     Raises
     ------
     ConfigError

@@ -17,14 +17,13 @@ from artsim.datasets.object_cache import ObjectCache
 from artsim.datasets.padding import PaddedDataset, PaddedStream
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.problems import repair_command
-from artsim.datasets.sample_options import draw_sample
+from artsim.datasets.sample_options import DrawnStream
 from artsim.datasets.shards import ShardReader, sample_key
 from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
-from artsim.renderers import Renderer, make_renderer
 from artsim.runs.storage import FolderStorage, Place, storage_of
 
 _OPEN_SHARDS = 64
@@ -177,12 +176,8 @@ class Dataset:
         return EpochStream(self, seed)
 
 
-class SampleStream(Shared):
-    """Endless on-line source: sample ``i`` is made when asked for, and is always the same.
-
-    Iterating yields samples ``start``, ``start + step``, ... Workers of a torch ``DataLoader``, and processes of its
-    process group, share them out by themselves; other processes need a ``start`` of their own and a common ``step``.
-    Indexing makes any one.
+class SampleStream(DrawnStream):
+    """Endless on-line source of samples of a dataset's objects, of one view at a time.
 
     Parameters
     ----------
@@ -190,37 +185,23 @@ class SampleStream(Shared):
     place : path, str or Storage
         Of the dataset that holds the objects.
     split : str
-    seed : int
-    start, step : int
+    seed, start, step : int
+        See :class:`artsim.datasets.sample_options.DrawnStream`.
     """
 
     def __init__(self, plan: Plan, place: Place, split: str = "train", seed: int = 1, start: int = 0, step: int = 1):
         if split not in SPLITS or not plan.objects_of[split]:
             raise ConfigError(f"split {split!r} has no objects", fix="choose one that has, or other shares")
-        if seed < 0 or start < 0 or step < 1:
-            raise ConfigError(f"a stream has no seed {seed}, start {start}, step {step}", fix="count from 0 upwards")
-        self.plan, self.split, self.seed, self.start, self.step = plan, split, seed, start, step
-        self.objects = ObjectCache(place)
-        self._renderer: Renderer | None = None
+        super().__init__(plan.sample, seed, 1, start, step)
+        self.plan, self.split, self.objects = plan, split, ObjectCache(place)
 
     def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape; see :meth:`Dataset.padded`."""
         return PaddedStream(self, max_parts or self.plan.max_parts, float32)
 
-    def __getitem__(self, i: int) -> Sample:
-        if i < 0:
-            raise IndexError(f"sample {i} of an endless stream")
-        if self._renderer is None:
-            self._renderer = make_renderer(self.plan.sample.renderer)
-        planned = self.plan.object_in_split(self.split, i)
-        return draw_sample(self.objects[planned.file], self.plan.sample, self.seed, i, self._renderer)
-
-    def __iter__(self) -> Iterator[Sample]:
-        share, shares = self._share()
-        i = self.start + share * self.step
-        while True:
-            yield self[i]
-            i += shares * self.step
+    def object(self, n: int) -> ArticulatedObject:
+        """The object at a turn of the split's rotation."""
+        return self.objects[self.plan.object_in_split(self.split, n).file]
 
 
 def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:

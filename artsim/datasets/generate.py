@@ -130,10 +130,6 @@ def generate(
         Do the share of one of several machines that share the folder or URL; :func:`artsim.datasets.merge.merge`
         completes the dataset.
 
-    Returns
-    -------
-    GenerateResult
-
     Raises
     ------
     AssetError

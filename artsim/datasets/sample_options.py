@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from artsim.common.json_records import from_json_values
+from artsim.common.sharding import Shared
 from artsim.errors import ConfigError, RenderError
 from artsim.model.draws import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
-from artsim.renderers import Renderer, RendererName
+from artsim.renderers import Renderer, RendererName, make_renderer
 
 _VIEW_ATTEMPTS = 50
 _SEEN_OFTEN_ENOUGH = 3
@@ -129,3 +132,39 @@ def check_visible(obj: ArticulatedObject, options: SampleOptions, seed: int, ide
     raise RenderError(
         f"{seen} of {_VIEW_ATTEMPTS} drawn views see the object", fix="correct the view options, or the object"
     )
+
+
+class DrawnStream(Shared):
+    """An endless source of samples: sample ``i`` is made when asked for, and is always the same.
+
+    It shows object ``i // views_per_object``. Iterating yields all samples of the objects ``start``, ``start + step``,
+    ... Workers of a torch ``DataLoader``, and processes of its process group, share the objects out by themselves;
+    other processes need a ``start`` of their own and a common ``step``. Indexing makes any one.
+    """
+
+    def __init__(self, options: SampleOptions, seed: int, views_per_object: int, start: int, step: int):
+        if min(seed, start) < 0 or min(views_per_object, step) < 1:
+            raise ConfigError(
+                f"a stream has no seed {seed}, {views_per_object} views per object, start {start}, step {step}",
+                fix="count from 0 upwards; views and step from 1",
+            )
+        self.options, self.seed, self.views_per_object = options, seed, views_per_object
+        self.start, self.step = start, step
+        self._renderer: Renderer | None = None
+
+    def object(self, n: int) -> ArticulatedObject:
+        """Object number ``n``, which samples ``n * views_per_object`` and on show."""
+        raise NotImplementedError
+
+    def __getitem__(self, i: int) -> Sample:
+        if i < 0:
+            raise IndexError(f"sample {i} of an endless stream")
+        if self._renderer is None:
+            self._renderer = make_renderer(self.options.renderer)
+        return draw_sample(self.object(i // self.views_per_object), self.options, self.seed, i, self._renderer)
+
+    def __iter__(self) -> Iterator[Sample]:
+        share, shares = self._share()
+        for n in itertools.count(self.start + share * self.step, shares * self.step):
+            for view in range(self.views_per_object):
+                yield self[n * self.views_per_object + view]

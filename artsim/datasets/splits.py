@@ -28,10 +28,6 @@ def assign_splits(objects: Sequence[tuple[str, str]], fractions: tuple[float, fl
     fractions : 3 float
         Shares of train, val and test; their sum is taken as 1.
     seed : int
-
-    Returns
-    -------
-    list of str
     """
     check_shares(fractions)
     category_of: dict[str, str] = {}

@@ -33,12 +33,7 @@ Its folder ``objects`` holds objects before they have a name in the plan, each c
 
 
 class DatasetFiles:
-    """What a worker process keeps of a dataset. The plan is read at the first shard: it may not exist before.
-
-    Parameters
-    ----------
-    storage : Storage
-    """
+    """What a worker process keeps of a dataset. The plan is read at the first shard: it may not exist before."""
 
     def __init__(self, storage: Storage):
         self.storage = storage

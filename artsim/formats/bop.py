@@ -93,12 +93,6 @@ class BopFormat(Format):
 class BopScene:
     """A scene, written image by image.
 
-    Parameters
-    ----------
-    output : Output
-    split : str
-    number : int
-
     Attributes
     ----------
     articulations : dict

@@ -56,15 +56,24 @@ _OBJECTS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class ConvertResult:
-    """What a call of :func:`convert` did."""
+    """What a call of :func:`convert` did.
+
+    Attributes
+    ----------
+    folder : Path
+    num_samples : int
+        Of the whole conversion.
+    made : int
+        Samples converted by this call.
+    files : int
+        Of the whole conversion, without ``conversion.json``.
+    seconds : float
+    """
 
     folder: Path
     num_samples: int
-    """Of the whole conversion."""
     made: int
-    """Samples converted by this call."""
     files: int
-    """Of the whole conversion, without ``conversion.json``."""
     seconds: float
 
 
@@ -100,10 +109,6 @@ def convert(
         Processes.
     progress : bool
         Show progress bars.
-
-    Returns
-    -------
-    ConvertResult
 
     Raises
     ------

@@ -31,24 +31,35 @@ from artsim.scenes.missing_returns import MissingReturns, missing_returns
 
 @dataclass(frozen=True, eq=False)
 class SceneView:
-    """One camera's view of a scene, with everything that is true of it."""
+    """One camera's view of a scene, with everything that is true of it.
+
+    Attributes
+    ----------
+    scene : Scene
+    camera : Camera
+    frame : SceneFrame
+        Free of noise.
+    depth : (H, W) float32
+        z-depth in metres as the sensor reports it, 0 = no return.
+    samples : tuple of (Sample or None), one for each instance
+        Cloud and ground truth, its points read from ``depth``, its part mask free of noise; None where the camera sees
+        nothing of the instance.
+    visible_fraction : (I,) float64
+        Pixels that show each instance over those that it would cover alone; 0 outside the image.
+    boxes : (I, 4) int64
+        First column and row, end column and row of the pixels that show each instance; all 0 where none does.
+    noise : str
+        Name of the depth sensor.
+    """
 
     scene: Scene
     camera: Camera
     frame: SceneFrame
-    """Free of noise."""
     depth: NDArray[np.float32]
-    """(H, W) float32. z-depth in metres as the sensor reports it, 0 = no return."""
     samples: tuple[Sample | None, ...]
-    """Cloud and ground truth of each instance, its points read from ``depth``, its part mask free of noise; None where
-    the camera sees nothing of it."""
     visible_fraction: Array
-    """(I,) float64. Pixels that show each instance over those that it would cover alone; 0 outside the image."""
     boxes: NDArray[np.int64]
-    """(I, 4) int64. First column and row, end column and row of the pixels that show each instance; all 0 where none
-    does."""
     noise: str
-    """Name of the depth sensor."""
 
 
 def observe_scene(

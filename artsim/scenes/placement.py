@@ -131,10 +131,6 @@ def resting_rotation(obj: ArticulatedObject) -> Array:
 
     Every part weighs as much as its convex hull, at the density of its body where it has one.
 
-    Parameters
-    ----------
-    obj : ArticulatedObject
-
     Returns
     -------
     (3, 3) float
