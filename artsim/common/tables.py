@@ -88,6 +88,12 @@ def _brief(value: Any) -> str:
     return printable(repr(value), 60)
 
 
+def first_of(texts: Sequence[str], most: int, between: str = ", ") -> str:
+    """The first of some texts, and how many more there are."""
+    more = [f"and {len(texts) - most} more"] if len(texts) > most else []
+    return between.join([*texts[:most], *more])
+
+
 def plural(number: int, thing: str) -> str:
     """``1 part``, ``3 parts``."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"

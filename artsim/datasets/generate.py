@@ -29,7 +29,6 @@ from pathlib import Path
 from artsim.datasets.description import DESCRIPTION, PLAN, StartedDataset, document_bytes, read_started
 from artsim.datasets.inventory import (
     UNFINISHED,
-    Inventory,
     examine,
     examine_sizes,
     leftover_problems,
@@ -48,9 +47,9 @@ from artsim.loading.sources import Source
 from artsim.model.draws import view_sampler
 from artsim.runs.lock import folder_lock
 from artsim.runs.pool import WorkerPool
-from artsim.runs.ray_pool import RayPool, Team
+from artsim.runs.ray_pool import RayPool
 from artsim.runs.recipe import check_counts, check_seed, differences
-from artsim.runs.storage import FolderStorage, Place, Storage, is_url, storage_of
+from artsim.runs.storage import FolderStorage, Storage, is_url, storage_of
 
 LOAD_LIMIT = 300.0
 """Seconds that an object may take to load: a hundred times what the largest real ones take."""
@@ -149,7 +148,11 @@ def generate(
         begun = _start(storage, asked, sources, alone)
         if begun is not None and _is_sound(folder, begun, num_samples, workers, progress):
             return _result(folder, begun, 0, start)
-    with folder_lock(folder) if alone else nullcontext(), _team(folder if alone else storage, workers, ray) as team:
+    shared = folder if alone else storage  # the files of a path reach the nodes of a cluster through this machine
+    with (
+        folder_lock(folder) if alone else nullcontext(),
+        WorkerPool(workers, storage) if ray is None else RayPool(ray, shared, VERSIONS_OF) as team,
+    ):
         try:
             begun, grown_from = _start(storage, asked, sources, alone), None
             if begun is None:
@@ -180,15 +183,11 @@ def generate(
         )
     if share is not None and not begun.complete:
         storage.write(share.marker, json.dumps({"shards": len(own)}).encode())
-    damaged = _damaged_files(begun, inventory) if grown_from is None else set()
-    files = tuple(name for name in restored.files if name in damaged)
+    new = {shard.name for shard, why in inventory.shards.items() if why == UNFINISHED} | {PLAN, DESCRIPTION}
+    new -= {problem.where for problem in begun.problems}
+    files = () if grown_from is not None else tuple(name for name in restored.files if name not in new)
     result = _result(folder if alone else storage.place, begun, restored.samples, start)
     return replace(result, restored=files, grown_from=grown_from)
-
-
-def _team(place: Place, workers: int, ray: str | None) -> Team:
-    """What does the tasks of a run."""
-    return WorkerPool(workers, storage_of(place)) if ray is None else RayPool(ray, place, VERSIONS_OF)
 
 
 def _is_sound(folder: Path, begun: StartedDataset, num_samples: int, workers: int, progress: bool) -> bool:
@@ -202,12 +201,6 @@ def _result(folder: Path | str, begun: StartedDataset, made: int, start: float) 
     left_out = tuple(str(entry["why"]) for entry in begun.document["left_out"])
     seconds = time.perf_counter() - start
     return GenerateResult(folder, begun.plan.num_samples, made, seconds, left_out, begun.plan.objects)
-
-
-def _damaged_files(begun: StartedDataset, inventory: Inventory) -> set[str]:
-    """Files that were there before, or were said to be, and have to be made again."""
-    shards = {shard.name for shard, why in inventory.shards.items() if why != UNFINISHED}
-    return shards | {planned.file for planned in inventory.objects} | {problem.where for problem in begun.problems}
 
 
 def _check_options(asked: Plan, workers: int, load_limit: float, sources: Sequence[Source]) -> None:

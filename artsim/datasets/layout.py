@@ -13,8 +13,8 @@ _OBJECTS_AT_ONCE = 16
 _LAP = 16
 """Turns of each object in a lap."""
 
-_FIRST_LAPS = ((0, 8), (8, 16))
-"""Shorter ones at the start: once each object has 8 views, a dataset that grows keeps at least half of it."""
+_SHORT_LAP = 8
+"""The same of the first turns: once each object has 8 views, a dataset that grows keeps at least half of it."""
 
 
 def at_place(place: int, objects: int, rounds: int | None = None) -> tuple[int, int]:
@@ -37,18 +37,10 @@ def at_place(place: int, objects: int, rounds: int | None = None) -> tuple[int, 
     """
     if rounds is not None and place >= rounds * objects:
         return rounds, place - rounds * objects
-    first, end = _lap(place // objects)
-    if rounds is not None:
-        end = min(end, rounds)
+    lap = _SHORT_LAP if place // objects < _LAP else _LAP
+    first = place // objects // lap * lap
+    end = first + lap if rounds is None else min(first + lap, rounds)
     in_a_row, left = end - first, place - first * objects
     few = left // (_OBJECTS_AT_ONCE * in_a_row) * _OBJECTS_AT_ONCE
     turn, object_of_few = divmod(left - few * in_a_row, min(_OBJECTS_AT_ONCE, objects - few))
     return first + turn, few + object_of_few
-
-
-def _lap(turn: int) -> tuple[int, int]:
-    """First and end turn of the lap that a turn belongs to."""
-    for first, end in _FIRST_LAPS:
-        if turn < end:
-            return first, end
-    return turn // _LAP * _LAP, turn // _LAP * _LAP + _LAP

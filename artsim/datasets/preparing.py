@@ -18,6 +18,7 @@ from typing import Any
 from artsim.common.files import parse_json
 from artsim.common.json_records import from_json_values
 from artsim.common.progress import track
+from artsim.common.tables import first_of
 from artsim.datasets.description import PLAN, READERS
 from artsim.datasets.plan import Plan, PlannedObject
 from artsim.datasets.splits import assign_splits, showing_order, unique_keys
@@ -258,9 +259,7 @@ def planned_objects(
 
 def unusable(left_out: Sequence[dict[str, str]], total: int, strict: bool) -> AssetError:
     """The error that names what cannot be used."""
-    reasons = [entry["why"] for entry in left_out[:_LISTED]]
-    if len(left_out) > _LISTED:
-        reasons.append(f"and {len(left_out) - _LISTED} more")
+    reasons = first_of([entry["why"] for entry in left_out], _LISTED, "; ")
     verb = "do not load, or were repaired (--strict)" if strict else "do not load"
-    what = f"{len(left_out)} of {total} objects {verb}: {'; '.join(reasons)}"
+    what = f"{len(left_out)} of {total} objects {verb}: {reasons}"
     return AssetError(what, fix="correct them, or leave them out with --skip-broken")

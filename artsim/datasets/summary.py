@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from artsim.common.names import printable
+from artsim.common.tables import first_of
 from artsim.datasets.plan import FORMAT, Plan, PlannedObject, ShardRecord
 from artsim.datasets.splits import SPLITS
 
@@ -34,13 +35,15 @@ def summary(
         The split that was opened.
     """
     options, views, states = plan.sample, plan.sample.views, plan.sample.states
+    counts = Counter(planned.category for planned in plan.objects).most_common()
+    categories = first_of([f"{category} {count}" for category, count in counts], _CATEGORIES_SHOWN)
     size = sum(record.bytes for record in shards) / 1e6
     chosen = "" if split is None else f", split {split}"
     lines = [
         f"{place}{chosen}: {sum(map(len, shards))} samples in {len(shards)} shards, {size:.4g} MB",
         "samples     " + ", ".join(f"{name} {plan.sizes[name]}" for name in SPLITS),
         "objects     " + ", ".join(f"{name} {len(plan.objects_of[name])}" for name in SPLITS),
-        f"categories  {_categories(plan)}",
+        f"categories  {categories}",
         f"sample      {options.num_points} points, {options.renderer}, noise {options.noise}, "
         f"images {' '.join(options.images) or 'none'}, scale {_value(options.scale)}",
         f"views       {views.custom or views.preset}, {views.width}x{views.height}, field of view {views.fov:g} deg",
@@ -56,13 +59,6 @@ def summary(
     if left_out:
         lines.append(f"{left_out} sources were left out (see left_out in {place}/dataset.json)")
     return "\n".join(printable(line, 240) for line in lines)
-
-
-def _categories(plan: Plan) -> str:
-    counts = Counter(planned.category for planned in plan.objects).most_common()
-    shown = ", ".join(f"{category} {count}" for category, count in counts[:_CATEGORIES_SHOWN])
-    more = len(counts) - _CATEGORIES_SHOWN
-    return shown if more <= 0 else f"{shown}, and {more} more"
 
 
 def _value(value: Any) -> str:
@@ -81,12 +77,8 @@ def object_lines(place: str, objects: Sequence[PlannedObject], kinds: int = _KIN
         How many kinds of repairs are listed at most.
     """
     rigid = [planned.source for planned in objects if planned.rigid]
-    lines = []
-    if rigid:
-        verb = "object has" if len(rigid) == 1 else "objects have"
-        more = len(rigid) - _NAMES_SHOWN
-        names = ", ".join(rigid[:_NAMES_SHOWN]) + ("" if more <= 0 else f", and {more} more")
-        lines.append(f"{len(rigid)} {verb} no moving joint: {names}")
+    verb = "object has" if len(rigid) == 1 else "objects have"
+    lines = [f"{len(rigid)} {verb} no moving joint: {first_of(rigid, _NAMES_SHOWN)}"] if rigid else []
     return [*lines, *_repair_lines(place, objects, kinds)]
 
 

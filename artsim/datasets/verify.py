@@ -18,7 +18,6 @@ from artsim.datasets.problems import Problem, repair_command
 from artsim.datasets.sample_checks import close, sample_problems
 from artsim.datasets.shards import ShardReader, sample_key
 from artsim.errors import ArtsimError, DatasetError
-from artsim.model.draws import Scale
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
@@ -180,14 +179,9 @@ def _plan_problems(sample: Sample, plan: Plan, index: int) -> Iterator[str]:
     images = {name for name in ("depth", "part_mask", "rgb") if getattr(sample, name) is not None}
     if images != set(options.images):
         yield f"has images {sorted(images)} instead of {sorted(options.images)}"
-    if not _is_asked_size(sample, options.scale):
+    low, high = (1.0, 1.0) if isinstance(options.scale, str) else options.scale
+    size = sample.scale if options.scale == "native" else sample.diagonal
+    if not low * (1 - 1e-9) <= size <= high * (1 + 1e-9):
         yield f"its scale of {sample.scale:.4g} (diagonal {sample.diagonal:.4g} m) is not as asked for"
     if not close(sample.T_world_camera @ sample.T_camera_part[0], np.eye(4), 1e-9):
         yield "the root part does not stand on the world's origin"
-
-
-def _is_asked_size(sample: Sample, scale: Scale) -> bool:
-    if scale == "native":
-        return sample.scale == 1.0
-    low, high = (1.0, 1.0) if scale == "unit" else scale
-    return low * (1 - 1e-9) <= sample.diagonal <= high * (1 + 1e-9)

@@ -182,10 +182,8 @@ def _cut(split: str, members: Sequence[int], size: int) -> list[Piece]:
     return [Piece(split, i, tuple(members[start : start + size])) for i, start in enumerate(starts)]
 
 
-@lru_cache(maxsize=1)
-def _opened(folder: Path) -> Dataset:
-    """The dataset that a worker reads, once."""
-    return Dataset(folder)
+_opened = lru_cache(maxsize=1)(Dataset)
+"""What a worker reads, opened once."""
 
 
 def convert_piece(output: Output, source: Path, to: FormatName, piece: Piece) -> Any:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias, TypeVar
 
 from artsim.common.extras import require_extra
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ConfigError
 from artsim.runs.pool import Progress, Tasks, WorkerLost, WorkerPool, ignore
 from artsim.runs.storage import FolderStorage, storage_of
 from artsim.runs.worker import Worker, outcome, set_worker
@@ -71,7 +71,9 @@ class RayPool:
         here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
             ray.get_runtime_context().get_node_id(), soft=False
         )
-        storage = _absolute(storage_of(context) if isinstance(context, str | Path) else context)
+        storage = storage_of(context) if isinstance(context, str | Path) else context
+        if isinstance(storage, FolderStorage):  # wherever the process that uses it runs
+            storage = FolderStorage(storage.folder.absolute())
         self._hub = ray.remote(num_cpus=0, max_concurrency=8, scheduling_strategy=here)(_Hub).remote(storage)
         # A cluster that is started here has no other machine.
         if isinstance(context, str | Path) and isinstance(storage, FolderStorage) and address != "local":
@@ -171,11 +173,6 @@ def connect(ray: Any, address: str) -> None:
         ) from error  # fmt: skip
 
 
-def _absolute(context: Any) -> Any:
-    """A folder, wherever the process that uses it runs."""
-    return FolderStorage(context.folder.absolute()) if isinstance(context, FolderStorage) else context
-
-
 class _Hub:
     """What nodes ask the driver's machine for; an actor there."""
 
@@ -247,9 +244,11 @@ def _do(
     run, hub, versions = about
     counts: list[int] = []
     if _here is None or _here[0] != run:
-        difference = version_difference(versions)
-        if difference is not None:
-            return "failed", difference, 0
+        for name, wanted in versions.items():
+            if version(name) != wanted:  # its bytes could be others
+                what = f"a node has {name} {version(name)}, the driver {wanted}"
+                fix = f"install the same on every node: pip install {name}=={wanted}"
+                return "failed", ConfigError(what, os.uname().nodename, fix), 0
         _here = run, Worker(context, counts.append, bool)
     worker = _here[1]
     worker.tell = counts.append
@@ -257,17 +256,6 @@ def _do(
     with _within(limit, lambda why: hub.is_late.remote(key, why)):
         kind, value = outcome(work, arguments)
     return kind, value, sum(counts)
-
-
-def version_difference(versions: dict[str, str]) -> ArtsimError | None:
-    """The error of a node that has other versions than the driver: its bytes could be others."""
-    for name, wanted in versions.items():
-        if version(name) != wanted:
-            return ConfigError(
-                f"a node has {name} {version(name)}, the driver {wanted}", os.uname().nodename,
-                f"install the same on every node: pip install {name}=={wanted}",
-            )  # fmt: skip
-    return None
 
 
 @contextlib.contextmanager

@@ -36,9 +36,11 @@ _WRITE = "be written", ConfigError
 class Storage(Protocol):
     """Files of a dataset, by name."""
 
-    @property
-    def place(self) -> str:
-        """Folder or URL."""
+    place: str
+    """Folder or URL."""
+
+    def __str__(self) -> str:
+        return self.place
 
     def read(self, name: str, most: int) -> bytes:
         """Content of a file; a DatasetError where it is missing, unreadable or larger than ``most`` bytes."""
@@ -89,26 +91,16 @@ def storage_of(place: Place) -> Storage:
     return place
 
 
-class FolderStorage:
+class FolderStorage(Storage):
     """Files of a folder."""
 
     def __init__(self, folder: Path):
-        self.folder = folder
-
-    @property
-    def place(self) -> str:
-        """The folder."""
-        return str(self.folder)
-
-    def __str__(self) -> str:
-        return self.place
+        self.folder, self.place = folder, str(folder)
 
     def read(self, name: str, most: int) -> bytes:
-        """See :meth:`Storage.read`."""
         return read_bounded(self.folder / name, most, Path(name).name, DatasetError, fix=_MISSING)
 
     def open(self, name: str) -> tuple[BinaryIO, int]:
-        """See :meth:`Storage.open`."""
         path = self.folder / name
         if not path.is_file():  # to open a pipe would wait for somebody who writes to it
             raise DatasetError("is missing, or no file", path, _MISSING)
@@ -119,11 +111,9 @@ class FolderStorage:
         return file, os.fstat(file.fileno()).st_size
 
     def write(self, name: str, data: bytes) -> None:
-        """See :meth:`Storage.write`."""
         write_atomic(self.folder / name, data)
 
     def write_new(self, name: str, data: bytes) -> None:
-        """See :meth:`Storage.write_new`."""
         path = self.folder / name
         part = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")  # processes of several nodes share numbers
         try:
@@ -142,7 +132,6 @@ class FolderStorage:
             part.unlink(missing_ok=True)
 
     def sizes(self, below: str = "") -> dict[str, int]:
-        """See :meth:`Storage.sizes`."""
         found = {}
         try:
             with os.scandir(self.folder / below) as entries:
@@ -158,7 +147,6 @@ class FolderStorage:
         return found
 
     def copy(self, source: str, target: str) -> None:
-        """See :meth:`Storage.copy`."""
         path = self.folder / target
         part = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
         try:
@@ -174,7 +162,7 @@ class FolderStorage:
             raise write_error(error, path) from error
 
     def remove(self, names: Iterable[str]) -> None:
-        """See :meth:`Storage.remove`; folders that are empty then go, too."""
+        """Folders that are empty then go, too."""
         folders = set()
         for name in names:
             (self.folder / name).unlink(missing_ok=True)
@@ -186,7 +174,7 @@ class FolderStorage:
                 empty.rmdir()
 
 
-class UrlStorage:
+class UrlStorage(Storage):
     """Files below a URL of fsspec. Requests that fail are made again, with longer and longer pauses.
 
     Parameters
@@ -203,9 +191,6 @@ class UrlStorage:
         self.place = url.rstrip("/")
         self._opened: tuple[int, Any, str] | None = None
         self._system()  # what is missing is said at once
-
-    def __str__(self) -> str:
-        return self.place
 
     def __getstate__(self) -> dict[str, Any]:
         return {"place": self.place, "_opened": None}
@@ -260,14 +245,13 @@ class UrlStorage:
         raise kind(f"cannot {doing} ({text:.300})", f"{self.place}/{name}", fix) from reason
 
     def read(self, name: str, most: int) -> bytes:
-        """See :meth:`Storage.read`."""
         data = self.range(name, 0, most + 1)  # to ask for the size before would be another request
         if len(data) > most:
             raise DatasetError(f"is over the limit of {most / 1e6:.0f} MB", f"{self.place}/{name}", _MISSING)
         return data
 
     def open(self, name: str) -> tuple[BinaryIO, int]:
-        """See :meth:`Storage.open`: each read is a request of just these bytes."""
+        """Each read is a request of just these bytes."""
         size = int(self._try(name, lambda: self._system()[0].info(self._path(name))["size"]))
         return cast(BinaryIO, _Ranges(self, name, size)), size
 
@@ -277,11 +261,9 @@ class UrlStorage:
         return data
 
     def write(self, name: str, data: bytes) -> None:
-        """See :meth:`Storage.write`."""
         self._try(name, lambda: self._system()[0].pipe_file(self._path(name), data), *_WRITE)
 
     def write_new(self, name: str, data: bytes) -> None:
-        """See :meth:`Storage.write_new`."""
 
         def work() -> None:
             try:
@@ -294,32 +276,27 @@ class UrlStorage:
         self._try(name, work, *_WRITE)
 
     def sizes(self, below: str = "") -> dict[str, int]:
-        """See :meth:`Storage.sizes`."""
 
         def work() -> dict[str, int]:
             try:
                 self._system()[0].invalidate_cache()  # others write, too
                 entries = self._system()[0].ls(self._path(below), detail=True)
-            except FileNotFoundError:
-                self._refuse_missing_bucket()
+            except FileNotFoundError:  # a bucket that is not there is said before anything is made: no write makes one
+                system, path = self._system()
+                bucket = path.partition("/")[0]
+                if self.place.rpartition("://")[0].rpartition("::")[2] in _OF_BUCKETS and not system.exists(bucket):
+                    raise ConfigError(
+                        f"there is no bucket {bucket}", self.place, "make it, or correct its name"
+                    ) from None
                 return {}
             return {e["name"].rstrip("/").rpartition("/")[2]: int(e["size"]) for e in entries if e["type"] == "file"}
 
         return self._try(below, work, "be listed")
 
-    def _refuse_missing_bucket(self) -> None:
-        """Say so before anything is made for a bucket that is not there: no write makes one."""
-        system, path = self._system()
-        bucket = path.partition("/")[0]
-        if self.place.rpartition("://")[0].rpartition("::")[2] in _OF_BUCKETS and not system.exists(bucket):
-            raise ConfigError(f"there is no bucket {bucket}", self.place, "make it, or correct its name")
-
     def copy(self, source: str, target: str) -> None:
-        """See :meth:`Storage.copy`."""
         self._try(target, lambda: self._system()[0].copy(self._path(source), self._path(target)), *_WRITE)
 
     def remove(self, names: Iterable[str]) -> None:
-        """See :meth:`Storage.remove`."""
         system, paths = self._system()[0], [self._path(name) for name in names]
         for first in range(0, len(paths), 1000):  # so many are one request to S3
             piece = paths[first : first + 1000]

@@ -65,9 +65,8 @@ def convert_scenes(
     return out
 
 
-@lru_cache(maxsize=1)
-def _opened(folder: Path) -> SceneDataset:
-    return SceneDataset(folder)
+_opened = lru_cache(maxsize=1)(SceneDataset)
+"""What a worker reads, opened once."""
 
 
 def _views(source: SceneDataset, scene: int) -> list[tuple[int, SceneRecord]]:
