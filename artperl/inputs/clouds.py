@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artperl.inputs.bounds import read_npy, read_npz
-from artperl.inputs.meshes import read_obj, read_off, read_stl
+from artperl.inputs.meshes import read_obj, read_off, read_ply, read_stl
 from artperl.inputs.pcd import read_pcd
-from artperl.inputs.ply import read_ply
 from artperl.inputs.text import read_text
 from artsim.errors import ConfigError
 

@@ -1,4 +1,4 @@
-"""Vertices of meshes as clouds: OBJ, STL, OFF. Faces, materials and other files are not looked at."""
+"""Vertices of meshes as clouds: OBJ, STL, OFF, PLY. Faces, materials and other files are not looked at."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from artperl.inputs.text import parse_columns
 from artsim.errors import AssetError, ConfigError
 from artsim.loading.mesh_files import Bounds
 from artsim.loading.mesh_files.obj import read_vertices
+from artsim.loading.mesh_files.ply import Tables, read_header
 from artsim.loading.mesh_files.stl import read_stl as read_triangles
 
 Array = NDArray[np.float64]
@@ -27,13 +28,41 @@ def read_obj(path: Path) -> tuple[Array, tuple[str, ...]]:
     """(N, 3) vertices of an OBJ file. Raises ConfigError when a vertex is no three numbers."""
 
     def read(data: bytes, bounds: Bounds) -> Array:
-        points = read_vertices(data, bounds)
-        if np.isnan(points).any() and b"nan" not in data.lower():
-            raise ValueError("a vertex is no three numbers")
-        return points
+        return _numbers(read_vertices(data, bounds), data)
 
     points = _read(path, read)
     return points, _SAID if len(points) else ()
+
+
+def _numbers(points: Array, data: bytes) -> Array:
+    """Points of a text, in which no word is anything else than a number."""
+    if np.isnan(points).any() and b"nan" not in data.lower():
+        raise ValueError("a vertex is no three numbers")
+    return points
+
+
+def read_ply(path: Path) -> tuple[Array, tuple[str, ...]]:
+    """(N, 3) vertices of a PLY file, and what of it is not used. Raises ConfigError when it is cut off."""
+
+    def read() -> tuple[Array, tuple[str, ...]]:
+        data = read_file(path, "cloud")
+        order, elements, _ = read_header(data)
+        if order == "" and len(data) > MAX_TEXT_BYTES:
+            raise ValueError(f"more than {MAX_TEXT_BYTES // 1_000_000} MB of text are not read")
+        check_count(3 * sum(element.count for element in elements if element.name == "vertex"), path, "a cloud")
+        tables = Tables(data)
+        found = {element.name: tables.read(element) for element in tables.elements}
+        if order == "" and tables.left:
+            raise ValueError(f"it has {tables.left} more than its header declares")
+        vertex = {name.lower(): values for name, values in found.get("vertex", {}).items()}
+        points = [vertex.pop(axis) for axis in "xyz" if isinstance(vertex.get(axis), np.ndarray)]
+        if len(points) < 3:
+            raise ConfigError("it has no vertices with x, y, z", path, _FIX)
+        cloud = np.stack(points, axis=1).astype(np.float64)
+        others = (f"not used: {', '.join(vertex)[:200]}",) if vertex else ()
+        return _numbers(cloud, data) if order == "" else cloud, others + (_SAID if found.get("face") else ())
+
+    return guard(read, path, "cloud", _FIX)
 
 
 def read_stl(path: Path) -> tuple[Array, tuple[str, ...]]:

@@ -118,7 +118,7 @@ SHAPES: dict[str, tuple[str, str | bytes, str | None, str | None]] = {
     "PLY, declared vertices": (
         "ply", PLY.format("ascii 1.0").replace("3", "9" * 15) + LISTS.format(1, "uchar", "int"), None, "can hold"),
     "PLY, declared list": ("ply", huge_ply(PLY.format("binary_little_endian 1.0") + LISTS.format(1, "uint", "int"),
-        bytes(36) + struct.pack("<I", 2**32 - 1) + bytes(99)), None, "cannot hold"),
+        bytes(36) + struct.pack("<I", 2**32 - 1) + bytes(99)), None, "ends after the file"),
     "PLY, lists of nothing": ("ply", huge_ply(PLY.format("binary_little_endian 1.0") + LISTS.format(2_000_000, "uchar",
         "int"), bytes(36 + 2_000_000)), None, "has no faces"),
     "PLY, uneven lists": ("ply", huge_ply(PLY.format("binary_little_endian 1.0") + LISTS.format(1_000_000, "uchar",
