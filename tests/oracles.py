@@ -13,7 +13,7 @@ from lxml import etree
 from scipy.spatial.transform import Rotation
 
 from artsim.common.extras import import_pybullet, silence_output
-from artsim.loading.zero_pose import unused_name
+from artsim.common.names import unused_name
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.model.transforms import invert_transform

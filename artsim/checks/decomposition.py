@@ -10,13 +10,9 @@ from manifold3d import Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 
 from artsim.loading.decomposition import (
-    DEFAULTS,
     VOLUME,
-    DecompositionOptions,
     closed_volume,
     connected_surfaces,
-    convex_pieces,
-    union_volume,
 )
 from artsim.model.collision import Collision, Sweep
 from artsim.model.kinematics import Array
@@ -83,25 +79,6 @@ def check_pieces(obj: ArticulatedObject, decomposed: ArticulatedObject) -> Piece
     surfaced = Sweep(replace(decomposed, parts=tuple(wholes)))
     overlaps = tuple(surfaced.added_overlaps(Sweep(obj), DEPTH * obj.diagonal))
     return PieceGates(errors, overlaps)
-
-
-def surface_errors(obj: ArticulatedObject, options: DecompositionOptions = DEFAULTS) -> list[float]:
-    """By what share pieces hold more than each of the closed surfaces that the parts of an object consist of.
-
-    Parameters
-    ----------
-    obj : ArticulatedObject
-    options : DecompositionOptions, optional
-    """
-    diagonal = obj.diagonal / obj.scale
-    errors = []
-    for part in obj.parts:
-        vertices = part.vertices / diagonal
-        for group in connected_surfaces(vertices, part.faces) if len(part.faces) else ():
-            volume = closed_volume(vertices, part.faces[group])
-            if volume is not None:
-                errors.append(union_volume(convex_pieces(vertices, part.faces[group], options)) / volume - 1.0)
-    return errors
 
 
 def _solid(vertices: Array, faces: NDArray[np.int32]) -> Manifold:

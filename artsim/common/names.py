@@ -88,3 +88,11 @@ def safe_name(text: object, fallback: str = "object") -> str:
         return name
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
     return f"{name[: _MAX_NAME - 9].rstrip('._-')}-{digest}"
+
+
+def unused_name(name: str, used: set[str]) -> str:
+    """A name that nothing has yet; it is used from now on."""
+    while name in used:
+        name += "_"
+    used.add(name)
+    return name

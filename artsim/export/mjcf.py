@@ -8,6 +8,7 @@ import numpy as np
 from lxml import etree
 
 from artsim.common.extras import import_mujoco
+from artsim.common.names import unused_name
 from artsim.errors import AssetError
 from artsim.export.looks import NO_FINISH, Finish, Look, looks_text
 from artsim.export.options import ExportOptions
@@ -76,7 +77,8 @@ def mjcf_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) 
             rotor = ROTOR_TIME * _lost(joint)
             bodies[-1].find("joint").set("armature", number(rotor))
         if joint is None and options.base == "free":
-            bodies[-1].insert(0, etree.Element("freejoint", name=_unused("root", robot)))
+            free = unused_name("root", {other.name for other in robot.joints})
+            bodies[-1].insert(0, etree.Element("freejoint", name=free))
     _add_exclusions(root, robot)
     _add_equalities(root, robot)
     if options.actuators != "none":
@@ -186,13 +188,6 @@ def _add_actuators(root: etree._Element, robot: Robot, kind: str) -> None:
 def _lost(joint: LinkJoint) -> float:
     """Effort that a motor loses for each unit of speed: control, weight and speed cancel at the velocity limit."""
     return (1.0 + 1.0 / STRENGTH) * joint.effort / joint.velocity
-
-
-def _unused(name: str, robot: Robot) -> str:
-    used = {joint.name for joint in robot.joints}
-    while name in used:
-        name += "_"
-    return name
 
 
 def _compile(text: str, robot: Robot, finish: Finish) -> None:

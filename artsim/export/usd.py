@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.common.extras import require_extra
+from artsim.common.names import unused_name
 from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
 from artsim.export.semantic_labels import add_labels
@@ -57,13 +58,12 @@ def usd_stage(
     free = options.base == "free"
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[0]) if free else root.GetPrim())
     if not free:
-        used = {link.name for link in robot.links} | {"joints", "joints_"}
-        held = next(word for word in ("fixed_base", "fixed_base_", "fixed_base__") if word not in used)
+        held = unused_name("fixed_base", {link.name for link in robot.links})
         base = UsdPhysics.FixedJoint.Define(stage, root.GetPath().AppendChild(held))
         base.CreateBody1Rel().SetTargets([paths[0]])
         base.CreateLocalPos0Attr(Gf.Vec3f(*robot.links[0].origin.tolist()))
         base.CreateLocalPos1Attr(Gf.Vec3f(0.0))
-    scope = root.GetPath().AppendChild("joints" if all(link.name != "joints" for link in robot.links) else "joints_")
+    scope = root.GetPath().AppendChild(unused_name("joints", {link.name for link in robot.links}))
     if robot.joints:
         UsdGeom.Scope.Define(stage, scope)
     for joint in robot.joints:
@@ -89,7 +89,7 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
     xform = UsdGeom.Xform.Define(stage, path)
     xform.AddTranslateOp().Set(Gf.Vec3d(*link.origin.tolist()))
     UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
-    moments, axes = principal_axes(link.inertia.tensor)
+    moments, axes = link.inertia.principal()
     mass = UsdPhysics.MassAPI.Apply(xform.GetPrim())
     mass.CreateMassAttr(link.inertia.mass)
     mass.CreateCenterOfMassAttr(Gf.Vec3f(*(link.inertia.center - link.origin).tolist()))
@@ -132,8 +132,7 @@ def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish, pictures: s
 
     if not finish.materials:
         return {}
-    taken = {link.name for link in robot.links}
-    scope = root.AppendChild(next(name for name in ("Looks", "Looks_", "Looks__") if name not in taken))
+    scope = root.AppendChild(unused_name("Looks", {link.name for link in robot.links}))
     UsdGeom.Scope.Define(stage, scope)
     for name, material in finish.materials.items():
         made = UsdShade.Material.Define(stage, scope.AppendChild(name))
@@ -273,13 +272,6 @@ def _add_mimic(prim: Any, source: Any, slides: bool, multiplier: float, offset: 
     prim.CreateAttribute(f"physxMimicJoint:{axis}:referenceJointAxis", Sdf.ValueTypeNames.Token).Set(axis)
     prim.CreateAttribute(f"physxMimicJoint:{axis}:gearing", Sdf.ValueTypeNames.Float).Set(-multiplier)
     prim.CreateAttribute(f"physxMimicJoint:{axis}:offset", Sdf.ValueTypeNames.Float).Set(-offset)
-
-
-def principal_axes(tensor: Array) -> tuple[Array, Array]:
-    """Principal moments (3,) of an inertia tensor and the rotation (3, 3) whose columns are their axes."""
-    moments, axes = np.linalg.eigh(tensor)
-    axes[:, 2] *= np.sign(np.linalg.det(axes))
-    return moments, axes
 
 
 def frame_along(axis: Array) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from artsim.common.files import read_bounded
 from artsim.errors import AssetError
-from artsim.loading.mesh_files import FORMATS, Bounds, Surface, UnusableMeshError, read_mesh
+from artsim.loading.mesh_files import FORMATS, Bounds, Neighbour, Surface, UnusableMeshError, read_mesh
 from artsim.loading.mesh_files.gltf import Key, Owner, read_gltf_parts
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
@@ -209,22 +209,26 @@ class MeshReader:
         kind = path.suffix.lower()
         if kind not in FORMATS:
             raise UnusableMeshError(f"mesh {name!r} is of a kind that is not read ({', '.join(FORMATS)})")
-        data = read_bounded(path, self.limits.max_mesh_bytes, "mesh")
-        contents = [data]
-        self._check_bytes(len(data), path)
-
-        def neighbour(beside: str) -> bytes:
-            contents.append(self._beside(path, beside))
-            return contents[-1]
-
+        contents, neighbour = self._open(path)
         try:
-            surface = read_mesh(data, kind, Bounds(path, self.limits.max_faces), neighbour)
+            surface = read_mesh(contents[0], kind, Bounds(path, self.limits.max_faces), neighbour)
         except UnusableMeshError as problem:
             self._take(contents, path)
             raise UnusableMeshError(f"mesh {name!r} {problem}") from problem
         self.notes += [Repair(f"mesh {name!r}", text) for text in surface.notes]
         self._read[path] = surface, contents
         return self._read[path]
+
+    def _open(self, path: Path) -> tuple[list[bytes], Neighbour]:
+        """The content of a file, and what gives that of files beside it, which is added."""
+        contents = [read_bounded(path, self.limits.max_mesh_bytes, "mesh")]
+        self._check_bytes(len(contents[0]), path)
+
+        def neighbour(beside: str) -> bytes:
+            contents.append(self._beside(path, beside))
+            return contents[-1]
+
+        return contents, neighbour
 
     def scene(self, filename: str, owner: Owner[Key]) -> tuple[dict[Key, Surface], list[str]]:
         """Surfaces of the parts of a glTF file, and names of nodes that belong to none.
@@ -241,18 +245,11 @@ class MeshReader:
             When it cannot be read, lies outside the allowed folders, or is over a limit.
         """
         path = self.resolve(filename)
-        data = read_bounded(path, self.limits.max_mesh_bytes, "mesh")
-        contents = [data]
-        self._check_bytes(len(data), path)
-
-        def neighbour(beside: str) -> bytes:
-            contents.append(self._beside(path, beside))
-            return contents[-1]
-
+        contents, neighbour = self._open(path)
         try:
             with np.errstate(all="ignore"):  # as for every mesh: numbers out of range are found at the end
                 bounds = Bounds(path, self.limits.max_faces)
-                surfaces, strays, notes = read_gltf_parts(data, bounds, neighbour, owner)
+                surfaces, strays, notes = read_gltf_parts(contents[0], bounds, neighbour, owner)
         except UnusableMeshError as problem:
             raise AssetError(f"mesh {filename!r} {problem}", path, "export it again as glTF 2.0") from problem
         self._take(contents, path)

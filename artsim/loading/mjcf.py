@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from artsim.common.extras import import_mujoco
+from artsim.common.names import unused_name
 from artsim.common.products import apply
 from artsim.errors import AssetError
 from artsim.loading.meshes import MeshReader, UnusableMeshError
@@ -35,7 +36,7 @@ from artsim.loading.mjcf_xml import SafeMjcf, safe_mjcf
 from artsim.loading.scene_objects import WORLD, WorldJoint, WorldLink
 from artsim.loading.urdf_document import Geometry, MeshFile, UrdfRobot
 from artsim.loading.xml_values import Element
-from artsim.loading.zero_pose import as_document, unused_name
+from artsim.loading.zero_pose import as_document
 from artsim.model.inertia import Inertia
 from artsim.model.objects import JointDynamics, Mesh, Repair
 

@@ -25,6 +25,7 @@ from artsim.common.files import parse_json, read_bounded
 from artsim.errors import AssetError
 from artsim.loading.mesh_files import FORMATS
 from artsim.loading.meshes import MeshReader
+from artsim.loading.packages import is_file
 from artsim.loading.urdf_document import Geometry, InlineMesh, MeshFile
 from artsim.loading.urdf_xml import safe_xml
 from artsim.model.objects import Repair
@@ -222,15 +223,8 @@ def _of_result(file: Path) -> PartMeshes | None:
 def _mesh(folder: str, stem: str, root: Path) -> Geometry:
     """The mesh of a name without an ending, of whatever format there is; the reader keeps it inside."""
     names = (stem, *(f"{stem}{suffix}" for suffix in FORMATS)) if "." in stem else [f"{stem}{s}" for s in FORMATS]
-    name = next((f"{folder}/{name}" for name in names if _is_file(root / folder / name)), f"{folder}/{stem}.obj")
+    name = next((f"{folder}/{name}" for name in names if is_file(root / folder / name)), f"{folder}/{stem}.obj")
     return Geometry(mesh=MeshFile(name))
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name that no file can have
-        return False
 
 
 def _of_files(file: Path, names: Mapping[int, str]) -> PartMeshes | None:

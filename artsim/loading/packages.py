@@ -97,14 +97,14 @@ class AssetPaths:
                 if not is_inside(candidate.path):
                     continue
                 path = _with_case_of_disk(candidate.path) if respelt else candidate.path
-                if path is not None and _is_file(path) and is_inside(path):
+                if path is not None and is_file(path) and is_inside(path):
                     self._say(candidate.assumed)
                     self._say(f"{filename!r} is {path.name!r} on disk: read" if respelt else "")
                     if plain and len(tried) == 1 and not respelt and path.name == name:
                         self._first[start] = path.parent
                     return path
         inside = [candidate for candidate in tried if is_inside(candidate.path)]
-        found_outside = next((c.path for c in tried if c not in inside and _is_file(c.path)), None)
+        found_outside = next((c.path for c in tried if c not in inside and is_file(c.path)), None)
         if found_outside is not None or not inside:
             raise AssetError(
                 f"{what} {filename!r} lies outside the asset's folder",
@@ -127,7 +127,7 @@ class AssetPaths:
         for level, ancestor in enumerate([self._own, *self._own.parents]):
             if level > _MANIFEST_LEVELS or _is_shared(ancestor):
                 return None
-            if _is_file(ancestor / "package.xml"):
+            if is_file(ancestor / "package.xml"):
                 return ancestor
         return None
 
@@ -258,7 +258,7 @@ class AssetPaths:
         if self._manifest_root is None or package in self.declared:
             return None
         beside = self._manifest_root.parent / package
-        return beside if beside != self._manifest_root and _is_file(beside / name) else None
+        return beside if beside != self._manifest_root and is_file(beside / name) else None
 
     def _fix_missing(self, package: str | None, rest: str) -> str:
         if package is None:
@@ -301,7 +301,8 @@ def _kept(candidates: Iterator[_Candidate], tried: list[_Candidate]) -> Iterator
         yield candidate
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is a file of a name, which may be one that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name too long for the file system, or with a zero byte

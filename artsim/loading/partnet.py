@@ -10,7 +10,7 @@ help to build a screw. Such objects are at rest at their file's zero.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from artsim.common.files import parse_json, read_bounded
@@ -102,36 +102,24 @@ def read_side_files(file: Path) -> SideFiles:
     own = meta.get("artsim")
     own = own if isinstance(own, dict) else {}
 
-    if file.name == GAPARTNET or file.suffix == ".json":  # the other files are about the links of mobility.urdf
-        labels = _gapartnet_labels(parsed(_GAPARTNET_LINKS)) if file.name == GAPARTNET else {}
-        return SideFiles(
-            object_id=_word(object_id) if isinstance(object_id, (str, int)) else None,
-            category=_word(category) if isinstance(category, str) else None,
-            labels=labels,
-            repairs=tuple(repairs),
-            contents=tuple(contents),
-        )
-
-    rows = [line.split() for line in (content("semantics.txt") or b"").decode("utf-8", "replace").splitlines()]
-    rows = [row for row in rows if len(row) >= 3]
-    labels = {row[0]: _word(row[2]) for row in rows}
-    num_movable = sum(row[1] not in _STILL for row in rows) if rows else None
-
-    mobility = parsed("mobility_v2.json")
-    if isinstance(mobility, list):
-        kinds = [str(m.get("joint", "")) for m in mobility if isinstance(m, dict)]
-        num_movable = sum(bool(kind) and kind not in _STILL for kind in kinds)
-
-    return SideFiles(
+    found = SideFiles(
         object_id=_word(object_id) if isinstance(object_id, (str, int)) else None,
         category=_word(category) if isinstance(category, str) else None,
-        labels=labels,
-        num_movable=num_movable,
-        parts=_names(own.get("parts")),
-        helpers=_names(own.get("helpers")),
-        repairs=tuple(repairs),
-        contents=tuple(contents),
     )
+    if file.name == GAPARTNET:  # the other files are about the links of mobility.urdf
+        found = replace(found, labels=_gapartnet_labels(parsed(_GAPARTNET_LINKS)))
+    elif file.suffix != ".json":
+        rows = [line.split() for line in (content("semantics.txt") or b"").decode("utf-8", "replace").splitlines()]
+        rows = [row for row in rows if len(row) >= 3]
+        num_movable = sum(row[1] not in _STILL for row in rows) if rows else None
+        mobility = parsed("mobility_v2.json")
+        if isinstance(mobility, list):
+            kinds = [str(m.get("joint", "")) for m in mobility if isinstance(m, dict)]
+            num_movable = sum(bool(kind) and kind not in _STILL for kind in kinds)
+        labels = {row[0]: _word(row[2]) for row in rows}
+        parts, helpers = _names(own.get("parts")), _names(own.get("helpers"))
+        found = replace(found, labels=labels, num_movable=num_movable, parts=parts, helpers=helpers)
+    return replace(found, repairs=tuple(repairs), contents=tuple(contents))
 
 
 def _gapartnet_labels(annotation: object) -> dict[str, str]:

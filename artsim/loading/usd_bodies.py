@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from artsim.common.names import unused_name
 from artsim.common.products import matmul, norm
 from artsim.errors import AssetError
 from artsim.loading.meshes import LoadLimits, UnusableMeshError
@@ -16,7 +17,6 @@ from artsim.loading.scene_objects import WORLD
 from artsim.loading.urdf_document import InlineMesh
 from artsim.loading.usd_shapes import KINDS, surface
 from artsim.loading.usd_values import flag, token
-from artsim.loading.zero_pose import unused_name
 from artsim.model.convex_bodies import convex_hull, is_convex
 from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Mesh, Repair

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from artsim.common.names import unused_name
 from artsim.common.products import matmul
 from artsim.loading.usd_bodies import StageReader, rigid
 from artsim.loading.usd_values import flag, number, rotation, token, vectors
-from artsim.loading.zero_pose import unused_name
 from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Repair
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from artsim.common.names import unused_name
 from artsim.common.products import matmul, unit
 from artsim.loading.scene_objects import WorldJoint, WorldLink
 from artsim.loading.urdf_document import Geometry, InlineMesh, Shape
@@ -15,7 +16,6 @@ from artsim.loading.usd_bodies import StageReader, UsdBody
 from artsim.loading.usd_dynamics import read_dynamics, read_inertia
 from artsim.loading.usd_joints import FreeAxis, UsdJoint
 from artsim.loading.usd_mimics import read_mimics
-from artsim.loading.zero_pose import unused_name
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
 

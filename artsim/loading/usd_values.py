@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -50,31 +51,17 @@ def token(attribute: Any, default: str, known: tuple[str, ...] = ()) -> str:
 
 def vectors(attribute: Any) -> Array:
     """(N, 3) float: the vectors of an array, or the one vector of an attribute; none where it has no value."""
-    found = _value(attribute)
-    if found is None:
-        return np.zeros((0, 3))
-    try:
-        return np.asarray(found, dtype=np.float64).reshape(-1, 3)
-    except (TypeError, ValueError) as error:
-        raise _error(attribute, found, "vectors") from error
+    return _converted(attribute, "vectors", lambda v: np.asarray(v, dtype=np.float64).reshape(-1, 3))
 
 
 def numbers(attribute: Any) -> Array:
     """(N,) numbers of an array; none where it has no value."""
-    found = _value(attribute)
-    try:
-        return np.zeros(0) if found is None else np.asarray(found, dtype=np.float64).ravel()
-    except (TypeError, ValueError) as error:
-        raise _error(attribute, found, "numbers") from error
+    return _converted(attribute, "numbers", lambda v: np.asarray(v, dtype=np.float64).ravel())
 
 
 def integers(attribute: Any) -> NDArray[np.int64]:
     """(N,) whole numbers of an array; none where it has no value."""
-    found = _value(attribute)
-    try:
-        return np.zeros(0, np.int64) if found is None else np.asarray(found).astype(np.int64, casting="safe").ravel()
-    except (TypeError, ValueError) as error:
-        raise _error(attribute, found, "whole numbers") from error
+    return _converted(attribute, "whole numbers", lambda v: np.asarray(v).astype(np.int64, casting="safe").ravel())
 
 
 def rotation(attribute: Any) -> Array:
@@ -93,6 +80,14 @@ def rotation(attribute: Any) -> Array:
         return np.eye(3)
     matrix: Array = Rotation.from_quat(values / length).as_matrix()
     return matrix
+
+
+def _converted(attribute: Any, wanted: str, convert: Callable[[Any], NDArray[Any]]) -> NDArray[Any]:
+    found = _value(attribute)
+    try:
+        return convert(np.zeros(0, np.int8) if found is None else found)
+    except (TypeError, ValueError) as error:
+        raise _error(attribute, found, wanted) from error
 
 
 def _value(attribute: Any) -> Any:

@@ -118,14 +118,6 @@ def _check_finite(link: WorldLink, arrays: Sequence[Array], file: Path) -> None:
         )
 
 
-def unused_name(name: str, used: set[str]) -> str:
-    """A name that nothing has yet; it is used from now on."""
-    while name in used:
-        name += "_"
-    used.add(name)
-    return name
-
-
 def combined(inertias: Sequence[Inertia]) -> Inertia | None:
     """Several bodies as one; None where none has a mass."""
     solid = [inertia for inertia in inertias if inertia.mass > 0]

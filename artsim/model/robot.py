@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.names import safe_name
+from artsim.common.names import safe_name, unused_name
 from artsim.errors import AssetError
 from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.kinematics import Array, Joint
@@ -181,10 +181,10 @@ def as_robot(obj: ArticulatedObject) -> Robot:
         if k > 0:
             parent = index[joint.parent]
             if joint.type == "screw":
-                slide = _unused_name(f"{obj.parts[k].name}_slide", used)
+                slide = unused_name(f"{obj.parts[k].name}_slide", used)
                 joints.append(_slide(slide, joint, parent, len(links), carried[k]))
                 parent = len(links)
-                helper = _unused_name(f"{obj.parts[k].name}_thread", used)
+                helper = unused_name(f"{obj.parts[k].name}_thread", used)
                 links.append(Link(helper, -1, origin, inertia.share(HELPER_SHARE)))
                 inertia = inertia.share(1.0 - HELPER_SHARE)
             joints.append(_joint(obj, k, parent, len(links), carried[k]))
@@ -198,13 +198,6 @@ def _carries(parents: Sequence[int] | NDArray[np.int64], k: int, j: int) -> bool
     while j > k:
         j = int(parents[j])
     return j == k
-
-
-def _unused_name(name: str, used: set[str]) -> str:
-    while name in used:
-        name += "_"
-    used.add(name)
-    return name
 
 
 def _link(obj: ArticulatedObject, k: int, origin: Array, inertia: Inertia) -> Link:
