@@ -1,7 +1,7 @@
 """What files of other tools say about a camera, format by format.
 
-Each function reads one format and returns None for any other. They are asked in order, those first whose files nothing
-else looks like. A file that no one else's name is on is ours.
+One table holds the formats, those first whose files nothing else looks like. A file that no one else's name is on is
+ours.
 """
 
 from __future__ import annotations
@@ -143,10 +143,9 @@ def _find(content: Any, hints: Hints, path: Path, deeper: int) -> _Found | None:
     scene = _bop_scene(data, hints, path)
     if scene is not None:
         return scene
-    for read in _FORMATS:
-        stated = read(data, hints, path)
-        if stated is not None:
-            return _Found(stated, (content,))
+    stated = _stated(data, hints)
+    if stated is not None:
+        return _Found(stated, (content,))
     if not deeper:
         return None
     known = sorted((n for n in data if plain(n) in _NESTED), key=lambda name: _NESTED.index(plain(name)))
@@ -225,48 +224,30 @@ def _bop_scene(data: Mapping[str, Any], hints: Hints, path: Path) -> _Found | No
                 path, f"add --image-id N, one of {choices}",
             )  # fmt: skip
         number = named[0] if named else next(iter(numbers))
-    found = _bop(data[numbers[number]], hints, path)
+    found = _stated(data[numbers[number]], hints, only="BOP")
     return None if found is None else _Found(
         replace(found, notes=(f"the camera of image {number}",)), (data[numbers[number]],)
     )  # fmt: skip
 
 
-def _bop(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """BOP: cam_K, or fx, fy, cx, cy with depth_scale in millimetres, as in camera.json."""
-    if "cam_K" in data:
-        return Stated(_matrix(data["cam_K"]), "BOP", _THEIRS)
-    if "depth_scale" in data and _has(data, "fx", "fy", "cx", "cy"):
-        return Stated(_pinhole(data, "cx", "cy"), "BOP", _THEIRS)
+def _stated(data: Mapping[str, Any], hints: Hints, only: str = "") -> Stated | None:
+    """The camera by the first format that finds its names, or by one alone."""
+    for name, center, camera, beside_it in _FORMATS:
+        K = None
+        if only not in ("", name) or (beside_it and not any(word in data for word in beside_it)):
+            continue
+        if callable(camera):
+            K = camera(data, hints)
+        elif isinstance(camera, tuple):
+            K = _of_four(*(_number(data[word]) for word in camera)) if all(word in data for word in camera) else None
+        elif camera in data:
+            K = _matrix(data[camera])
+        if K is not None:
+            return Stated(K, name, center)
     return None
 
 
-def _ros(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """ROS: sensor_msgs/CameraInfo of ROS 1 and 2, and files of camera_calibration; OpenCV's own files are alike."""
-    name = next((n for n in ("camera_matrix", "cameraMatrix", "Camera_Matrix", "cam_matrix", "mtx") if n in data), None)
-    if name is not None:
-        return Stated(_matrix(data[name]), "OpenCV and ROS", _THEIRS)
-    of_ros = any(n in data for n in ("distortion_model", "header", "D", "d", "R", "P", "p", "binning_x", "roi"))
-    name = next((n for n in ("K", "k") if n in data and (of_ros or n == "k")), None)
-    if name is not None:
-        return Stated(_matrix(data[name]), "a ROS CameraInfo", _THEIRS)
-    name = next((n for n in ("P", "p", "projection_matrix") if n in data), None)
-    if name is not None and _is_matrix(data[name]):
-        return Stated(_matrix(data[name]), "a ROS CameraInfo", _THEIRS)
-    return None
-
-
-def _open3d(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """Open3D: PinholeCameraIntrinsic, whose matrix stands column by column."""
-    return Stated(_matrix(data["intrinsic_matrix"]), "Open3D", _THEIRS) if "intrinsic_matrix" in data else None
-
-
-def _realsense(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """RealSense: rs2_intrinsics."""
-    return Stated(_pinhole(data, "ppx", "ppy"), "RealSense", _THEIRS) if _has(data, "fx", "fy", "ppx", "ppy") else None
-
-
-def _nerf(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """transforms.json of NeRF, instant-ngp and nerfstudio."""
+def _nerf(data: Mapping[str, Any], hints: Hints) -> Array | None:
     size = stated_size([data], hints.size) or hints.size
     if "fl_x" in data:
         fx = _number(data["fl_x"])
@@ -277,44 +258,46 @@ def _nerf(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
     else:
         return None
     middle = (0.5 * size[0], 0.5 * size[1]) if size else (data["cx"], data["cy"])
-    cx, cy = (_number(data.get(n, value)) for n, value in zip(("cx", "cy"), middle, strict=True))
-    return Stated(_of_four(fx, fy, cx, cy), _NERF, _OURS)
+    return _of_four(fx, fy, *(_number(data.get(n, value)) for n, value in zip(("cx", "cy"), middle, strict=True)))
 
 
-def _kalibr(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """Kalibr: a pinhole's fx, fy, cx, cy in a list."""
+def _kalibr(data: Mapping[str, Any], hints: Hints) -> Array | None:
     four = _flat(data.get("intrinsics"))
-    return Stated(_of_four(*map(_number, four)), "Kalibr", _THEIRS) if len(four) == 4 else None
+    return _of_four(*map(_number, four)) if len(four) == 4 else None
 
 
-def _ours(data: Mapping[str, Any], hints: Hints, path: Path) -> Stated | None:
-    """artsim's own samples and scenes, and what is not of any other tool: fx, fy, cx, cy, or K."""
-    if _has(data, "fx", "fy", "cx", "cy"):
-        return Stated(_pinhole(data, "cx", "cy"), "artsim (fx, fy, cx, cy)", _OURS)
-    return Stated(_matrix(data["K"]), "artsim (K)", _OURS) if "K" in data else None
+def _projection(data: Mapping[str, Any], hints: Hints) -> Array | None:
+    name = next((n for n in ("P", "p", "projection_matrix") if _is_matrix(data.get(n))), None)
+    return None if name is None else _matrix(data[name])
 
 
-_FORMATS: tuple[Callable[[Mapping[str, Any], Hints, Path], Stated | None], ...] = (
-    _bop, _realsense, _open3d, _kalibr, _nerf, _ros, _ours,
+_FOUR = ("fx", "fy", "cx", "cy")
+_FORMATS: tuple[
+    tuple[str, float, str | tuple[str, ...] | Callable[[Mapping[str, Any], Hints], Array | None], tuple[str, ...]], ...
+] = (
+    ("BOP", _THEIRS, "cam_K", ()),
+    ("BOP", _THEIRS, _FOUR, ("depth_scale",)),  # camera.json
+    ("RealSense", _THEIRS, ("fx", "fy", "ppx", "ppy"), ()),
+    ("Open3D", _THEIRS, "intrinsic_matrix", ()),  # column by column
+    ("Kalibr", _THEIRS, _kalibr, ()),
+    (_NERF, _OURS, _nerf, ()),  # also of instant-ngp and nerfstudio
+    *(("OpenCV and ROS", _THEIRS, name, ())
+      for name in ("camera_matrix", "cameraMatrix", "Camera_Matrix", "cam_matrix", "mtx")),
+    ("a ROS CameraInfo", _THEIRS, "K",
+     ("distortion_model", "header", "D", "d", "R", "P", "p", "binning_x", "roi")),
+    ("a ROS CameraInfo", _THEIRS, "k", ()),
+    ("a ROS CameraInfo", _THEIRS, _projection, ()),
+    ("artsim (fx, fy, cx, cy)", _OURS, _FOUR, ()),  # and what is not of any other tool
+    ("artsim (K)", _OURS, "K", ()),
 )  # fmt: skip
-
-
-def _has(data: Mapping[str, Any], *names: str) -> bool:
-    return all(name in data for name in names)
+"""What each is called, where it has the centre of the first pixel, the name of its matrix, or of fx, fy, cx and cy, and
+names of which one stands beside."""
 
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise TypeError(f"{str(value)[:40]!r} is no number")
     return float(value)
-
-
-def _numbers(values: Any) -> tuple[float, ...]:
-    """Numbers of a list, nested or not, or of an OpenCV matrix; none for anything else."""
-    if isinstance(values, Mapping):
-        values = values.get("data")
-    flat = _flat(values)
-    return tuple(_number(value) for value in flat if value is not None)
 
 
 def _flat(values: Any) -> list[Any]:
@@ -330,15 +313,14 @@ def _is_matrix(values: Any) -> bool:
 
 def _matrix(values: Any) -> Array:
     """(3, 3) of nine numbers, nested or not, or of the left of a (3, 4) or (4, 4) matrix."""
-    numbers = [float(v) for v in values.ravel()[:17]] if isinstance(values, np.ndarray) else list(_numbers(values))
+    if isinstance(values, Mapping):
+        values = values.get("data")
+    flat = values.ravel()[:17].tolist() if isinstance(values, np.ndarray) else _flat(values)
+    numbers = [_number(value) for value in flat if value is not None]
     columns = {9: 3, 12: 4, 16: 4}.get(len(numbers))
     if columns is None:
         raise ValueError(f"{len(numbers)} numbers are no intrinsic matrix")
     return np.array(numbers).reshape(-1, columns)[:3, :3]
-
-
-def _pinhole(data: Mapping[str, Any], cx: str, cy: str) -> Array:
-    return _of_four(*(_number(data[name]) for name in ("fx", "fy", cx, cy)))
 
 
 def _of_four(fx: float, fy: float, cx: float, cy: float) -> Array:
