@@ -42,6 +42,7 @@ def read_document(
     Returns
     -------
     robot : UrdfRobot
+        With collision geometry and inertia, of MJCF and USD.
     repairs : list of Repair
     contents : list of bytes
         Of other files that it is made of, but for meshes.

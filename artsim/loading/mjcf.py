@@ -44,34 +44,7 @@ from artsim.model.objects import JointDynamics, Mesh, Repair
 def read_mjcf(
     data: bytes, file: Path, reader: MeshReader, body: str | None = None
 ) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
-    """Links and joints of an MJCF document.
-
-    Parameters
-    ----------
-    data : bytes
-        Content of the file.
-    file : Path
-        Its path, for messages and as the root of names.
-    reader : MeshReader
-        Reads its meshes, and finds what it includes.
-    body : str, optional
-        Which object of a scene: see :func:`artsim.loading.scene_objects.chosen`.
-
-    Returns
-    -------
-    robot : UrdfRobot
-        With collision geometry and inertia.
-    repairs : list of Repair
-    contents : list of bytes
-        Included files.
-
-    Raises
-    ------
-    AssetError
-        Naming what cannot be read.
-    ConfigError
-        When MuJoCo is not installed.
-    """
+    """Links and joints of an MJCF document, as :func:`artsim.loading.documents.read_document` gives them."""
     mujoco = import_mujoco("MJCF files")
 
     repairs: list[Repair] = []

@@ -24,6 +24,7 @@ from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, Inlin
 from artsim.model.convex_bodies import convex_hull, is_convex
 from artsim.model.kinematics import Array
 from artsim.model.objects import Mesh, Repair
+from artsim.model.transforms import rotation_of_quaternion
 
 _SHOWN_GROUPS = 3
 """MuJoCo's viewers show groups 0 to 2 unless they are told otherwise."""
@@ -234,10 +235,6 @@ def pose(position: Array, turn: Array) -> Array:
 
 def rotation(quaternion: Sequence[float] | Array) -> Array:
     """(3, 3) rotation of a quaternion w, x, y, z of any length; none where it is 0, as MuJoCo has it."""
-    from scipy.spatial.transform import Rotation
-
-    w, x, y, z = np.asarray(quaternion, dtype=np.float64).tolist()
-    if not math.hypot(w, x, y, z) > _NO_TURN:
-        return np.eye(3)
-    matrix: Array = Rotation.from_quat([x, y, z, w]).as_matrix()
-    return matrix
+    w, *vector = np.asarray(quaternion, dtype=np.float64).tolist()
+    length = math.hypot(w, *vector)
+    return rotation_of_quaternion(np.array([*vector, w]) / length) if length > _NO_TURN else np.eye(3)

@@ -88,28 +88,9 @@ def is_mobility(document: object) -> bool:
 
 
 def read_mobility(document: Any, file: Path, reader: MeshReader) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
-    """Links and joints of an annotation.
+    """Links and joints of an annotation, as :func:`artsim.loading.documents.read_document` gives them.
 
-    Parameters
-    ----------
-    document : list or dict
-        See :func:`is_mobility`.
-    file : Path
-        For messages, and as the place of the meshes.
-    reader : MeshReader
-
-    Returns
-    -------
-    robot : UrdfRobot
-        Links have the names that PartNet-Mobility's URDF files give them.
-    repairs : list of Repair
-    contents : list of bytes
-        Other files that tell where the meshes of a part are.
-
-    Raises
-    ------
-    AssetError
-        Naming the element.
+    Links have the names that PartNet-Mobility's URDF files give them.
     """
     rows = document["mobility"] if isinstance(document, dict) else document
     if len(rows) > reader.limits.max_links:

@@ -35,28 +35,7 @@ def is_shape2motion(document: object) -> bool:
 def read_shape2motion(
     document: dict[str, Any], file: Path, reader: MeshReader
 ) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
-    """Links and joints of a tree.
-
-    Parameters
-    ----------
-    document : dict
-        The root.
-    file : Path
-        For messages.
-    reader : MeshReader
-
-    Returns
-    -------
-    robot : UrdfRobot
-    repairs : list of Repair
-    contents : list of bytes
-        None: all of it stands in the file.
-
-    Raises
-    ------
-    AssetError
-        When a node cannot be read, or there are too many.
-    """
+    """Links and joints of a tree, as :func:`artsim.loading.documents.read_document` gives them."""
     repairs: list[Repair] = []
     links: list[WorldLink] = []
     waiting: list[tuple[Any, int]] = [(document, -1)]

@@ -46,30 +46,7 @@ from artsim.model.objects import JointDynamics, Repair
 
 
 def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
-    """Links and joints of a USD file.
-
-    Parameters
-    ----------
-    file : Path
-    limits : LoadLimits
-    body : str, optional
-        Which object of a scene: see :func:`artsim.loading.scene_objects.chosen`.
-
-    Returns
-    -------
-    robot : UrdfRobot
-        With collision geometry and inertia.
-    repairs : list of Repair
-    contents : list of bytes
-        Other layers that it is made of.
-
-    Raises
-    ------
-    AssetError
-        Naming what cannot be read.
-    ConfigError
-        When usd-core is not installed.
-    """
+    """Links and joints of a USD file, as :func:`artsim.loading.documents.read_document` gives them."""
     with require_extra("USD files"):
         import pxr  # noqa: F401
     found: tuple[UrdfRobot, list[Repair], list[bytes]] = read_apart(READER, file, limits, body)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from artsim.errors import AssetError
 from artsim.loading.mesh_files.surface import quote_name
 from artsim.model.kinematics import Array
+from artsim.model.transforms import rotation_of_quaternion
 
 
 def number(attribute: Any, default: float) -> float:
@@ -66,8 +67,6 @@ def integers(attribute: Any) -> NDArray[np.int64]:
 
 def rotation(attribute: Any) -> Array:
     """(3, 3) rotation of a quaternion of any length; the identity where there is none, or it has no length."""
-    from scipy.spatial.transform import Rotation
-
     found = _value(attribute)
     if found is None:
         return np.eye(3)
@@ -76,10 +75,7 @@ def rotation(attribute: Any) -> Array:
     except (AttributeError, TypeError, ValueError) as error:
         raise _error(attribute, found, "a quaternion") from error
     length = float(np.linalg.norm(values))
-    if not (np.isfinite(length) and length > 1e-6):
-        return np.eye(3)
-    matrix: Array = Rotation.from_quat(values / length).as_matrix()
-    return matrix
+    return rotation_of_quaternion(values / length) if np.isfinite(length) and length > 1e-6 else np.eye(3)
 
 
 def _converted(attribute: Any, wanted: str, convert: Callable[[Any], NDArray[Any]]) -> NDArray[Any]:

@@ -10,11 +10,11 @@ import numpy as np
 from lxml import etree
 
 from artsim.common.elementary import cos, sin
-from artsim.common.products import matmul, norm, unit
+from artsim.common.products import norm, unit
 from artsim.errors import AssetError
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
-from artsim.model.transforms import cross_matrix
+from artsim.model.transforms import rotation_of_quaternion
 
 # What C's strtod reads in decimal; Python's float would also take 1_0 and other scripts' digits.
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan)", re.IGNORECASE | re.ASCII)
@@ -145,9 +145,7 @@ class Element:
             raise self.error(f"{what} is no rotation", 'write quat_xyzw="0 0 0 1" or an rpy')
         if abs(length - 1.0) > 1e-3:
             self.say(f"{what} has length {length:.4g}: normalised")
-        x, y, z, w = unit(values).tolist()
-        cross = cross_matrix((x, y, z))
-        return np.eye(3) + 2.0 * (w * cross + matmul(cross, cross))
+        return rotation_of_quaternion(unit(values))
 
 
 def rotation_of(rpy: Array) -> Array:

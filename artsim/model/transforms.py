@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.products import apply
+from artsim.common.products import apply, matmul
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,13 @@ def cross_matrix(vectors: ArrayLike) -> Array:
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return matrix
+
+
+def rotation_of_quaternion(quaternion: ArrayLike) -> Array:
+    """(3, 3) rotation of a unit quaternion x, y, z, w."""
+    *vector, w = np.asarray(quaternion, dtype=np.float64)
+    cross = cross_matrix(vector)
+    return np.eye(3) + 2.0 * (w * cross + matmul(cross, cross))
 
 
 def transform_points(T_to_from: ArrayLike, points: ArrayLike) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from lxml import etree
@@ -27,32 +26,27 @@ from artsim.loading.mesh_files.surface import (
     quote_name,
     transform_affine,
 )
+from artsim.model.transforms import rotation_of_quaternion
 
 _MAX_DEPTH = 150
 """Nodes inside nodes; far from Python's own limit."""
+_NOTHING = np.zeros(4, dtype=object)
+"""Pieces, nodes, faces and vertices that a node shows, all that it contains included, before any of it is copied."""
 
 
 def read_dae(data: bytes, bounds: Bounds) -> Surface:
-    """The surface of the scene that a COLLADA file shows, in metres.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of the scene that a COLLADA file shows, in metres; raises as ``read_mesh``."""
     document = Document(data, bounds)
     draft = Draft()
     scale = _unit(document, draft)
     _tell_up_axis(document, draft)
     scene = _Scene(document, bounds, draft)
     roots = scene.roots()
-    total = _Extent()
-    for root in roots:
-        total += scene.extent(root, _MAX_DEPTH)
-    bounds.check_pieces(max(total.instances, total.nodes))
-    bounds.check(total.faces, "triangles")
-    bounds.check(total.vertices, "vertices")
-    draft.declared = total.faces
+    pieces, nodes, faces, vertices = sum((scene.extent(root, _MAX_DEPTH) for root in roots), start=_NOTHING)
+    bounds.check_pieces(max(pieces, nodes))
+    bounds.check(faces, "triangles")
+    bounds.check(vertices, "vertices")
+    draft.declared = faces
     for root in roots:
         scene.show(root, np.diag([scale, scale, scale, 1.0]))
     scene.tell_unseen()
@@ -82,30 +76,13 @@ def _tell_up_axis(document: Document, draft: Draft) -> None:
         draft.note(f"up_axis {quote_name(axis.strip())} is not applied, as in RViz, PyBullet and SAPIEN")
 
 
-@dataclass
-class _Extent:
-    """How much a node shows, all that it contains included, before any of it is copied."""
-
-    instances: int = 0
-    nodes: int = 0
-    faces: int = 0
-    vertices: int = 0
-
-    def __iadd__(self, other: _Extent) -> _Extent:
-        self.instances += other.instances
-        self.nodes += other.nodes
-        self.faces += other.faces
-        self.vertices += other.vertices
-        return self
-
-
 class _Scene:
     """The nodes of a file, and what they show."""
 
     def __init__(self, document: Document, bounds: Bounds, draft: Draft):
         self._document, self._bounds, self._draft = document, bounds, draft
         self._geometries: dict[etree._Element, Geometry | None] = {}
-        self._extents: dict[etree._Element, _Extent | None] = {}
+        self._extents: dict[etree._Element, np.ndarray | None] = {}
         self._seen: set[etree._Element] = set()
         self._told: set[tuple[etree._Element, str]] = set()
 
@@ -125,8 +102,8 @@ class _Scene:
         self._draft.note("has no scene: each geometry is shown once, as it is")
         return self._document.root.findall("library_geometries/geometry")
 
-    def extent(self, node: etree._Element, depth: int) -> _Extent:
-        """What a node, scene or geometry shows.
+    def extent(self, node: etree._Element, depth: int) -> np.ndarray:
+        """How much a node, scene or geometry shows: see :data:`_NOTHING`.
 
         Raises
         ------
@@ -141,19 +118,18 @@ class _Scene:
         if depth == 0:
             raise UnusableMeshError(f"its nodes are nested over {_MAX_DEPTH} deep")
         self._extents[node] = None
-        total = _Extent(nodes=1)
+        total = _NOTHING + [0, 1, 0, 0]
         for geometry in self._shown_by(node):
-            total += _Extent(1, 0, len(geometry.faces), len(geometry.vertices))
+            total += [1, 0, len(geometry.faces), len(geometry.vertices)]
         for child in self._children(node):
             part = self.extent(child, depth - 1)
-            if part.instances:
-                total += part
+            total += part if part[0] else 0
         self._extents[node] = total
         return total
 
     def show(self, node: etree._Element, T: Array) -> None:
         """Add what a node shows to the surface; T carries its parent's frame to the file's."""
-        if not self.extent(node, _MAX_DEPTH).instances:
+        if not self.extent(node, _MAX_DEPTH)[0]:
             return
         if node.tag == "node":
             for element in node:
@@ -247,19 +223,14 @@ def _scaling(element: etree._Element, node: etree._Element) -> Array:
 
 
 def _rotation(element: etree._Element, node: etree._Element) -> Array:
-    """About an axis, by degrees, as Rodrigues' formula says."""
+    """About an axis, by degrees."""
     x, y, z, degrees = values(element, 4, node).tolist()
     length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return np.eye(4)
-    x, y, z = x / length, y / length, z / length
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     T = np.eye(4)
-    T[:3, :3] = [
-        [c + (1 - c) * x * x, (1 - c) * x * y - s * z, (1 - c) * x * z + s * y],
-        [(1 - c) * x * y + s * z, c + (1 - c) * y * y, (1 - c) * y * z - s * x],
-        [(1 - c) * x * z - s * y, (1 - c) * y * z + s * x, c + (1 - c) * z * z],
-    ]
+    if length > 0.0:
+        half = math.radians(0.5 * degrees)
+        along = math.sin(half) / length
+        T[:3, :3] = rotation_of_quaternion(np.array([along * x, along * y, along * z, math.cos(half)]))
     return T
 
 

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from artsim.common.files import parse_json
+from artsim.common.products import norm
 from artsim.loading.mesh_files.gltf_buffers import Buffers, Items, integer
 from artsim.loading.mesh_files.polygons import fans, strips
 from artsim.loading.mesh_files.surface import (
@@ -28,6 +29,7 @@ from artsim.loading.mesh_files.surface import (
     quote_name,
     transform_affine,
 )
+from artsim.model.transforms import rotation_of_quaternion
 
 _READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "EXT_lights_", "KHR_xmp")
@@ -42,21 +44,7 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 def read_gltf(data: bytes, bounds: Bounds, neighbour: Callable[[str], bytes]) -> Surface:
-    """The surface of the scene that a glTF file shows.
-
-    Parameters
-    ----------
-    data : bytes
-        Of a ``.gltf`` or ``.glb`` file.
-    bounds : Bounds
-    neighbour : callable
-        Gives the bytes of a file that this one names.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of the scene that a glTF file shows; raises as ``read_mesh``."""
     draft = Draft()
     for _, piece in _scene(data, bounds, neighbour, draft).pieces():
         draft.add(*piece)
@@ -72,12 +60,7 @@ def read_gltf_parts(
 ) -> tuple[dict[Key, Surface], list[str], tuple[str, ...]]:
     """The surface of each of the parts that the nodes of a glTF file belong to.
 
-    Parameters
-    ----------
-    data, bounds, neighbour
-        As for :func:`read_gltf`.
-    owner : callable
-        Where it does not tell of a node, what carries the node counts.
+    Parameters are those of ``read_mesh``. Where ``owner`` does not tell of a node, what carries the node counts.
 
     Returns
     -------
@@ -87,11 +70,6 @@ def read_gltf_parts(
         Names of nodes that show something and belong to no part.
     notes : tuple of str
         What was left out, assumed or mended.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
     """
     whole = Draft()
     scene = _scene(data, bounds, neighbour, whole)
@@ -173,54 +151,45 @@ class _Scene:
         self._document, self._buffers, self._bounds, self._draft = document, buffers, bounds, draft
         self._meshes: dict[tuple[int, tuple[float, ...]], tuple[Array, Indices]] = {}
         self._nodes = document.list("nodes")
-        self._carrier: dict[int, Items] = {}
         self._num_primitives = 0
 
     def pieces(self) -> Iterator[tuple[list[Items], tuple[Array, Indices]]]:
         """Count what the scene shows, then read it: each piece with its node, and the nodes that carry that."""
         shown = self._shown()
-        copies = [self._placements(node, T) for node, T in shown]
+        copies = [self._placements(line[0], T) for line, T in shown]
         self._bounds.check_pieces(sum(map(len, copies)))
         self._draft.declared = sum(
-            self._declared(node) * len(places) for (node, _), places in zip(shown, copies, strict=True)
+            self._declared(line[0]) * len(places) for (line, _), places in zip(shown, copies, strict=True)
         )
         self._bounds.check(self._draft.declared, "triangles")
-        meshes = [self._mesh(node) for node, _ in shown]
+        meshes = [self._mesh(line[0]) for line, _ in shown]
         sizes = [len(vertices) * len(places) for (vertices, _), places in zip(meshes, copies, strict=True)]
         self._bounds.check(sum(sizes), "vertices")
-        self._tell_unseen([node for node, _ in shown])
-        for (node, _), (vertices, faces), places in zip(shown, meshes, copies, strict=True):
+        self._tell_unseen([line[0] for line, _ in shown])
+        for (line, _), (vertices, faces), places in zip(shown, meshes, copies, strict=True):
             self._draft.accounted += len(faces) * len(places)
             for T in places:
                 piece = transform_affine(T, vertices), faces[:, ::-1] if mirrors(T) else faces
-                yield self._line(node), piece
+                yield line, piece
 
-    def _shown(self) -> list[tuple[Items, Array]]:
-        """Each node with a mesh in the scene, and the transform to the file's frame."""
-        waiting = [(number, np.eye(4), 0) for number in self._roots()]
+    def _shown(self) -> list[tuple[list[Items], Array]]:
+        """Each node with a mesh in the scene, with those that carry it, and the transform to the file's frame."""
+        waiting: list[tuple[int, Array, list[Items]]] = [(number, np.eye(4), []) for number in self._roots()]
         visited: set[int] = set()
         shown = []
         while waiting:
-            number, T, depth = waiting.pop()
-            if number in visited or depth > _MAX_DEPTH:
+            number, T, above = waiting.pop()
+            if number in visited or len(above) > _MAX_DEPTH:
                 raise UnusableMeshError(f"node {number} has two parents, or is nested too deeply")
             visited.add(number)
-            node = self._nodes[number]
-            T = compose_affine(T, _transform(node))
-            if "mesh" in node.value:
-                shown.append((node, T))
+            line = [self._nodes[number], *above]
+            T = compose_affine(T, _transform(line[0]))
+            if "mesh" in line[0].value:
+                shown.append((line, T))
                 self._bounds.check_pieces(len(shown))
-            for child in reversed(node.array("children")):
-                waiting.append((integer(child, len(self._nodes)), T, depth + 1))
-                self._carrier[id(self._nodes[waiting[-1][0]].value)] = node
+            children = [integer(child, len(self._nodes)) for child in line[0].array("children")]
+            waiting += [(child, T, line) for child in reversed(children)]
         return shown
-
-    def _line(self, node: Items) -> list[Items]:
-        """A node, what carries it, and so on to the root."""
-        line = [node]
-        while id(line[-1].value) in self._carrier:
-            line.append(self._carrier[id(line[-1].value)])
-        return line
 
     def _roots(self) -> list[int]:
         scenes = self._document.list("scenes")
@@ -353,18 +322,10 @@ def _transform(node: Items) -> Array:
 
 def _compose(move: Array, turn: Array, scale: Array) -> Array:
     """(4, 4) transform that scales, turns by a quaternion (x, y, z, w), then moves."""
-    x, y, z, w = turn.tolist()
-    length = math.sqrt(x * x + y * y + z * z + w * w)
+    length = float(norm(turn))
     if not 0.0 < length < math.inf:
         raise UnusableMeshError("a node has a rotation that is none")
-    x, y, z, w = x / length, y / length, z / length, w / length
     T = np.eye(4)
-    T[:3, :3] = scale * np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    T[:3, :3] = scale * rotation_of_quaternion(turn / length)
     T[:3, 3] = move
     return T

@@ -10,13 +10,7 @@ _HEADER = 16
 
 
 def read_msh(data: bytes, bounds: Bounds) -> Surface:
-    """The surface of an MSH file.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of an MSH file; raises as ``read_mesh``."""
     if len(data) < _HEADER:
         raise UnusableMeshError("is shorter than the header of an MSH file")
     vertices, normals, textures, faces = (int(n) for n in np.frombuffer(data, "<i4", 4))

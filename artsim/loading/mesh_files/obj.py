@@ -115,13 +115,7 @@ def _strip_comment(text: bytes) -> bytes:
 
 
 def read_obj(data: bytes, bounds: Bounds) -> Surface:
-    """The surface of a Wavefront file.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of a Wavefront file; raises as ``read_mesh``."""
     return _surface(statements(data, bounds), _declaration(data), bounds)
 
 
@@ -164,13 +158,7 @@ class Painted:
 
 
 def read_painted(data: bytes, bounds: Bounds) -> Painted:
-    """The surface of a Wavefront file, as :func:`read_obj` gives it, and its looks.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of a Wavefront file, as :func:`read_obj` gives it, and its looks."""
     found = statements(data, bounds)
     surface = _surface(found, _declaration(data), bounds)
     assert surface.corners is not None

@@ -73,13 +73,7 @@ class _Lists:
 
 
 def read_ply(data: bytes, bounds: Bounds) -> Surface:
-    """The surface of a PLY file: its faces and triangle strips.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of a PLY file, its faces and triangle strips; raises as ``read_mesh``."""
     tables = Tables(data)
     draft = Draft(declared=sum(e.count for e in tables.elements if e.name == "face"))
     for element in tables.elements:

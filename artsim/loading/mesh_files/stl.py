@@ -19,13 +19,7 @@ _WORDS = (b"solid", b"facet", b"outer", b"vertex", b"endloop", b"endfacet", b"en
 
 
 def read_stl(data: bytes, bounds: Bounds) -> Surface:
-    """The surface of an STL file.
-
-    Raises
-    ------
-    UnusableMeshError
-    AssetError
-    """
+    """The surface of an STL file; raises as ``read_mesh``."""
     count = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else None
     # Bytes may begin with "solid" too, so their number decides.
     if count is not None and len(data) == _HEADER + _TRIANGLE.itemsize * count:
