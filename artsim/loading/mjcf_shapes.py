@@ -24,7 +24,7 @@ from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, Inlin
 from artsim.model.convex_bodies import convex_hull, is_convex
 from artsim.model.kinematics import Array
 from artsim.model.objects import Mesh, Repair
-from artsim.model.transforms import rotation_of_quaternion
+from artsim.model.transforms import compose_transform, rotation_of_quaternion
 
 _SHOWN_GROUPS = 3
 """MuJoCo's viewers show groups 0 to 2 unless they are told otherwise."""
@@ -167,11 +167,11 @@ class ShapeReader:
 
     def _pose(self, g: int) -> Array:
         """(4, 4) frame of a shape, as its document or mesh file has it, in the world."""
-        T = pose(self._state.geom_xpos[g], self._state.geom_xmat[g].reshape(3, 3))
+        T = compose_transform(self._state.geom_xpos[g], self._state.geom_xmat[g].reshape(3, 3))
         if self._model.geom_type[g] == self._types.mjGEOM_MESH:
             # MuJoCo moves meshes into the frame of their own inertia.
             mesh = int(self._model.geom_dataid[g])
-            T_file_mesh = pose(self._model.mesh_pos[mesh], rotation(self._model.mesh_quat[mesh]))
+            T_file_mesh = compose_transform(self._model.mesh_pos[mesh], rotation(self._model.mesh_quat[mesh]))
             T = T @ np.linalg.inv(T_file_mesh)
         return T
 
@@ -224,13 +224,6 @@ class ShapeReader:
 def numbers(enumeration: Any) -> SimpleNamespace:
     """Members of one of MuJoCo's enumerations as the whole numbers that its arrays hold."""
     return SimpleNamespace(**{name: int(value) for name, value in enumeration.__members__.items()})
-
-
-def pose(position: Array, turn: Array) -> Array:
-    """(4, 4) transform of a place and a rotation."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = turn, position
-    return T
 
 
 def rotation(quaternion: Sequence[float] | Array) -> Array:

@@ -38,6 +38,7 @@ from artsim.loading.urdf_document import MimicRelation, Shape, UrdfJoint, UrdfLi
 from artsim.loading.xml_values import Element
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
+from artsim.model.transforms import compose_transform
 
 _HELD = ("free", "static", "heavy", "fixed", "junk", "")
 _MOVES = {"hinge": "revolute", "slider": "prismatic"}
@@ -201,7 +202,7 @@ def _document(
             joints.append(turned)
             continue
         element = Element(f"joint {body.joint!r}", file, repairs)
-        joint = _joint(body, parent.link, _shift(body.origin - parent.origin), element)
+        joint = _joint(body, parent.link, compose_transform(body.origin - parent.origin), element)
         if joint.type == "prismatic" and body.limit.get("rotates"):
             helper, pair = _screw(body, joint, element)
             links.append(helper)
@@ -220,14 +221,8 @@ def _link(body: _Body, names: dict[int, str], meshes: PartMeshes) -> UrdfLink:
         shapes += found
         if not found and body.number not in meshes.of_link:
             unusable.append(f"part {part} ({names[part]}) has no mesh {meshes.where}")
-    place = _shift(-body.origin)
+    place = compose_transform(-body.origin)
     return UrdfLink(body.link, tuple(Shape(geometry, place) for geometry in shapes), tuple(unusable))
-
-
-def _shift(offset: Array) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = offset
-    return T
 
 
 def _joint(body: _Body, parent: str, origin: Array, element: Element) -> UrdfJoint:

@@ -36,7 +36,7 @@ from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
 from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
-from artsim.model.transforms import transform_points
+from artsim.model.transforms import compose_transform, transform_points
 
 _FAR = 20.0
 """Times the object's size that no slide goes: a cart on its track goes once, a drawer less."""
@@ -285,9 +285,7 @@ def _to_rest_frame(
         for joint, a, o, r in zip(tree.joints, unit(axes), origins, rest, strict=True)
     ]
     turn, reasons = rest_rotation(KinematicTree(joints), posed, rest, category)
-    T_base_rest = np.eye(4)
     if turn is not None:
-        T_base_rest[:3, :3] = turn.T
         posed = [replace(p, vertices=apply(turn, p.vertices)) for p in posed]
         joints = [
             replace(joint, axis=_triple(apply(turn, joint.axis)), origin=_triple(apply(turn, joint.origin)))
@@ -297,5 +295,5 @@ def _to_rest_frame(
     center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
     joints = [replace(joint, origin=_triple(np.asarray(joint.origin) - center)) for joint in joints]
     joints[0] = replace(joints[0], origin=(0.0, 0.0, 0.0))
-    T_base_rest[:3, 3] = apply(T_base_rest[:3, :3], center)
+    T_base_rest = compose_transform(center) if turn is None else compose_transform(apply(turn.T, center), turn.T)
     return KinematicTree(joints), [replace(p, vertices=p.vertices - center) for p in posed], T_base_rest, reasons

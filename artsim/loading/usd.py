@@ -43,6 +43,7 @@ from artsim.loading.zero_pose import as_document
 from artsim.model.inertia import Inertia
 from artsim.model.kinematics import Array
 from artsim.model.objects import JointDynamics, Repair
+from artsim.model.transforms import compose_transform
 
 
 def read_usd(file: Path, limits: LoadLimits, body: str | None = None) -> tuple[UrdfRobot, list[Repair], list[bytes]]:
@@ -109,7 +110,5 @@ def _show_something(links: list[WorldLink], file: Path, repairs: list[Repair]) -
 def _box_of(inertia: Inertia) -> tuple[Array, Array]:
     """Pose (4, 4) and sides (3,) of the box, full and of one density, that has a mass and an inertia; 0: none has."""
     moments, axes = inertia.principal()
-    T_world_box = np.eye(4)
-    T_world_box[:3, :3], T_world_box[:3, 3] = axes, inertia.center
     squares = 6.0 / inertia.mass * (moments.sum() - 2.0 * moments)
-    return T_world_box, np.sqrt(squares.clip(0.0))
+    return compose_transform(inertia.center, axes), np.sqrt(squares.clip(0.0))

@@ -13,6 +13,7 @@ from artsim.loading.usd_bodies import StageReader, rigid
 from artsim.loading.usd_values import flag, number, rotation, token, vectors
 from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Repair
+from artsim.model.transforms import compose_transform
 
 _AXES = ("X", "Y", "Z")
 
@@ -138,15 +139,13 @@ def _end(reader: StageReader, prim: Any, side: int) -> tuple[int, str, Array]:
         if not target:
             raise reader.error(prim, f"its body {targets[0]} does not exist", "name a body of the file")
         affine, body, path = reader.affine(target), reader.owner(target), str(targets[0])
-    T_prim_joint = np.eye(4)
-    T_prim_joint[:3, 3] = next(iter(vectors(position)), np.zeros(3))
-    T_world_joint = np.eye(4)
-    T_world_joint[:3, 3] = matmul(affine, T_prim_joint)[:3, 3]
-    if not (np.abs(T_world_joint) <= LARGEST).all():
+    T_prim_joint = compose_transform(next(iter(vectors(position)), np.zeros(3)))
+    anchor = matmul(affine, T_prim_joint)[:3, 3]
+    if not (np.abs(anchor) <= LARGEST).all():
         raise reader.error(
             prim, f"its frame in body {side} is not finite, or too far", "write a finite localPos and localRot"
         )
-    T_world_joint[:3, :3] = matmul(rigid(affine, reader.where(prim))[:3, :3], rotation(turn))
+    T_world_joint = compose_transform(anchor, matmul(rigid(affine, reader.where(prim))[:3, :3], rotation(turn)))
     return body, path, matmul(np.linalg.inv(reader.bodies[body].T_world_body), T_world_joint)
 
 

@@ -14,7 +14,7 @@ from artsim.common.products import norm, unit
 from artsim.errors import AssetError
 from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
-from artsim.model.transforms import rotation_of_quaternion
+from artsim.model.transforms import compose_transform, rotation_of_quaternion
 
 # What C's strtod reads in decimal; Python's float would also take 1_0 and other scripts' digits.
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan)", re.IGNORECASE | re.ASCII)
@@ -118,17 +118,12 @@ class Element:
             values = self.parsed(own, f"<{origin.tag}> {own[:60]!r}", (3, 6))
             self.say(f"<{origin.tag}> has its numbers as text: read as xyz{' and rpy' if len(values) == 6 else ''}")
             xyz, rpy = " ".join(map(repr, values[:3].tolist())), " ".join(map(repr, values[3:].tolist())) or None
-        turn, place = np.eye(4), np.eye(4)
-        if rpy is not None:
-            turn[:3, :3] = rotation_of(self._three(rpy, "rpy"))
+        turn = np.eye(3) if rpy is None else rotation_of(self._three(rpy, "rpy"))
         if quaternion is not None:
-            if not np.array_equal(turn, np.eye(4)):
+            if not np.array_equal(turn, np.eye(3)):
                 raise self.error("<origin> has both rpy and quat_xyzw", "remove one of them")
-            turn[:3, :3] = self._quaternion(quaternion)
-        if xyz is not None:
-            place[:3, 3] = self._three(xyz, "xyz")
-        place[:3, :3] = turn[:3, :3]
-        return place
+            turn = self._quaternion(quaternion)
+        return compose_transform(np.zeros(3) if xyz is None else self._three(xyz, "xyz"), turn)
 
     def _three(self, text: str, attribute: str) -> Array:
         what = f"{attribute}={text[:60]!r} of <origin>"

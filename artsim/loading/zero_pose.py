@@ -22,6 +22,7 @@ from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.kinematics import LARGEST, Array
 from artsim.model.objects import Repair
+from artsim.model.transforms import compose_transform
 
 
 def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> UrdfRobot:
@@ -54,8 +55,7 @@ def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], b
     origins = [np.zeros(3) if link.joint is None else link.joint.anchor for link in links]
     found, joints = [], []
     for k, link in enumerate(links):
-        T_link_world = np.eye(4)
-        T_link_world[:3, 3] = -origins[k]
+        T_link_world = compose_transform(-origins[k])
         inertia = None if link.inertia is None else link.inertia.transformed(T_link_world)
         shapes, collision = (
             tuple(replace(shape, origin=matmul(T_link_world, shape.origin)) for shape in some)
@@ -88,15 +88,24 @@ def _without(links: Sequence[WorldLink], root: int) -> list[WorldLink]:
 def _joint(link: WorldLink, parent: str, offset: Array, file: Path, repairs: list[Repair]) -> UrdfJoint:
     joint = link.joint
     assert joint is not None
-    origin = np.eye(4)
-    origin[:3, 3] = offset
     kind, lower, upper = joint.type, joint.lower, joint.upper
     if kind in ("revolute", "continuous", "prismatic"):
         element = Element(f"joint {joint.name!r}", file, repairs)
         if not (np.isfinite(joint.axis).all() and abs(np.linalg.norm(joint.axis) - 1.0) < 1e-6):
             raise element.error("has no axis", "give its axis a length")
         kind, lower, upper = settle_limits(kind, lower, upper, element)
-    return UrdfJoint(joint.name, kind, parent, link.name, origin, joint.axis, lower, upper, joint.mimic, joint.dynamics)
+    return UrdfJoint(
+        joint.name,
+        kind,
+        parent,
+        link.name,
+        compose_transform(offset),
+        joint.axis,
+        lower,
+        upper,
+        joint.mimic,
+        joint.dynamics,
+    )
 
 
 def _check_names(names: Sequence[str], plural: str, file: Path) -> None:

@@ -28,6 +28,14 @@ def cross_matrix(vectors: ArrayLike) -> Array:
     return matrix
 
 
+def compose_transform(position: ArrayLike, rotation: ArrayLike | None = None) -> Array:
+    """(4, 4) transform that turns by a rotation (3, 3), if there is one, and then moves by (3,)."""
+    T = np.eye(4)
+    T[:3, :3] = np.eye(3) if rotation is None else rotation
+    T[:3, 3] = position
+    return T
+
+
 def rotation_of_quaternion(quaternion: ArrayLike) -> Array:
     """(3, 3) rotation of a unit quaternion x, y, z, w."""
     *vector, w = np.asarray(quaternion, dtype=np.float64)

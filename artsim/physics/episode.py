@@ -29,6 +29,7 @@ from artsim.model.draws import (
 )
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import compose_transform
 from artsim.observing.capture import observe
 from artsim.observing.sample import Sample
 from artsim.observing.sensor import find_sensor
@@ -175,9 +176,8 @@ class Episode:
             return self._camera
         center, _ = bounding_sphere(obj, most_open_state(obj))
         angle = np.deg2rad(self.options.orbit_speed) * self.time
-        T_world_turned = np.eye(4)
-        T_world_turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-        T_world_turned[:3, 3] = center - T_world_turned[:3, :3] @ center
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        T_world_turned = compose_transform(center - turn @ center, turn)
         return replace(self._camera, T_world_camera=T_world_turned @ self._camera.T_world_camera)
 
     def look(self, rng: np.random.Generator, seed: int = -1) -> Sample:

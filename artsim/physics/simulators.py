@@ -33,7 +33,7 @@ from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, sample_state
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.model.transforms import invert_transform, transform_points
+from artsim.model.transforms import compose_transform, invert_transform, transform_points
 
 AGREEMENT = 1e-6
 """Metres by which places of parts may differ; for objects larger than 1 m, share of their diagonal."""
@@ -92,7 +92,7 @@ def in_pybullet(file: Path) -> LoadedFile:
         found = {base: np.eye(4)}
         for name, link in names:
             state = bullet.getLinkState(body, link, computeForwardKinematics=True, physicsClientId=client)
-            found[name] = _pose(np.reshape(bullet.getMatrixFromQuaternion(state[5]), (3, 3)), state[4])
+            found[name] = compose_transform(state[4], np.reshape(bullet.getMatrixFromQuaternion(state[5]), (3, 3)))
         return found
 
     return LoadedFile(len(infos) + 1, len(moving), poses)
@@ -121,7 +121,7 @@ def in_mujoco(file: Path) -> LoadedFile:
         for joint in joints:
             data.qpos[joint.qposadr[0]] = values[joint.name]
         mujoco.mj_kinematics(model, data)
-        return {b.name: _pose(data.xmat[b.id].reshape(3, 3), data.xpos[b.id]) for b in bodies}
+        return {b.name: compose_transform(data.xpos[b.id], data.xmat[b.id].reshape(3, 3)) for b in bodies}
 
     return LoadedFile(model.nbody - 1, model.njnt, poses)
 
@@ -153,12 +153,6 @@ def _sapien() -> Any:
         with require_extra("sapien"):
             import sapien
     return sapien
-
-
-def _pose(rotation: Any, position: Any) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, position
-    return pose
 
 
 SIMULATORS: dict[str, Callable[[Path], LoadedFile]] = {

@@ -26,7 +26,7 @@ from artsim.loading.mesh_files.surface import (
     quote_name,
     transform_affine,
 )
-from artsim.model.transforms import rotation_of_quaternion
+from artsim.model.transforms import compose_transform, rotation_of_quaternion
 
 _MAX_DEPTH = 150
 """Nodes inside nodes; far from Python's own limit."""
@@ -213,9 +213,7 @@ def _matrix(element: etree._Element, node: etree._Element) -> Array:
 
 
 def _translation(element: etree._Element, node: etree._Element) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = values(element, 3, node)
-    return T
+    return compose_transform(values(element, 3, node))
 
 
 def _scaling(element: etree._Element, node: etree._Element) -> Array:
@@ -226,12 +224,12 @@ def _rotation(element: etree._Element, node: etree._Element) -> Array:
     """About an axis, by degrees."""
     x, y, z, degrees = values(element, 4, node).tolist()
     length = math.sqrt(x * x + y * y + z * z)
-    T = np.eye(4)
-    if length > 0.0:
-        half = math.radians(0.5 * degrees)
-        along = math.sin(half) / length
-        T[:3, :3] = rotation_of_quaternion(np.array([along * x, along * y, along * z, math.cos(half)]))
-    return T
+    if length == 0.0:
+        return np.eye(4)
+    half = math.radians(0.5 * degrees)
+    along = math.sin(half) / length
+    turn = rotation_of_quaternion([along * x, along * y, along * z, math.cos(half)])
+    return compose_transform(np.zeros(3), turn)
 
 
 def _look_at(element: etree._Element, node: etree._Element) -> Array:
@@ -242,10 +240,8 @@ def _look_at(element: etree._Element, node: etree._Element) -> Array:
     lengths = [math.sqrt(float((v * v).sum())) for v in (back, right)]
     if min(lengths) == 0.0:
         raise UnusableMeshError(f"<lookat> of node {quote_name(attribute(node))} has no direction")
-    T = np.eye(4)
-    T[:3, 0], T[:3, 2], T[:3, 3] = right / lengths[1], back / lengths[0], eye
-    T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
-    return T
+    x, z = right / lengths[1], back / lengths[0]
+    return compose_transform(eye, np.column_stack([x, np.cross(z, x), z]))
 
 
 def _skew(element: etree._Element, node: etree._Element) -> Array:

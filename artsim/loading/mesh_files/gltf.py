@@ -29,7 +29,7 @@ from artsim.loading.mesh_files.surface import (
     quote_name,
     transform_affine,
 )
-from artsim.model.transforms import rotation_of_quaternion
+from artsim.model.transforms import compose_transform, rotation_of_quaternion
 
 _READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "EXT_lights_", "KHR_xmp")
@@ -325,7 +325,4 @@ def _compose(move: Array, turn: Array, scale: Array) -> Array:
     length = float(norm(turn))
     if not 0.0 < length < math.inf:
         raise UnusableMeshError("a node has a rotation that is none")
-    T = np.eye(4)
-    T[:3, :3] = scale * rotation_of_quaternion(turn / length)
-    T[:3, 3] = move
-    return T
+    return compose_transform(move, scale * rotation_of_quaternion(turn / length))
