@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from artsim.common.files import read_bounded
 from artsim.errors import ArtsimError
 from artsim.loading.joint_xml import MOVING_TYPES
-from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, triangles
+from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.object_files import find_urdf, read_urdf
+from artsim.loading.urdf_document import Geometry, MeshFile
 from artsim.loading.urdf_xml import safe_xml
 from artsim.model.convex_bodies import is_convex
 from artsim.model.kinematics import Array
@@ -97,13 +97,12 @@ def _convexity_problems(collision: etree._Element, reader: MeshReader) -> list[s
     mesh = collision.find("geometry/mesh")
     if mesh is None:
         return []
+    name = mesh.get("filename") or ""
     try:
-        path = reader.resolve(mesh.get("filename") or "")
-        content = read_bounded(path, reader.limits.max_mesh_bytes, "mesh")
-        vertices, faces, _ = triangles(content, path.suffix.lower(), path)
+        vertices, faces = reader.shape(Geometry(mesh=MeshFile(name)))
     except (UnusableMeshError, ArtsimError) as problem:
         return [str(problem)]
-    return [] if len(faces) and is_convex(vertices, faces) else [f"mesh {path.name!r} is not convex"]
+    return [] if is_convex(vertices, faces) else [f"mesh {name.rpartition('/')[2]!r} is not convex"]
 
 
 def _paths(package_roots: Mapping[str, str | Path] | None) -> dict[str, Path]:

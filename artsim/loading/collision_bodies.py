@@ -35,12 +35,7 @@ def read_bodies(
         A URDF file or its folder that passes the gates of its collision geometry and inertia
         (:mod:`artsim.checks.strict_urdf`).
     package_roots : mapping, optional
-        As for :func:`artsim.load`.
-
-    Raises
-    ------
-    AssetError
-        When the file cannot be read.
+        As for :func:`artsim.load`, which says what is raised, too.
     """
     import trimesh
 

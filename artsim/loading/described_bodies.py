@@ -35,23 +35,9 @@ def with_described_bodies(
 ) -> list[Part]:
     """Parts with the bodies that the document gives them; without, where it says nothing of one.
 
-    Parameters
-    ----------
-    parts : sequence of Part
-        At rest, in the rest frame.
-    bodies : sequence of RigidBody
-        What each part is made of.
-    robot : UrdfRobot
-    reader : MeshReader
-    T_rest_part : (K, 4, 4) float
-        Maps the base link's frame, as each part carries it from the file's zero to rest, to the rest frame.
-    file : Path
-        For messages.
-
-    Raises
-    ------
-    AssetError
-        When something lies too far away to compute with.
+    ``bodies`` are what each part is made of; ``T_rest_part`` (K, 4, 4) maps the base link's frame, as each part carries
+    it from the file's zero to rest, to the rest frame. Raises AssetError when something lies too far away to compute
+    with.
     """
     links = {link.name: link for link in robot.links}
     if not any(link.collision or link.inertia is not None for link in links.values()):

@@ -52,20 +52,8 @@ _OTHER_TYPES = {
 def read_joint(joint: etree._Element, links: Collection[str], file: Path, repairs: list[Repair]) -> UrdfJoint:
     """A joint.
 
-    Parameters
-    ----------
-    joint : element
-    links : collection of str
-        Names of the document's links.
-    file : Path
-        For messages.
-    repairs : list of Repair
-        Added to.
-
-    Raises
-    ------
-    AssetError
-        When its type is none that is read, it hangs on no link, or a value of it is not usable.
+    ``links`` are the names of the document's links. Raises AssetError when its type is none that is read, it hangs on
+    no link, or a value of it is not usable.
     """
     element = Element(f"joint {joint.get('name')!r}", file, repairs)
     kind = joint.get("type")

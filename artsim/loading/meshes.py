@@ -34,7 +34,6 @@ __all__ = [
     "check_range",
     "check_shapes",
     "merge_shapes",
-    "triangles",
 ]
 
 _TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
@@ -284,25 +283,6 @@ class MeshReader:
             self._check_bytes(len(content), path)
             self._num_bytes += len(content)
         self.contents += contents
-
-
-def triangles(
-    data: bytes, kind: str, where: Path, max_faces: int = LoadLimits().max_faces
-) -> tuple[Array, NDArray[np.int32], tuple[str, ...]]:
-    """Vertices, triangles and what was left out, assumed or mended of a mesh file that needs no other file.
-
-    Raises
-    ------
-    UnusableMeshError
-        When the content cannot be read.
-    AssetError
-        When it is over a limit, or dangerous.
-    """
-    try:
-        surface = read_mesh(data, kind, Bounds(where, max_faces))
-    except UnusableMeshError as problem:
-        raise UnusableMeshError(f"mesh {where.name!r} {problem}") from problem
-    return surface.vertices, surface.faces, surface.notes
 
 
 def merge_shapes(shapes: list[tuple[Array, NDArray[np.int32], Array]]) -> tuple[Array, NDArray[np.int32]]:

@@ -20,26 +20,8 @@ _MAX_INCLUDES = 100
 def put_included(root: etree._Element, file: Path, paths: AssetPaths, max_bytes: int) -> list[bytes]:
     """Put the elements of included files in place of each ``<include>``; each file once, as MuJoCo has it.
 
-    Parameters
-    ----------
-    root : element
-        Top element of the document; changed.
-    file : Path
-        The document.
-    paths : AssetPaths
-        Says where files may be.
-    max_bytes : int
-        Of all included files together.
-
-    Returns
-    -------
-    contents : list of bytes
-        Of the included files.
-
-    Raises
-    ------
-    AssetError
-        When a file is missing, outside the allowed folders, included twice or not well formed, or all are too large.
+    Changes ``root``; returns the content of the included files, which may have ``max_bytes`` together. Raises
+    AssetError when one is missing, outside the allowed folders, included twice or not well formed, or all are too large.
     """
     reading = _Reading(file, paths, max_bytes, {file.resolve()})
     reading.expand(root, file.parent)

@@ -105,21 +105,7 @@ def is_mjcf(data: bytes, where: Path) -> bool:
 def safe_mjcf(data: bytes, file: Path, paths: AssetPaths, limits: LoadLimits, repairs: list[Repair]) -> SafeMjcf:
     """Make a document safe.
 
-    Parameters
-    ----------
-    data : bytes
-        Content of the file.
-    file : Path
-    paths : AssetPaths
-        Says where included files may be.
-    limits : LoadLimits
-    repairs : list of Repair
-        Added to.
-
-    Raises
-    ------
-    AssetError
-        When it is not well formed, names a file outside the allowed folders, or is over a limit.
+    Raises AssetError when it is not well formed, names a file outside the allowed folders, or is over a limit.
     """
     data, found = readable_xml(data, file)
     repairs += found

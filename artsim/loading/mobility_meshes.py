@@ -77,9 +77,6 @@ def part_meshes(
         Each part's name.
     links : collection of int
         Numbers of the bodies.
-    reader : MeshReader
-    repairs : list of Repair
-        Added to.
 
     Raises
     ------

@@ -28,17 +28,8 @@ from artsim.model.transforms import compose_transform
 def as_document(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> UrdfRobot:
     """Links and joints of an object.
 
-    Parameters
-    ----------
-    links : sequence of WorldLink
-        The world first, parents before children. A world that shows nothing and holds or frees one link is left out:
-        that link is the object's root.
-    file : Path
-        For messages.
-    repairs : list of Repair
-        Added to.
-    body : str, optional
-        Which object of a scene: see :func:`artsim.loading.scene_objects.chosen`.
+    ``links`` and ``body`` are those of :func:`artsim.loading.scene_objects.chosen`. A world that shows nothing and
+    holds or frees one link is left out: that link is the object's root.
 
     Raises
     ------

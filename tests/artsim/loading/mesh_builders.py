@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from artsim.loading.meshes import triangles
+from artsim.loading.mesh_files import Bounds, read_mesh
+from artsim.loading.meshes import LoadLimits
 
 WEDGE = ([[0, 0, 0], [0.1, 0, 0], [0.1, 0.2, 0], [0, 0.2, 0], [0, 0, 0.3], [0.1, 0, 0.3]],
          [[0, 3, 2], [0, 2, 1], [0, 1, 5], [0, 5, 4], [3, 4, 5], [3, 5, 2], [0, 4, 3], [1, 2, 5]])  # fmt: skip
@@ -25,6 +26,12 @@ def read(content: bytes | str, kind: str) -> tuple[np.ndarray, np.ndarray, str]:
     data = content.encode() if isinstance(content, str) else content
     vertices, faces, notes = triangles(data, kind, Path(f"m{kind}"))
     return vertices, faces, "\n".join(notes)
+
+
+def triangles(data: bytes, kind: str, where: Path) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Vertices, triangles and what is said of a mesh file, each by itself."""
+    surface = read_mesh(data, kind, Bounds(where, LoadLimits().max_faces))
+    return surface.vertices, surface.faces, surface.notes
 
 
 def area(vertices: np.ndarray, faces: np.ndarray) -> float:

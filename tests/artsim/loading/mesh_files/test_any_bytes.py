@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from artsim.errors import ArtsimError
 from artsim.loading.mesh_files import Bounds
-from artsim.loading.meshes import UnusableMeshError, triangles
-from tests.artsim.loading.mesh_builders import CORNERS, POINTS, SQUARE, WEDGE_DAE, dae, gltf
+from artsim.loading.meshes import UnusableMeshError
+from tests.artsim.loading.mesh_builders import CORNERS, POINTS, SQUARE, WEDGE_DAE, dae, gltf, triangles
 from tests.conftest import CASES
 
 CUBE = trimesh.creation.box()

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from artsim.loading.meshes import triangles
-from tests.artsim.loading.mesh_builders import area, volume
+from tests.artsim.loading.mesh_builders import area, triangles, volume
 from tests.conftest import installed
 
 
