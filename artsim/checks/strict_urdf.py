@@ -17,7 +17,7 @@ from artsim.errors import ArtsimError
 from artsim.loading.joint_xml import MOVING_TYPES
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.object_files import find_urdf, read_urdf
-from artsim.loading.urdf_document import Geometry, MeshFile
+from artsim.loading.urdf_document import MeshFile
 from artsim.loading.urdf_xml import safe_xml
 from artsim.model.convex_bodies import is_convex
 from artsim.model.kinematics import Array
@@ -99,7 +99,7 @@ def _convexity_problems(collision: etree._Element, reader: MeshReader) -> list[s
         return []
     name = mesh.get("filename") or ""
     try:
-        vertices, faces = reader.shape(Geometry(mesh=MeshFile(name)))
+        vertices, faces = reader.shape(MeshFile(name))
     except (UnusableMeshError, ArtsimError) as problem:
         return [str(problem)]
     return [] if is_convex(vertices, faces) else [f"mesh {name.rpartition('/')[2]!r} is not convex"]

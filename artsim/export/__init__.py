@@ -106,12 +106,7 @@ def export(
 
 
 def check_formats(formats: Sequence[str]) -> None:
-    """Refuse formats that cannot be written.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse formats that cannot be written; raises ConfigError."""
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown or not formats:
         raise ConfigError(f"cannot write formats {unknown}", "formats", f"name some of {', '.join(FORMATS)}")

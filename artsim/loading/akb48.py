@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from artsim.common.products import matmul
-from artsim.loading.urdf_document import UrdfRobot
+from artsim.loading.urdf_document import MeshFile, Shape, UrdfRobot
 from artsim.model.objects import Repair
 
 T_LINK_MESH = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -27,15 +27,11 @@ def with_meshes_of_unity(robot: UrdfRobot, repairs: list[Repair]) -> UrdfRobot:
     repairs : list of Repair
         Added to.
     """
-    links = [
-        replace(
-            link,
-            shapes=tuple(
-                replace(shape, origin=matmul(shape.origin, T_LINK_MESH)) if shape.geometry.mesh is not None else shape
-                for shape in link.shapes
-            ),
-        )
-        for link in robot.links
-    ]
+
+    def turned(shape: Shape) -> Shape:
+        is_file = isinstance(shape.geometry, MeshFile)
+        return replace(shape, origin=matmul(shape.origin, T_LINK_MESH)) if is_file else shape
+
+    links = [replace(link, shapes=tuple(map(turned, link.shapes))) for link in robot.links]
     repairs.append(Repair("meshes", "turned from Unity's axes to URDF's, as in AKB-48", note=True))
     return replace(robot, links=tuple(links))

@@ -6,10 +6,11 @@ before they are read. Each is read once, however often the URDF names it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -21,9 +22,9 @@ from artsim.loading.mesh_files import FORMATS, Bounds, Neighbour, Surface, Unusa
 from artsim.loading.mesh_files.gltf import Key, Owner, read_gltf_parts
 from artsim.loading.packages import AssetPaths, MissingFileError
 from artsim.loading.primitives import box, capsule, cylinder, sphere
-from artsim.loading.urdf_document import Geometry, MeshFile
+from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, InlineMesh, MeshFile, Sphere
 from artsim.model.kinematics import Array
-from artsim.model.objects import Repair
+from artsim.model.objects import Mesh, Repair
 from artsim.model.transforms import transform_points
 
 __all__ = [
@@ -36,10 +37,12 @@ __all__ = [
     "merge_shapes",
 ]
 
-_TRIANGLES = {"box": 12, "cylinder": 256, "capsule": 4096, "sphere": 5120}
-"""Of each primitive: round ones have 64 sides, a sphere is an icosahedron whose faces are divided four times."""
-
-
+_PRIMITIVES: dict[type, Callable[[Any], Mesh]] = {
+    Box: lambda shape: box(shape.size),
+    Cylinder: lambda shape: cylinder(shape.radius, shape.length),
+    Capsule: lambda shape: capsule(shape.radius, shape.length),
+    Sphere: lambda shape: sphere(shape.radius),
+}
 _LARGEST = 1e6
 """Metres, or units of a file in millimetres: squares and products of much larger coordinates overflow."""
 
@@ -62,12 +65,7 @@ class LoadLimits:
 
 
 def check_shapes(data: bytes, where: Path, limits: LoadLimits) -> None:
-    """Refuse a URDF file with too many shapes before it is parsed.
-
-    Raises
-    ------
-    AssetError
-    """
+    """Refuse a URDF file with too many shapes before it is parsed; raises AssetError."""
     count = data.count(b"<geometry")
     if count > limits.max_shapes:
         raise AssetError(
@@ -78,12 +76,7 @@ def check_shapes(data: bytes, where: Path, limits: LoadLimits) -> None:
 
 
 def check_range(vertices: Array, where: str) -> None:
-    """Refuse coordinates that nothing can be computed with.
-
-    Raises
-    ------
-    AssetError
-    """
+    """Refuse coordinates that nothing can be computed with; raises AssetError."""
     if not (np.abs(vertices) <= _LARGEST).all():
         raise AssetError(
             f"a coordinate is not finite, or over {_LARGEST:g}", where, "write sizes, origins and meshes in metres"
@@ -91,12 +84,7 @@ def check_range(vertices: Array, where: str) -> None:
 
 
 def check_copies(faces: int, where: Path, limits: LoadLimits) -> None:
-    """Refuse more triangles of meshes that are used again than are allowed.
-
-    Raises
-    ------
-    AssetError
-    """
+    """Refuse more triangles of meshes that are used again than are allowed; raises AssetError."""
     if faces > limits.max_copied_faces:
         raise AssetError(
             f"copies of its meshes have more than {limits.max_copied_faces} triangles",
@@ -142,23 +130,16 @@ class MeshReader:
         AssetError
             When a mesh lies outside the allowed folders or is over a limit.
         """
-        if geometry.mesh is not None:
-            return self._file(geometry.mesh)
-        if geometry.inline is not None:
-            self._count(len(geometry.inline.faces))
-            return geometry.inline.vertices, geometry.inline.faces
-        self._count(_TRIANGLES[str(geometry)])
-        if geometry.box is not None:
-            return box(geometry.box.size)
-        if geometry.sphere is not None:
-            return sphere(geometry.sphere.radius)
-        if geometry.cylinder is not None:
-            return cylinder(geometry.cylinder.radius, geometry.cylinder.length)
-        assert geometry.capsule is not None
-        return capsule(geometry.capsule.radius, geometry.capsule.length)
+        if isinstance(geometry, MeshFile):
+            return self._file(geometry)
+        if isinstance(geometry, InlineMesh):
+            vertices, faces = geometry.vertices, geometry.faces
+        else:
+            vertices, faces = _PRIMITIVES[type(geometry)](geometry)
+        self._count(len(faces))
+        return vertices, faces
 
     def _count(self, faces: int) -> None:
-        """Count triangles before they are made."""
         self.num_faces += faces
         if self.num_faces > self.limits.max_faces:
             raise AssetError(

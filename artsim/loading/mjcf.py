@@ -34,7 +34,7 @@ from artsim.loading.mjcf_equalities import EqualityReader
 from artsim.loading.mjcf_shapes import ShapeReader, Shapes, numbers, rotation
 from artsim.loading.mjcf_xml import SafeMjcf, safe_mjcf
 from artsim.loading.scene_objects import WORLD, WorldJoint, WorldLink
-from artsim.loading.urdf_document import Geometry, MeshFile, UrdfRobot
+from artsim.loading.urdf_document import MeshFile, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.loading.zero_pose import as_document
 from artsim.model.inertia import Inertia
@@ -66,7 +66,7 @@ def read_mjcf(
 def _read_mesh(filename: str, reader: MeshReader, file: Path) -> Mesh:
     """A mesh file's vertices and triangles, as they stand in the file."""
     try:
-        return reader.shape(Geometry(mesh=MeshFile(filename)))
+        return reader.shape(MeshFile(filename))
     except UnusableMeshError as problem:
         fix = getattr(problem.__cause__, "fix", "restore the file, or save it as .obj or .stl")
         raise AssetError(str(problem), file, fix) from problem

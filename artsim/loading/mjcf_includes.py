@@ -21,7 +21,8 @@ def put_included(root: etree._Element, file: Path, paths: AssetPaths, max_bytes:
     """Put the elements of included files in place of each ``<include>``; each file once, as MuJoCo has it.
 
     Changes ``root``; returns the content of the included files, which may have ``max_bytes`` together. Raises
-    AssetError when one is missing, outside the allowed folders, included twice or not well formed, or all are too large.
+    AssetError when one is missing, outside the allowed folders, included twice or not well formed, or they are too
+    large.
     """
     reading = _Reading(file, paths, max_bytes, {file.resolve()})
     reading.expand(root, file.parent)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -179,16 +178,16 @@ class ShapeReader:
         types, kind = self._types, self._model.geom_type[g]
         size = self._model.geom_size[g].copy()
         if kind == types.mjGEOM_MESH:
-            return Geometry(inline=self._mesh(int(self._model.geom_dataid[g])))
+            return self._mesh(int(self._model.geom_dataid[g]))
         if kind == types.mjGEOM_BOX:
-            return Geometry(box=Box(2.0 * size))
+            return Box(2.0 * size)
         if kind == types.mjGEOM_SPHERE:
-            return Geometry(sphere=Sphere(float(size[0])))
+            return Sphere(float(size[0]))
         if kind == types.mjGEOM_CAPSULE:
-            return Geometry(capsule=Capsule(float(size[0]), 2.0 * float(size[1])))
+            return Capsule(float(size[0]), 2.0 * float(size[1]))
         if kind == types.mjGEOM_CYLINDER:
-            return Geometry(cylinder=Cylinder(float(size[0]), 2.0 * float(size[1])))
-        return Geometry(inline=InlineMesh("ellipsoid", *ellipsoid(size)))
+            return Cylinder(float(size[0]), 2.0 * float(size[1]))
+        return InlineMesh("ellipsoid", *ellipsoid(size))
 
     def _mesh(self, mesh: int) -> InlineMesh:
         if mesh not in self._meshes:
@@ -210,15 +209,14 @@ class ShapeReader:
 
     def _convex(self, g: int) -> Geometry:
         """A geom as MuJoCo lets it collide: a mesh as its convex hull, which is made once."""
-        geometry = self._geometry(g)
-        mesh = geometry.inline
-        if mesh is None or self._model.geom_type[g] != self._types.mjGEOM_MESH:
-            return geometry
+        mesh = self._geometry(g)
+        if not isinstance(mesh, InlineMesh) or self._model.geom_type[g] != self._types.mjGEOM_MESH:
+            return mesh
         number = int(self._model.geom_dataid[g])
         if number not in self._hulls:
             convex = is_convex(mesh.vertices, mesh.faces)
             self._hulls[number] = mesh if convex else InlineMesh(mesh.name, *convex_hull(mesh.vertices, _THIN))
-        return replace(geometry, inline=self._hulls[number])
+        return self._hulls[number]
 
 
 def numbers(enumeration: Any) -> SimpleNamespace:

@@ -152,12 +152,7 @@ def _point(value: object, key: str, own: int, where: str, repairs: list[Repair])
 
 
 def _checked(bodies: list[_Body], file: Path) -> list[_Body]:
-    """The bodies, each with a number of its own and a parent that is there.
-
-    Raises
-    ------
-    AssetError
-    """
+    """The bodies, each with a number of its own and a parent that is there; raises AssetError."""
     numbers = Counter(body.number for body in bodies)
     for body in bodies:
         where = f"{file}: body {body.number}"

@@ -133,7 +133,7 @@ def _of_scene(
     found: dict[str, dict[int, list[Geometry]]] = {"part": {}, "link": {}}
     for (kind, number), surface in surfaces.items():
         mesh = InlineMesh(f"{kind} {number} of {scene.name}", surface.vertices, surface.faces)
-        found[kind][number] = [Geometry(inline=mesh)]
+        found[kind][number] = [mesh]
     return PartMeshes(found["part"], f"in {scene.name}", found["link"])
 
 
@@ -221,7 +221,7 @@ def _mesh(folder: str, stem: str, root: Path) -> Geometry:
     """The mesh of a name without an ending, of whatever format there is; the reader keeps it inside."""
     names = (stem, *(f"{stem}{suffix}" for suffix in FORMATS)) if "." in stem else [f"{stem}{s}" for s in FORMATS]
     name = next((f"{folder}/{name}" for name in names if is_file(root / folder / name)), f"{folder}/{stem}.obj")
-    return Geometry(mesh=MeshFile(name))
+    return MeshFile(name)
 
 
 def _of_files(file: Path, names: Mapping[int, str]) -> PartMeshes | None:
@@ -233,7 +233,7 @@ def _of_files(file: Path, names: Mapping[int, str]) -> PartMeshes | None:
             # PartNet's own original-7.obj is no part 7: without result.json it is anyone's.
             ours = own in names and not path.stem.startswith(("original-", "new-"))
             if own is not None and ours and path.suffix.lower() in FORMATS:
-                found.setdefault(own, []).append(Geometry(mesh=MeshFile(path.relative_to(file.parent).as_posix())))
+                found.setdefault(own, []).append(MeshFile(path.relative_to(file.parent).as_posix()))
         if found:
             return PartMeshes(found, f"in {folder or 'the folder'}")
     return None
@@ -250,7 +250,7 @@ def _of_urdf(file: Path) -> PartMeshes | None:
         number = re.fullmatch(r".*-(\d{1,18})", visual.get("name") or "", re.DOTALL)
         mesh = visual.find("geometry/mesh")
         if number is not None and mesh is not None and mesh.get("filename"):
-            found.setdefault(int(number[1]), []).append(Geometry(mesh=MeshFile(str(mesh.get("filename")))))
+            found.setdefault(int(number[1]), []).append(MeshFile(str(mesh.get("filename"))))
     return PartMeshes(found, f"in {path.name}", contents=[data]) if found else None
 
 

@@ -22,6 +22,7 @@ from artsim.loading.mesh_files.obj import read_painted
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError
 from artsim.loading.object_files import read_urdf
 from artsim.loading.partnet import read_side_files
+from artsim.loading.urdf_document import MeshFile
 from artsim.model.appearance import Coat, Colour, Material
 from artsim.model.appearance.textures import Image
 from artsim.model.objects import ArticulatedObject
@@ -83,9 +84,9 @@ def _meshes_of_links(file: Path) -> dict[tuple[str, ...], list[Path]]:
         paths = []
         for name in body.links:
             for shape in links[name].shapes:
-                if shape.geometry.mesh is None:
+                if not isinstance(shape.geometry, MeshFile):
                     raise UnusableMeshError("primitives have no material file")
-                paths.append(reader.resolve(shape.geometry.mesh.filename))
+                paths.append(reader.resolve(shape.geometry.filename))
         found[tuple(body.links)] = paths
     return found
 

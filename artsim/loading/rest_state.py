@@ -107,6 +107,12 @@ class _Shape:
         low, high = self.tree.limits[k]
         return np.linspace(low, high, _STATES)
 
+    def best(self, cost: Callable[[float], float], k: int) -> float:
+        """The least-cost state of a joint."""
+        states = self.states(k)
+        state = states[np.argmin([cost(state) for state in states])]
+        return self.refined(cost, k, float(state), float(states[1] - states[0]))
+
     def refined(self, cost: Callable[[float], float], k: int, state: float, reach: float) -> float:
         """The least-cost state within reach of one, cut to the limits."""
         from scipy.optimize import minimize_scalar
@@ -153,9 +159,7 @@ def _covering_flap(shape: _Shape, k: int) -> float | None:
         low, high = flap.min(axis=0), flap.max(axis=0)
         return float(high[2] - low[2] + norm(0.5 * (low + high)[:2] - body[:2]))
 
-    states = shape.states(k)
-    best = states[np.argmin([cost(state) for state in states])]
-    return shape.refined(cost, k, float(best), float(states[1] - states[0]))
+    return shape.best(cost, k)
 
 
 def _folded(shape: _Shape, k: int) -> float | None:
@@ -200,9 +204,7 @@ def _upright_handle(shape: _Shape, k: int) -> float | None:
     def cost(state: float) -> float:
         return -float(shape.posed(k, state)[k][:, 2].mean())
 
-    states = shape.states(k)
-    best = states[np.argmin([cost(state) for state in states])]
-    upright = shape.refined(cost, k, float(best), float(states[1] - states[0]))
+    upright = shape.best(cost, k)
     zero = float(shape.rest[k])
     return zero if abs(upright - zero) < _UPRIGHT else upright
 

@@ -17,7 +17,7 @@ from artsim.errors import AssetError
 from artsim.loading.json_values import text, triple
 from artsim.loading.meshes import MeshReader
 from artsim.loading.scene_objects import WorldJoint, WorldLink
-from artsim.loading.urdf_document import Geometry, MeshFile, Shape, UrdfRobot
+from artsim.loading.urdf_document import MeshFile, Shape, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.loading.zero_pose import as_document
 from artsim.model.objects import Repair
@@ -61,7 +61,7 @@ def read_shape2motion(
 
 def _link(node: dict[str, Any], parent: int, where: str, file: Path, repairs: list[Repair]) -> WorldLink:
     name = text(node.get("dof_name"), "dof_name", where)
-    shape = Shape(Geometry(mesh=MeshFile(f"part_objs/{_ROOT_MESH if parent < 0 else name}.obj")), np.eye(4))
+    shape = Shape(MeshFile(f"part_objs/{_ROOT_MESH if parent < 0 else name}.obj"), np.eye(4))
     if parent < 0:
         return WorldLink(name, shapes=[shape])
     kind = str(node.get("motion_type"))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,20 @@ from artsim.model.kinematics import Array
 from artsim.model.objects import UNKNOWN_DYNAMICS, JointDynamics
 
 
+class _Primitive:
+    def __str__(self) -> str:
+        return type(self).__name__.lower()
+
+
 @dataclass(frozen=True)
-class Box:
+class Box(_Primitive):
     """Centred box of (3,) side lengths; one of them may be 0."""
 
     size: Array
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(_Primitive):
     """Centred cylinder along z."""
 
     radius: float
@@ -32,7 +38,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
-class Capsule:
+class Capsule(_Primitive):
     """Centred capsule along z: ``length`` is that of the cylinder between the two half spheres."""
 
     radius: float
@@ -40,7 +46,7 @@ class Capsule:
 
 
 @dataclass(frozen=True)
-class Sphere:
+class Sphere(_Primitive):
     """Centred sphere."""
 
     radius: float
@@ -53,6 +59,9 @@ class MeshFile:
     filename: str
     scale: Array | None = None
 
+    def __str__(self) -> str:
+        return f"mesh {self.filename!r}"
+
 
 @dataclass(frozen=True, eq=False)
 class InlineMesh:
@@ -62,24 +71,12 @@ class InlineMesh:
     vertices: Array
     faces: NDArray[np.int32]
 
-
-@dataclass(frozen=True)
-class Geometry:
-    """A shape of a link; one field is set."""
-
-    box: Box | None = None
-    cylinder: Cylinder | None = None
-    capsule: Capsule | None = None
-    sphere: Sphere | None = None
-    mesh: MeshFile | None = None
-    inline: InlineMesh | None = None
-
     def __str__(self) -> str:
-        if self.mesh is not None:
-            return f"mesh {self.mesh.filename!r}"
-        if self.inline is not None:
-            return f"mesh {self.inline.name!r}"
-        return next(name for name, shape in vars(self).items() if shape is not None)
+        return f"mesh {self.name!r}"
+
+
+Geometry: TypeAlias = Box | Cylinder | Capsule | Sphere | MeshFile | InlineMesh
+"""A shape of a link."""
 
 
 @dataclass(frozen=True)

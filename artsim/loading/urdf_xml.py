@@ -150,21 +150,21 @@ def _read_shape(visual: etree._Element, element: Element) -> Shape | None:
 
 def _read_geometry(shape: etree._Element, kind: str, element: Element) -> Geometry:
     if kind == "mesh":
-        return Geometry(mesh=_read_mesh(shape, element))
+        return _read_mesh(shape, element)
     if kind == "box":
         size = element.finite(shape, "size", 3, own=True)
         if (size < 0).any() or (size > 0).sum() < 2:  # a flat one is a surface
             raise EmptyShapeError(f"<box> of size {' '.join(f'{s:g}' for s in size)} has no extent")
-        return Geometry(box=Box(size))
+        return Box(size)
     radius = float(element.finite(shape, "radius", 1)[0])
     length = 0.0 if kind == "sphere" else float(element.finite(shape, "length", 1)[0])
     if not (radius > 0 and length >= 0):
         raise EmptyShapeError(f"<{kind}> of radius {radius:g} and length {length:g} has no extent")
     if kind == "sphere":
-        return Geometry(sphere=Sphere(radius))
+        return Sphere(radius)
     if kind == "capsule" and length > 0:
-        return Geometry(capsule=Capsule(radius, length))
-    return Geometry(cylinder=Cylinder(radius, length)) if kind == "cylinder" else Geometry(sphere=Sphere(radius))
+        return Capsule(radius, length)
+    return Cylinder(radius, length) if kind == "cylinder" else Sphere(radius)
 
 
 def _read_mesh(mesh: etree._Element, element: Element) -> MeshFile:

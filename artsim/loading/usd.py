@@ -34,7 +34,7 @@ from artsim.loading import primitives
 from artsim.loading.meshes import LoadLimits
 from artsim.loading.reader_process import Reader, read_apart
 from artsim.loading.scene_objects import WorldLink
-from artsim.loading.urdf_document import Geometry, InlineMesh, MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
+from artsim.loading.urdf_document import InlineMesh, MimicRelation, Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.usd_bodies import StageReader
 from artsim.loading.usd_joints import read_joints
 from artsim.loading.usd_layers import open_stage, unreadable
@@ -80,7 +80,7 @@ def _prepare() -> None:
 
 READER = Reader(
     f"{__name__}:READER", _read, _prepare, "usd-core",
-    (UrdfRobot, UrdfLink, UrdfJoint, Shape, Geometry, InlineMesh, MimicRelation, JointDynamics, Inertia, Repair),
+    (UrdfRobot, UrdfLink, UrdfJoint, Shape, InlineMesh, MimicRelation, JointDynamics, Inertia, Repair),
 )  # fmt: skip
 
 
@@ -97,7 +97,7 @@ def _show_something(links: list[WorldLink], file: Path, repairs: list[Repair]) -
         if link.inertia is not None and link.inertia.mass > 0:
             T_world_box, size = _box_of(link.inertia)
             if size.min() > 0:
-                link.shapes = [Shape(Geometry(inline=InlineMesh(link.name, *primitives.box(size))), T_world_box)]
+                link.shapes = [Shape(InlineMesh(link.name, *primitives.box(size)), T_world_box)]
     if not any(link.shapes for link in links):
         raise AssetError(
             "no prim of the object is a surface, and no body has a mass and an inertia",

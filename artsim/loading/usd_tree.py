@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.names import unused_name
 from artsim.common.products import matmul, unit
 from artsim.loading.scene_objects import WorldJoint, WorldLink
-from artsim.loading.urdf_document import Geometry, InlineMesh, Shape
+from artsim.loading.urdf_document import InlineMesh, Shape
 from artsim.loading.usd_bodies import StageReader, UsdBody
 from artsim.loading.usd_dynamics import read_dynamics, read_inertia
 from artsim.loading.usd_joints import FreeAxis, UsdJoint
@@ -203,9 +203,7 @@ class _Tree:
 
     def _link(self, body: int, parent: int, joint: WorldJoint | None) -> WorldLink:
         reader, found, T_world_zero = self._reader, self._reader.bodies[body], self._T_world_zero[body]
-        shapes, collision = (
-            [Shape(Geometry(inline=mesh), T_world_zero) for mesh in meshes] for meshes in (found.shown, found.solid)
-        )
+        shapes, collision = ([Shape(mesh, T_world_zero) for mesh in meshes] for meshes in (found.shown, found.solid))
         inertia = None
         if found.prim is not None:
             solid = [(mesh.vertices, mesh.faces) for mesh in found.solid]

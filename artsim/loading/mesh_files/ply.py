@@ -92,12 +92,7 @@ def read_ply(data: bytes, bounds: Bounds) -> Surface:
 
 
 def read_header(data: bytes) -> tuple[str, list[Element], int]:
-    """Byte order ("" for text), elements, and where their values begin.
-
-    Raises
-    ------
-    UnusableMeshError
-    """
+    """Byte order ("" for text), elements, and where their values begin; raises UnusableMeshError."""
     found = re.search(rb"(?:^|[\r\n])end_header[ \t]*(\r\n|\r|\n)", data[:_MAX_HEADER])
     if not data.startswith(b"ply") or found is None:
         raise UnusableMeshError("has no PLY header")

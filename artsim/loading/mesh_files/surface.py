@@ -75,12 +75,7 @@ class Bounds:
     max_faces: int
 
     def check(self, count: int, what: str) -> None:
-        """Refuse more than ``max_faces`` of something.
-
-        Raises
-        ------
-        AssetError
-        """
+        """Refuse more than ``max_faces`` of something; raises AssetError."""
         limit = self.max_faces if what == "triangles" else max(self.max_faces, _FEW)
         if count > limit:
             raise AssetError(
@@ -90,12 +85,7 @@ class Bounds:
             )
 
     def check_pieces(self, count: int) -> None:
-        """Refuse too many primitives, or copies of them.
-
-        Raises
-        ------
-        AssetError
-        """
+        """Refuse too many primitives, or copies of them; raises AssetError."""
         if count > _MAX_PIECES:
             raise AssetError(
                 f"the mesh is made up of {_readable(count)} pieces, over the limit of {_MAX_PIECES}",
