@@ -41,7 +41,7 @@ def ancsh_stages(options: TrainOptions) -> list[Any]:
     ]
 
 
-def coordinate_loss(network: nn.Module, clouds: Clouds, truth: Truth) -> tuple[Tensor, dict[str, float]]:
+def coordinate_loss(network: nn.Module, clouds: Clouds, truth: Truth, whole: Truth) -> tuple[Tensor, dict[str, float]]:
     """Distances of the predicted places from the true ones, and the overlap of parts."""
     said = network(clouds.points)
     naocs = truth.canonical + 0.5
@@ -67,7 +67,7 @@ def miou_loss(logits: Tensor, part: Tensor) -> Tensor:
     return 1.0 - (overlap.sum(1) / present.sum(1)).mean()
 
 
-def joint_loss(network: nn.Module, clouds: Clouds, truth: Truth) -> tuple[Tensor, dict[str, float]]:
+def joint_loss(network: nn.Module, clouds: Clouds, truth: Truth, whole: Truth) -> tuple[Tensor, dict[str, float]]:
     """Errors of the votes of those points that are to vote, and of which joint they vote for."""
     said = network(clouds.points)
     joint, axis, offset, heat = joint_targets(truth)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
+from artperl.core.clouds import Clouds
 from artperl.data.truth import Truth
 from artperl.perception.network import Perceived, Votes
 
@@ -19,6 +20,17 @@ _THIN = 0.1
 
 _JOINT_SHARP = 0.2
 """Huber loss of joints turns linear there."""
+
+
+def perception_loss(
+    network: nn.Module, clouds: Clouds, truth: Truth, whole: Truth
+) -> tuple[Tensor, dict[str, float]]:  # fmt: skip
+    """Sum of :func:`perception_losses`, and figures for people: a :data:`artperl.training.supervised.Loss`."""
+    perceived, share = network(clouds.points), len(truth) / len(whole)
+    with torch.autocast(truth.part.device.type, enabled=False):
+        losses = {name: loss / share for name, loss in perception_losses(perceived, truth, whole).items()}
+        figures = {name: loss.item() for name, loss in losses.items()} | perception_figures(perceived, truth)
+        return torch.stack(list(losses.values())).sum(), figures
 
 
 def perception_losses(perceived: Perceived | Votes, truth: Truth, whole: Truth | None = None) -> dict[str, Tensor]:

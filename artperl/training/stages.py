@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from torch import nn
@@ -20,8 +21,9 @@ from artperl.training.objects import TrainingObjects
 from artperl.training.omad_stages import omad_estimator, omad_run_networks, omad_stages
 from artperl.training.options import TrainOptions
 from artperl.training.paper_stages import paper_estimator, paper_networks, paper_stages
-from artperl.training.perception import PerceptionStage
+from artperl.training.perception_losses import perception_loss
 from artperl.training.sporeagent_stages import sporeagent_estimator, sporeagent_run_networks, sporeagent_stages
+from artperl.training.supervised import SupervisedStage
 from artperl.training.validation import Calibration, Validation
 
 
@@ -75,23 +77,15 @@ def stages_of(options: TrainOptions) -> list[Stage]:
     return PROGRAMMES[options.method].stages(options)
 
 
-def perception_stages(options: TrainOptions) -> list[Stage]:
-    """Perception on clouds of few points, then on denser ones, fewer at a time."""
-    points, clouds = options.num_points, options.batch_size
-    return [
-        PerceptionStage("perception", options.perception_steps, points, clouds, options.seed),
-        PerceptionStage(
-            "dense", options.dense_steps, points * options.denser, max(1, clouds // options.denser), options.seed + 3
-        ),
-    ]
-
-
 def _full_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     return {"perception": Perception(num_rows, options.width, options.votes)}
 
 
 def _full_stages(options: TrainOptions) -> list[Stage]:
-    return [*perception_stages(options), Validation(), BoxStage(), Calibration()]
+    """Perception on clouds of few points, then on denser ones, fewer at a time; boxes; the confidence."""
+    learn = partial(SupervisedStage, network="perception", loss=perception_loss, validated=True)
+    dense = learn("dense", steps="dense_steps", dense=True)
+    return [learn("perception"), dense, Validation(), BoxStage(), Calibration()]
 
 
 def _full_estimator(context: Context) -> Estimator:

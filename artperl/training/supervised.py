@@ -18,8 +18,10 @@ from artperl.training.steps import one_cycle, set_rate
 from artperl.training.validation import goes_on, step_taken
 from artsim.common.progress import track
 
-Loss = Callable[[nn.Module, Clouds, Truth], tuple[Tensor, dict[str, float]]]
-"""Of a network, clouds and their truth: what is to be low, and figures that tell people how it learns."""
+Loss = Callable[[nn.Module, Clouds, Truth, Truth], tuple[Tensor, dict[str, float]]]
+"""Of a network, clouds, their truth, and that of the batch that they are some of: what is to be low, and figures that
+tell people how it learns. Both are means over the clouds, so that means of all processes add up to those of the batch.
+"""
 
 Taken = tuple[dict[str, float], str | None]
 """Of a step that was taken: figures for the curves, and a line for people where there is a new one."""
@@ -30,7 +32,7 @@ SAVE_STEPS = 100
 
 @dataclass(frozen=True)
 class SupervisedStage:
-    """A stage of ``perception_steps`` batches of fresh clouds.
+    """A stage of batches of fresh clouds.
 
     Attributes
     ----------
@@ -38,46 +40,51 @@ class SupervisedStage:
         Of the stage.
     network : str
     loss : Loss
-        A mean over clouds.
     validated : bool
         Whether the estimator is validated at intervals: where no later stage learns.
+    steps : str
+        Option that says how many batches.
+    dense : bool
+        Whether clouds are fewer and denser: of as many points as the estimator looks at.
     """
 
     name: str
     network: str
     loss: Loss
     validated: bool = False
+    steps: str = "perception_steps"
+    dense: bool = False
 
     @property
     def lengths(self) -> dict[str, str]:
         """See :class:`artperl.training.stages.Stage`."""
-        return {self.name: "perception_steps"}
+        return {self.name: self.steps}
 
     def run(self, context: Context) -> None:
         """Take the steps that are left."""
-        take_steps(
-            context, self.name, self.network, context.options.perception_steps, self._learn, validated=self.validated
-        )
+        total = getattr(context.options, self.steps)
+        take_steps(context, self.name, self.network, total, self._learn, validated=self.validated)
 
     def _learn(self, context: Context, first: int) -> Iterator[Taken]:
-        options = context.options
+        options, ranks, total = context.options, context.ranks, getattr(context.options, self.steps)
         network, optimizer = context.state.networks[self.network], context.state.optimizers[self.network]
-        ranks = context.ranks
+        denser = options.denser if self.dense else 1
         data = batches(
-            context.objects.data, context.objects.num_rows, options.num_points, options.batch_size, first, options.seed,
-            context.workers, (ranks.rank, ranks.count), ranks.in_turn,
+            context.objects.data, context.objects.num_rows, denser * options.num_points,
+            max(1, options.batch_size // denser), first, options.seed + (3 if self.dense else 0), context.workers,
+            (ranks.rank, ranks.count), ranks.in_turn,
         )  # fmt: skip
-        for step in range(first, options.perception_steps):
-            clouds, truth = next(data)
-            own = ranks.rows(len(truth))
-            share = (own.stop - own.start) / len(truth)
-            set_rate(optimizer, options.perception_rate * one_cycle(step, options.perception_steps))
+        for step in range(first, total):
+            clouds, whole = next(data)
+            own = ranks.rows(len(whole))
+            share, truth = (own.stop - own.start) / len(whole), whole[own].to(context.device)
+            set_rate(optimizer, options.perception_rate * one_cycle(step, total))
             with autocast(context.device, options.mixed_precision):
-                loss, figures = self.loss(network, clouds[own].to(context.device), truth[own].to(context.device))
+                loss, figures = self.loss(network, clouds[own].to(context.device), truth, whole.to(context.device))
             descend(optimizer, network, share * loss, ranks)
             means = {"loss": loss.item(), **figures}
             means = dict(zip(means, ranks.add([share * value for value in means.values()]), strict=True))
-            yield means, told({name: means[name] for name in figures})
+            yield means, told({name: means[name] for name in ("loss", "accuracy") if name in means})
 
 
 def told(figures: dict[str, float]) -> str:
@@ -85,7 +92,9 @@ def told(figures: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.3g}" for name, value in figures.items())
 
 
-def segmentation_loss(network: nn.Module, clouds: Clouds, truth: Truth) -> tuple[Tensor, dict[str, float]]:
+def segmentation_loss(
+    network: nn.Module, clouds: Clouds, truth: Truth, whole: Truth
+) -> tuple[Tensor, dict[str, float]]:
     """Cross-entropy of the parts of points."""
     logits = network(clouds.points).float()
     loss = nn.functional.cross_entropy(logits.flatten(0, 1), truth.part.flatten())
