@@ -17,8 +17,7 @@ from torch import Tensor
 from artperl.core.batch import Batch
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate, points_at_rest
-from artperl.core.kd_tree import KDTree
-from artperl.core.neighbours import planes
+from artperl.core.neighbours import planes, tree_of
 from artperl.perception.network import Perceived
 from artperl.perception.preprocess import Cloud
 
@@ -136,7 +135,7 @@ class Evidence(Batch):
 def roughness(points: Tensor) -> Tensor:
     """() median distance, root mean square, of some of the points (N, 3) and their neighbours from planes, metres."""
     cloud, count = points.double().numpy(), min(_NEIGHBOURS, len(points))
-    spread = planes(cloud, KDTree.of(cloud).nearest(cloud[:_LOOKED_AT], count)[1])[0]
+    spread = planes(cloud, tree_of(cloud).query(cloud[:_LOOKED_AT], range(1, count + 1))[1])[0]
     return torch.from_numpy(np.sqrt(spread[:, 0].clip(min=0.0) / count)).median().to(points.dtype)
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from artperl.core.confidence import Calibration, PartCalibration, PartSymptoms, Symptoms
-from artperl.core.kd_tree import KDTree
+from artperl.core.neighbours import tree_of
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import KINDS
@@ -240,7 +240,8 @@ def visibility(shapes: Shapes, observed: Observed, posed: Posed) -> Array:
     seen = np.zeros(len(points))
     cloud, part = observed.points[0].numpy(), observed.part[0].numpy()
     for k in np.unique(part):
-        near = KDTree.of(cloud[part == k]).nearest(points[k], 1, _SEEN * float(shapes.diagonal[0]))[0]
+        within = _SEEN * float(shapes.diagonal[0])
+        near = tree_of(cloud[part == k]).query(points[k], distance_upper_bound=within)[0]
         seen[k] = np.isfinite(near).mean()
     return seen
 

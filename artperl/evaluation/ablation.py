@@ -64,7 +64,6 @@ STAGES: dict[str, Change] = {
     "more than one reference": _options(references=1),
     "beam search": _options(beam=0),
     "outline term": _refinement(outline_weight=0.0),
-    "hidden parts": _options(occluded_parts=False),
     "normal alignment": _options(normal_alignment=False),
     "network for boxes": lambda whole: replace(whole, boxes=None),
 }

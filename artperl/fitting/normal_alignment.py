@@ -13,8 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from artperl.core.kd_tree import KDTree
-from artperl.core.neighbours import planes
+from artperl.core.neighbours import planes, tree_of
 from artperl.core.pose import Theta, clamp_state, pose_parts
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.shapes import Shapes
@@ -43,7 +42,7 @@ def normals_of(points: Array) -> tuple[NDArray[np.int64], Array]:
     Normals have either sign.
     """
     count = min(_NEIGHBOURS, len(points))
-    spread, normal = planes(points, KDTree.of(points).nearest(points[:_LOOKED_AT], count)[1])
+    spread, normal = planes(points, tree_of(points).query(points[:_LOOKED_AT], range(1, count + 1))[1])
     flat = np.flatnonzero((spread[:, 0] < _FLAT**2 * spread[:, 1]) & (spread[:, 1] > 0.0))
     return flat, normal[flat]
 

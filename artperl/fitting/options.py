@@ -32,8 +32,6 @@ class EstimatorOptions:
     """Mixes of joint states that are followed down a tree with chains of three joints and more; 0 goes without."""
     refine: RefineOptions = field(default_factory=RefineOptions)
     """The last refinement."""
-    occluded_parts: bool = True
-    """Parts that hardly show turn to where no more of them would be seen: :mod:`artperl.fitting.occluded_parts`."""
     normal_alignment: bool = True
     """In the end, parts turn until their flat surfaces face along their axes:
     :mod:`artperl.fitting.normal_alignment`."""

@@ -43,6 +43,8 @@ WEIGHTS = Path(__file__).parents[1] / "weights"
 _FORMAT = 4
 _AGAIN = "train it again"
 _SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
+_GONE = {"occluded_parts"}
+"""Options that files of former versions may name: they are passed over."""
 
 
 def save_estimator(estimator: Estimator | Stored, folder: Path, about: Mapping[str, Any]) -> None:
@@ -153,7 +155,9 @@ def load_estimator(
             from_json_values(_PerceptionSize, settings.get("perception")),
             None if settings.get("boxes") is None else from_json_values(_BoxesSize, settings["boxes"]),
         )
-        options = replace(from_json_values(EstimatorOptions, settings.get("options")), **changes)
+        told = settings.get("options")
+        known = {name: told[name] for name in told if name not in _GONE} if isinstance(told, dict) else told
+        options = replace(from_json_values(EstimatorOptions, known), **changes)
         calibration = from_json_values(Calibration, settings.get("calibration"))
         part_calibration = from_json_values(PartCalibration, settings.get("part_calibration"))
     except ValueError as error:

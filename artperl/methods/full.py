@@ -23,7 +23,6 @@ from artperl.core.estimate import Estimate, estimate_of_fit, widen
 from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import Context
 from artperl.fitting.normal_alignment import align_normals
-from artperl.fitting.occluded_parts import pose_occluded_parts
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import Fit, find_fit
@@ -40,7 +39,7 @@ from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ArtsimError
 
 _LATE_POINTS = 8192
-"""Points that occluded parts and normals are posed by."""
+"""Points that tell normals."""
 _OWN = 0.9
 """Probability from which a point is taken for one of the object: a foreign point moves faces of boxes, while a point of
 the object that is left out is missed by nobody."""
@@ -144,14 +143,11 @@ class Estimator:
         fit = find_fit(Context(seen, clouds, perceived, found, options), clock).to("cpu")
         with clock("labels"):
             part = cloud.for_every_point(fit.observed.part[0].numpy(), -1)
-            some = cloud.some(_LATE_POINTS)
-            late = cloud.points[some], part[some]
-        if options.occluded_parts:
-            with clock("occluded parts"):
-                fit = replace(fit, theta=pose_occluded_parts(fit.shapes, fit.theta, *late))
         if options.normal_alignment:
             with clock("normals"):
-                fit = replace(fit, theta=align_normals(fit.shapes, fit.theta, *late))
+                some = cloud.some(_LATE_POINTS)
+                theta = align_normals(fit.shapes, fit.theta, cloud.points[some], part[some])
+                fit = replace(fit, theta=theta)
         with clock("report"):
             estimate = estimate_of_fit(fit.shapes, fit.observed, [fit.start, fit.theta], part)
             center, size = widen(estimate.rotation, estimate.translation, estimate.size, cloud.points, part)

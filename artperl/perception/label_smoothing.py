@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.core.clouds import Clouds
-from artperl.core.kd_tree import KDTree
-from artperl.core.neighbours import planes
+from artperl.core.neighbours import planes, tree_of
 from artperl.perception.network import Perceived, Votes
 from artsim.common.compiled import compiled
 
@@ -70,11 +69,10 @@ class Walks:
     @staticmethod
     def of(points: Array, diagonal: float) -> Walks:
         """Walks among points (N, 3) of an object with such a diagonal, in the unit of the points."""
-        tree = KDTree.of(points)
-        here = tree.points
-        near = np.argsort(tree.order)[tree.nearest(here, min(_NEIGHBOURS + 1, len(points)))[1]]
-        normal = planes(here, near)[1]
-        return Walks(tree.order, *_steps(here, near, normal, _STEP * diagonal))
+        tree = tree_of(points)
+        here = points[tree.indices]
+        near = np.argsort(tree.indices)[tree.query(here, range(1, min(_NEIGHBOURS + 1, len(points)) + 1))[1]]
+        return Walks(tree.indices, *_steps(here, near, planes(here, near)[1], _STEP * diagonal))
 
     def mean_of_ends(self, values: Array) -> Array:
         """(N, P) mean of values (N, P) over where walks from each point end."""

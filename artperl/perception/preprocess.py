@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from artperl.core.clouds import draw, is_measured
-from artperl.core.kd_tree import KDTree
+from artperl.core.neighbours import tree_of
 from artsim.errors import ArtsimError
 
 Array = NDArray[np.float64]
@@ -95,7 +95,8 @@ class Cloud:
     @cached_property
     def _nearest(self) -> NDArray[np.int64]:
         """(G,) of the seen points, the nearest to each that shows the object."""
-        return KDTree.of(self.seen).nearest(self.points[self.good], 1)[1][:, 0]
+        nearest: NDArray[np.int64] = tree_of(self.seen).query(self.points[self.good])[1]
+        return nearest
 
     def for_every_point(self, values: NDArray[Any], outlier: Any) -> NDArray[Any]:
         """(N, ...) of values (M, ...) of the seen points, that of the nearest; outliers have one of their own."""
@@ -145,11 +146,11 @@ def clean(points: Array) -> NDArray[np.int64]:
     good = good[_as_seen(points[good])]
     if len(good) > _NEIGHBOURS:
         known = good[draw(len(good), min(_CLEANED, len(good)), np.random.default_rng(0))]
-        tree = KDTree.of(points[known])
-        usual = np.sqrt(np.median(tree.nearest(points[known[:1024]], _NEIGHBOURS + 1)[0][:, -1]))
+        tree = tree_of(points[known])
+        usual = np.median(tree.query(points[known[:1024]], _NEIGHBOURS + 1)[0][:, -1])
         within = max(_OUTLIER * usual, 1e-9)
         alone = ~_is_crowded(points[good], points[known], within)
-        apart = tree.nearest(points[good[alone]], _FEW_NEIGHBOURS + 1, within)[0][:, -1]
+        apart = tree.query(points[good[alone]], _FEW_NEIGHBOURS + 1, distance_upper_bound=within)[0][:, -1]
         alone[alone] = ~np.isfinite(apart)
         good = good[~alone]
     if len(good) < _FEWEST or np.ptp(points[good], axis=0).max() < _SMALLEST:
