@@ -29,7 +29,7 @@ from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.estimate import Estimate
 from artperl.data.categories import ARTIMAGE, objects_of
-from artperl.evaluation import metrics
+from artperl.evaluation import box_overlap, metrics
 from artperl.evaluation.artimage import real_objects
 from artperl.evaluation.benchmark import find_estimator
 from artperl.evaluation.metrics import rest_centers, true_poses
@@ -180,7 +180,9 @@ def moving_parts(estimate: Estimate, sample: Sample) -> list[dict[str, float]]:
     """Figures of each moving part."""
     rotation, center = true_poses(sample)
     off = metrics.rotation_error(estimate.rotation, rotation)
-    posed = metrics.iou_exact(estimate.rotation, estimate.translation, estimate.size, rotation, center, sample.box_size)
+    posed = box_overlap.iou_exact(
+        estimate.rotation, estimate.translation, estimate.size, rotation, center, sample.box_size
+    )
     known = known_axes(estimate, sample)
     rest, rooted = at_rest(estimate, sample), at_rest(estimate, sample, root_known=True)
     points = np.bincount(sample.part, minlength=len(off))
@@ -214,7 +216,7 @@ def known_axes(estimate: Estimate, sample: Sample) -> list[Array]:
     for axis in range(3):
         offset, size = apart.copy(), estimate.size.copy()
         offset[:, axis], size[:, axis] = 0.0, sample.box_size[:, axis]
-        result.append(metrics.iou_rest_exact(offset, size, np.zeros_like(offset), sample.box_size))
+        result.append(box_overlap.iou_rest_exact(offset, size, np.zeros_like(offset), sample.box_size))
     return result
 
 
@@ -224,7 +226,7 @@ def at_rest(estimate: Estimate, sample: Sample, root_known: bool = False) -> Arr
     if root_known:
         center[0], size[0] = true_poses(sample)[1][0], sample.box_size[0]
     rest_center = rest_centers(center, size, estimate.T_camera_part)
-    return metrics.iou_rest_exact(rest_center, size, sample.box_center, sample.box_size)
+    return box_overlap.iou_rest_exact(rest_center, size, sample.box_center, sample.box_size)
 
 
 def draw(every: dict[str, dict[str, Array]], path: Path) -> None:

@@ -76,9 +76,9 @@ class Estimate(EstimateOptions):
         if self.detections is not None or self.detector is not None or is_image_pair(self.clouds):
             estimate_scene(self)
             return
-        if self.picture is not None or self.estimators or self.skip_bad or self.apart:
+        if self.picture is not None or self.estimators or self.skip_bad:
             raise ConfigError(
-                "these are of an image of several objects", "picture, estimators, skip_bad, apart",
+                "these are of an image of several objects", "picture, estimators, skip_bad",
                 "name the image in colour, then the depth image, and add --intrinsics camera.json",
             )  # fmt: skip
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"

@@ -63,9 +63,6 @@ class EstimateOptions:
     one for each category. By default those that come with the package, by their names."""
     picture: Path | None = None
     """For an image of several objects: write the image with boxes and joint axes drawn over it here, as PNG."""
-    apart: bool = False
-    """For an image of several objects: move overlapping boxes apart, by at most 3 cm, as a simulator needs.
-    This reduces accuracy."""
     skip_bad: bool = False
     """Leave out detections that cannot be used, and list them, instead of refusing the file."""
     seen_from: tuple[float, float] | None = None

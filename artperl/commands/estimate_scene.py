@@ -56,9 +56,7 @@ def estimate_scene(options: EstimateOptions) -> None:
     depth = read_depth_image(depth_file, options.input_options())
     rgb = read_image(image)
     told: dict[str, Any] = {} if options.seen_from is None else {"seen_from": options.seen_from}
-    estimator = SceneEstimator(
-        named_estimators(options.estimators), options.detector or SHIPPED, apart=options.apart, **told
-    )
+    estimator = SceneEstimator(named_estimators(options.estimators), options.detector or SHIPPED, **told)
     size = (depth.values.shape[1], depth.values.shape[0])
     given = None if options.detections is None else _read_detections(options, image, size)
     detections = given or Detections((), (), (f"objects are found by {estimator.detector}",))
@@ -132,8 +130,7 @@ def scene_record(result: SceneEstimate, detections: Detections) -> dict[str, Any
         if obj.estimate is None:
             objects.append({**record, "error": obj.problem})
         else:
-            own = {"score": obj.score, "moved": obj.moved.tolist(), **plain_record(obj.estimate)}
-            objects.append({**record, **own})
+            objects.append({**record, "score": obj.score, **plain_record(obj.estimate)})
     return {
         "objects": objects, "skipped": list(detections.skipped), "notes": list(detections.notes),
         "milliseconds": result.milliseconds,

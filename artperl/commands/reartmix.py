@@ -19,10 +19,7 @@ _FOLDER = Path("out/reartmix")
 
 @dataclass(frozen=True)
 class ReArtMix:
-    """Test estimators on images of several objects: average precision at 5 degrees, 5 cm and IoU 0.5.
-
-    With --json, the same command continues a run that was stopped.
-    """
+    """Test estimators on images of several objects: average precision at 5 degrees, 5 cm and IoU 0.5."""
 
     root: Path | None = None
     """Folder that artsim scene wrote, or that has the layout of ReArtMix; by default scenes are made in
@@ -42,8 +39,6 @@ class ReArtMix:
     seen_from: tuple[float, float] | None = None
     """Range of the camera's azimuth, for the estimators: degrees about the object's vertical, 0 for its front.
     By default unknown."""
-    apart: bool = False
-    """Move estimates whose boxes overlap apart, as artperl estimate --apart does."""
     picture: Path | None = None
     """Write the first 12 images with the estimates over them here, as PNG."""
     json: Path | None = None
@@ -71,6 +66,6 @@ class ReArtMix:
             say(f"left out: {text}")
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
         named: dict[str, str | Path] = {"drawer": "generic", **named_estimators(self.estimators)}
-        estimator = SceneEstimator(named, self.detector or SHIPPED, apart=self.apart, **told)
-        figures = run_reartmix(images, detections, estimator, True, say, self.picture, self.json)
+        estimator = SceneEstimator(named, self.detector or SHIPPED, **told)
+        figures = run_reartmix(images, detections, estimator, True, say, self.picture)
         write_kept(self.json, figures, indent=1)

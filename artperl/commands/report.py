@@ -16,8 +16,8 @@ from artsim.common.progress import say
 class Report:
     """Compare all methods on a benchmark: train or load each, test each on the same views, and write one report.
 
-    The report is OUT/report.html, one page with everything in it; report.md and report.json have its figures. Stop it
-    at any moment with Ctrl-C: rerun the command to resume. Each step says how long it took.
+    The report is OUT/report.md; report.json has its figures. Stop it at any moment with Ctrl-C: rerun the command to
+    resume. Each step says how long it took.
 
     To see what a report is, in some minutes: artperl report --quick
 
@@ -27,7 +27,7 @@ class Report:
 
     Of some methods and categories: artperl report --category laptop --methods full ancsh omad
 
-    The same methods on real objects, without another training, in report-real.html: artperl report --row real
+    The same methods on real objects, without another training, in report-real.md: artperl report --row real
     """
 
     benchmark: Literal["artimage", "robotarm"] = "artimage"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -120,7 +121,6 @@ class Train:
         import torch
 
         from artperl.training.recipes import Recipe, is_made
-        from artperl.training.report import WandbReport
         from artperl.training.run import Training
 
         if self.threads is not None:
@@ -133,8 +133,9 @@ class Train:
         out = self.out or Path("out/train") / f"{name}-{method}{preset}"
         if recipe is None or not is_made(out, recipe):
             try:
-                report = None if self.wandb is None else WandbReport(self.wandb, out, asdict(options))
-                training = Training(options, out, self.workers, report=report, recipe=recipe, device=self.device)
+                training = Training(options, out, self.workers, recipe=recipe, device=self.device)
+                if self.wandb is not None and training.context.ranks.first:
+                    _open_wandb(self.wandb, out, asdict(options))
                 training.run()
                 training.context.ranks.close()
                 if not training.context.ranks.first:
@@ -178,6 +179,15 @@ class Train:
         elif self.categories == ("all",):
             changes["categories"] = list(FAMILIES)
         return changed(preset, changes)
+
+
+def _open_wandb(project: str, out: Path, options: dict[str, Any]) -> None:
+    """Let Weights & Biases read what is written for TensorBoard."""
+    try:
+        wandb: Any = importlib.import_module("wandb")
+    except ImportError as error:
+        raise ConfigError(f"Weights & Biases cannot be imported ({error})", "wandb", "pip install wandb") from error
+    wandb.init(project=project, name=out.name, group=out.name, dir=str(out), config=options, sync_tensorboard=True)
 
 
 def _plain(value: Any) -> Any:

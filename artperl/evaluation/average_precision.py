@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from artperl.evaluation.metrics import iou_exact, rotation_error
+from artperl.evaluation.box_overlap import iou_exact
+from artperl.evaluation.metrics import rotation_error
 from artperl.evaluation.part_detection import precision_recall
 
 Array = NDArray[np.float64]

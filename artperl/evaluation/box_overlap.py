@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 Array = NDArray[np.float64]
 
-_CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
-# Corners of each face in order around it, counter-clockwise seen from outside: -x, +x, -y, +y, -z, +z.
-_FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-_COINCIDENT = 1e-14
-"""Faces nearer than this share of the boxes' size lie in one plane: only one of them bounds the intersection."""
+_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+_EDGES = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
+_MARGIN = 1e-12
+"""Share of the boxes' size by which a point on a face may lie outside by rounding."""
 
 
 def intersection_volume(
@@ -24,8 +24,8 @@ def intersection_volume(
 ) -> Array:
     """Volume that pairs of oriented boxes share.
 
-    Each face of either box is clipped by the six half-spaces of the other (Sutherland-Hodgman). What is left bounds
-    the intersection, and the divergence theorem turns it into a volume.
+    It is that of the convex hull of all corners of the intersection: those of each box in the other one, and the points
+    where edges of one pass through faces of the other.
 
     Parameters
     ----------
@@ -49,81 +49,37 @@ def intersection_volume(
     )
     near = np.linalg.norm(ca - cb, axis=1) < 0.5 * (np.linalg.norm(sa, axis=1) + np.linalg.norm(sb, axis=1))
     volume = np.zeros(len(ca))
-    if near.any():
-        volume[near] = _overlap(*(x[near] for x in (Ra, ca, sa, Rb, cb, sb)))
+    for n in np.flatnonzero(near):
+        volume[n] = _shared_volume(Ra[n].T @ Rb[n], Ra[n].T @ (cb[n] - ca[n]), sa[n], sb[n])
     return volume.reshape(shape)
 
 
-def _overlap(Ra: Array, ca: Array, sa: Array, Rb: Array, cb: Array, sb: Array) -> Array:
-    """(M,) shared volume of M pairs of boxes, in the frame of box a (so that the origin lies inside it)."""
-    R = np.swapaxes(Ra, 1, 2) @ Rb
-    c = (np.swapaxes(Ra, 1, 2) @ (cb - ca)[..., None])[..., 0]
-    margin = _COINCIDENT * (np.linalg.norm(sa, axis=1) + np.linalg.norm(sb, axis=1))
-    eye, origin = np.broadcast_to(np.eye(3), R.shape), np.zeros_like(c)
-    volume = _flux(eye, origin, sa, R, c, sb, margin, True) + _flux(R, c, sb, eye, origin, sa, margin, False)
-    return np.clip(volume, 0.0, np.minimum(sa.prod(axis=1), sb.prod(axis=1)))
+def _shared_volume(R: Array, c: Array, sa: Array, sb: Array) -> float:
+    """Volume that a box shares with another one, given in its frame."""
+    inside = (
+        _corners_inside(np.eye(3), np.zeros(3), sa, R, c, sb),
+        _corners_inside(R, c, sb, np.eye(3), np.zeros(3), sa),
+    )
+    try:
+        volume = ConvexHull(np.concatenate(inside)).volume
+    except (QhullError, ValueError):  # they lie in a plane, or there are none
+        return 0.0
+    return float(min(volume, sa.prod(), sb.prod()))
 
 
-def _faces(R: Array, c: Array, s: Array) -> Array:
-    """(M, 6, 4, 3) corners of the faces."""
-    corners = (0.5 * _CORNER_SIGNS * s[:, None]) @ np.swapaxes(R, 1, 2) + c[:, None]
-    return corners[:, _FACES]
+def _corners_inside(R: Array, c: Array, s: Array, other_R: Array, other_c: Array, other_s: Array) -> Array:
+    """(n, 3) corners of a box, and points of its edges on faces of another box, that lie in this."""
+    corners = (0.5 * _SIGNS * s @ R.T + c - other_c) @ other_R
+    start, along = corners[_EDGES[:, 0]], np.diff(corners[_EDGES], axis=1)[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):  # an edge may run along a face
+        share = ((0.5 * np.stack([-other_s, other_s]) - start[:, None]) / along[:, None]).reshape(len(start), 6, 1)
+        places = (start[:, None] + share * along[:, None])[((share >= 0.0) & (share <= 1.0))[..., 0]]
+    points = np.concatenate([corners, places])
+    margin = _MARGIN * float(np.linalg.norm(s) + np.linalg.norm(other_s))
+    return points[(np.abs(points) <= 0.5 * other_s + margin).all(axis=1)] @ other_R.T + other_c
 
 
-def _flux(
-    R: Array, c: Array, s: Array, other_R: Array, other_c: Array, other_s: Array, margin: Array, keep_shared: bool
-) -> Array:
-    """(M,) a third of the flux of the position through those parts of boxes' faces that lie inside other boxes.
-
-    Where faces of both lie in one plane, they count as inside only if they look the same way and ``keep_shared``: a
-    face that both boxes have bounds the intersection once, and boxes that touch from outside share nothing.
-    """
-    M = len(R)
-    polygons, count = _faces(R, c, s).reshape(M * 6, 4, 3), np.full(M * 6, 4)
-    outward = np.stack([-R, R], axis=-1).transpose(0, 2, 3, 1).reshape(M, 6, 3)
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            normal = sign * other_R[:, :, axis]
-            offset = (normal * other_c).sum(axis=1) + 0.5 * other_s[:, axis]
-            alike = keep_shared & ((outward @ normal[:, :, None])[..., 0] > 0.0)
-            allowed = np.where(alike, margin[:, None], -margin[:, None]).reshape(-1)
-            polygons, count = _clip(polygons, count, np.repeat(normal, 6, axis=0), np.repeat(offset, 6), allowed)
-    # Fans from the first corner: padded corners repeat the last one and add nothing.
-    first, second, third = polygons[:, :1], polygons[:, 1:-1], polygons[:, 2:]
-    triple = (np.cross(second - first, third - first) * first).sum(axis=(1, 2))
-    return np.where(count >= 3, triple, 0.0).reshape(M, 6).sum(axis=1) / 6.0
-
-
-def _clip(polygons: Array, count: Array, normal: Array, offset: Array, margin: Array) -> tuple[Array, Array]:
-    """Convex polygons (Q, V, 3), the first ``count`` corners of each, cut by half-spaces ``normal @ p <= offset``.
-
-    Returns
-    -------
-    polygons : (Q, V + 1, 3)
-        The last corner is repeated as padding.
-    count : (Q,)
-    """
-    Q, V, _ = polygons.shape
-    corner = np.arange(V)
-    present = corner < count[:, None]
-    following = np.where(corner + 1 < count[:, None], corner + 1, 0)
-    height = (polygons @ normal[:, :, None])[..., 0] - offset[:, None] - margin[:, None]
-    inside = height <= 0.0
-    next_height = np.take_along_axis(height, following, axis=1)
-    crosses = present & (inside != (next_height <= 0.0))
-    gap = np.where(crosses, height - next_height, 1.0)
-    share = np.where(crosses, height / gap, 0.0)[..., None]
-    cut = polygons + share * (np.take_along_axis(polygons, following[..., None], axis=1) - polygons)
-    # Each corner gives itself, if inside, and then the cut of its edge, if there is one.
-    slots = np.stack([polygons, cut], axis=2).reshape(Q, 2 * V, 3)
-    used = np.stack([present & inside, crosses], axis=2).reshape(Q, 2 * V)
-    order = np.argsort(~used, axis=1, kind="stable")[:, : V + 1]
-    count = np.minimum(used.sum(axis=1), V + 1)
-    order = np.take_along_axis(order, np.minimum(np.arange(V + 1), np.maximum(count - 1, 0)[:, None]), axis=1)
-    return np.take_along_axis(slots, order[..., None], axis=1), count
-
-
-def iou(
+def iou_exact(
     rotation_a: ArrayLike,
     center_a: ArrayLike,
     size_a: ArrayLike,
@@ -144,8 +100,8 @@ def iou(
     return ratio
 
 
-def iou_aligned(center_a: ArrayLike, size_a: ArrayLike, center_b: ArrayLike, size_b: ArrayLike) -> Array:
-    """Exact intersection over union of boxes (..., 3) that are aligned with the axes of one frame."""
+def iou_rest_exact(center_a: ArrayLike, size_a: ArrayLike, center_b: ArrayLike, size_b: ArrayLike) -> Array:
+    """Exact intersection over union of boxes (..., 3) in the rest frame, along its axes: no pose enters."""
     ca, sa, cb, sb = (np.asarray(x, np.float64) for x in (center_a, size_a, center_b, size_b))
     low, high = np.maximum(ca - 0.5 * sa, cb - 0.5 * sb), np.minimum(ca + 0.5 * sa, cb + 0.5 * sb)
     shared = np.maximum(high - low, 0.0).prod(axis=-1)

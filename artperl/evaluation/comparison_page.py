@@ -1,15 +1,12 @@
-"""A comparison of methods as Markdown, and as one HTML page with everything in it."""
+"""A comparison of methods as Markdown."""
 
 from __future__ import annotations
 
-import base64
-import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from artperl.evaluation.comparison import mean_over_parts
 from artperl.evaluation.published import ARTIMAGE_PUBLISHED, ROBOTARM_PUBLISHED, TITLES, Published
-from artsim.common.names import printable
 
 Rows = Mapping[str, Mapping[str, dict[str, Any]]]
 """Records of :func:`artperl.evaluation.comparison.row_record` by category and method."""
@@ -138,74 +135,3 @@ def _means(rows: Rows) -> list[str]:
 
 def _line(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"
-
-
-def html_page(text: str, title: str, pictures: Mapping[str, bytes], views: Mapping[str, str]) -> str:
-    """The report as one page.
-
-    Parameters
-    ----------
-    text : str
-        :func:`markdown`.
-    title : str
-    pictures : mapping of str to bytes
-        PNG files by their captions.
-    views : mapping of str to str
-        Pages to turn estimates in, by their captions.
-    """
-    body = _html_of(text)
-    for caption, png in pictures.items():
-        data = base64.b64encode(png).decode()
-        told = html.escape(printable(caption, 120))
-        body += f'<h2>{told}</h2><img alt="{told}" src="data:image/png;base64,{data}">\n'
-    for caption, page in views.items():
-        told, inner = html.escape(printable(caption, 120)), html.escape(page)
-        frame = f'<iframe title="{told}" loading="lazy" sandbox="allow-scripts" srcdoc="{inner}"></iframe>'
-        body += f"<h2>{told}</h2>{frame}\n"
-    return _PAGE.format(title=html.escape(title), body=body)
-
-
-def _html_of(text: str) -> str:
-    """Headings, lists and tables of :func:`markdown` in HTML."""
-    out: list[str] = []
-    before = ""
-    for line in text.splitlines():
-        table, was_table = line.startswith("|"), before.startswith("|")
-        if table != was_table:
-            out.append("<table>" if table else "</table>")
-        if table and not line.startswith("| ---"):
-            tag = "td" if was_table else "th"
-            cells = (_cell_html(cell.strip()) for cell in line[1:-1].split("|"))
-            out.append("<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>")
-        elif line.startswith("#"):
-            level = len(line.split()[0])
-            out.append(f"<h{level}>{html.escape(line.lstrip('# '))}</h{level}>")
-        elif line.startswith("- "):
-            out.append(f"<li>{html.escape(line[2:])}</li>")
-        before = line
-    return "\n".join([*out, "</table>" if before.startswith("|") else ""])
-
-
-def _cell_html(cell: str) -> str:
-    """A cell; the interval of a mean stands below it, so that tables of many parts fit a page."""
-    mean, bracket, interval = html.escape(cell).partition(" [")
-    return f"{mean}<small>{interval.rstrip(']').replace(', ', ' to ')}</small>" if bracket else mean
-
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1.5em auto; max-width: 84em; padding: 0 1em; color: #1b1b1b; }}
-table {{ border-collapse: collapse; margin: 0.4em 0 1.2em; display: block; overflow-x: auto; font-size: 0.85em; }}
-th, td {{ border-bottom: 1px solid #ddd; padding: 0.25em 0.8em 0.25em 0; text-align: right; white-space: nowrap; }}
-th {{ white-space: normal; vertical-align: bottom; }} td {{ vertical-align: top; }}
-td small {{ display: block; color: #666; }}
-th:first-child, td:first-child {{ text-align: left; }}
-li {{ margin-left: 1.2em; overflow-wrap: anywhere; }}
-h3 {{ margin: 1em 0 0.2em; font-size: 1em; }}
-img {{ max-width: 100%; }} iframe {{ width: 100%; height: 44em; border: 1px solid #ddd; }}
-</style></head><body>
-{body}
-</body></html>
-"""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import rankdata
 
 from artperl.core.estimate import Estimate, points_at_rest
-from artperl.evaluation.box_overlap import iou, iou_aligned, iou_omad_legacy
+from artperl.evaluation.box_overlap import iou_exact, iou_omad_legacy, iou_rest_exact
 from artsim.observing.sample import Sample
 
 Array = NDArray[np.float64]
@@ -60,23 +60,6 @@ def translation_error(estimate: ArrayLike, truth: ArrayLike, diagonal: ArrayLike
     distance = np.linalg.norm(np.asarray(estimate, np.float64) - np.asarray(truth, np.float64), axis=-1)
     share: Array = distance / np.asarray(diagonal, np.float64)
     return share
-
-
-def iou_exact(
-    rotation: ArrayLike,
-    center: ArrayLike,
-    size: ArrayLike,
-    true_rotation: ArrayLike,
-    true_center: ArrayLike,
-    true_size: ArrayLike,
-) -> Array:
-    """Exact IoU of posed part boxes: rotations (..., 3, 3), centres and sizes (..., 3)."""
-    return iou(rotation, center, size, true_rotation, true_center, true_size)
-
-
-def iou_rest_exact(center: ArrayLike, size: ArrayLike, true_center: ArrayLike, true_size: ArrayLike) -> Array:
-    """Exact IoU of part boxes (..., 3) in the rest frame: shape and place in the object, but no pose."""
-    return iou_aligned(center, size, true_center, true_size)
 
 
 def direction_error(estimate: ArrayLike, truth: ArrayLike) -> Array:

@@ -20,10 +20,9 @@ from artperl.evaluation.average_precision import CRITERIA, PosedObject, ap_table
 from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.realistic_detections import LEAST_VISIBLE, realistic_detections
 from artperl.evaluation.reartmix_files import AnnotatedImage, ReArtMixFolder, is_reartmix
-from artperl.evaluation.reartmix_record import ImageRecord, Kept, setup_of
 from artperl.inputs.detections import Detection, Detections
 from artperl.scene.drawing import draw_scene, scene_gallery
-from artperl.scene.estimator import SceneEstimator
+from artperl.scene.estimator import SceneEstimate, SceneEstimator
 from artsim.common.outputs import write_output
 from artsim.common.progress import track
 from artsim.families import FAMILIES, make
@@ -150,7 +149,6 @@ def run_reartmix(
     progress: bool = True,
     say: Callable[[str], None] = print,
     gallery: Path | None = None,
-    kept: Path | None = None,
 ) -> dict[str, Any]:
     """Estimate every detected object of every image, score, and print the table.
 
@@ -165,9 +163,6 @@ def run_reartmix(
         Gets each line.
     gallery : Path, optional
         PNG to write, of the first images with the estimates over them; over depth where there is no colour.
-    kept : Path, optional
-        File that keeps what was found while the run lasts: a stopped one goes on from it. The first images are
-        estimated again where a gallery shows them.
 
     Returns
     -------
@@ -177,25 +172,23 @@ def run_reartmix(
         that look the same count as wrong, ``images``, ``detections``, ``failures``, ``seconds`` (median of an image
         by stage), ``notes``.
     """
-    true, pictures, colourless = list[PosedObject](), list[bytes](), 0
-    record = Kept(kept, setup_of([str(key) for key in images.sizes], detections, estimator))
-    try:
-        for key, image in track("images", images, total=len(images), unit="image", shown=progress):
-            true += image.objects
-            colourless += image.rgb is None
-            drawn = gallery is not None and len(pictures) < _SHOWN
-            if str(key) in record.records and not drawn:
-                continue
-            result = estimator(image.rgb, image.depth, image.K, None if detections is None else detections.of(key))
-            record.add(str(key), ImageRecord.of(key, result))
-            if drawn:
-                pictures.append(draw_scene(_background(image), image.K, result))
-    except BaseException:  # Ctrl-C, too
-        record.write()
-        raise
-    records = list(record.records.values())
-    found = [obj for own in records for obj in own.found]
-    times = {stage: [own.seconds[stage] for own in records if stage in own.seconds] for stage in _STAGES}
+    true, found, results = list[PosedObject](), list[PosedObject](), list[SceneEstimate]()
+    pictures, colourless = list[bytes](), 0
+    for key, image in track("images", images, total=len(images), unit="image", shown=progress):
+        true += image.objects
+        colourless += image.rgb is None
+        result = estimator(image.rgb, image.depth, image.K, None if detections is None else detections.of(key))
+        results.append(result)
+        found += [
+            PosedObject(str(key), obj.detection.category, own.rotation, own.translation, own.size, obj.score)
+            for obj in result.objects
+            if (own := obj.estimate) is not None
+        ]
+        if gallery is not None and len(pictures) < _SHOWN:
+            pictures.append(draw_scene(_background(image), image.K, result))
+    times = [{**own.milliseconds, "all": sum(own.milliseconds.values())} for own in results]
+    stages = [stage for stage in _STAGES if times and stage in times[0]]
+    detected = sum(len(own.objects) for own in results)
     table, strict = ap_table(found, true), ap_table(found, [replace(obj, equals=()) for obj in true])
     notes = [f"objects are found by {estimator.detector}"] if detections is None else list(detections.notes)
     if detections is None and colourless:
@@ -204,9 +197,8 @@ def run_reartmix(
     figures: dict[str, Any] = {
         "categories": table, "mean": _mean(table, list(table)), "mean_with_estimator": _mean(table, have),
         "strict": strict, "mean_strict": _mean(strict, list(strict)),
-        "images": len(images), "detections": sum(own.detected for own in records),
-        "failures": sum(len(own.failures) for own in records),
-        "seconds": {stage: float(np.median(own)) for stage, own in times.items() if own}, "notes": notes,
+        "images": len(images), "detections": detected, "failures": detected - len(found), "notes": notes,
+        "seconds": {stage: float(np.median([own[stage] for own in times])) / 1e3 for stage in stages},
     }  # fmt: skip
     lacking = [name for name in table if name not in have]
     if lacking:

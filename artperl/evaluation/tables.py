@@ -10,31 +10,11 @@ from numpy.typing import NDArray
 
 from artperl.evaluation.metrics import METRICS
 from artperl.evaluation.part_detection import part_figures, part_line
+from artperl.evaluation.published import ARTIMAGE_PUBLISHED
 from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored
 
 Array = NDArray[np.float64]
-
-PUBLISHED: dict[str, dict[str, tuple[float, ...]]] = {
-    "laptop": {"rotation_deg": (4.9, 4.7), "translation_partnet": (0.053, 0.066), "iou_omad_legacy": (0.646, 0.504)},
-    "eyeglasses": {
-        "rotation_deg": (4.1, 6.2, 6.0),
-        "translation_partnet": (0.047, 0.095, 0.091),
-        "iou_omad_legacy": (0.586, 0.465, 0.517),
-    },
-    "dishwasher": {
-        "rotation_deg": (3.9, 4.3),
-        "translation_partnet": (0.055, 0.079),
-        "iou_omad_legacy": (0.893, 0.676),
-    },
-    "scissors": {"rotation_deg": (2.2, 2.6), "translation_partnet": (0.031, 0.042), "iou_omad_legacy": (0.409, 0.463)},
-    "drawer": {
-        "rotation_deg": (3.5, 3.5, 3.5, 3.5),
-        "translation_partnet": (0.061, 0.112, 0.121, 0.104),
-        "iou_omad_legacy": (0.848, 0.786, 0.790, 0.812),
-    },
-}
-"""Means of ArtPERL on the original ArtImage, by part (its table 1)."""
 
 _NAME, _MEDIAN, _MEAN = 14, 9, 7
 """Widths of the table's columns."""
@@ -151,12 +131,13 @@ def _cell(part: dict[str, dict[str, float]], name: str) -> str:
 
 def against_published(category: str, figures: dict[str, Any]) -> str:
     """Where means are better than those published for other images of the category, and where not."""
-    published = PUBLISHED[category]
-    names = {"rotation_deg": "rotation", "translation_partnet": "translation", "iou_omad_legacy": "OMAD's IoU"}
+    published = ARTIMAGE_PUBLISHED[category]["artperl"]
     texts = []
-    for name, title in names.items():
+    for name, title, other in (
+        ("rotation_deg", "rotation", published.rotation), ("translation_partnet", "translation", published.translation),
+        ("iou_omad_legacy", "OMAD's IoU", published.iou),
+    ):  # fmt: skip
         own = [part[name]["mean"] for part in figures["parts"]]
-        other = published[name]
         sign = 1.0 if METRICS[name].less_is_better else -1.0
         worse = [k for k, (a, b) in enumerate(zip(own, other, strict=True)) if sign * a >= sign * b]
         texts.append(f"{title} {'better' if not worse else f'not better for part {worse}'}")

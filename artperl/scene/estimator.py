@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,6 @@ from artperl.inputs.detections import Detection
 from artperl.methods.estimator_files import WEIGHTS, load_estimator, stored_method
 from artperl.methods.protocol import Method
 from artperl.scene.denoise import denoise
-from artperl.scene.separation import moved, moved_apart
 from artsim.errors import ArtsimError, ConfigError
 
 if TYPE_CHECKING:
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
 
 _MOST_POINTS = 8192
 """Of an object's cloud: what estimators are tested with. More cost time and bring nothing."""
-_MOST_MOVED = 0.03
-"""Metres. An estimate that is deeper in another one is wrong in another way."""
 _FAR, _NEAR = 30.0, 0.05
 """Metres. No indoor image has its median depth beyond: then the unit is another one."""
 
@@ -43,15 +40,12 @@ class SceneObject:
     problem : str
         Why there is no estimate.
     milliseconds : float
-    moved : (3,) float
-        Metres by which the estimate was moved, since another object stood in its place. Camera frame.
     """
 
     detection: Detection
     estimate: Estimate | None
     problem: str = ""
     milliseconds: float = 0.0
-    moved: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     @property
     def score(self) -> float:
@@ -77,8 +71,6 @@ class SceneEstimate:
         lines = []
         for number, obj in enumerate(self.objects):
             head = f"{number} {obj.detection.category}, detected {100 * obj.detection.score:.0f} %"
-            if obj.moved.any():
-                head += f", moved by {1e3 * np.linalg.norm(obj.moved):.0f} mm out of another object"
             lines.append(f"{head}: {obj.problem}" if obj.estimate is None else f"{head}\n{obj.estimate}")
         return "\n\n".join(lines) or "no object is detected"
 
@@ -96,21 +88,16 @@ class SceneEstimator:
         the package, by their names.
     detector : str or Path
         Name or folder of the detector, loaded when an image comes without detections.
-    apart : bool
-        Move estimates that stand in each other apart, by at most 3 cm, as a simulator needs them. They are less exact
-        then: one that is wrong moves its neighbours, too.
     **changes
         Of the estimators' options, such as ``seen_from=(-75.0, 75.0)``.
     """
 
     def __init__(
-        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = SHIPPED, apart: bool = False,
-        **changes: Any,
+        self, estimators: Mapping[str, str | Path] | None = None, detector: str | Path = SHIPPED, **changes: Any
     ):  # fmt: skip
         shipped = {path.parent.name: path.parent.name for path in WEIGHTS.glob("*/estimator.json")}
         shipped.pop("generic", None)  # of no category
         self.estimators: dict[str, str | Path] = {**shipped, **(estimators or {})}
-        self.apart = apart
         self.changes, self._loaded = changes, dict[str, Method]()
         self._detector_name = detector
         self._detector: Detector | None = None
@@ -163,7 +150,6 @@ class SceneEstimator:
         objects = tuple(self._object(depth, K, detection) for detection in detections)
         whole = 1e3 * (time.perf_counter() - begun)
         estimating = sum(obj.milliseconds for obj in objects)
-        objects = _moved_apart(objects) if self.apart else objects
         return SceneEstimate(objects, {**times, "clouds": whole - estimating, "estimates": estimating})
 
     def _object(self, depth: NDArray[np.float64], K: NDArray[np.float64], detection: Detection) -> SceneObject:
@@ -193,14 +179,6 @@ class SceneEstimator:
             # The other methods have no options.
             self._loaded[category] = load_estimator(name, method=method, **(self.changes if method == "full" else {}))
         return self._loaded[category]
-
-
-def _moved_apart(objects: Sequence[SceneObject]) -> tuple[SceneObject, ...]:
-    moves = moved_apart([obj.estimate for obj in objects], _MOST_MOVED)
-    return tuple(
-        obj if obj.estimate is None or not move.any() else replace(obj, estimate=moved(obj.estimate, move), moved=move)
-        for obj, move in zip(objects, moves, strict=True)
-    )
 
 
 def check_images(rgb: ArrayLike | None, depth: NDArray[np.float64]) -> None:

@@ -16,9 +16,7 @@ from typing import Any, Literal
 from artperl.data.categories import ARTIMAGE
 from artperl.evaluation.artimage import has_half, row_objects, row_samples
 from artperl.evaluation.comparison import row_record
-from artperl.evaluation.comparison_page import html_page, markdown
-from artperl.evaluation.estimate_page import page
-from artperl.evaluation.pictures import curves, overlays
+from artperl.evaluation.comparison_page import markdown
 from artperl.evaluation.robotarm import ARM, arm_samples, seven_part_arm
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
@@ -30,7 +28,7 @@ from artperl.training.recipes import about_tested
 from artperl.training.run import Training
 from artperl.training.timing import filling, trained_minutes
 from artsim.common.files import write_atomic
-from artsim.errors import ArtsimError, ConfigError
+from artsim.errors import ConfigError
 from artsim.export import export
 from artsim.loading.urdf import load
 from artsim.model.objects import ArticulatedObject
@@ -51,8 +49,6 @@ _NOISY, _DEGRADED = 0.5, 0.6
 """Shares of the clouds that trainings for the arm see with a sensor's noise; cut, dirty or sparse, as by bad masks."""
 _ARM_STEPS = 6000
 """Batches that the estimator for any tree learns on from an arm."""
-_OVERLAYS = 4
-"""Views of a category that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +142,7 @@ def quick_comparison(options: ComparisonOptions) -> ComparisonOptions:
 def run_comparison(
     options: ComparisonOptions, out: Path, workers: int = 1, progress: bool = True, say: Callable[[str], None] = print
 ) -> dict[str, Any]:  # fmt: skip
-    """Train or load every method, score it, and write ``report.md``, ``report.json`` and ``report.html``.
+    """Train or load every method, score it, and write ``report.md`` and ``report.json``.
 
     Parameters
     ----------
@@ -204,9 +200,7 @@ def run_comparison(
     text, name = markdown(options.benchmark, rows, notes(options)), f"report{options.suffix}"
     write_kept(out / f"{name}.json", report, indent=1)
     write_atomic(out / f"{name}.md", text.encode())
-    pictures, views = drawn(options, out, say)
-    write_atomic(out / f"{name}.html", html_page(text, f"{options.benchmark}, compared", pictures, views).encode())
-    say(f"report: {out / name}.html, {name}.md, {name}.json")
+    say(f"report: {out / name}.md, {name}.json")
     return report
 
 
@@ -325,27 +319,3 @@ def notes(options: ComparisonOptions) -> list[str]:
             "stands among other things, and masks are not exact. Trainings see cut, dirty and noisy clouds.",
         )
     return lines
-
-
-def drawn(options: ComparisonOptions, out: Path, say: Callable[[str], None]) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Pictures and pages of a report: overlays of the best method, its estimates to turn, and curves of the agent.
-
-    They show test objects in few views, so that a report that goes on does not make all of them again.
-    """
-    pictures, views = {}, {}
-    few = min(_OVERLAYS, options.views)
-    for category in options.of_categories:
-        first = rows_of(options, category)[0]
-        shown = tested_views(replace(options, objects=min(options.objects, few), views=few), category)[1][:few]
-        try:
-            estimator, _ = row_estimator(options, category, first, out, 0, False, say)
-            pictures[f"{category}: estimates of {first}, true boxes dashed"] = overlays(estimator, shown)
-            estimate = estimator(shown[0].points)
-            last = replace(estimate, trajectory=estimate.trajectory[-1:])
-            views[f"{category}: an estimate of {first} to turn"] = page(last, shown[0].points)
-            events = out / "train" / f"{category}-artperl" / "events"
-            if events.is_dir():
-                pictures[f"{category}: how artperl learnt"] = curves(events)
-        except ArtsimError as error:  # without matplotlib there are no pictures
-            say(f"no pictures of {category}: {error}")
-    return pictures, views

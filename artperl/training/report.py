@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from artperl.evaluation.pictures import curves, overlays
 from artperl.evaluation.scoring import Scored
 from artperl.methods.protocol import Method
 from artsim.common.files import write_atomic, write_error
-from artsim.errors import ConfigError
 from artsim.observing.sample import Sample
 
 _SHOWN = 8
@@ -87,41 +85,6 @@ def write_scalars(board: SummaryWriter, group: str, figures: dict[str, float], s
             board.add_scalar(f"{group}/{name}", value, step)
     except OSError as error:  # of the thread that writes: the disk may be full
         raise write_error(error, Path(board.log_dir)) from error
-
-
-class WandbReport:
-    """Hears the figures of a run for Weights & Biases, by the names that TensorBoard shows.
-
-    Parameters
-    ----------
-    project : str
-    out : Path
-        Folder of the run. Where it was stopped and goes on, that is another run of the same group.
-    options : dict
-        What the run depends on, in JSON's terms.
-
-    Raises
-    ------
-    ConfigError
-        When it is not installed.
-    """
-
-    def __init__(self, project: str, out: Path, options: dict[str, Any]):
-        try:
-            self._wandb: Any = importlib.import_module("wandb")
-        except ImportError as error:
-            raise ConfigError(f"Weights & Biases cannot be imported ({error})", "wandb", "pip install wandb") from error
-        self._about = {"project": project, "name": out.name, "group": out.name, "dir": str(out), "config": options}
-        self._run: Any = None
-        self._groups: set[str] = set()
-
-    def __call__(self, group: str, figures: dict[str, float], step: int) -> None:
-        if self._run is None:  # of several processes, the first one alone has figures
-            self._run = self._wandb.init(**self._about)
-        if group not in self._groups:  # each stage counts its own steps
-            self._groups.add(group)
-            self._run.define_metric(f"{group}/*", step_metric=f"{group}/step")
-        self._run.log({f"{group}/{name}": value for name, value in figures.items()} | {f"{group}/step": step})
 
 
 def scalars(figures: dict[str, Any]) -> dict[str, float]:

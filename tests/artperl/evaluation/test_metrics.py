@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 from artperl.evaluation import metrics
-from artperl.evaluation.box_overlap import intersection_volume, iou_omad_legacy
+from artperl.evaluation.box_overlap import intersection_volume, iou_exact, iou_omad_legacy, iou_rest_exact
 
 FRAMES = {
     "as in our tables: x back, z up": np.eye(3),
@@ -75,21 +75,21 @@ def test_a_box_overlaps_itself_wholly_however_it_is_turned() -> None:
     turns = Rotation.create_group("O").as_matrix()
     for _ in range(50):
         rotation, center, size = random_box(rng)
-        assert metrics.iou_exact(rotation, center, size, rotation, center, size) == pytest.approx(1.0, abs=1e-9)
+        assert iou_exact(rotation, center, size, rotation, center, size) == pytest.approx(1.0, abs=1e-9)
         for turn in turns:  # the same body, described with its axes exchanged
             other = np.abs(turn.T @ np.diag(size) @ turn).diagonal()
-            same = metrics.iou_exact(rotation, center, size, rotation @ turn, center, other)
+            same = iou_exact(rotation, center, size, rotation @ turn, center, other)
             assert same == pytest.approx(1.0, abs=1e-9)
 
 
 def test_shared_faces_are_counted_once() -> None:
     eye, size = np.eye(3), np.ones(3)
     shift = np.array([0.25, 0.0, 0.0])  # four faces lie in one plane with their counterparts
-    assert metrics.iou_exact(eye, 0 * shift, size, eye, shift, size) == pytest.approx(0.75 / 1.25, abs=1e-12)
-    touching = metrics.iou_exact(eye, 0 * shift, size, eye, 4 * shift, size)
+    assert iou_exact(eye, 0 * shift, size, eye, shift, size) == pytest.approx(0.75 / 1.25, abs=1e-12)
+    touching = iou_exact(eye, 0 * shift, size, eye, 4 * shift, size)
     assert touching == pytest.approx(0.0, abs=1e-9)
     for nudge in 10.0 ** np.arange(-18, -3):
-        almost = metrics.iou_exact(eye, np.zeros(3), size, eye, np.full(3, nudge), size)
+        almost = iou_exact(eye, np.zeros(3), size, eye, np.full(3, nudge), size)
         assert almost == pytest.approx((1 - nudge) ** 3 / (2 - (1 - nudge) ** 3), abs=1e-9)
 
 
@@ -98,18 +98,18 @@ def test_closed_forms_of_boxes() -> None:
     eighth = Rotation.from_euler("z", 45, degrees=True).as_matrix()
     # Two unit squares turned by 45 degrees share a regular octagon of area 2 (sqrt(2) - 1).
     assert intersection_volume(eye, zero, one, eighth, zero, one) == pytest.approx(2 * (np.sqrt(2) - 1), abs=1e-12)
-    assert metrics.iou_exact(eye, zero, one, eighth, zero, 0.3 * one) == pytest.approx(0.027, abs=1e-12)
-    assert metrics.iou_exact(eye, zero, one, eighth, 3 * one, one) == 0.0
+    assert iou_exact(eye, zero, one, eighth, zero, 0.3 * one) == pytest.approx(0.027, abs=1e-12)
+    assert iou_exact(eye, zero, one, eighth, 3 * one, one) == 0.0
     # A lid of 1 cm that is 5 mm off its plane keeps a third.
     lid = np.array([0.3, 0.2, 0.01])
-    assert metrics.iou_exact(eye, zero, lid, eye, [0, 0, 0.005], lid) == pytest.approx(1 / 3, abs=1e-12)
+    assert iou_exact(eye, zero, lid, eye, [0, 0, 0.005], lid) == pytest.approx(1 / 3, abs=1e-12)
 
 
 def test_overlap_is_symmetric_and_never_above_one() -> None:
     rng = np.random.default_rng(3)
     for _ in range(100):
         a, b = random_box(rng), random_box(rng)
-        forward, backward = float(metrics.iou_exact(*a, *b)), float(metrics.iou_exact(*b, *a))
+        forward, backward = float(iou_exact(*a, *b)), float(iou_exact(*b, *a))
         assert forward == pytest.approx(backward, abs=1e-10)
         assert 0.0 <= forward <= 1.0
 
@@ -119,9 +119,7 @@ def test_rest_frame_overlap_is_the_exact_one_of_aligned_boxes() -> None:
     ca, cb = 0.3 * rng.normal(size=(2, 40, 3))
     sa, sb = rng.uniform(0.2, 1.0, size=(2, 40, 3))
     eye = np.broadcast_to(np.eye(3), (40, 3, 3))
-    np.testing.assert_allclose(
-        metrics.iou_rest_exact(ca, sa, cb, sb), metrics.iou_exact(eye, ca, sa, eye, cb, sb), atol=1e-10
-    )
+    np.testing.assert_allclose(iou_rest_exact(ca, sa, cb, sb), iou_exact(eye, ca, sa, eye, cb, sb), atol=1e-10)
 
 
 def test_published_sampler_equals_the_exact_overlap_where_its_slip_does_no_harm() -> None:
@@ -135,7 +133,7 @@ def test_published_sampler_equals_the_exact_overlap_where_its_slip_does_no_harm(
     size = rng.uniform(0.5, 1.0, size=(20, 2, 3))
     center = low + 0.5 * size
     legacy = iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
-    exact = metrics.iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
+    exact = iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     assert np.abs(legacy - exact).max() < 0.05
 
 
@@ -143,7 +141,7 @@ def test_published_sampler_is_off_elsewhere_by_as_much_as_reported() -> None:
     rng = np.random.default_rng(6)
     center, size = 0.2 * rng.normal(size=(120, 2, 3)), rng.uniform(0.3, 1.0, size=(120, 2, 3))
     legacy = iou_omad_legacy(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
-    exact = metrics.iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
+    exact = iou_rest_exact(center[:, 0], size[:, 0], center[:, 1], size[:, 1])
     assert 0.02 < np.abs(legacy - exact).mean() < 0.3
 
 
@@ -153,7 +151,7 @@ def test_published_sampler_depends_on_the_frame_and_the_exact_overlap_does_not()
     legacy = []
     for R in FRAMES.values():
         boxes = R @ center, np.abs(R) @ size, R @ (center + off), np.abs(R) @ size
-        assert metrics.iou_rest_exact(*boxes) == pytest.approx(0.6, abs=1e-12)
+        assert iou_rest_exact(*boxes) == pytest.approx(0.6, abs=1e-12)
         legacy.append(float(iou_omad_legacy(*boxes)))
     assert max(legacy) == 1.0
     assert min(legacy) == 0.0

@@ -16,8 +16,8 @@ from artperl.evaluation.realistic_detections import Flaws, realistic_detections
 from artperl.evaluation.reartmix import SceneImages, open_images, run_reartmix
 from artperl.evaluation.reartmix_files import NAMES, ReArtMixFolder
 from artperl.inputs.detections import read_detections
-from artperl.scene.estimator import SceneEstimate, SceneEstimator
-from artsim.errors import ArtsimError, ConfigError, DatasetError
+from artperl.scene.estimator import SceneEstimator
+from artsim.errors import ArtsimError, DatasetError
 from artsim.model.transforms import transform_points
 from artsim.scenes import SceneCameraOptions, SceneDataset, SceneOptions, SceneRun, generate_scenes, open_scenes
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
@@ -144,34 +144,6 @@ def test_the_benchmark_finds_scissors_and_says_what_has_no_estimator(scenes: Sce
     assert figures["categories"]["scissors"]["5_cm"] > 0.0
     assert figures["mean"]["5_cm"] == pytest.approx(figures["mean_with_estimator"]["5_cm"] / 2)
     assert any("no estimator for stapler" in line for line in lines)
-
-
-def test_a_stopped_run_goes_on_from_the_images_that_it_has_seen(tmp_path: Path) -> None:
-    generate_scenes(RUN, tmp_path / "scenes", 3, seed=11, workers=1, progress=False)
-    images, kept = SceneImages(tmp_path / "scenes"), tmp_path / "figures.json"
-    detections, whole = images.own_detections(0), list[str]()
-    figures = run_reartmix(images, detections, SceneEstimator(), False, whole.append)
-    asked = list[int]()
-
-    class Stopped(SceneEstimator):
-        def __call__(self, *told: Any) -> SceneEstimate:
-            asked.append(len(told))
-            if len(asked) == 3:
-                raise KeyboardInterrupt
-            return super().__call__(*told)
-
-    with pytest.raises(KeyboardInterrupt):
-        run_reartmix(images, detections, Stopped(), False, whole.append, kept=kept)
-    assert "unfinished" in json.loads(kept.read_text())
-    again = run_reartmix(images, detections, Stopped(), False, whole.append, kept=kept)
-    assert len(asked) == 4
-    told = {name: own for name, own in again.items() if name != "seconds"}
-    assert told == {name: own for name, own in figures.items() if name != "seconds"}
-    run_reartmix(images, detections, Stopped(apart=True), False, whole.append, kept=kept)
-    assert len(asked) == 7  # of another setup nothing is kept
-    kept.write_text(kept.read_text().replace('"detected"', '"found so far"'))
-    with pytest.raises(ConfigError, match="damaged"):
-        run_reartmix(images, detections, Stopped(), False, whole.append, kept=kept)
 
 
 @pytest.mark.parametrize(

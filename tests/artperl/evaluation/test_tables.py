@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from artperl.evaluation.metrics import METRICS
+from artperl.evaluation.published import ARTIMAGE_PUBLISHED
 from artperl.evaluation.scoring import evaluate
-from artperl.evaluation.tables import PUBLISHED, against_published, summary, table
+from artperl.evaluation.tables import against_published, summary, table
 from artperl.methods.full import Estimator
 from artsim.observing.sample import Sample
 
@@ -46,10 +47,10 @@ def test_a_summary_says_what_confidence_is_worth(estimator: Estimator, sample: S
 
 def test_published_means_are_beaten_or_not() -> None:
     def figures(share: float) -> dict[str, object]:
-        published = PUBLISHED["scissors"]
+        published = ARTIMAGE_PUBLISHED["scissors"]["artperl"]
         means = [
             {"rotation_deg": share * r, "translation_partnet": share * t, "iou_omad_legacy": i / share}
-            for r, t, i in zip(*published.values(), strict=True)
+            for r, t, i in zip(published.rotation, published.translation, published.iou, strict=True)
         ]
         return {"parts": [{name: {"mean": value} for name, value in part.items()} for part in means]}
 

@@ -53,28 +53,6 @@ def test_one_object_is_posed_and_the_others_say_why_they_are_not() -> None:
     assert near.mean() > 0.9
 
 
-@pytest.mark.slow
-def test_what_is_found_twice_in_one_place_is_moved_apart_and_says_so() -> None:
-    obj = make("laptop", 1_000_003).with_diagonal(0.4)
-    frame = render(obj, [0.0, 1.6], CAMERA)
-    told = mask_record(frame.part_ids != BACKGROUND)
-    found = [
-        Detection(0, "laptop", score, told["segmentation"], tuple(told["bbox"]), (320, 240)) for score in (0.9, 0.8)
-    ]
-    here, there = load_scene_estimator(apart=True)(None, frame.depth, CAMERA.K, found).objects
-    assert 0.003 < np.linalg.norm(here.moved) <= 0.03  # half of the thickness of the base, or of the lid
-    np.testing.assert_allclose(here.moved, -there.moved, atol=1e-9)
-    left = load_scene_estimator()(None, frame.depth, CAMERA.K, found)
-    first, second = left.objects
-    assert first.estimate is not None
-    assert second.estimate is not None
-    np.testing.assert_array_equal(first.estimate.T_camera_part, second.estimate.T_camera_part)
-    assert "moved" not in str(left)
-    assert here.estimate is not None
-    np.testing.assert_allclose(here.estimate.translation, first.estimate.translation + here.moved)
-    assert " mm out of another object" in str(SceneEstimate((here, there)))
-
-
 def test_a_gallery_has_every_picture_in_its_place() -> None:
     shades = (40, 90, 140, 190)
     pictures = [draw_scene(np.full((60, 80, 3), shade, np.uint8), CAMERA.K, SceneEstimate(())) for shade in shades]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from artperl.boxes.evidence import PERCEIVED, SHARES, Evidence, roughness
 from artperl.boxes.network import Boxes, box_losses
 from artperl.core.batch import concatenate
-from artperl.evaluation.box_overlap import iou_aligned
+from artperl.evaluation.box_overlap import iou_rest_exact
 from artperl.evaluation.samples import frozen_samples
 from artperl.methods.estimator_files import load_estimator
 from artperl.training import box_records
@@ -156,7 +156,7 @@ def test_the_loss_is_what_boxes_do_not_share_and_how_far_faces_are_off() -> None
     size, true_size = torch.from_numpy(rng.uniform(0.1, 0.5, (2, 50, 1, 3)))
     valid = torch.ones(50, 1, dtype=torch.bool)
     losses = box_losses(center, size, true_center, true_size, valid)
-    shared = iou_aligned(center, size, true_center, true_size)
+    shared = iou_rest_exact(center, size, true_center, true_size)
     faces = [
         (c + sign * 0.5 * s - tc - sign * 0.5 * ts).abs() / (0.5 * ts + 0.004)
         for sign in (-1, 1)
@@ -177,7 +177,7 @@ def test_boxes_that_are_all_off_alike_are_learnt() -> None:
     records = concatenate([box_records.Records(e, true_center, true_size, rest) for e in evidence])
     boxes = box_records.learn(records, 1, 80, 150, 0, False, lambda *_: None)
     center, size, farther = (values.detach().numpy() for values in boxes(wall_and_box(99)[0]))
-    assert iou_aligned(center, size, true_center, true_size).min() > 0.97
+    assert iou_rest_exact(center, size, true_center, true_size).min() > 0.97
     assert float(farther[0, 0] * unit) == pytest.approx(0.01, abs=0.002)
     again = box_records.learn(records, 1, 80, 150, 0, False, lambda *_: None)
     assert all(torch.equal(a, b) for a, b in zip(boxes.parameters(), again.parameters(), strict=True))
