@@ -28,19 +28,32 @@ from artsim.model.draws import sample_view
 from artsim.model.kinematics import Array
 from tests.conftest import BOX_LAPTOP, ROOT
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_workers")]
 
 OPTIONS = SampleOptions(num_points=128)
+
+
+def write_sources(root: Path) -> list[Source]:
+    for i in range(3):
+        folder = root / "objects" / f"laptop_{i}"
+        folder.mkdir(parents=True)
+        (folder / "mobility.urdf").write_text(BOX_LAPTOP.replace("0.3 0.4 0.02", f"0.3 0.4 0.0{i + 1}"))
+    return find_sources([root / "objects"])
 
 
 @pytest.fixture
 def sources(tmp_path: Path) -> list[Source]:
     """Three different objects of boxes."""
-    for i in range(3):
-        folder = tmp_path / "objects" / f"laptop_{i}"
-        folder.mkdir(parents=True)
-        (folder / "mobility.urdf").write_text(BOX_LAPTOP.replace("0.3 0.4 0.02", f"0.3 0.4 0.0{i + 1}"))
-    return find_sources([tmp_path / "objects"])
+    return write_sources(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Source], Path]:
+    """Objects and a dataset of them that no test changes."""
+    root = tmp_path_factory.mktemp("made_once")
+    sources = write_sources(root)
+    make(sources, root / "out", workers=1)
+    return sources, root / "out"
 
 
 def make(sources: list[Source], out: Path, **options: object) -> artsim.datasets.generate.GenerateResult:
@@ -79,9 +92,14 @@ def wait_for_shards(out: Path, count: int) -> None:
     wait_until(lambda: (out / ".parts").exists() and len(list(out.glob("*.tar"))) >= count)
 
 
-def test_shards_are_byte_identical_whatever_the_number_of_workers(sources: list[Source], tmp_path: Path) -> None:
-    made = [make(sources, tmp_path / str(workers), workers=workers) for workers in (1, 2, 5)]
-    first, *others = [digests(result.folder) for result in made]
+def test_shards_are_byte_identical_whatever_the_number_of_workers(
+    sources: list[Source], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of new processes, too, which import everything themselves, as runs of users do."""
+    copies = make(sources, tmp_path / "copies", workers=5)
+    monkeypatch.undo()
+    made = [make(sources, tmp_path / str(workers), workers=workers) for workers in (1, 2)]
+    first, *others = [digests(result.folder) for result in (*made, copies)]
     assert len([name for name in first if name.endswith(".tar")]) == 6
     assert all(other == first for other in others)
 
@@ -168,14 +186,14 @@ def test_a_finished_dataset_is_left_alone(sources: list[Source], tmp_path: Path)
         ({"sample": SampleOptions(128, views=artsim.ViewOptions(fov=50.0))}, "sample.views.fov"),
     ],
 )
-def test_another_plan_is_refused(change: dict[str, object], named: str, sources: list[Source], tmp_path: Path) -> None:
-    make(sources, tmp_path / "out")
-    before = digests(tmp_path / "out")
+def test_another_plan_is_refused(change: dict[str, object], named: str, made_once: tuple[list[Source], Path]) -> None:
+    sources, out = made_once
+    before = digests(out)
     with pytest.raises(DatasetError, match=rf"another plan \(different: {named}\)"):
-        make(sources, tmp_path / "out", **change)
+        make(sources, out, **change)
     with pytest.raises(DatasetError, match=r"another plan \(different: objects\)"):
-        make(sources[:2], tmp_path / "out")
-    assert digests(tmp_path / "out") == before
+        make(sources[:2], out)
+    assert digests(out) == before
 
 
 def test_a_changed_source_is_another_plan(sources: list[Source], tmp_path: Path) -> None:
@@ -274,7 +292,6 @@ def test_a_full_disk_is_a_clear_error_and_nothing_is_left_half_written(sources: 
     assert verify(out, progress=False) == []
 
 
-@pytest.mark.usefixtures("quick_workers")
 def test_a_worker_that_dies_is_a_clear_error(
     sources: list[Source], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
