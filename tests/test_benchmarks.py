@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +16,14 @@ from artperl.methods.estimator_files import load_estimator
 from artsim.export import export
 from artsim.families import make
 from tests.conftest import BOX_LAPTOP, ROOT, absent, installed, valve
+from tests.programs import run_here
 
 pytestmark = pytest.mark.slow
 
 
 def run(name: str, *options: object, code: int = 0) -> tuple[list[str], str]:
     """Lines that a program prints, and what it says of an error."""
-    words = [sys.executable, "-m", f"benchmarks.{name}", *map(str, options)]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, env={**os.environ, "COLUMNS": "300"})
+    done = run_here(f"benchmarks.{name}", *options)
     assert done.returncode == code, done.stderr[-3000:]
     return done.stdout.splitlines(), done.stderr
 

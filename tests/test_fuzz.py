@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from tests.conftest import CASES, ROOT
 from tests.fuzz import targets
 from tests.fuzz.seeds import WEIGHTS, Input, corpus, input_at, input_of
 from tests.fuzz.targets import TARGETS, examine
+from tests.programs import run_here
 
 FOUND = sorted((CASES / "fuzz").iterdir())
 """What the fuzzer has found before."""
@@ -73,9 +73,8 @@ def test_a_raw_exception_is_found(desk: Path, monkeypatch: pytest.MonkeyPatch) -
     assert "KeyError" in finding.cause
 
 
-def fuzz(out: Path, *options: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    words = [sys.executable, "-m", "benchmarks.fuzz", "--kinds", "cloud", "--workers", "1", "--out", str(out), *options]
-    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, env={**os.environ, **variables})
+def fuzz(out: Path, *options: object) -> CompletedProcess[str]:
+    return run_here("benchmarks.fuzz", "--kinds", "cloud", "--workers", 1, "--out", out, *options)
 
 
 @pytest.mark.slow
@@ -96,7 +95,9 @@ def test_a_run_counts_what_it_read_and_goes_on_where_it_stopped(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_an_input_that_ends_its_process_is_a_crash_and_the_next_ones_are_read(tmp_path: Path) -> None:
+def test_an_input_that_ends_its_process_is_a_crash_and_the_next_ones_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "sitecustomize.py").write_text(
         "import os, sys\n"
         "if '--part' in sys.orig_argv:\n"
@@ -104,7 +105,8 @@ def test_an_input_that_ends_its_process_is_a_crash_and_the_next_ones_are_read(tm
         "    real = seeds.input_at\n"
         "    seeds.input_at = lambda seed, i, kinds: os._exit(7) if i == 3 else real(seed, i, kinds)\n"
     )
-    done = fuzz(tmp_path / "out", "--runs", "6", PYTHONPATH=os.pathsep.join([str(tmp_path), str(ROOT)]))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    done = fuzz(tmp_path / "out", "--runs", "6")
     assert done.returncode == 1, done.stderr
     report = json.loads((tmp_path / "out" / "parts" / "0.json").read_text())
     assert (report["end"], report["causes"]) == (6, {"crash exit code 7": 1})

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
@@ -16,6 +15,7 @@ from artperl.methods.estimator_files import WEIGHTS
 from artsim.families import make
 from tests.conftest import ROOT
 from tests.digests import weights_digest
+from tests.programs import run_here
 from tests.reproduce import family_digest
 
 FOLDER = ROOT / "results"
@@ -24,9 +24,8 @@ PAGES = ("artperl_results.md", "measured.md", "experiments.md")
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e-\d+)?|\.\d+")
 
 
-def results(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    words = [sys.executable, "-m", "benchmarks.results", "--folder", str(folder), *options]
-    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+def results(folder: Path, *options: str) -> CompletedProcess[str]:
+    return run_here("benchmarks.results", "--folder", folder, *options)
 
 
 def numbers(text: str) -> set[str]:

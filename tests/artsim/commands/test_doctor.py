@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ from artsim.commands.doctor import BACKENDS, Finding, examine, finding_table
 from artsim.errors import ConfigError
 from artsim.renderers import RENDERERS
 from tests.conftest import absent
+from tests.programs import run_here
 from tests.without import environment
 
 pytestmark = pytest.mark.slow
@@ -94,12 +93,7 @@ def test_the_table_has_a_mend_below_each_backend_that_does_not_work() -> None:
 
 
 def test_the_program_prints_the_table() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "from artsim.commands.verbs import main; main()", "doctor", "raycast"],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    done = run_here("artsim", "doctor", "raycast")
     assert done.returncode == 0, done.stderr
     assert "raycast       yes" in done.stdout
 

@@ -10,23 +10,17 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import ROOT
+from tests.programs import run_here as run
 
 pytestmark = pytest.mark.slow
 
 LAPTOP = "urdf_assets/laptop"
-ARTSIM = str(Path(sys.executable).with_name("artsim"))
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(arguments, capture_output=True, text=True, cwd=ROOT, timeout=120)
-
-
-def generate(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return run(sys.executable, "generate.py", *arguments)
+ARTSIM, GENERATE = "artsim", "generate.py"
 
 
 def test_help_teaches() -> None:
-    result = generate("--help")
+    """By new processes, as a shell starts them."""
+    result = subprocess.run([sys.executable, GENERATE, "--help"], capture_output=True, text=True, cwd=ROOT)
     assert result.returncode == 0
     for word in (
         "--objects",
@@ -38,13 +32,14 @@ def test_help_teaches() -> None:
         "To load objects:",
     ):
         assert word in result.stdout
-    result = run(ARTSIM, "--help")
+    program = Path(sys.executable).with_name(ARTSIM)
+    result = subprocess.run([program, "--help"], capture_output=True, text=True)
     for verb in ("generate", "families", "vary", "view", "inspect", "verify"):
         assert verb in result.stdout
 
 
 def test_a_mistyped_option_is_pointed_out() -> None:
-    result = generate("--objects", LAPTOP, "--out", "x", "--num-sample", "3")
+    result = run(GENERATE, "--objects", LAPTOP, "--out", "x", "--num-sample", "3")
     assert result.returncode == 2
     assert "num-samples" in result.stdout + result.stderr
     assert "Traceback" not in result.stderr
@@ -58,8 +53,8 @@ def test_errors_are_one_line_and_exit_with_2(tmp_path: Path) -> None:
         (ARTSIM, "inspect", str(tmp_path / "nowhere")),
         (ARTSIM, "verify", str(tmp_path)),
         (ARTSIM, "view", str(tmp_path)),
-        (sys.executable, "generate.py", "--objects", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")),
-        (sys.executable, "generate.py", "--objects", "urdf_assets/laptop", "--out", str(tmp_path), "--num-points", "0"),
+        (GENERATE, "--objects", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")),
+        (GENERATE, "--objects", "urdf_assets/laptop", "--out", str(tmp_path), "--num-points", "0"),
     ):
         result = run(*arguments)
         assert result.returncode == 2, arguments
@@ -86,7 +81,7 @@ def test_inspect_prints_tree_limits_boxes_and_repairs() -> None:
 def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     out = tmp_path / "first"
     options = "--num-samples 20 --scale 0.5 1.0 --states.joint-range screen -1.5 0 --images depth part_mask"
-    made = generate("--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), *options.split())
+    made = run(GENERATE, "--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), *options.split())
     assert made.returncode == 0, made.stderr
     assert "20 samples" in made.stdout
     assert "sound" in run(ARTSIM, "verify", str(out)).stdout
@@ -102,7 +97,7 @@ def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     assert "mine.tar: is no part of this dataset. Fix: move it out of the folder, or delete it" in refused.stdout
     (out / "mine.tar").unlink()
     assert f"{out}: nothing to repair" in run(ARTSIM, "repair", str(out)).stdout
-    assert "already complete, 20 samples" in generate(*made.args[2:]).stdout
+    assert "already complete, 20 samples" in run(*made.args).stdout
     view = run(ARTSIM, "view", str(out), "--samples", "2", "--rerun", str(tmp_path / "r.rrd"))
     assert view.returncode == 0, view.stderr
     assert (out / "contact_sheet.png").stat().st_size > 10_000
